@@ -1,0 +1,36 @@
+#include "modules/core/covariance.hpp"
+
+#include <Eigen/Eigenvalues>
+
+#include "modules/core/lie.hpp"
+
+namespace km {
+
+UncertainPose compose(const UncertainPose& T_a_b, const UncertainPose& T_b_c) {
+  const Matrix6 Ad_c_b = adjoint(T_b_c.T.inverse());
+  return {T_a_b.T * T_b_c.T, Ad_c_b * T_a_b.Sigma * Ad_c_b.transpose() + T_b_c.Sigma};
+}
+
+UncertainPose inverse(const UncertainPose& T_a_b) {
+  const Matrix6 Ad_a_b = adjoint(T_a_b.T);
+  return {T_a_b.T.inverse(), Ad_a_b * T_a_b.Sigma * Ad_a_b.transpose()};
+}
+
+UncertainPose between_on_chain(const UncertainPose& T_a_b, const UncertainPose& T_a_c) {
+  const SE3 T_b_c = T_a_b.T.inverse() * T_a_c.T;
+  const Matrix6 Ad_c_b = adjoint(T_b_c.inverse());
+  const Matrix6 added = T_a_c.Sigma - Ad_c_b * T_a_b.Sigma * Ad_c_b.transpose();
+  const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(0.5 * (added + added.transpose()));
+  const Vector6 clipped = eigen.eigenvalues().cwiseMax(0.0);
+  return {T_b_c, eigen.eigenvectors() * clipped.asDiagonal() * eigen.eigenvectors().transpose()};
+}
+
+bool is_covariance(const Matrix6& Sigma) {
+  if (!Sigma.allFinite()) return false;
+  const double scale = Sigma.cwiseAbs().maxCoeff();
+  if ((Sigma - Sigma.transpose()).cwiseAbs().maxCoeff() > 1e-6 * scale) return false;
+  const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(Sigma, Eigen::EigenvaluesOnly);
+  return eigen.eigenvalues().minCoeff() >= -1e-9 * scale;
+}
+
+}  // namespace km

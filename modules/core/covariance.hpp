@@ -1,0 +1,35 @@
+#pragma once
+
+#include "modules/core/geometry.hpp"
+
+namespace km {
+
+// Covariances of poses are 6x6, in the tangent space at the pose: T = T_mean * exp(xi),
+// xi = [rotation; translation] ~ N(0, Sigma) [rad, m]. First order, as in Mangelson et al.,
+// "Characterizing the Uncertainty of Jointly Distributed Poses in the Lie Algebra", TRO 2020,
+// for independent poses.
+
+/// A rigid transform with its covariance.
+struct UncertainPose {
+  SE3 T = SE3::Identity();
+  Matrix6 Sigma = Matrix6::Zero();
+};
+
+/// T_a_b * T_b_c of independent factors: Sigma_ac = Ad(T_b_c^-1) Sigma_ab Ad(T_b_c^-1)^T +
+/// Sigma_bc.
+[[nodiscard]] UncertainPose compose(const UncertainPose& T_a_b, const UncertainPose& T_b_c);
+
+/// T_b_a with Sigma_ba = Ad(T_a_b) Sigma_ab Ad(T_a_b)^T.
+[[nodiscard]] UncertainPose inverse(const UncertainPose& T_a_b);
+
+/// T_b_c between two poses of ONE chain from a, where c comes after b: the part of the chain's
+/// covariance that was added between b and c, Sigma_bc = Sigma_ac - Ad(T_c_b) Sigma_ab Ad(T_c_b)^T.
+/// It is the exact inverse of compose(); negative eigenvalues left by rounding are set to zero.
+[[nodiscard]] UncertainPose between_on_chain(const UncertainPose& T_a_b,
+                                             const UncertainPose& T_a_c);
+
+/// True if every element is finite, the matrix symmetric to 1e-6 of its largest element, and no
+/// eigenvalue below -1e-9 of the largest. For matrices that come from outside.
+[[nodiscard]] bool is_covariance(const Matrix6& Sigma);
+
+}  // namespace km

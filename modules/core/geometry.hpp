@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace km {
+
+/// Rigid transform. `T_a_b` maps coordinates in frame b to frame a: p_a = T_a_b * p_b.
+/// It is also the pose of frame b expressed in frame a. Chains read inside out:
+/// T_a_c = T_a_b * T_b_c.
+using SE3 = Eigen::Isometry3d;
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+/// Rotation angle of `R`, in [0, pi] [rad].
+inline double angle_of(const Eigen::Matrix3d& R) {
+  return Eigen::AngleAxisd(R).angle();
+}
+
+/// The transform with rotation `R` and translation `t`.
+inline SE3 make_pose(const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
+  SE3 T = SE3::Identity();
+  T.linear() = R;
+  T.translation() = t;
+  return T;
+}
+
+}  // namespace km

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "modules/core/geometry.hpp"
+#include "modules/core/ids.hpp"
+#include "modules/core/stamp.hpp"
+
+namespace km {
+
+/// 256-bit binary descriptor (ORB).
+using OrbDescriptor = std::array<std::uint8_t, 32>;
+
+/// An image point of the left camera with its depth, if stereo gave one.
+struct Keypoint {
+  Eigen::Vector2f bearing = Eigen::Vector2f::Zero();  ///< On z = 1 of the left camera, undistorted.
+  float inverse_depth = 0.0F;  ///< 1/z in the left camera [1/m]; 0: depth unknown.
+  std::uint8_t octave = 0;     ///< Level of the scale pyramid (factor 1.2): noise 1.2^octave px.
+
+  [[nodiscard]] bool has_depth() const { return inverse_depth > 0.0F; }
+  /// Point in the left camera's frame [m]. Precondition: has_depth().
+  [[nodiscard]] Eigen::Vector3d point_cam() const {
+    return bearing.homogeneous().cast<double>() / static_cast<double>(inverse_depth);
+  }
+};
+
+/// What another robot needs to align itself with a keyframe: points, descriptors, and the numbers
+/// of the rig that give their noise a meaning. keypoints and descriptors have equal length.
+struct KeyframeFeatures {
+  SE3 T_body_cam = SE3::Identity();  ///< Left camera.
+  double focal_px = 0.0;
+  double baseline_m = 0.0;
+  std::vector<Keypoint> keypoints;
+  std::vector<OrbDescriptor> descriptors;
+};
+
+/// Pose of a keyframe in its robot's odometry frame with the covariance accumulated along the
+/// odometry since that robot's first keyframe (see between_on_chain()).
+struct OdometryPose {
+  KeyframeId id;
+  SE3 T_odom_kf = SE3::Identity();
+  Matrix6 covariance = Matrix6::Zero();
+};
+
+/// A keyframe with what place recognition and verification work on.
+struct Keyframe {
+  OdometryPose odometry;
+  Stamp stamp = 0;
+  KeyframeFeatures features;
+};
+
+}  // namespace km

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <memory>
+
+#include "modules/core/frame.hpp"
+#include "modules/core/geometry.hpp"
+#include "modules/core/ids.hpp"
+
+namespace km {
+
+/// Estimate of the body's motion at one image. `odom` has z up, against gravity.
+struct OdometryState {
+  Stamp stamp = 0;
+  SE3 T_odom_body = SE3::Identity();
+  Eigen::Vector3d v_odom = Eigen::Vector3d::Zero();      ///< [m/s]
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< [rad/s]
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< [m/s^2]
+};
+
+/// A new keyframe as odometry hands it on. Its pose is chained from the relative poses, so that
+/// T_odom_kf is constant once published although odometry refines its recent past.
+struct KeyframeOdometry {
+  KeyframeId id;
+  Stamp stamp = 0;
+  SE3 T_odom_kf = SE3::Identity();           ///< Product of the relative poses up to here.
+  SE3 T_previous_kf = SE3::Identity();       ///< Pose in the keyframe before; odom for the first.
+  Matrix6 covariance = Matrix6::Zero();      ///< Of T_previous_kf; zero for the first.
+  std::shared_ptr<const StereoFrame> frame;  ///< Null where there are no images (recorded graphs).
+};
+
+}  // namespace km

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "modules/core/geometry.hpp"
+#include "modules/core/ids.hpp"
+#include "modules/core/keyframe.hpp"
+
+namespace km {
+
+/// A measured relative pose between two keyframes, of one robot or of two.
+struct RelativePose {
+  KeyframeId from;
+  KeyframeId to;
+  SE3 T_from_to = SE3::Identity();
+  Matrix6 covariance = Matrix6::Identity();  ///< At T_from_to, see covariance.hpp.
+};
+
+/// Identity of a loop closure. The direction counts: a pair of keyframes measured once from each
+/// side is two closures.
+struct ClosureId {
+  KeyframeId from;
+  KeyframeId to;
+  auto operator<=>(const ClosureId&) const = default;
+};
+
+/// A geometrically verified loop closure with the odometry of both ends, so that every robot can
+/// test its consistency without having heard of those keyframes before.
+struct Closure {
+  OdometryPose from;
+  OdometryPose to;
+  SE3 T_from_to = SE3::Identity();
+  Matrix6 covariance = Matrix6::Identity();
+  int inliers = 0;          ///< Correspondences that support it.
+  double similarity = 0.0;  ///< Normalised score of the bag of words; 0 if unknown.
+
+  [[nodiscard]] ClosureId id() const { return {from.id, to.id}; }
+  [[nodiscard]] RelativePose relative_pose() const {
+    return {from.id, to.id, T_from_to, covariance};
+  }
+};
+
+/// The closures between robots a <= b (or inside one, a == b) that agree with each other. Decided
+/// by one robot for the pair, a, so that both ends hold the same edges; the newest version counts.
+struct InlierSet {
+  RobotId a = 0;
+  RobotId b = 0;
+  std::uint32_t version = 0;
+  std::vector<ClosureId> closures;  ///< Ascending.
+};
+
+/// How far a candidate of place recognition got, and why it stopped: a row of loop_closures.csv.
+enum class ClosureStage { kCandidate, kRequested, kReceived, kVerified, kInlier };
+
+struct ClosureOutcome {
+  ClosureId id;
+  double similarity = 0.0;
+  ClosureStage stage = ClosureStage::kCandidate;
+  std::string reason;  ///< Why it went no further; empty if it is not over.
+  int matches = 0;     ///< Descriptor matches.
+  int inliers = 0;     ///< Correspondences that support the pose.
+};
+
+/// A robot's optimised keyframe poses, index i being keyframe i of `robot`.
+struct Trajectory {
+  RobotId robot = 0;
+  RobotId anchor = 0;  ///< Robot whose first keyframe defines `world`; `robot` itself when alone.
+  std::vector<SE3> T_world_kf;
+};
+
+/// State of distributed optimisation as one robot sees it, for status lines and tables.
+struct OptimizerProgress {
+  RobotId anchor = 0;
+  std::vector<RobotId> members;  ///< Robots that optimise together, ascending.
+  std::uint32_t round = 0;       ///< Rounds in all: in one, every member updates its block once.
+  double cost = 0.0;             ///< Team cost, chordal without 1/2.
+  double gradient_norm = 0.0;    ///< Riemannian, of the team.
+  double seconds = 0.0;          ///< Time spent optimising.
+  bool settled = false;          ///< Nothing left to improve with what is known.
+};
+
+}  // namespace km

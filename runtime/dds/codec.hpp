@@ -1,0 +1,40 @@
+#pragma once
+
+#include <dds/dds.h>
+
+#include <optional>
+#include <utility>
+
+namespace km {
+
+/// Result of decoding untrusted bytes: a value, or why there is none (a string literal).
+template <typename T>
+struct [[nodiscard]] Decoded {
+  std::optional<T> value;
+  const char* refusal = nullptr;
+
+  static Decoded accept(T decoded) { return {std::move(decoded), nullptr}; }
+  static Decoded refuse(const char* why) { return {std::nullopt, why}; }
+};
+
+/// How messages of type T travel between robots. Specialised by the module that owns T, in its
+/// <module>_codec.hpp:
+///
+///     template <>
+///     struct Codec<InlierSet> {
+///       using Wire = km_wire_InlierSet;                      // generated from idl/
+///       static constexpr const char* kTopic = "inlier_sets"; // DDS topic name
+///       static constexpr std::uint16_t kVersion = 1;         // of the wire type, idl/README.md
+///       static const dds_topic_descriptor_t& descriptor() { return km_wire_InlierSet_desc; }
+///
+///       struct Encoded {                         // owns what `wire` points to; movable
+///         Wire wire{};
+///         std::vector<km_wire_ClosureRef> closures;
+///       };
+///       static Encoded encode(const InlierSet&);        // all but wire.header: the writer fills it
+///       static Decoded<InlierSet> decode(const Wire&);  // trusts nothing; header already checked
+///     };
+template <typename T>
+struct Codec;
+
+}  // namespace km

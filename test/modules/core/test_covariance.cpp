@@ -1,0 +1,61 @@
+#include <catch2/catch.hpp>
+
+#include <cmath>
+
+#include "modules/core/covariance.hpp"
+#include "modules/core/lie.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+TEST_CASE("The composed covariance is that of sampled products", "[core]") {
+  std::mt19937 rng(5);
+  const double sigma = 0.01;  // small: first-order propagation is then exact to a few per cent
+  const UncertainPose a{random_pose(rng, 2.0), random_covariance(rng, sigma)};
+  const UncertainPose b{random_pose(rng, 2.0), random_covariance(rng, sigma)};
+  const UncertainPose ab = compose(a, b);
+  const Matrix6 La = a.Sigma.llt().matrixL();
+  const Matrix6 Lb = b.Sigma.llt().matrixL();
+  Matrix6 sampled = Matrix6::Zero();
+  const int samples = 20000;
+  for (int i = 0; i < samples; ++i) {
+    const SE3 Ta = a.T * se3_exp(La * random_vector<6>(rng));
+    const SE3 Tb = b.T * se3_exp(Lb * random_vector<6>(rng));
+    const Vector6 xi = se3_log(ab.T.inverse() * Ta * Tb);
+    sampled += xi * xi.transpose() / samples;
+  }
+  CHECK((sampled - ab.Sigma).norm() < 0.05 * ab.Sigma.norm());
+}
+
+TEST_CASE("The covariance between two poses of a chain is what was composed between", "[core]") {
+  std::mt19937 rng(7);
+  const UncertainPose a_b{random_pose(rng), random_covariance(rng, 0.1)};
+  const UncertainPose b_c{random_pose(rng), random_covariance(rng, 0.2)};
+  const UncertainPose found = between_on_chain(a_b, compose(a_b, b_c));
+  CHECK((found.Sigma - b_c.Sigma).norm() < 1e-9);
+  CHECK((found.T.matrix() - b_c.T.matrix()).norm() < 1e-12);
+}
+
+TEST_CASE("Inverting twice gives the pose and the covariance back", "[core]") {
+  std::mt19937 rng(9);
+  const UncertainPose a{random_pose(rng), random_covariance(rng, 0.1)};
+  const UncertainPose again = inverse(inverse(a));
+  CHECK((again.Sigma - a.Sigma).norm() < 1e-9);
+  CHECK((again.T.matrix() - a.T.matrix()).norm() < 1e-12);
+}
+
+TEST_CASE("Matrices that are no covariance are told apart", "[core]") {
+  CHECK(is_covariance(Matrix6::Identity()));
+  CHECK(is_covariance(Matrix6::Zero()));
+  Matrix6 bad = Matrix6::Identity();
+  bad(0, 1) = 0.5;
+  CHECK_FALSE(is_covariance(bad));  // not symmetric
+  CHECK_FALSE(is_covariance(-Matrix6::Identity()));
+  bad = Matrix6::Identity();
+  bad(2, 2) = std::nan("");
+  CHECK_FALSE(is_covariance(bad));
+}
+
+}  // namespace
+}  // namespace km

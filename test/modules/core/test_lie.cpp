@@ -1,0 +1,60 @@
+#include <catch2/catch.hpp>
+
+#include <numbers>
+
+#include "modules/core/lie.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+TEST_CASE("Exponential and logarithm of SE(3) invert each other", "[core]") {
+  const unsigned seed = GENERATE(range(0U, 30U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const SE3 T = random_pose(rng);
+  CHECK((se3_exp(se3_log(T)).matrix() - T.matrix()).norm() < 1e-12);
+}
+
+TEST_CASE("The rotation logarithm is exact near zero and near pi", "[core]") {
+  const double angle =
+      GENERATE(0.0, 1e-12, 1e-6, 1e-4, 1.0, std::numbers::pi - 1e-7, std::numbers::pi - 1e-3);
+  CAPTURE(angle);
+  const Eigen::Vector3d phi = angle * Eigen::Vector3d(0.6, -0.48, 0.64);
+  CHECK((so3_log(so3_exp(phi)) - phi).norm() < 1e-8);
+}
+
+TEST_CASE("A quarter turn about z maps x to y", "[core]") {
+  const Eigen::Matrix3d R = so3_exp({0, 0, std::numbers::pi / 2});
+  CHECK((R * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm() < 1e-15);
+}
+
+TEST_CASE("The right Jacobian is the derivative of the exponential", "[core]") {
+  const double angle = GENERATE(0.0, 1e-6, 1e-3, 0.5, 2.5);
+  CAPTURE(angle);
+  const Eigen::Vector3d phi = angle * Eigen::Vector3d(2.0, -1.0, 2.0) / 3.0;
+  const double h = 1e-6;
+  Eigen::Matrix3d numeric;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d step = h * Eigen::Vector3d::Unit(i);
+    numeric.col(i) = so3_log(so3_exp(phi - step).transpose() * so3_exp(phi + step)) / (2.0 * h);
+  }
+  CHECK((so3_right_jacobian(phi) - numeric).norm() < 1e-8);
+  CHECK((so3_right_jacobian_inverse(phi) * numeric - Eigen::Matrix3d::Identity()).norm() < 1e-8);
+}
+
+TEST_CASE("The adjoint moves a perturbation from the right to the left", "[core]") {
+  std::mt19937 rng(3);
+  const SE3 T = random_pose(rng);
+  const Vector6 xi = random_vector<6>(rng);
+  CHECK(((T * se3_exp(xi)).matrix() - (se3_exp(adjoint(T) * xi) * T).matrix()).norm() < 1e-10);
+}
+
+TEST_CASE("The nearest rotation of a reflection is a rotation", "[core]") {
+  const Eigen::Matrix3d R = nearest_rotation(Eigen::Vector3d(1.0, 1.0, -0.5).asDiagonal());
+  CHECK(R.determinant() == Approx(1.0));
+  CHECK((R - Eigen::Matrix3d::Identity()).norm() < 1e-12);
+}
+
+}  // namespace
+}  // namespace km
