@@ -20,6 +20,14 @@ struct RelativePose {
   Matrix6 covariance = Matrix6::Identity();  ///< At T_from_to, see covariance.hpp.
 };
 
+/// Two keyframes that place recognition takes for the same place. `match` is always one of this
+/// robot's own; `query` is a peer's, or a later one of its own.
+struct LoopCandidate {
+  KeyframeId query;
+  KeyframeId match;
+  double similarity = 0.0;  ///< Normalised score of the bag of words.
+};
+
 /// Identity of a loop closure. The direction counts: a pair of keyframes measured once from each
 /// side is two closures.
 struct ClosureId {
