@@ -1,0 +1,104 @@
+#include <catch2/catch.hpp>
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <set>
+#include <string>
+#include <vector>
+
+// The layers of the tree, by what files include (the linker checks the rest: a pure module links
+// neither threads nor DDS nor YAML):
+//   modules/core        Eigen and the standard library
+//   modules/<m>         core, its own folder, and the modules listed below
+//   runtime             core
+//   modules/<m>/*_node, *_codec   its own module, core, runtime
+//   apps, test          everything
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Modules an algorithm may use beside core and itself.
+const std::map<std::string, std::set<std::string>> kModuleUses = {
+    {"loop_closure", {"place_recognition"}},
+    {"pose_graph", {"outlier_rejection"}},
+};
+
+std::vector<std::string> includes_of(const fs::path& file) {
+  static const std::regex pattern(R"(^\s*#\s*include\s*[<"]([^>"]+)[>"])");
+  std::vector<std::string> found;
+  std::ifstream stream(file);
+  std::smatch match;
+  for (std::string line; std::getline(stream, line);)
+    if (std::regex_search(line, match, pattern)) found.push_back(match[1]);
+  return found;
+}
+
+bool is_source(const fs::path& file) {
+  return file.extension() == ".hpp" || file.extension() == ".cpp";
+}
+
+// "modules/vio/vio.hpp" -> "vio"; empty if it is not below modules/.
+std::string module_of(const std::string& path) {
+  static const std::string root = "modules/";
+  if (!path.starts_with(root)) return {};
+  return path.substr(root.size(), path.find('/', root.size()) - root.size());
+}
+
+bool joins_runtime(const fs::path& file) {
+  const std::string stem = file.stem().string();
+  return stem.ends_with("_node") || stem.ends_with("_codec");
+}
+
+bool is_process_level(const std::string& header) {
+  static const std::set<std::string> threads = {"thread", "mutex",  "condition_variable",
+                                                "atomic", "future", "shared_mutex"};
+  return threads.contains(header) || header.starts_with("yaml-cpp/") ||
+         header.starts_with("dds/") || header.starts_with("CLI/");
+}
+
+// Why `file` may not include `header`, or nothing.
+std::string violation(const fs::path& file, const std::string& header) {
+  const std::string own = module_of(file.generic_string());
+  const std::string used = module_of(header);
+  const bool in_runtime = file.generic_string().starts_with("runtime/");
+  if (header.starts_with("apps/") || header.starts_with("test/")) return "a lower layer";
+  if (in_runtime) return used.empty() || used == "core" ? "" : "runtime knows no module";
+  if (header.starts_with("runtime/"))
+    return joins_runtime(file) ? "" : "only nodes and codecs use runtime";
+  if (is_process_level(header))
+    return joins_runtime(file) ? "" : "algorithms own no threads, DDS, YAML or command lines";
+  if (used.empty() || used == "core" || used == own) return "";
+  const auto allowed = kModuleUses.find(own);
+  return allowed != kModuleUses.end() && allowed->second.contains(used) ? "" : "another module";
+}
+
+TEST_CASE("Every include obeys the layers", "[layers]") {
+  std::size_t files = 0;
+  for (const char* root : {"modules", "runtime"})
+    for (const auto& entry : fs::recursive_directory_iterator(root)) {
+      if (!is_source(entry.path())) continue;
+      ++files;
+      for (const std::string& header : includes_of(entry.path())) {
+        CAPTURE(entry.path().string(), header);
+        CHECK(violation(entry.path(), header) == "");
+      }
+    }
+  CHECK(files > 20);  // run from the root of the repository
+}
+
+TEST_CASE("The layer rules refuse what they are for", "[layers]") {
+  CHECK_FALSE(violation("modules/vio/vio.cpp", "runtime/node.hpp").empty());
+  CHECK_FALSE(violation("modules/vio/vio.cpp", "thread").empty());
+  CHECK_FALSE(violation("modules/vio/vio.cpp", "modules/loop_closure/verifier.hpp").empty());
+  CHECK_FALSE(violation("modules/vio/vio_node.cpp", "modules/sensors/sensors_node.hpp").empty());
+  CHECK_FALSE(violation("runtime/log.hpp", "modules/vio/vio.hpp").empty());
+  CHECK(violation("modules/vio/vio_node.cpp", "runtime/node.hpp").empty());
+  CHECK(violation("runtime/dds/codec.hpp", "modules/core/ids.hpp").empty());
+}
+
+}  // namespace
+}  // namespace km
