@@ -1,0 +1,82 @@
+#pragma once
+
+#include <common.h>
+
+#include <cmath>
+#include <optional>
+
+#include "modules/core/covariance.hpp"
+#include "modules/core/geometry.hpp"
+#include "modules/core/ids.hpp"
+#include "modules/core/keyframe.hpp"
+
+namespace km {
+
+// The parts of idl/common.idl to and from core types, for all codecs. from_wire() trusts nothing:
+// nullopt where a number is not finite or does not have the meaning of its field.
+
+/// A quaternion from the wire may be this far from unit length; it is normalised.
+inline constexpr double kUnitQuaternionTolerance = 1e-3;
+
+/// No robot is farther than this from the origin of a frame [m]; a larger number is refused.
+inline constexpr double kMaxWireTranslation_m = 1e7;
+
+/// The largest element of a covariance that is still a covariance [rad^2, m^2].
+inline constexpr double kMaxWireVariance = 1e14;
+
+inline km_wire_KeyframeRef to_wire(const KeyframeId& id) {
+  return {.robot = id.robot, .index = id.index};
+}
+
+inline KeyframeId from_wire(const km_wire_KeyframeRef& wire) {
+  return {wire.robot, wire.index};
+}
+
+inline km_wire_Pose to_wire(const SE3& T_a_b) {
+  const Eigen::Quaterniond q(T_a_b.linear());
+  const Eigen::Vector3d& t = T_a_b.translation();
+  return {.q = {q.x(), q.y(), q.z(), q.w()}, .t = {t.x(), t.y(), t.z()}};
+}
+
+inline std::optional<SE3> from_wire(const km_wire_Pose& wire) {
+  const Eigen::Quaterniond q(Eigen::Vector4d(wire.q[0], wire.q[1], wire.q[2], wire.q[3]));
+  const Eigen::Vector3d t(wire.t[0], wire.t[1], wire.t[2]);
+  // Written so that NaN fails.
+  if (!(std::abs(q.norm() - 1.0) <= kUnitQuaternionTolerance)) return std::nullopt;
+  if (!(t.cwiseAbs().maxCoeff() <= kMaxWireTranslation_m) || !t.allFinite()) return std::nullopt;
+  return make_pose(q.normalized().toRotationMatrix(), t);
+}
+
+inline km_wire_Covariance to_wire(const Matrix6& Sigma) {
+  km_wire_Covariance wire{};
+  int k = 0;
+  for (int r = 0; r < 6; ++r)
+    for (int c = r; c < 6; ++c) wire.upper[k++] = Sigma(r, c);
+  return wire;
+}
+
+/// Accepts semi-definite matrices, zero included: what the first keyframe of a chain has.
+inline std::optional<Matrix6> from_wire(const km_wire_Covariance& wire) {
+  Matrix6 Sigma;
+  int k = 0;
+  for (int r = 0; r < 6; ++r)
+    for (int c = r; c < 6; ++c) Sigma(r, c) = Sigma(c, r) = wire.upper[k++];
+  if (!Sigma.allFinite() || Sigma.cwiseAbs().maxCoeff() > kMaxWireVariance) return std::nullopt;
+  if (!is_covariance(Sigma)) return std::nullopt;
+  return Sigma;
+}
+
+inline km_wire_OdometryPose to_wire(const OdometryPose& pose) {
+  return {.keyframe = to_wire(pose.id),
+          .T_odom_kf = to_wire(pose.T_odom_kf),
+          .covariance = to_wire(pose.covariance)};
+}
+
+inline std::optional<OdometryPose> from_wire(const km_wire_OdometryPose& wire) {
+  const std::optional<SE3> T_odom_kf = from_wire(wire.T_odom_kf);
+  const std::optional<Matrix6> covariance = from_wire(wire.covariance);
+  if (!T_odom_kf || !covariance) return std::nullopt;
+  return OdometryPose{from_wire(wire.keyframe), *T_odom_kf, *covariance};
+}
+
+}  // namespace km

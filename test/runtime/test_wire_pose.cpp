@@ -1,0 +1,93 @@
+#include <catch2/catch.hpp>
+#include <limits>
+#include <random>
+
+#include "modules/core/lie.hpp"
+#include "runtime/dds/wire_pose.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kRounding = 1e-12;  // a rotation matrix to a quaternion and back
+
+TEST_CASE("an odometry pose crosses the wire unchanged", "[wire_pose]") {
+  const auto seed = GENERATE(1U, 2U, 3U, 4U, 5U);
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  OdometryPose sent;
+  sent.id = {65535, 4000000000U};
+  sent.T_odom_kf = random_pose(rng, 1000.0);
+  sent.covariance = random_covariance(rng, 0.3);
+
+  const std::optional<OdometryPose> received = from_wire(to_wire(sent));
+  REQUIRE(received);
+  CHECK(received->id == sent.id);
+  CHECK(received->T_odom_kf.isApprox(sent.T_odom_kf, kRounding));
+  CHECK(received->covariance == Matrix6(sent.covariance.selfadjointView<Eigen::Upper>()));
+}
+
+TEST_CASE("a pose from the wire is a rotation even if its quaternion was rounded", "[wire_pose]") {
+  km_wire_Pose wire = to_wire(SE3::Identity());
+  wire.q[0] = 5e-4;
+  wire.q[3] = 1.0005;
+  const std::optional<SE3> pose = from_wire(wire);
+  REQUIRE(pose);
+  CHECK((pose->linear().transpose() * pose->linear()).isIdentity(kRounding));
+}
+
+TEST_CASE("poses that are not poses are refused", "[wire_pose]") {
+  const double bad = GENERATE(values({kNan, kInfinity, -kInfinity, 1e300}));
+  const int slot = GENERATE(0, 1, 2, 3, 4, 5, 6);
+  CAPTURE(bad, slot);
+  km_wire_Pose wire = to_wire(SE3::Identity());
+  (slot < 4 ? wire.q[slot] : wire.t[slot - 4]) = bad;
+  CHECK_FALSE(from_wire(wire));
+}
+
+TEST_CASE("a quaternion that is not of unit length is refused", "[wire_pose]") {
+  const double w = GENERATE(0.0, 0.99, 1.01, -2.0);
+  CAPTURE(w);
+  km_wire_Pose wire = to_wire(SE3::Identity());
+  wire.q[3] = w;
+  CHECK_FALSE(from_wire(wire));
+}
+
+TEST_CASE("matrices that are not covariances are refused", "[wire_pose]") {
+  km_wire_Covariance wire = to_wire(Matrix6::Identity());
+  REQUIRE(from_wire(wire));
+  SECTION("not finite") {
+    wire.upper[7] = kNan;
+  }
+  SECTION("beyond any scale") {
+    wire.upper[0] = 1e300;
+  }
+  SECTION("negative variance") {
+    wire.upper[20] = -1e-3;
+  }
+  SECTION("correlation above one") {
+    wire.upper[1] = 1.1;
+  }
+  CHECK_FALSE(from_wire(wire));
+}
+
+TEST_CASE("the zero covariance of a first keyframe is accepted", "[wire_pose]") {
+  CHECK(from_wire(to_wire(Matrix6(Matrix6::Zero()))) == Matrix6(Matrix6::Zero()));
+}
+
+TEST_CASE("an odometry pose with one bad part is refused", "[wire_pose]") {
+  km_wire_OdometryPose wire = to_wire(OdometryPose{});
+  REQUIRE(from_wire(wire));
+  SECTION("pose") {
+    wire.T_odom_kf.t[1] = kNan;
+  }
+  SECTION("covariance") {
+    wire.covariance.upper[0] = kInfinity;
+  }
+  CHECK_FALSE(from_wire(wire));
+}
+
+}  // namespace
+}  // namespace km
