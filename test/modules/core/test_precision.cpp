@@ -1,0 +1,41 @@
+#include <catch2/catch.hpp>
+
+#include <limits>
+
+#include "modules/core/precision.hpp"
+
+namespace km {
+namespace {
+
+TEST_CASE("A covariance gives the weights of its block traces", "[precision]") {
+  Matrix6 covariance = Matrix6::Zero();
+  covariance.diagonal() << 0.01, 0.02, 0.03, 0.1, 0.2, 0.3;
+  covariance(0, 3) = covariance(3, 0) = 0.01;  // cross terms do not count
+
+  const Precision precision = precision_of(covariance);
+
+  CHECK(precision.kappa == Approx(3.0 / (2.0 * 0.06)));
+  CHECK(precision.tau == Approx(3.0 / 0.6));
+}
+
+TEST_CASE("Weights survive the way through a covariance", "[precision]") {
+  const Precision there{10000.0, 100.0};
+  const Matrix6 covariance = covariance_of(there);
+  CHECK(covariance(0, 0) == Approx(5e-5));   // [rad^2]
+  CHECK(covariance(5, 5) == Approx(1e-2));   // [m^2]
+
+  const Precision back = precision_of(covariance);
+  CHECK(back.kappa == Approx(there.kappa));
+  CHECK(back.tau == Approx(there.tau));
+}
+
+TEST_CASE("Weights of nothing are refused", "[precision]") {
+  const double infinite = std::numeric_limits<double>::infinity();
+  CHECK_THROWS_AS(precision_of(Matrix6::Zero()), std::invalid_argument);
+  CHECK_THROWS_AS(precision_of(Matrix6::Constant(std::nan(""))), std::invalid_argument);
+  CHECK_THROWS_AS(covariance_of({0.0, 1.0}), std::invalid_argument);
+  CHECK_THROWS_AS(covariance_of({1.0, infinite}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace km
