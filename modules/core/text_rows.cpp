@@ -1,0 +1,72 @@
+#include "modules/core/text_rows.hpp"
+
+#include <charconv>
+
+namespace km {
+namespace {
+
+constexpr std::string_view kBlanks = " \t\r\f\v";
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(kBlanks);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
+}
+
+std::vector<std::string_view> split_at_commas(std::string_view line) {
+  std::vector<std::string_view> fields;
+  for (std::size_t comma = line.find(','); comma != line.npos; comma = line.find(',')) {
+    fields.push_back(trimmed(line.substr(0, comma)));
+    line.remove_prefix(comma + 1);
+  }
+  fields.push_back(trimmed(line));
+  return fields;
+}
+
+std::vector<std::string_view> split_at_blanks(std::string_view line) {
+  std::vector<std::string_view> fields;
+  while (!line.empty()) {
+    const std::size_t end = std::min(line.find_first_of(kBlanks), line.size());
+    fields.push_back(line.substr(0, end));
+    line = trimmed(line.substr(end));
+  }
+  return fields;
+}
+
+template <typename T>
+std::optional<T> parse_whole(std::string_view field) {
+  if (field.starts_with('+')) field.remove_prefix(1);
+  T value{};
+  const char* const end = field.data() + field.size();
+  const auto [stopped, error] = std::from_chars(field.data(), end, value);
+  if (error != std::errc() || stopped != end) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+std::vector<TextRow> split_rows(std::string_view text) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  std::vector<TextRow> rows;
+  for (int number = 1; !text.empty(); ++number) {
+    const std::size_t end = text.find('\n');
+    std::string_view line = text.substr(0, end);
+    text.remove_prefix(end == text.npos ? text.size() : end + 1);
+    line = trimmed(line.substr(0, line.find('#')));
+    if (line.empty()) continue;
+    rows.push_back(
+        {number, line.find(',') == line.npos ? split_at_blanks(line) : split_at_commas(line)});
+  }
+  return rows;
+}
+
+std::optional<double> parse_double(std::string_view field) {
+  return parse_whole<double>(field);
+}
+
+std::optional<std::int64_t> parse_int64(std::string_view field) {
+  return parse_whole<std::int64_t>(field);
+}
+
+}  // namespace km

@@ -1,0 +1,47 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "modules/core/text_rows.hpp"
+
+namespace km {
+
+using Fields = std::vector<std::string_view>;
+
+TEST_CASE("Rows keep their line numbers past comments and empty lines", "[core]") {
+  const auto rows = split_rows("# header\n\n1,2\n   \n3,4\n");
+  REQUIRE(rows.size() == 2);
+  CHECK(rows[0].line == 3);
+  CHECK(rows[1].line == 5);
+  CHECK(rows[1].fields == Fields{"3", "4"});
+}
+
+TEST_CASE("Commas, blanks, CRLF, a byte order mark and trailing comments are understood",
+          "[core]") {
+  const auto rows = split_rows("\xEF\xBB\xBF 1 ,\ta b , 3 # note\r\n4  5\t6\r\n7");
+  REQUIRE(rows.size() == 3);
+  CHECK(rows[0].fields == Fields{"1", "a b", "3"});
+  CHECK(rows[1].fields == Fields{"4", "5", "6"});
+  CHECK(rows[2].fields == Fields{"7"});
+}
+
+TEST_CASE("Empty fields between commas are kept", "[core]") {
+  CHECK(split_rows("1,,3,")[0].fields == Fields{"1", "", "3", ""});
+  CHECK(split_rows("").empty());
+}
+
+TEST_CASE("A field is a number only if all of it is", "[core]") {
+  CHECK(parse_int64("1403636584763555584") == 1403636584763555584);
+  CHECK(parse_double("+1.5e-3") == 1.5e-3);
+  CHECK(std::isnan(parse_double("nan").value()));
+  for (const std::string bad : {"", "1.5x", "1 2", "x", "-"}) {
+    CAPTURE(bad);
+    CHECK_FALSE(parse_double(bad));
+    CHECK_FALSE(parse_int64(bad));
+  }
+  CHECK_FALSE(parse_int64("1.0"));
+  CHECK_FALSE(parse_int64("99999999999999999999"));
+}
+
+}  // namespace km
