@@ -21,8 +21,8 @@ TEST_CASE("A covariance gives the weights of its block traces", "[precision]") {
 TEST_CASE("Weights survive the way through a covariance", "[precision]") {
   const Precision there{10000.0, 100.0};
   const Matrix6 covariance = covariance_of(there);
-  CHECK(covariance(0, 0) == Approx(5e-5));   // [rad^2]
-  CHECK(covariance(5, 5) == Approx(1e-2));   // [m^2]
+  CHECK(covariance(0, 0) == Approx(5e-5));  // [rad^2]
+  CHECK(covariance(5, 5) == Approx(1e-2));  // [m^2]
 
   const Precision back = precision_of(covariance);
   CHECK(back.kappa == Approx(there.kappa));
