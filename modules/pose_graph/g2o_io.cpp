@@ -1,0 +1,190 @@
+#include "modules/pose_graph/g2o_io.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <stdexcept>
+#include <unordered_set>
+
+#include "modules/pose_graph/text_fields.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::uint64_t kLetters = 26;
+constexpr double kUnitTolerance = 1e-3;  // files round their quaternions, some to 6 digits
+
+KeyframeId read_id(TextFields& fields) {
+  const std::uint64_t key = fields.integer("vertex id");
+  const auto id = keyframe_of_key(key);
+  if (!id) fields.fail("vertex id " + std::to_string(key) + " names no robot and index");
+  return *id;
+}
+
+SE3 read_pose(TextFields& fields, int dimension) {
+  Eigen::Vector3d t = Eigen::Vector3d::Zero();
+  for (int i = 0; i < dimension; ++i) t(i) = fields.number("translation");
+  if (dimension == 2) {
+    const Eigen::AngleAxisd R(fields.number("angle"), Eigen::Vector3d::UnitZ());
+    return make_pose(R.toRotationMatrix(), t);
+  }
+  Eigen::Quaterniond q;
+  for (double& c : q.coeffs()) c = fields.number("quaternion");
+  if (!(std::abs(q.norm() - 1.0) <= kUnitTolerance))
+    fields.fail("quaternion has length " + std::to_string(q.norm()));
+  return make_pose(q.normalized().toRotationMatrix(), t);
+}
+
+// Upper triangle of an NxN information matrix, inverted.
+template <int N>
+Eigen::Matrix<double, N, N> read_inverse(TextFields& fields) {
+  Eigen::Matrix<double, N, N> information;
+  for (int r = 0; r < N; ++r)
+    for (int c = r; c < N; ++c)
+      information(r, c) = information(c, r) = fields.number("information");
+  const Eigen::LLT<Eigen::Matrix<double, N, N>> llt(information);
+  if (llt.info() != Eigen::Success) fields.fail("information matrix is not positive definite");
+  return llt.solve(Eigen::Matrix<double, N, N>::Identity());
+}
+
+// Exchanges [translation; rotation] and [rotation; translation].
+Matrix6 swap_blocks(const Matrix6& M) {
+  Matrix6 swapped;
+  swapped << M.bottomRightCorner<3, 3>(), M.bottomLeftCorner<3, 3>(),  //
+      M.topRightCorner<3, 3>(), M.topLeftCorner<3, 3>();
+  return swapped;
+}
+
+// x, y, angle -> rotation about z, translation in x and y.
+Matrix6 lift(const Eigen::Matrix3d& Sigma) {
+  constexpr int kPlace[] = {3, 4, 2};
+  Matrix6 lifted = Matrix6::Zero();
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) lifted(kPlace[r], kPlace[c]) = Sigma(r, c);
+  return lifted;
+}
+
+class Reader {
+ public:
+  G2oGraph graph{.dimension = 0, .vertices = {}, .edges = {}};
+
+  void read_line(TextFields& fields) {
+    const std::string_view tag = fields.text("tag");
+    if (tag == "FIX") return;
+    const bool is_vertex = tag == "VERTEX_SE3:QUAT" || tag == "VERTEX_SE2";
+    const bool is_edge = tag == "EDGE_SE3:QUAT" || tag == "EDGE_SE2";
+    if (!is_vertex && !is_edge) fields.fail("unknown tag '" + std::string(tag) + '\'');
+    set_dimension(tag.ends_with("SE2") ? 2 : 3, fields);
+    is_vertex ? read_vertex(fields) : read_edge(fields);
+    if (!fields.at_end()) fields.fail("more fields than " + std::string(tag) + " has");
+  }
+
+ private:
+  void set_dimension(int dimension, const TextFields& fields) {
+    if (graph.dimension == 0) graph.dimension = dimension;
+    if (graph.dimension != dimension) fields.fail("2D and 3D in one file");
+  }
+
+  void read_vertex(TextFields& fields) {
+    const KeyframeId id = read_id(fields);
+    if (!seen_.insert(id).second) fields.fail("vertex " + to_string(id) + " is given twice");
+    graph.vertices.push_back({id, read_pose(fields, graph.dimension)});
+  }
+
+  void read_edge(TextFields& fields) {
+    RelativePose& edge = graph.edges.emplace_back();
+    edge.from = read_id(fields);
+    edge.to = read_id(fields);
+    if (edge.from == edge.to) fields.fail("edge from " + to_string(edge.from) + " to itself");
+    edge.T_from_to = read_pose(fields, graph.dimension);
+    edge.covariance =
+        graph.dimension == 2 ? lift(read_inverse<3>(fields)) : swap_blocks(read_inverse<6>(fields));
+  }
+
+  std::unordered_set<KeyframeId> seen_;
+};
+
+void write_pose(std::ostream& out, const SE3& T) {
+  const Eigen::Quaterniond q(T.linear());
+  for (const double c : T.translation()) out << ' ' << c;
+  for (const double c : q.coeffs()) out << ' ' << c;
+}
+
+void write_edge(std::ostream& out, const RelativePose& edge) {
+  const Eigen::LLT<Matrix6> llt(swap_blocks(edge.covariance));
+  if (llt.info() != Eigen::Success)
+    throw std::invalid_argument("write_g2o: covariance of edge " + to_string(edge.from) + " -> " +
+                                to_string(edge.to) + " is not positive definite");
+  const Matrix6 information = llt.solve(Matrix6::Identity());
+  out << "EDGE_SE3:QUAT " << key_of_keyframe(edge.from) << ' ' << key_of_keyframe(edge.to);
+  write_pose(out, edge.T_from_to);
+  for (int r = 0; r < 6; ++r)
+    for (int c = r; c < 6; ++c) out << ' ' << information(r, c);
+  out << '\n';
+}
+
+}  // namespace
+
+std::optional<KeyframeId> keyframe_of_key(std::uint64_t key) {
+  const auto letter = static_cast<char>(key >> 56U);
+  const std::uint64_t index = letter == 0 ? key & 0xffffffffU : key & ((1ULL << 56U) - 1);
+  std::uint64_t robot = 0;
+  if (letter == 0)
+    robot = key >> 32U;
+  else if ('a' <= letter && letter <= 'z')
+    robot = static_cast<std::uint64_t>(letter - 'a');
+  else if ('A' <= letter && letter <= 'Z')
+    robot = static_cast<std::uint64_t>(letter - 'A') + kLetters;
+  else
+    return std::nullopt;
+  if (robot > std::numeric_limits<RobotId>::max() || index > 0xffffffffU) return std::nullopt;
+  return KeyframeId{static_cast<RobotId>(robot), static_cast<std::uint32_t>(index)};
+}
+
+std::uint64_t key_of_keyframe(const KeyframeId& id) {
+  const std::uint64_t robot = id.robot;
+  if (robot < kLetters) return (('a' + robot) << 56U) | id.index;
+  if (robot < 2 * kLetters) return (('A' + robot - kLetters) << 56U) | id.index;
+  return (robot << 32U) | id.index;
+}
+
+G2oGraph read_g2o(std::istream& in, const std::string& file) {
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  if (in.bad()) throw std::runtime_error(file + ": cannot be read to its end");
+  Reader reader;
+  for (const TextRow& row : split_rows(text)) {
+    TextFields fields(row, file);
+    reader.read_line(fields);
+  }
+  if (reader.graph.dimension == 0) throw std::runtime_error(file + ": no vertex and no edge");
+  return std::move(reader.graph);
+}
+
+G2oGraph read_g2o(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  if (!in) throw std::runtime_error(file.string() + ": cannot be opened");
+  return read_g2o(in, file.string());
+}
+
+void write_g2o(std::ostream& out, const G2oGraph& graph) {
+  if (graph.dimension != 3) throw std::invalid_argument("write_g2o: the graph is not 3D");
+  const auto precision = out.precision(std::numeric_limits<double>::max_digits10);
+  for (const G2oVertex& vertex : graph.vertices) {
+    out << "VERTEX_SE3:QUAT " << key_of_keyframe(vertex.id);
+    write_pose(out, vertex.T_world_kf);
+    out << '\n';
+  }
+  for (const RelativePose& edge : graph.edges) write_edge(out, edge);
+  out.precision(precision);
+}
+
+void write_g2o(const std::filesystem::path& file, const G2oGraph& graph) {
+  std::ofstream out(file);
+  write_g2o(out, graph);
+  out.close();
+  if (!out) throw std::runtime_error(file.string() + ": cannot be written");
+}
+
+}  // namespace km

@@ -1,0 +1,139 @@
+#include "modules/pose_graph/recorded_graph.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <istream>
+#include <iterator>
+#include <limits>
+#include <optional>
+#include <set>
+#include <span>
+#include <stdexcept>
+
+#include "modules/core/precision.hpp"
+#include "modules/pose_graph/g2o_io.hpp"
+#include "modules/pose_graph/text_fields.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::string_view kColumns =
+    "robot_src,pose_src,robot_dst,pose_dst,qx,qy,qz,qw,tx,ty,tz,kappa,tau";
+constexpr double kUnitTolerance = 1e-3;  // quaternions are rounded to 6 digits
+
+KeyframeId read_keyframe(TextFields& fields) {
+  const auto robot = fields.integer("robot", std::numeric_limits<RobotId>::max());
+  const auto index = fields.integer("pose", std::numeric_limits<std::uint32_t>::max());
+  return {static_cast<RobotId>(robot), static_cast<std::uint32_t>(index)};
+}
+
+RelativePose read_row(TextFields& fields) {
+  RelativePose row;
+  row.from = read_keyframe(fields);
+  row.to = read_keyframe(fields);
+  if (row.from == row.to) fields.fail("measurement from " + to_string(row.from) + " to itself");
+  Eigen::Quaterniond q;
+  for (double& c : q.coeffs()) c = fields.number("quaternion");
+  if (!(std::abs(q.norm() - 1.0) <= kUnitTolerance))
+    fields.fail("quaternion has length " + std::to_string(q.norm()));
+  Eigen::Vector3d t;
+  for (double& c : t) c = fields.number("translation");
+  row.T_from_to = make_pose(q.normalized().toRotationMatrix(), t);
+  const Precision precision{fields.number("kappa"), fields.number("tau")};
+  if (!(precision.kappa > 0.0 && precision.tau > 0.0))
+    fields.fail("kappa and tau must be positive");
+  row.covariance = covariance_of(precision);
+  return row;
+}
+
+// The one robot that has edges inside itself.
+RobotId owner(const std::vector<RelativePose>& edges, const std::string& file) {
+  std::set<RobotId> owners;
+  for (const RelativePose& edge : edges)
+    if (edge.from.robot == edge.to.robot) owners.insert(edge.from.robot);
+  if (owners.size() == 1) return *owners.begin();
+  std::string list;
+  for (const RobotId robot : owners) list += ' ' + std::to_string(robot);
+  throw std::runtime_error(file + ": must hold the odometry of one robot, has that of" +
+                           (owners.empty() ? " none" : list));
+}
+
+// odometry[i] for every i up to the last keyframe that any edge of the robot names.
+void check_chain(const std::vector<std::optional<RelativePose>>& odometry, RobotId robot,
+                 const std::string& file) {
+  const auto gap = std::find(odometry.begin(), odometry.end(), std::nullopt);
+  if (gap == odometry.end()) return;
+  const auto index = static_cast<std::uint32_t>(gap - odometry.begin());
+  throw std::runtime_error(file + ": no odometry from " + to_string({robot, index}) + " to " +
+                           to_string({robot, index + 1}));
+}
+
+// Number of odometry steps if every index named were on the chain; bounded by the edges there are,
+// so that a wild index cannot ask for more memory than the file has rows.
+std::size_t chain_length(const std::vector<RelativePose>& edges, RobotId robot,
+                         const std::string& file) {
+  std::size_t last = 0;
+  for (const RelativePose& edge : edges)
+    for (const KeyframeId& id : {edge.from, edge.to})
+      if (id.robot == robot) last = std::max<std::size_t>(last, id.index);
+  if (last <= edges.size()) return last;
+  throw std::runtime_error(file + ": no odometry up to " +
+                           to_string({robot, static_cast<std::uint32_t>(last)}));
+}
+
+}  // namespace
+
+RecordedGraph make_recorded_graph(const std::vector<RelativePose>& edges, const std::string& file) {
+  RecordedGraph graph;
+  graph.robot = owner(edges, file);
+  std::vector<std::optional<RelativePose>> odometry(chain_length(edges, graph.robot, file));
+  for (const RelativePose& edge : edges) {
+    const bool from_here = edge.from.robot == graph.robot;
+    const bool to_here = edge.to.robot == graph.robot;
+    if (!from_here && !to_here)
+      throw std::runtime_error(file + ": edge " + to_string(edge.from) + " -> " +
+                               to_string(edge.to) + " does not touch robot " +
+                               std::to_string(graph.robot));
+    if (!from_here || !to_here)
+      graph.inter_closures.push_back(edge);
+    else if (edge.to.index == edge.from.index + 1 && !odometry[edge.from.index])
+      odometry[edge.from.index] = edge;
+    else
+      graph.intra_closures.push_back(edge);
+  }
+  check_chain(odometry, graph.robot, file);
+  for (const auto& edge : odometry) graph.odometry.push_back(*edge);
+  return graph;
+}
+
+std::vector<RelativePose> read_measurements_csv(std::istream& in, const std::string& file) {
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  if (in.bad()) throw std::runtime_error(file + ": cannot be read to its end");
+  if (!text.starts_with(kColumns))
+    throw std::runtime_error(file + ":1: the first line must name the columns " +
+                             std::string(kColumns));
+  const std::vector<TextRow> table = split_rows(text);
+  std::vector<RelativePose> rows;
+  for (const TextRow& row : std::span(table).subspan(1)) {
+    TextFields fields(row, file);
+    rows.push_back(read_row(fields));
+  }
+  return rows;
+}
+
+RecordedGraph read_recorded_graph(const std::filesystem::path& file) {
+  if (file.extension() == ".g2o") {
+    const G2oGraph graph = read_g2o(file);
+    if (graph.dimension != 3) throw std::runtime_error(file.string() + ": the graph is not 3D");
+    return make_recorded_graph(graph.edges, file.string());
+  }
+  if (file.extension() != ".csv")
+    throw std::runtime_error(file.string() + ": neither .g2o nor .csv");
+  std::ifstream in(file);
+  if (!in) throw std::runtime_error(file.string() + ": cannot be opened");
+  return make_recorded_graph(read_measurements_csv(in, file.string()), file.string());
+}
+
+}  // namespace km

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "modules/core/pose_graph.hpp"
+
+namespace km {
+
+/// One robot's part of a recorded pose graph.
+struct RecordedGraph {
+  RobotId robot = 0;
+  std::vector<RelativePose> odometry;        ///< [i]: from keyframe i to i + 1 of `robot`.
+  std::vector<RelativePose> intra_closures;  ///< Between keyframes of `robot`, as in the file.
+  std::vector<RelativePose> inter_closures;  ///< `robot` at one end, either one; as in the file.
+
+  [[nodiscard]] std::size_t poses() const { return odometry.size() + 1; }
+};
+
+/// Sorts the measurements of one robot's file: edges from keyframe i to i + 1 are its odometry (a
+/// second one for the same i is a closure), other edges inside the robot and edges to others are
+/// closures. The robot is the one that has edges inside itself. `file` names the source in errors.
+///
+/// Throws std::runtime_error "file: what" unless exactly one robot has edges inside itself, every
+/// edge touches it, its odometry is a chain from keyframe 0 without gaps, and its closures end on
+/// that chain.
+[[nodiscard]] RecordedGraph make_recorded_graph(const std::vector<RelativePose>& edges,
+                                                const std::string& file);
+
+/// Reads measurements as rows robot_src, pose_src, robot_dst, pose_dst, qx, qy, qz, qw, tx, ty, tz,
+/// kappa, tau [, ...] below one line of column names; further columns are ignored. kappa and tau
+/// weigh rotation and translation, see precision.hpp. Quaternions are normalised.
+/// Throws std::runtime_error "file:line: what".
+[[nodiscard]] std::vector<RelativePose> read_measurements_csv(std::istream& in,
+                                                              const std::string& file);
+
+/// Reads one robot's part from a 3D g2o file (*.g2o) or a table of measurements (*.csv).
+/// Throws std::runtime_error as the functions above.
+[[nodiscard]] RecordedGraph read_recorded_graph(const std::filesystem::path& file);
+
+}  // namespace km

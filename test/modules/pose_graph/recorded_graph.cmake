@@ -1,0 +1,1 @@
+km_test(recorded_graph SOURCES test_g2o_io.cpp test_recorded_graph.cpp LINK km_recorded_graph)
