@@ -1,0 +1,92 @@
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+namespace km {
+
+/// Set of integers below a fixed capacity, one bit each. Binary operations expect equal capacities.
+class BitSet {
+ public:
+  explicit BitSet(std::size_t capacity = 0) : words_((capacity + 63) / 64, 0) {}
+
+  void insert(std::size_t i) { words_[i / 64] |= std::uint64_t{1} << (i % 64); }
+  void erase(std::size_t i) { words_[i / 64] &= ~(std::uint64_t{1} << (i % 64)); }
+  [[nodiscard]] bool contains(std::size_t i) const {
+    return (words_[i / 64] >> (i % 64) & 1U) != 0;
+  }
+
+  /// The smallest element that is at least `from`.
+  [[nodiscard]] std::optional<std::size_t> next(std::size_t from) const {
+    std::size_t w = from / 64;
+    if (w >= words_.size()) return std::nullopt;
+    std::uint64_t word = words_[w] & (~std::uint64_t{0} << (from % 64));
+    while (word == 0) {
+      if (++w == words_.size()) return std::nullopt;
+      word = words_[w];
+    }
+    return 64 * w + static_cast<std::size_t>(std::countr_zero(word));
+  }
+
+  void clear() { std::fill(words_.begin(), words_.end(), 0); }
+  void grow(std::size_t capacity) { words_.resize((capacity + 63) / 64, 0); }
+
+  void subtract(const BitSet& other) {
+    for (std::size_t w = 0; w < words_.size(); ++w) words_[w] &= ~other.words_[w];
+  }
+  void assign_intersection(const BitSet& x, const BitSet& y) {
+    words_.resize(x.words_.size());
+    for (std::size_t w = 0; w < words_.size(); ++w) words_[w] = x.words_[w] & y.words_[w];
+  }
+  [[nodiscard]] std::size_t count_common(const BitSet& other) const {
+    std::size_t count = 0;
+    for (std::size_t w = 0; w < words_.size(); ++w)
+      count += static_cast<std::size_t>(std::popcount(words_[w] & other.words_[w]));
+    return count;
+  }
+  [[nodiscard]] bool contains_all(const BitSet& other) const {
+    for (std::size_t w = 0; w < words_.size(); ++w)
+      if ((other.words_[w] & ~words_[w]) != 0) return false;
+    return true;
+  }
+
+ private:
+  std::vector<std::uint64_t> words_;
+};
+
+/// Undirected graph without loops, adjacency as bits. Vertices are numbered from 0.
+class BitGraph {
+ public:
+  explicit BitGraph(std::size_t vertices = 0)
+      : capacity_(vertices), rows_(vertices, BitSet(vertices)) {}
+
+  [[nodiscard]] std::size_t size() const { return rows_.size(); }
+  [[nodiscard]] std::size_t capacity() const { return capacity_; }  ///< Of every set of vertices.
+  [[nodiscard]] const BitSet& neighbours(std::size_t v) const { return rows_[v]; }
+  [[nodiscard]] bool adjacent(std::size_t u, std::size_t v) const { return rows_[u].contains(v); }
+
+  void connect(std::size_t u, std::size_t v) {
+    rows_[u].insert(v);
+    rows_[v].insert(u);
+  }
+
+  /// Adds one vertex without edges and returns its number. Amortised: the rows double.
+  std::size_t add_vertex() {
+    if (size() == capacity_) {
+      capacity_ = std::max<std::size_t>(64, 2 * capacity_);
+      for (BitSet& row : rows_) row.grow(capacity_);
+    }
+    rows_.emplace_back(capacity_);
+    return size() - 1;
+  }
+
+ private:
+  std::size_t capacity_;
+  std::vector<BitSet> rows_;
+};
+
+}  // namespace km

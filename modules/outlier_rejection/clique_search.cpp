@@ -1,0 +1,176 @@
+#include "modules/outlier_rejection/clique_search.hpp"
+
+#include <algorithm>
+#include <deque>
+
+namespace km {
+namespace {
+
+using Vertices = std::vector<std::size_t>;
+
+// Vertices of the k-core of the subgraph that `candidates` induce: each has at least k neighbours
+// among them. Ordered by repeatedly taking the vertex of least degree away (degeneracy order), the
+// last taken first, so that the densest part comes first.
+Vertices core_in_degeneracy_order(const BitGraph& graph, std::span<const std::size_t> candidates,
+                                  std::size_t k) {
+  BitSet members(graph.capacity());
+  for (const std::size_t v : candidates) members.insert(v);
+  struct Entry {
+    std::size_t vertex, degree;
+  };
+  std::vector<Entry> left;
+  for (const std::size_t v : candidates)
+    left.push_back({v, graph.neighbours(v).count_common(members)});
+
+  Vertices order;
+  while (!left.empty()) {
+    const auto least =
+        std::min_element(left.begin(), left.end(),
+                         [](const Entry& x, const Entry& y) { return x.degree < y.degree; });
+    const Entry taken = *least;
+    *least = left.back();
+    left.pop_back();
+    const BitSet& neighbours = graph.neighbours(taken.vertex);
+    for (Entry& entry : left) entry.degree -= neighbours.contains(entry.vertex) ? 1 : 0;
+    if (taken.degree >= k || !order.empty()) order.push_back(taken.vertex);
+  }
+  std::reverse(order.begin(), order.end());
+  return order;
+}
+
+BitGraph induced(const BitGraph& graph, const Vertices& vertices) {
+  BitGraph result(vertices.size());
+  for (std::size_t i = 0; i < vertices.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      if (graph.adjacent(vertices[i], vertices[k])) result.connect(i, k);
+  return result;
+}
+
+// Depth-first branch and bound over the whole of one graph.
+class BranchAndBound {
+ public:
+  BranchAndBound(const BitGraph& graph, const CliqueGoal& goal)
+      : graph_(graph), goal_(goal), best_size_(goal.more_than) {}
+
+  CliqueSearch run() {
+    levels_.emplace_back();
+    levels_[0].candidates = BitSet(graph_.capacity());
+    for (std::size_t v = 0; v < graph_.size(); ++v) levels_[0].candidates.insert(v);
+    expand(0);
+    std::sort(result_.clique.begin(), result_.clique.end());
+    return std::move(result_);
+  }
+
+ private:
+  struct Level {
+    BitSet candidates, uncoloured, rest, conflict;
+    std::vector<BitSet> colours;     // independent sets, [c - 1] for colour c
+    Vertices order;                  // vertices that could lead to a larger clique ...
+    std::vector<std::size_t> bound;  // ... and the colours in use up to each
+  };
+
+  Level& level(std::size_t depth) {
+    if (levels_.size() <= depth) levels_.emplace_back();
+    return levels_[depth];  // a deque: references to other levels stay valid
+  }
+
+  void expand(std::size_t depth) {
+    if (++result_.nodes > goal_.max_nodes) {
+      result_.proven = false;
+      done_ = true;
+      return;
+    }
+    Level& here = level(depth);
+    colour_candidates(here, best_size_ - std::min(best_size_, clique_.size()));
+    while (!here.order.empty() && !done_) {
+      if (clique_.size() + here.bound.back() <= best_size_) return;
+      const std::size_t v = here.order.back();
+      here.order.pop_back();
+      here.bound.pop_back();
+      clique_.push_back(v);
+      Level& below = level(depth + 1);
+      below.candidates.assign_intersection(here.candidates, graph_.neighbours(v));
+      if (below.candidates.next(0))
+        expand(depth + 1);
+      else if (clique_.size() > best_size_)
+        record();
+      clique_.pop_back();
+      here.candidates.erase(v);
+    }
+  }
+
+  void record() {
+    best_size_ = clique_.size();
+    result_.clique = clique_;
+    done_ = best_size_ >= goal_.enough;
+  }
+
+  // A clique takes at most one vertex of each colour: only vertices of a colour above `spare` can
+  // lead to a clique larger than the best, and only they enter `order`.
+  void colour_candidates(Level& here, std::size_t spare) {
+    here.order.clear();
+    here.bound.clear();
+    here.uncoloured = here.candidates;
+    std::size_t colours = 0;
+    for (auto first = here.uncoloured.next(0); first; first = here.uncoloured.next(*first)) {
+      if (here.colours.size() == colours) here.colours.emplace_back(graph_.capacity());
+      BitSet& colour = here.colours[colours++];
+      colour.clear();
+      BitSet& rest = here.rest;
+      rest = here.uncoloured;
+      for (auto v = first; v; v = rest.next(*v + 1)) {
+        here.uncoloured.erase(*v);
+        if (colours > spare && recolour(here, *v, spare)) continue;
+        rest.subtract(graph_.neighbours(*v));
+        colour.insert(*v);
+        if (colours <= spare) continue;
+        here.order.push_back(*v);
+        here.bound.push_back(colours);
+      }
+    }
+  }
+
+  // Tries to give v one of the first `spare` colours by moving the only vertex there that is in its
+  // way to another of them.
+  bool recolour(Level& here, std::size_t v, std::size_t spare) {
+    const BitSet& neighbours = graph_.neighbours(v);
+    for (std::size_t c = 0; c + 1 < spare; ++c) {
+      BitSet& colour = here.colours[c];
+      if (colour.count_common(neighbours) != 1) continue;
+      BitSet& conflict = here.conflict;
+      conflict.assign_intersection(colour, neighbours);
+      const std::size_t w = *conflict.next(0);
+      for (std::size_t d = c + 1; d < spare; ++d) {
+        if (here.colours[d].count_common(graph_.neighbours(w)) != 0) continue;
+        colour.erase(w);
+        here.colours[d].insert(w);
+        colour.insert(v);
+        return true;
+      }
+    }
+    return false;
+  }
+
+  const BitGraph& graph_;
+  const CliqueGoal goal_;
+  std::size_t best_size_;
+  Vertices clique_;
+  std::deque<Level> levels_;
+  CliqueSearch result_;
+  bool done_ = false;
+};
+
+}  // namespace
+
+CliqueSearch find_clique(const BitGraph& graph, std::span<const std::size_t> candidates,
+                         const CliqueGoal& goal) {
+  const Vertices vertices = core_in_degeneracy_order(graph, candidates, goal.more_than);
+  if (vertices.size() <= goal.more_than) return {};
+  const BitGraph subgraph = induced(graph, vertices);
+  CliqueSearch result = BranchAndBound(subgraph, goal).run();
+  for (std::size_t& v : result.clique) v = vertices[v];
+  std::sort(result.clique.begin(), result.clique.end());
+  return result;
+}
+
+}  // namespace km

@@ -1,0 +1,136 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <fstream>
+#include <random>
+#include <sstream>
+#include <vector>
+
+#include "modules/outlier_rejection/clique_search.hpp"
+#include "modules/outlier_rejection/max_clique.hpp"
+#include "test/modules/outlier_rejection/random_graph.hpp"
+#include "test/support/shared_data.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::uint64_t kNoLimit = std::uint64_t{1} << 40U;
+
+// Size of the maximum clique of the first n vertices, by trying every subset.
+std::size_t brute_force(const Rows& rows, std::size_t n) {
+  std::vector<unsigned> adjacent(n, 0);
+  for (std::size_t v = 0; v < n; ++v)
+    for (const std::size_t u : rows[v]) {
+      adjacent[v] |= 1U << u;
+      adjacent[u] |= 1U << v;
+    }
+  std::size_t best = 0;
+  for (unsigned set = 0; set < 1U << n; ++set) {
+    bool clique = true;
+    for (std::size_t v = 0; v < n && clique; ++v)
+      if ((set >> v & 1U) != 0) clique = (set & ~adjacent[v] & ~(1U << v)) == 0;
+    if (clique) best = std::max(best, static_cast<std::size_t>(std::popcount(set)));
+  }
+  return best;
+}
+
+// The same from scratch by the search itself, over all vertices at once.
+std::size_t from_scratch(const Rows& rows, std::size_t n) {
+  BitGraph graph(n);
+  for (std::size_t v = 0; v < n; ++v)
+    for (const std::size_t u : rows[v]) graph.connect(u, v);
+  std::vector<std::size_t> all(n);
+  for (std::size_t v = 0; v < n; ++v) all[v] = v;
+  return find_clique(graph, all, {.more_than = 0, .enough = n, .max_nodes = kNoLimit})
+      .clique.size();
+}
+
+TEST_CASE("The clique is a maximum after every insertion, by brute force", "[clique]") {
+  const unsigned seed = GENERATE(range(0U, 12U));
+  const double density = GENERATE(0.2, 0.5, 0.8);
+  CAPTURE(seed, density);
+  std::mt19937 rng(seed);
+  const Rows rows = random_graph(14, density, rng);
+  MaxClique clique(kNoLimit);
+  for (std::size_t n = 1; n <= rows.size(); ++n) {
+    const std::size_t before = clique.clique().size();
+    const bool grew = clique.add(rows[n - 1]);
+    CHECK(clique.clique().size() == brute_force(rows, n));
+    CHECK(grew == (clique.clique().size() > before));
+    CHECK(clique.proven());
+  }
+}
+
+TEST_CASE("Adding one at a time finds what a search from scratch finds", "[clique]") {
+  const unsigned seed = GENERATE(range(0U, 4U));
+  const double density = GENERATE(0.1, 0.5, 0.7);
+  CAPTURE(seed, density);
+  std::mt19937 rng(100 + seed);
+  const Rows rows = random_graph(90, density, rng);
+  MaxClique clique(kNoLimit);
+  for (std::size_t n = 1; n <= rows.size(); ++n) {
+    clique.add(rows[n - 1]);
+    REQUIRE(clique.clique().size() == from_scratch(rows, n));
+    REQUIRE(is_clique(rows, clique.clique()));
+  }
+}
+
+TEST_CASE("A planted clique is found, whatever the order of its vertices", "[clique]") {
+  const unsigned seed = GENERATE(range(0U, 10U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  // 400 vertices at density 0.1: cliques of chance stay below 8, far below the planted 20.
+  const auto [rows, planted] = planted_clique(400, 20, 0.1, rng);
+  MaxClique clique(kNoLimit);
+  for (const auto& row : rows) clique.add(row);
+  CHECK(std::vector(clique.clique().begin(), clique.clique().end()) == planted);
+}
+
+TEST_CASE("Of equally large cliques the older one is kept", "[clique]") {
+  MaxClique clique(kNoLimit);  // 0-1, then 1-2, then 2-3
+  CHECK(clique.add({}));
+  for (const std::size_t v : {0U, 1U, 2U}) clique.add(std::vector<std::size_t>{v});
+  CHECK(std::vector(clique.clique().begin(), clique.clique().end()) ==
+        std::vector<std::size_t>{0, 1});
+}
+
+TEST_CASE("A search cut short keeps a valid clique and says so", "[clique]") {
+  std::mt19937 rng(5);
+  const Rows rows = random_graph(120, 0.8, rng);
+  MaxClique limited(3), repeated(3);
+  for (const auto& row : rows) {
+    limited.add(row);
+    repeated.add(row);
+    REQUIRE(is_clique(rows, limited.clique()));
+  }
+  CHECK_FALSE(limited.proven());
+  CHECK(limited.clique().size() >= 2);
+  CHECK(std::ranges::equal(limited.clique(), repeated.clique()));  // nodes are counted, not time
+}
+
+TEST_CASE("Neighbours that cannot be are refused and change nothing", "[clique]") {
+  MaxClique clique(kNoLimit);
+  clique.add({});
+  CHECK_THROWS_WITH(clique.add(std::vector<std::size_t>{1}), Catch::Contains("1 does not exist"));
+  CHECK_THROWS_WITH(clique.add(std::vector<std::size_t>{0, 0}), Catch::Contains("given twice"));
+  CHECK(clique.size() == 1);
+  CHECK(clique.add(std::vector<std::size_t>{0}));
+}
+
+TEST_CASE("The consistency graph of Manhattan has the clique numbers PMC proves", "[clique]") {
+  const auto file = shared_data("pose_graphs/outliers/consistency_1500.adjacency.txt");
+  if (!file) return;
+  const Rows rows = read_adjacency(*file);
+  REQUIRE(rows.size() == 1500);
+  MaxClique clique(kNoLimit);
+  std::vector<std::size_t> sizes;
+  for (const auto& row : rows) {
+    clique.add(row);
+    if (clique.size() % 250 == 0) sizes.push_back(clique.clique().size());
+  }
+  CHECK(sizes == std::vector<std::size_t>{41, 77, 106, 133, 156, 172});
+  CHECK(is_clique(rows, clique.clique()));
+}
+
+}  // namespace
+}  // namespace km
