@@ -1,0 +1,26 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "modules/pose_graph/quadratic_problem.hpp"
+
+namespace km {
+
+/// Chordal initialisation of one block (Carlone et al., "Initialization Techniques for 3D SLAM",
+/// ICRA 2015, Sec. III-B): rotations minimise sum kappa ||R_j - R_i R_ij||_F^2 over all matrices,
+/// then projected to SO(3); translations minimise sum tau ||t_j - t_i - R_i t_ij||^2 given those.
+/// Pose 0 is the identity. Two sparse factorisations.
+/// Throws std::invalid_argument if the edges do not connect all poses.
+[[nodiscard]] std::vector<SE3> chordal_initialisation(Eigen::Index poses,
+                                                      std::span<const BlockEdge> edges);
+
+/// Poses chained along the edges i -> i + 1, pose 0 being the identity.
+/// Throws std::invalid_argument if one of these edges is missing.
+[[nodiscard]] std::vector<SE3> odometry_initialisation(Eigen::Index poses,
+                                                       std::span<const BlockEdge> edges);
+
+/// Poses lifted to rank r by lifted_identity(r).
+[[nodiscard]] LiftedPoses lift(std::span<const SE3> poses, Eigen::Index rank);
+
+}  // namespace km

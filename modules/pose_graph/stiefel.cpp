@@ -1,0 +1,61 @@
+#include "modules/pose_graph/stiefel.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+
+#include "modules/pose_graph/rank_dispatch.hpp"
+
+namespace km {
+
+Eigen::MatrixXd nearest_stiefel(const Eigen::MatrixXd& M) {
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(M, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  return svd.matrixU() * svd.matrixV().transpose();
+}
+
+double stiefel_error(const LiftedPoses& X) {
+  double error = 0.0;
+  for (Eigen::Index i = 0; i < pose_count(X); ++i) {
+    const auto Y = X.middleCols<3>(4 * i);
+    const Eigen::Matrix3d gram = Y.transpose() * Y;
+    error = std::max(error, (gram - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff());
+  }
+  return error;
+}
+
+LiftedPoses project_tangent(const LiftedPoses& X, const LiftedPoses& V) {
+  LiftedPoses projected = V;
+  dispatch_rank(X.rows(), [&]<int kRank>() {
+    for (Eigen::Index i = 0; i < pose_count(X); ++i) {
+      const auto Y = lifted_block<kRank, 3>(X, 4 * i);
+      auto P = lifted_block<kRank, 3>(projected, 4 * i);
+      const Eigen::Matrix3d S = Y.transpose() * P;
+      P.noalias() -= Y * (0.5 * (S + S.transpose())).eval();
+    }
+  });
+  return projected;
+}
+
+LiftedPoses retract(const LiftedPoses& X, const LiftedPoses& V) {
+  LiftedPoses moved = X + V;
+  for (Eigen::Index i = 0; i < pose_count(X); ++i) {
+    const auto V_i = V.middleCols<3>(4 * i);
+    const Eigen::Matrix3d gram = Eigen::Matrix3d::Identity() + V_i.transpose() * V_i;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(gram);
+    moved.middleCols<3>(4 * i) = (moved.middleCols<3>(4 * i) * eigen.operatorInverseSqrt()).eval();
+  }
+  return moved;
+}
+
+Eigen::MatrixXd lifting_matrix(Eigen::Index rank) {
+  return Eigen::MatrixXd::Identity(rank, 3);
+}
+
+Eigen::MatrixXd lift(const Eigen::MatrixXd& L, const SE3& T) {
+  return L * T.matrix();
+}
+
+Eigen::MatrixXd lifted_identity(Eigen::Index rank) {
+  return Eigen::MatrixXd::Identity(rank, 3) * Eigen::Matrix<double, 3, 4>::Identity();
+}
+
+}  // namespace km

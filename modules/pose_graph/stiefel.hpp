@@ -1,0 +1,45 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "modules/core/geometry.hpp"
+
+namespace km {
+
+/// n poses in the rank relaxation of SE-Sync (Rosen et al., IJRR 2019, Sec. 4): an r x 4n matrix
+/// whose columns 4i to 4i+3 are [Y_i p_i], Y_i in St(3, r) (orthonormal columns), p_i in R^r [m].
+/// With r = 3 it holds ordinary poses [R_i t_i] (or mirrored ones). Tangent vectors and gradients
+/// have the same shape. A point of (St(3, r) x R^r)^n is called feasible below.
+using LiftedPoses = Eigen::MatrixXd;
+
+/// Number of poses of `X`.
+inline Eigen::Index pose_count(const LiftedPoses& X) {
+  return X.cols() / 4;
+}
+
+/// The matrix of St(3, r) nearest to `M` (r x 3) in the Frobenius norm: U V^T of its SVD.
+[[nodiscard]] Eigen::MatrixXd nearest_stiefel(const Eigen::MatrixXd& M);
+
+/// Largest entry of |Y_i^T Y_i - I| over the poses: 0 if X is feasible.
+[[nodiscard]] double stiefel_error(const LiftedPoses& X);
+
+/// Orthogonal projection of `V` onto the tangent space at feasible `X`: V_i - Y_i sym(Y_i^T V_i) on
+/// the rotations, the identity on the translations.
+[[nodiscard]] LiftedPoses project_tangent(const LiftedPoses& X, const LiftedPoses& V);
+
+/// The point reached from `X` along tangent `V` by the polar retraction,
+/// (Y_i + V_i) (I + V_i^T V_i)^(-1/2), of second order; translations are added.
+[[nodiscard]] LiftedPoses retract(const LiftedPoses& X, const LiftedPoses& V);
+
+/// The matrix of St(3, r) by which every robot lifts its frame: the first three unit vectors. Equal
+/// on all robots without an exchange. Precondition: rank >= 3.
+[[nodiscard]] Eigen::MatrixXd lifting_matrix(Eigen::Index rank);
+
+/// One pose, lifted: L [R t] for a transform `L` = [Y p] (r x 4) that carries the frame of `T`,
+/// i.e. [Y R, Y t + p].
+[[nodiscard]] Eigen::MatrixXd lift(const Eigen::MatrixXd& L, const SE3& T);
+
+/// The transform [lifting_matrix(rank) 0], for lift().
+[[nodiscard]] Eigen::MatrixXd lifted_identity(Eigen::Index rank);
+
+}  // namespace km

@@ -1,0 +1,32 @@
+#pragma once
+
+#include "modules/pose_graph/quadratic_problem.hpp"
+
+namespace km {
+
+/// When minimise() stops.
+struct TruncatedNewtonOptions {
+  int max_iterations = 3;            ///< Accepted steps.
+  int max_cg_iterations = 50;        ///< Hessian products per step.
+  double cg_tolerance = 0.1;         ///< Residual of the Newton system over its right-hand side.
+  double gradient_tolerance = 1e-6;  ///< Riemannian gradient norm at which nothing is left to do.
+};
+
+struct [[nodiscard]] TruncatedNewtonResult {
+  LiftedPoses X;  ///< Feasible; the start if no step was accepted.
+  double initial_cost = 0.0;
+  double cost = 0.0;                   ///< At X; never above initial_cost.
+  double initial_gradient_norm = 0.0;  ///< Riemannian.
+  double gradient_norm = 0.0;
+  int iterations = 0;
+  int cg_iterations = 0;
+};
+
+/// Minimises `problem` from feasible `X` by the Riemannian trust-region method with preconditioned
+/// truncated conjugate gradients (Absil, Baker, Gallivan, "Trust-Region Methods on Riemannian
+/// Manifolds", FoCM 2007, Alg. 1 and 2). The radius is measured in the norm of the preconditioner
+/// and starts out too large to bind.
+[[nodiscard]] TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
+                                             const TruncatedNewtonOptions& options);
+
+}  // namespace km

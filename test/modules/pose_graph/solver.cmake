@@ -1,0 +1,3 @@
+km_test(pose_graph
+  SOURCES test_chordal.cpp test_quadratic_problem.cpp test_stiefel.cpp test_truncated_newton.cpp
+  LINK km_pose_graph km_recorded_graph)
