@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cmath>
+
+namespace km {
+
+/// Probability that the squared Mahalanobis length of a 6-dimensional normal vector is below `x`:
+/// the chi-squared distribution with 6 degrees of freedom, closed for even numbers of them.
+inline double chi_squared_6(double x) {
+  const double half = 0.5 * x;
+  return 1.0 - std::exp(-half) * (1.0 + half + 0.5 * half * half);
+}
+
+/// The x with chi_squared_6(x) = probability, to rounding. Precondition: 0 < probability < 1.
+inline double chi_squared_6_quantile(double probability) {
+  double below = 0.0, above = 1000.0;
+  for (int i = 0; i < 64; ++i) {
+    const double middle = 0.5 * (below + above);
+    (chi_squared_6(middle) < probability ? below : above) = middle;
+  }
+  return 0.5 * (below + above);
+}
+
+}  // namespace km

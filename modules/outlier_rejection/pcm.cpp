@@ -1,0 +1,62 @@
+#include "modules/outlier_rejection/pcm.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+namespace km {
+namespace {
+
+constexpr double kOrthonormal = 1e-6;
+
+bool is_pose(const SE3& T) {
+  const Eigen::Matrix3d R = T.linear();
+  return T.matrix().allFinite() && (R.transpose() * R).isIdentity(kOrthonormal) &&
+         R.determinant() > 0.0;
+}
+
+}  // namespace
+
+bool is_usable(const Closure& closure) {
+  return closure.from.id != closure.to.id && is_pose(closure.from.T_odom_kf) &&
+         is_pose(closure.to.T_odom_kf) && is_pose(closure.T_from_to) &&
+         is_covariance(closure.from.covariance) && is_covariance(closure.to.covariance) &&
+         is_covariance(closure.covariance);
+}
+
+Pcm::Pcm(RobotId a, RobotId b, const PcmConfig& config)
+    : a_(std::min(a, b)),
+      b_(std::max(a, b)),
+      config_(checked(config)),
+      test_(config),
+      clique_(static_cast<std::uint64_t>(config.max_search_nodes)) {}
+
+PcmVerdict Pcm::add(const Closure& closure) {
+  const auto [low, high] = std::minmax(closure.from.id.robot, closure.to.id.robot);
+  if (low != a_ || high != b_ || !is_usable(closure))
+    throw std::invalid_argument("Pcm::add: closure " + to_string(closure.from.id) + " -> " +
+                                to_string(closure.to.id) + " is malformed or not between robots " +
+                                std::to_string(a_) + " and " + std::to_string(b_));
+  if (known_.contains(closure.id())) return PcmVerdict::kRepeated;
+  if (known_.size() >= kMaxClosures) return PcmVerdict::kFull;
+  known_.insert(closure.id());
+
+  OrientedClosure added = test_.orient(closure);
+  if (config_.odometry_gate && a_ == b_ && !test_.agrees_with_odometry(added))
+    return PcmVerdict::kAgainstOdometry;
+  std::vector<std::size_t> consistent;
+  for (std::size_t k = 0; k < closures_.size(); ++k)
+    if (test_.consistent(added, closures_[k])) consistent.push_back(k);
+  closures_.push_back(std::move(added));
+  return clique_.add(consistent) ? PcmVerdict::kGrew : PcmVerdict::kAdded;
+}
+
+std::vector<ClosureId> Pcm::inliers() const {
+  std::vector<ClosureId> ids;
+  if (clique_.clique().size() < static_cast<std::size_t>(config_.min_inliers)) return ids;
+  for (const std::size_t i : clique_.clique()) ids.push_back(closures_[i].id);
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
+}  // namespace km

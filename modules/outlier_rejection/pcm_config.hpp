@@ -1,0 +1,67 @@
+#pragma once
+
+#include <numbers>
+
+#include "modules/core/config.hpp"
+
+namespace km {
+
+/// How a cycle of two closures and the odometry between them is judged.
+enum class CycleCriterion {
+  kMahalanobis,  ///< Its distance from the identity, weighed by the covariance along the cycle.
+  kBounds,       ///< Its translation and its rotation against fixed bounds.
+};
+
+/// Parameters of Pcm. Field names are the YAML keys below `pcm:`.
+struct PcmConfig {
+  static constexpr const char* kSection = "pcm";
+
+  CycleCriterion criterion = CycleCriterion::kMahalanobis;
+
+  /// Mahalanobis: a cycle is consistent if its squared distance is within this quantile of
+  /// chi-squared with 6 degrees of freedom (0.99: 16.8).
+  double confidence = 0.99;
+
+  /// Mahalanobis: factors on the standard deviations that odometry and closures come with. Larger
+  /// where these are known to be too small: what counts is what the sensors really do.
+  double odometry_noise_scale = 1.0;
+  double closure_noise_scale = 1.0;
+
+  /// Bounds: largest translation [m] and rotation [rad] of a consistent cycle.
+  double max_cycle_translation_m = 0.5;
+  double max_cycle_rotation_rad = 0.1;
+
+  /// Bounds: true multiplies them by the number of transforms in the cycle.
+  bool bounds_per_transform = false;
+
+  /// Closures inside one robot must agree with that robot's odometry alone. Wrong where odometry
+  /// jumps: such a closure is the correction.
+  bool odometry_gate = false;
+
+  /// A smaller consistent set is not trusted and not published.
+  int min_inliers = 3;
+
+  /// Bound on the search tree after one closure; beyond it the best set found so far is kept.
+  int max_search_nodes = 100000;
+
+  void visit_fields(auto& visitor) {
+    visitor.field(
+        "criterion", criterion,
+        {{"mahalanobis", CycleCriterion::kMahalanobis}, {"bounds", CycleCriterion::kBounds}},
+        "mahalanobis: by covariance; bounds: fixed");
+    visitor.field("confidence", confidence, {0.01, 1.0 - 1e-12}, "chi-squared, 6 dof");
+    visitor.field("odometry_noise_scale", odometry_noise_scale, {0.01, 1000.0},
+                  "on standard deviations");
+    visitor.field("closure_noise_scale", closure_noise_scale, {0.01, 1000.0},
+                  "on standard deviations");
+    visitor.field("max_cycle_translation_m", max_cycle_translation_m, {1e-6, 1000.0}, "[m]");
+    visitor.field("max_cycle_rotation_rad", max_cycle_rotation_rad, {1e-6, std::numbers::pi},
+                  "[rad]");
+    visitor.field("bounds_per_transform", bounds_per_transform, "times transforms in the cycle");
+    visitor.field("odometry_gate", odometry_gate, "closures inside one robot against its odometry");
+    visitor.field("min_inliers", min_inliers, {1, 1000}, "smaller sets are not trusted");
+    visitor.field("max_search_nodes", max_search_nodes, {1, 1000000000}, "per closure");
+  }
+};
+
+}  // namespace km

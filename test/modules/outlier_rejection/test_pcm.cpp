@@ -1,0 +1,181 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "modules/outlier_rejection/pcm.hpp"
+#include "test/modules/outlier_rejection/chain.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+// Two quarter turns, then four steps straight on.
+Chain hook() {
+  Chain chain(0);
+  for (int i = 0; i < 2; ++i) chain.step(rotz(kPi / 2, 1.0));
+  for (int i = 0; i < 4; ++i) chain.step(rotz(0.0, 1.0));
+  return chain;
+}
+
+PcmConfig per_transform(double translation_m, double rotation_rad) {
+  PcmConfig config;
+  config.criterion = CycleCriterion::kBounds;
+  config.bounds_per_transform = true;
+  config.max_cycle_translation_m = translation_m;
+  config.max_cycle_rotation_rad = rotation_rad;
+  config.min_inliers = 1;
+  return config;
+}
+
+std::vector<std::uint32_t> from_indices(const Pcm& pcm) {
+  std::vector<std::uint32_t> indices;
+  for (const ClosureId& id : pcm.inliers()) indices.push_back(id.from.index);
+  return indices;
+}
+
+TEST_CASE("Pairwise bounds on translation keep the older of two equal sets", "[pcm]") {
+  const Chain chain = hook();
+  Pcm pcm(0, 0, per_transform(0.05, kPi));
+  const auto add = [&](std::size_t from, double x, double y) {
+    return pcm.add(closure(chain.at(from), chain.at(0), rotz(kPi, x, y)));
+  };
+  CHECK(add(3, 0.0, 0.9) == PcmVerdict::kGrew);
+  CHECK(add(4, -0.9, 0.9) == PcmVerdict::kGrew);
+  CHECK(add(5, -1.9, 0.8) == PcmVerdict::kGrew);
+  // 0.256 / 5 = 0.0512 against closure 3: inconsistent, so {4, 5, 6} only ties with {3, 4, 5}.
+  CHECK(add(6, -2.8, 0.74) == PcmVerdict::kAdded);
+  CHECK(from_indices(pcm) == std::vector<std::uint32_t>{3, 4, 5});
+}
+
+TEST_CASE("Pairwise bounds on rotation keep the older of two equal sets", "[pcm]") {
+  const Chain chain = hook();
+  Pcm pcm(0, 0, per_transform(1000.0, 0.005));
+  const auto add = [&](std::size_t from, double angle, double x) {
+    return pcm.add(closure(chain.at(from), chain.at(0), rotz(angle, x, 1.0)));
+  };
+  CHECK(add(3, kPi, 0.0) == PcmVerdict::kGrew);
+  CHECK(add(4, 3.141, -1.0) == PcmVerdict::kGrew);
+  CHECK(add(5, 3.13, -2.0) == PcmVerdict::kGrew);
+  CHECK(add(6, 3.12, -3.0) == PcmVerdict::kAdded);  // 0.021 / 4 = 0.00525 against closure 4
+  CHECK(from_indices(pcm) == std::vector<std::uint32_t>{3, 4, 5});
+}
+
+// Half true closures with honest covariances, half random poses.
+std::vector<Closure> mixed_closures(const TwoRobots& robots, std::size_t count, std::mt19937& rng) {
+  std::uniform_int_distribution<std::size_t> pose(0, robots.a.size() - 1);
+  std::vector<Closure> closures;
+  for (std::size_t n = 0; n < count; ++n) {
+    const std::size_t i = pose(rng);
+    const std::size_t j = pose(rng);
+    closures.push_back(robots.measure(i, j, 0.02, rng));
+    if (n % 2 == 1) closures.back().T_from_to = random_pose(rng);
+  }
+  return closures;
+}
+
+TEST_CASE("PCM keeps the true closures among as many random ones", "[pcm]") {
+  const unsigned seed = GENERATE(range(0U, 10U));
+  const bool reverse_some = GENERATE(false, true);
+  CAPTURE(seed, reverse_some);
+  std::mt19937 rng(seed);
+  const TwoRobots robots(12, 3, 40, 0.01, rng);
+  std::vector<Closure> closures = mixed_closures(robots, 40, rng);
+  PcmConfig config;
+  config.confidence = 0.99999;  // 190 pairs of true closures: none may fail by chance
+  Pcm pcm(3, 12, config);
+  std::vector<ClosureId> truth;
+  for (std::size_t n = 0; n < closures.size(); ++n) {
+    if (reverse_some && n % 3 == 0) closures[n] = reversed(closures[n]);
+    if (pcm.add(closures[n]) == PcmVerdict::kRepeated) continue;
+    if (n % 2 == 0) truth.push_back(closures[n].id());
+  }
+  std::sort(truth.begin(), truth.end());
+  CHECK(pcm.inliers() == truth);
+  CHECK(pcm.proven());
+}
+
+TEST_CASE("A closure given twice counts once, one from each side twice", "[pcm]") {
+  std::mt19937 rng(1);
+  const TwoRobots robots(0, 1, 5, 0.01, rng);
+  PcmConfig config;
+  config.min_inliers = 1;
+  Pcm pcm(0, 1, config);
+  const Closure measured = robots.measure(2, 3, 0.02, rng);
+  CHECK(pcm.add(measured) == PcmVerdict::kGrew);
+  CHECK(pcm.add(measured) == PcmVerdict::kRepeated);
+  CHECK(pcm.add(reversed(measured)) == PcmVerdict::kGrew);
+  CHECK(pcm.inliers() == std::vector<ClosureId>{measured.id(), reversed(measured).id()});
+}
+
+TEST_CASE("Fewer closures than min_inliers are not handed out", "[pcm]") {
+  std::mt19937 rng(1);
+  const TwoRobots robots(0, 1, 5, 0.001, rng);
+  PcmConfig config;
+  config.min_inliers = 3;
+  config.confidence = 0.9999;
+  Pcm pcm(0, 1, config);
+  for (std::size_t n = 0; n < 3; ++n) {
+    CHECK(pcm.inliers().empty());
+    CHECK(pcm.add(robots.measure(n, n + 1, 0.001, rng)) == PcmVerdict::kGrew);
+  }
+  CHECK(pcm.inliers().size() == 3);
+}
+
+TEST_CASE("The odometry gate is for closures inside one robot, when asked for", "[pcm]") {
+  const Chain chain = hook();
+  PcmConfig config;
+  config.min_inliers = 1;
+  const Closure wrong = closure(chain.at(3), chain.at(0), rotz(kPi, 5.0, 5.0));
+  CHECK(Pcm(0, 0, config).add(wrong) == PcmVerdict::kGrew);
+  config.odometry_gate = true;
+  Pcm gated(0, 0, config);
+  CHECK(gated.add(wrong) == PcmVerdict::kAgainstOdometry);
+  CHECK(gated.add(wrong) == PcmVerdict::kRepeated);
+  CHECK(gated.add(closure(chain.at(4), chain.at(0), rotz(kPi, -1.0, 1.0))) == PcmVerdict::kGrew);
+  CHECK(gated.size() == 1);
+}
+
+TEST_CASE("PCM refuses closures it cannot weigh and keeps its state", "[pcm]") {
+  std::mt19937 rng(1);
+  const TwoRobots robots(0, 1, 5, 0.01, rng);
+  Pcm pcm(0, 1, PcmConfig{});
+  const Closure good = robots.measure(2, 3, 0.02, rng);
+  Closure bad = good;
+  SECTION("another pair") {
+    bad.to.id.robot = 2;
+  }
+  SECTION("inside one robot") {
+    bad.to.id.robot = 0;
+  }
+  SECTION("not finite") {
+    bad.T_from_to.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  }
+  SECTION("not a rotation") {
+    bad.from.T_odom_kf.linear() *= 1.1;
+  }
+  SECTION("a reflection") {
+    bad.from.T_odom_kf.linear().col(0) *= -1.0;
+  }
+  SECTION("not a covariance") {
+    bad.covariance(2, 2) = -1.0;
+  }
+  CHECK_THROWS_AS(pcm.add(bad), std::invalid_argument);
+  CHECK(pcm.size() == 0);
+  CHECK(pcm.add(good) == PcmVerdict::kGrew);
+}
+
+TEST_CASE("PCM refuses a configuration out of bounds", "[pcm]") {
+  PcmConfig config;
+  config.closure_noise_scale = std::nan("");
+  CHECK_THROWS_AS(Pcm(0, 1, config), ConfigError);
+  config = {};
+  config.confidence = 1.0;
+  CHECK_THROWS_AS(Pcm(0, 1, config), ConfigError);
+}
+
+}  // namespace
+}  // namespace km
