@@ -2,20 +2,9 @@
 
 #include <dds/dds.h>
 
-#include <optional>
-#include <utility>
+#include "runtime/dds/decoded.hpp"
 
 namespace km {
-
-/// Result of decoding untrusted bytes: a value, or why there is none (a string literal).
-template <typename T>
-struct [[nodiscard]] Decoded {
-  std::optional<T> value;
-  const char* refusal = nullptr;
-
-  static Decoded accept(T decoded) { return {std::move(decoded), nullptr}; }
-  static Decoded refuse(const char* why) { return {std::nullopt, why}; }
-};
 
 /// How messages of type T travel between robots. Specialised by the module that owns T, in its
 /// <module>_codec.hpp:
@@ -31,8 +20,9 @@ struct [[nodiscard]] Decoded {
 ///         Wire wire{};
 ///         std::vector<km_wire_ClosureRef> closures;
 ///       };
-///       static Encoded encode(const InlierSet&);        // all but wire.header: the writer fills it
-///       static Decoded<InlierSet> decode(const Wire&);  // trusts nothing; header already checked
+///       static Encoded encode(const InlierSet&);        // all but wire.header: the writer fills
+///       it static Decoded<InlierSet> decode(const Wire&);  // trusts nothing; header already
+///       checked
 ///     };
 template <typename T>
 struct Codec;

@@ -1,0 +1,114 @@
+#include "runtime/dds/bridge.hpp"
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+
+#include "runtime/log.hpp"
+#include "runtime/thread_name.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kSendQueue = 8192;
+constexpr std::chrono::seconds kAcknowledgementTime{2};
+constexpr dds_duration_t kWakeUp = DDS_MSECS(250);  // for what only time tells
+
+// Attachment numbers of the wait set; incoming topics follow.
+constexpr dds_attach_t kOther = 0;
+constexpr dds_attach_t kFirstTopic = 1;
+
+double steady_now_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+}  // namespace
+
+DdsBridge::DdsBridge(const DdsParticipant& participant)
+    : participant_(participant),
+      peers_(participant),
+      waitset_(dds_create_waitset(participant.handle()), "wait set"),
+      stop_request_(dds_create_guardcondition(participant.handle()), "guard condition"),
+      sender_(
+          kSendQueue, Overflow::kBlock, [](const Job& job) { job(); }, "dds_send") {
+  for (const dds_entity_t condition :
+       {stop_request_.handle(), peers_.discovery_condition(), peers_.liveliness_condition()})
+    check_dds(dds_waitset_attach(waitset_.handle(), condition, kOther), "cannot wait");
+}
+
+DdsBridge::~DdsBridge() {
+  stop();
+}
+
+OutgoingTopic& DdsBridge::add_outgoing(TopicSpec spec) {
+  outgoing_.push_back(std::make_unique<OutgoingTopic>(participant_, peers_, std::move(spec)));
+  return *outgoing_.back();
+}
+
+void DdsBridge::add_incoming(TopicSpec spec, bool addressed, IncomingTopic::HeaderOf header_of,
+                             IncomingTopic::Handler handler) {
+  incoming_.push_back(std::make_unique<IncomingTopic>(participant_, peers_, std::move(spec),
+                                                      addressed, header_of, std::move(handler)));
+  const auto number = kFirstTopic + static_cast<dds_attach_t>(incoming_.size() - 1);
+  check_dds(dds_waitset_attach(waitset_.handle(), incoming_.back()->condition(), number),
+            "cannot wait");
+}
+
+TrafficSnapshot DdsBridge::traffic() const {
+  TrafficSnapshot snapshot;
+  for (const auto& topic : outgoing_) topic->add_to(snapshot);
+  for (const auto& topic : incoming_) topic->add_to(snapshot);
+  return snapshot;
+}
+
+void DdsBridge::start() {
+  sender_.start();
+  receiver_ = std::thread(&DdsBridge::receive_until_stopped, this);
+}
+
+void DdsBridge::stop() noexcept {
+  if (std::exchange(stopped_, true)) return;
+  sender_.stop();
+  if (!receiver_.joinable()) return;
+  await_acknowledgements();
+  dds_set_guardcondition(stop_request_.handle(), true);
+  receiver_.join();
+}
+
+std::exception_ptr DdsBridge::error() const {
+  return receive_failed_ ? receive_error_ : sender_.error();
+}
+
+void DdsBridge::receive_until_stopped() try {
+  name_this_thread("dds_receive");
+  std::vector<dds_attach_t> triggered(incoming_.size() + 3);
+  bool stop = false;
+  while (!stop) {
+    const dds_return_t count =
+        check_dds(dds_waitset_wait(waitset_.handle(), triggered.data(), triggered.size(), kWakeUp),
+                  "cannot wait for messages");
+    dds_read_guardcondition(stop_request_.handle(), &stop);
+    // Who is there comes before what they say.
+    const double now_s = steady_now_s();
+    peers_.poll(now_s);
+    const auto n = std::min(triggered.size(), static_cast<std::size_t>(count));
+    for (std::size_t i = 0; i < n; ++i)
+      if (triggered[i] >= kFirstTopic)
+        incoming_[static_cast<std::size_t>(triggered[i] - kFirstTopic)]->take(now_s);
+  }
+} catch (...) {
+  receive_error_ = std::current_exception();
+  receive_failed_ = true;  // after receive_error_: publishes it
+}
+
+void DdsBridge::await_acknowledgements() noexcept {
+  const auto deadline = std::chrono::steady_clock::now() + kAcknowledgementTime;
+  bool complete = true;
+  for (const auto& topic : outgoing_) {
+    const auto left = deadline - std::chrono::steady_clock::now();
+    complete &= topic->wait_for_acks(std::max(left, decltype(left)::zero()));
+  }
+  if (!complete) log::warn("dds") << "closing before every peer has acknowledged every message";
+}
+
+}  // namespace km

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <dds/dds.h>
+
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace km {
+
+/// A call into DDS that failed. what() names the call's purpose and DDS's reason.
+struct DdsError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Returns `result`, a handle or a count, or throws DdsError if it is an error code.
+inline dds_return_t check_dds(dds_return_t result, const std::string& purpose) {
+  if (result < 0) throw DdsError(purpose + ": " + dds_strretcode(result));
+  return result;
+}
+
+/// Owns a DDS entity and with it, as DDS has it, the entity's children.
+class DdsEntity {
+ public:
+  DdsEntity() = default;
+  /// Takes what a dds_create_* call returned. Throws DdsError if that is an error.
+  DdsEntity(dds_entity_t created, const std::string& purpose)
+      : handle_(check_dds(created, "cannot create " + purpose)) {}
+  ~DdsEntity() { reset(); }
+  DdsEntity(DdsEntity&& other) noexcept : handle_(std::exchange(other.handle_, 0)) {}
+  DdsEntity& operator=(DdsEntity&& other) noexcept {
+    if (this != &other) {
+      reset();
+      handle_ = std::exchange(other.handle_, 0);
+    }
+    return *this;
+  }
+
+  [[nodiscard]] dds_entity_t handle() const { return handle_; }
+  void reset() noexcept {
+    if (handle_ > 0) dds_delete(handle_);
+    handle_ = 0;
+  }
+
+ private:
+  dds_entity_t handle_ = 0;
+};
+
+struct DdsQosDeleter {
+  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
+};
+using DdsQos = std::unique_ptr<dds_qos_t, DdsQosDeleter>;
+
+inline DdsQos make_dds_qos() {
+  return DdsQos(dds_create_qos());
+}
+
+}  // namespace km

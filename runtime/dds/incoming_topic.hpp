@@ -1,0 +1,71 @@
+#pragma once
+
+#include <dds/ddsi/ddsi_serdata.h>
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "runtime/dds/outgoing_topic.hpp"
+#include "runtime/dds/sequence_tracker.hpp"
+
+namespace km {
+
+/// The receiving end of a topic. Everything that arrives is untrusted: what is not from an
+/// accepted peer, not new, or not decodable is counted by reason, logged at a limited rate, and
+/// goes no further. take() belongs to the receive thread; add_to() is thread-safe.
+class IncomingTopic {
+ public:
+  /// Gets a sample of the topic's C type; publishes it, or returns why not (a string literal).
+  using Handler = std::function<const char*(const void* wire)>;
+  /// The header inside a sample of the topic's C type.
+  using HeaderOf = const km_wire_Header& (*)(const void* wire);
+
+  /// `addressed`: takes only what is sent to this robot alone, else only what is sent to all.
+  IncomingTopic(const DdsParticipant& participant, Peers& peers, TopicSpec spec, bool addressed,
+                HeaderOf header_of, Handler handler);
+
+  /// Triggers while there is something to take.
+  [[nodiscard]] dds_entity_t condition() const { return condition_.handle(); }
+
+  /// Handles everything there is.
+  void take(double now_s);
+
+  void add_to(TrafficSnapshot& snapshot) const;
+
+ private:
+  using Stream = std::pair<RobotId, std::uint64_t>;  // robot and boot
+
+  void handle(const ddsi_serdata& serialized, dds_instance_handle_t writer, double now_s);
+  const char* accept(const void* wire, std::uint64_t size, dds_instance_handle_t writer,
+                     double now_s);
+  const char* check_sender(const km_wire_Header& header, dds_instance_handle_t writer,
+                           double now_s);
+  std::optional<Guid> participant_of(dds_instance_handle_t writer);
+  bool is_new(const km_wire_Header& header);
+
+  const DdsParticipant& participant_;
+  Peers& peers_;
+  TopicSpec spec_;
+  HeaderOf header_of_;
+  Handler handler_;
+  std::vector<std::max_align_t> sample_;                         // one C sample, reused
+  std::map<dds_instance_handle_t, Guid> participant_of_writer_;  // receive thread only
+
+  mutable std::mutex mutex_;  // guards the counts
+  std::map<Stream, SequenceTracker> streams_;
+  std::map<RobotId, TrafficCount> from_;
+  std::uint64_t duplicates_ = 0;
+  std::map<std::string, std::uint64_t> refused_;
+
+  DdsEntity topic_;
+  DdsEntity subscriber_;
+  DdsEntity reader_;
+  DdsEntity condition_;
+};
+
+}  // namespace km

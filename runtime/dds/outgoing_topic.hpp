@@ -1,0 +1,76 @@
+#pragma once
+
+#include <dds/ddsc/dds_statistics.h>
+
+#include <chrono>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common.h"
+#include "runtime/dds/entity.hpp"
+#include "runtime/dds/participant.hpp"
+#include "runtime/dds/peers.hpp"
+#include "runtime/dds/topic_kind.hpp"
+#include "runtime/dds/traffic.hpp"
+
+namespace km {
+
+/// A topic between robots as DDS knows it.
+struct TopicSpec {
+  std::string name;
+  const dds_topic_descriptor_t* descriptor = nullptr;
+  TopicKind kind = TopicKind::kEvent;
+  TrafficCategory category = TrafficCategory::kOther;
+};
+
+/// DDS partition in which the messages to one robot travel.
+[[nodiscard]] std::string partition_of(RobotId robot);
+
+/// The sending end of a topic. Messages to all robots go through one writer; each robot addressed
+/// gets a writer of its own, in its own partition, so that nobody else is sent its bytes.
+/// write() belongs to one thread; add_to() is thread-safe.
+class OutgoingTopic {
+ public:
+  OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec);
+
+  /// Fills the rest of `header`, which is part of the sample `wire`, and writes to robot `to`, or
+  /// to all. Messages are numbered per writer. What DDS refuses is counted and logged.
+  void write(std::optional<RobotId> to, km_wire_Header& header, const void* wire);
+
+  /// Waits until every matched reader has everything. False on timeout.
+  bool wait_for_acks(std::chrono::nanoseconds timeout);
+
+  void add_to(TrafficSnapshot& snapshot) const;
+
+ private:
+  struct StatisticsDeleter {
+    void operator()(dds_statistics* statistics) const { dds_delete_statistics(statistics); }
+  };
+  struct Writer {
+    DdsEntity publisher;
+    DdsEntity writer;
+    std::unique_ptr<dds_statistics, StatisticsDeleter> statistics;
+    std::uint32_t next_number = 0;
+    std::vector<Guid> readers;  // participants of those matched
+    TrafficCount written;
+    std::uint64_t failures = 0;
+    std::map<Guid, TrafficCount> sent_to;
+  };
+
+  Writer& writer_to(std::optional<RobotId> to);
+  static void refresh_readers(Writer& writer);
+  static std::uint64_t retransmitted_bytes(const Writer& writer);
+
+  const DdsParticipant& participant_;
+  const Peers& peers_;
+  TopicSpec spec_;
+  DdsEntity topic_;
+  mutable std::mutex mutex_;  // guards the map and all counts; never held while writing
+  std::map<std::optional<RobotId>, Writer> writers_;
+};
+
+}  // namespace km

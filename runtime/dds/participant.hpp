@@ -1,0 +1,47 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "runtime/dds/dds_config.hpp"
+#include "runtime/dds/entity.hpp"
+#include "runtime/dds/network_interface.hpp"
+#include "runtime/dds/robot_identity.hpp"
+
+namespace km {
+
+/// A DDS domain configured for one link. DDS allows one configuration per domain and process, so
+/// two of these with the same domain number cannot exist at once.
+class DdsDomain {
+ public:
+  /// Throws ConfigError for an unusable `config`, DdsError if DDS refuses it.
+  explicit DdsDomain(const DdsConfig& config);
+
+  [[nodiscard]] const DdsConfig& config() const { return config_; }
+  [[nodiscard]] const NetworkInterface& interface() const { return interface_; }
+
+ private:
+  DdsConfig config_;
+  NetworkInterface interface_;
+  DdsEntity domain_;
+};
+
+/// A robot's presence on the network: one per robot, whatever the number of its topics.
+class DdsParticipant {
+ public:
+  /// Creates the domain as well: the case of one robot per process.
+  DdsParticipant(const DdsConfig& config, const RobotIdentity& identity);
+  /// Joins a domain that several robots of one process share (tests).
+  DdsParticipant(std::shared_ptr<const DdsDomain> domain, const RobotIdentity& identity);
+
+  [[nodiscard]] const RobotIdentity& identity() const { return identity_; }
+  [[nodiscard]] const DdsConfig& config() const { return domain_->config(); }
+  [[nodiscard]] dds_entity_t handle() const { return participant_.handle(); }
+
+ private:
+  std::shared_ptr<const DdsDomain> domain_;  // outlives the participant
+  RobotIdentity identity_;
+  DdsEntity participant_;
+};
+
+}  // namespace km

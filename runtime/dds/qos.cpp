@@ -1,0 +1,48 @@
+#include "runtime/dds/qos.hpp"
+
+#include <cmath>
+
+namespace km {
+
+const char* to_string(TrafficCategory category) {
+  switch (category) {
+    case TrafficCategory::kPlaceRecognition:
+      return "place_recognition";
+    case TrafficCategory::kGeometricVerification:
+      return "geometric_verification";
+    case TrafficCategory::kPoseGraphOptimization:
+      return "pgo";
+    case TrafficCategory::kOther:
+      break;
+  }
+  return "other";
+}
+
+DdsQos make_topic_qos(TopicKind kind, const DdsConfig& config) {
+  DdsQos owner = make_dds_qos();
+  dds_qos_t* qos = owner.get();
+  dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, 1);
+  dds_qset_writer_data_lifecycle(qos, false);  // an orderly exit takes nothing back
+  dds_qset_ignorelocal(qos, DDS_IGNORELOCAL_PARTICIPANT);
+
+  if (kind == TopicKind::kStatus) {
+    dds_qset_reliability(qos, DDS_RELIABILITY_BEST_EFFORT, 0);
+    dds_qset_durability(qos, DDS_DURABILITY_VOLATILE);
+    dds_qset_liveliness(qos, DDS_LIVELINESS_AUTOMATIC,
+                        static_cast<dds_duration_t>(std::llround(config.liveliness_s * 1e9)));
+    return owner;
+  }
+
+  dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
+  if (kind == TopicKind::kRequest) {
+    dds_qset_durability(qos, DDS_DURABILITY_VOLATILE);
+  } else {
+    dds_qset_durability(qos, DDS_DURABILITY_TRANSIENT_LOCAL);
+    // The history kept for robots that join later is this one, not the one above.
+    dds_qset_durability_service(qos, 0, DDS_HISTORY_KEEP_LAST, 1, DDS_LENGTH_UNLIMITED,
+                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+  }
+  return owner;
+}
+
+}  // namespace km

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "modules/core/ids.hpp"
+#include "runtime/dds/topic_kind.hpp"
+
+namespace km {
+
+enum class Direction { kOut, kIn };
+
+/// Messages and their serialized bytes, DDS's 4-byte encoding header included; RTPS, UDP and IP
+/// headers are not.
+struct TrafficCount {
+  std::uint64_t messages = 0;
+  std::uint64_t bytes = 0;
+
+  void add(std::uint64_t size) {
+    ++messages;
+    bytes += size;
+  }
+  bool operator==(const TrafficCount&) const = default;
+};
+
+/// Traffic of one topic with one peer since the start.
+struct PeerTraffic {
+  std::string topic;
+  TrafficCategory category = TrafficCategory::kOther;
+  Direction direction = Direction::kOut;
+  std::optional<RobotId> peer;  ///< Empty: a reader that is no robot of the team, or all peers.
+  TrafficCount count;           ///< Out: once per reader matched when it was written.
+  std::uint64_t retransmitted_bytes = 0;  ///< Out only; of a topic to all it has no single peer.
+};
+
+/// What happened on one topic in one direction since the start.
+struct TopicTraffic {
+  std::string topic;
+  TrafficCategory category = TrafficCategory::kOther;
+  Direction direction = Direction::kOut;
+  TrafficCount count;            ///< Out: once per message. In: new messages that were accepted.
+  std::uint64_t duplicates = 0;  ///< In: arrived before.
+  std::uint64_t missing = 0;     ///< In: numbers that have not arrived (yet).
+  std::uint64_t failures = 0;    ///< Out: refused by DDS.
+  std::map<std::string, std::uint64_t> refused;  ///< In: by reason.
+};
+
+struct TrafficSnapshot {
+  std::vector<PeerTraffic> peers;
+  std::vector<TopicTraffic> topics;
+
+  /// Bytes of a category, over all topics and peers; sent ones with their retransmissions.
+  [[nodiscard]] std::uint64_t bytes(Direction direction, TrafficCategory category) const;
+};
+
+/// Writes traffic.csv: cumulative counts over time, a row whenever one has changed. Columns:
+/// time_s, direction, topic, category, peer ("*" where it has no single one), messages, bytes,
+/// retransmitted_bytes.
+class TrafficCsv {
+ public:
+  /// Writes the header line. `output` outlives this.
+  explicit TrafficCsv(std::ostream& output);
+  void append(double time_s, const TrafficSnapshot& snapshot);
+
+ private:
+  std::ostream& output_;
+  using Key = std::tuple<std::string, Direction, std::optional<RobotId>>;
+  std::map<Key, std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>> written_;
+};
+
+}  // namespace km

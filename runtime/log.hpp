@@ -1,0 +1,85 @@
+#pragma once
+
+#include <map>
+#include <ostream>
+#include <sstream>
+#include <string>
+#include <string_view>
+
+namespace km {
+
+/// Lets a message of a kind through at most once per interval, and counts what it held back.
+/// Memory is bounded. Not thread-safe.
+class RateLimit {
+ public:
+  explicit RateLimit(double interval_s) : interval_s_(interval_s) {}
+
+  struct Verdict {
+    bool pass = false;
+    int held_back = 0;  ///< Since the last one that passed, if this one does.
+  };
+  Verdict ask(const std::string& key, double now_s);
+
+ private:
+  struct Entry {
+    double last_s = 0.0;
+    int held_back = 0;
+  };
+  double interval_s_;
+  std::map<std::string, Entry, std::less<>> entries_;
+};
+
+namespace log {
+
+enum class Level { kError, kWarn, kInfo, kDebug };
+
+/// One line, written as a whole when it goes out of scope: "12:00:01.123 warn pcm: text".
+class Line {
+ public:
+  Line(Level level, std::string_view tag);
+  /// `key` limits the rate: see limited().
+  Line(Level level, std::string_view tag, std::string key);
+  ~Line();
+  Line(const Line&) = delete;
+  Line& operator=(const Line&) = delete;
+
+  template <typename T>
+  Line& operator<<(const T& value) {
+    if (enabled_) text_ << value;
+    return *this;
+  }
+
+ private:
+  Level level_;
+  std::string tag_;
+  std::string key_;
+  bool enabled_;
+  std::ostringstream text_;
+};
+
+inline Line error(std::string_view tag) {
+  return {Level::kError, tag};
+}  ///< The run is compromised.
+inline Line warn(std::string_view tag) {
+  return {Level::kWarn, tag};
+}  ///< Data lost or refused.
+inline Line info(std::string_view tag) {
+  return {Level::kInfo, tag};
+}  ///< A few per minute.
+inline Line debug(std::string_view tag) {
+  return {Level::kDebug, tag};
+}
+
+/// At most one line per `key` in 5 s; the next one says how many were held back.
+inline Line limited(Level level, std::string_view tag, std::string key) {
+  return {level, tag, std::move(key)};
+}
+
+/// Lines less important than `level` are dropped. Default kInfo. Thread-safe.
+void set_level(Level level);
+
+/// Where lines go, std::cerr by default; returns where they went. For tests.
+std::ostream* set_output(std::ostream* output);
+
+}  // namespace log
+}  // namespace km

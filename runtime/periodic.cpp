@@ -1,0 +1,50 @@
+#include "runtime/periodic.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "runtime/thread_name.hpp"
+
+namespace km {
+
+Periodic::Periodic(Duration period, std::function<void()> tick, std::string name)
+    : period_(period), tick_(std::move(tick)), name_(std::move(name)) {
+  if (period <= Duration::zero()) throw std::invalid_argument("Periodic: period is not positive");
+}
+
+void Periodic::start() {
+  thread_ = std::thread(&Periodic::run, this);
+}
+
+void Periodic::stop() noexcept {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  wake_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+std::exception_ptr Periodic::error() const {
+  const std::lock_guard lock(mutex_);
+  return error_;
+}
+
+void Periodic::run() try {
+  name_this_thread(name_);
+  auto next = std::chrono::steady_clock::now();
+  std::unique_lock lock(mutex_);
+  while (!stop_) {
+    lock.unlock();
+    tick_();
+    lock.lock();
+    next = std::max(next + period_, std::chrono::steady_clock::now());
+    wake_.wait_until(lock, next, [this] { return stop_; });
+  }
+} catch (...) {
+  const std::lock_guard lock(mutex_);
+  error_ = std::current_exception();
+}
+
+}  // namespace km

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+
+namespace km {
+
+/// Calls `tick` on its own thread at a fixed rate, at once when stopped never again. A tick that
+/// takes too long delays the following ones; missed ones are not made up for. `tick` should post
+/// into a worker rather than compute.
+class Periodic {
+ public:
+  using Duration = std::chrono::steady_clock::duration;
+
+  /// Throws std::invalid_argument unless `period` is positive.
+  Periodic(Duration period, std::function<void()> tick, std::string name = {});
+  ~Periodic() { stop(); }
+  Periodic(const Periodic&) = delete;
+  Periodic& operator=(const Periodic&) = delete;
+
+  /// The first tick comes at once. Call once.
+  void start();
+
+  /// Waits for a tick that is running. Idempotent. Not callable from the tick.
+  void stop() noexcept;
+
+  /// The exception that ended the thread, or null. Thread-safe.
+  std::exception_ptr error() const;
+
+ private:
+  void run();
+
+  const Duration period_;
+  const std::function<void()> tick_;
+  const std::string name_;
+  mutable std::mutex mutex_;  // guards what follows
+  std::condition_variable wake_;
+  bool stop_ = false;
+  std::exception_ptr error_;
+  std::thread thread_;
+};
+
+}  // namespace km

@@ -1,0 +1,135 @@
+#pragma once
+
+#include <unistd.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "runtime/dds/bridge.hpp"
+#include "runtime/dds/robot_status.hpp"
+#include "runtime/dds/robot_status_codec.hpp"
+#include "runtime/dds/robot_status_node.hpp"
+#include "test/runtime/dds/ping.hpp"
+
+namespace km {
+
+/// Upper bound on anything a test waits for: only a failing test takes that long.
+inline constexpr std::chrono::seconds kPatience{20};
+
+/// Loopback, a domain and a team of this process alone: tests that run side by side never meet.
+inline DdsConfig loopback_config() {
+  static int count = 0;
+  DdsConfig config;
+  config.domain = static_cast<int>((static_cast<unsigned>(getpid()) * 7919U) % 200U) + 1;
+  config.team = "test-" + std::to_string(getpid()) + '-' + std::to_string(++count);
+  config.interface = "lo";
+  config.spdp_interval_s = 0.2;
+  return config;
+}
+
+/// Collects what a topic publishes; one may wait for it. Thread-safe.
+template <typename T>
+class Inbox {
+ public:
+  explicit Inbox(Topic<T>& topic) {
+    topic.subscribe([this](const std::shared_ptr<const T>& message) {
+      const std::lock_guard lock(mutex_);
+      messages_.push_back(*message);
+      changed_.notify_all();
+    });
+  }
+
+  /// Waits until there are `count` messages; all there are by then.
+  std::vector<T> wait_for(std::size_t count) {
+    return wait_until([count](const std::vector<T>& messages) { return messages.size() >= count; });
+  }
+  std::vector<T> wait_until(const std::function<bool(const std::vector<T>&)>& enough) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, kPatience, [&] { return enough(messages_); });
+    return messages_;
+  }
+  std::vector<T> messages() {
+    const std::lock_guard lock(mutex_);
+    return messages_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<T> messages_;
+};
+
+/// A robot that does nothing but talk: status, pings to all, pings to one.
+struct TestRobot {
+  explicit TestRobot(std::shared_ptr<const DdsDomain> domain, RobotId id,
+                     TopicKind ping_kind = TopicKind::kEvent,
+                     std::uint16_t protocol = kProtocolVersion)
+      : participant(std::move(domain),
+                    {id, "robot" + std::to_string(id), protocol, random_boot_id()}),
+        bridge(participant),
+        status([id] { return RobotStatus{.robot = id, .name = "robot" + std::to_string(id)}; },
+               status_out, status_in),
+        peer_events(bridge.peers().events()),
+        received(pings_in),
+        received_addressed(addressed_in) {
+    bridge.send(status_out, TopicKind::kStatus, TrafficCategory::kOther);
+    bridge.receive(status_in, TopicKind::kStatus, TrafficCategory::kOther);
+    bridge.send(pings_out, ping_kind, TrafficCategory::kPlaceRecognition);
+    bridge.receive(pings_in, ping_kind, TrafficCategory::kPlaceRecognition);
+    bridge.send(addressed_out, ping_kind, TrafficCategory::kGeometricVerification);
+    bridge.receive_addressed(addressed_in, ping_kind, TrafficCategory::kGeometricVerification);
+  }
+  ~TestRobot() { stop(); }
+
+  void start() {
+    bridge.start();
+    status.start();
+  }
+  void stop() {
+    status.stop();
+    bridge.stop();
+  }
+  RobotId id() const { return participant.identity().robot; }
+  void ping(std::uint32_t index, std::vector<std::uint8_t> payload = {}) {
+    pings_out.publish({id(), index, std::move(payload)});
+  }
+  void ping_one(RobotId to, std::uint32_t index, std::vector<std::uint8_t> payload = {}) {
+    addressed_out.publish(
+        {to, std::make_shared<const Ping>(Ping{id(), index, std::move(payload)})});
+  }
+  static std::size_t matching(const std::vector<PeerEvent>& events, PeerEventKind kind,
+                              RobotId robot) {
+    std::size_t found = 0;
+    for (const PeerEvent& event : events)
+      found += event.kind == kind && event.identity.robot == robot ? 1 : 0;
+    return found;
+  }
+  /// True once there have been `count` such events.
+  bool hears(PeerEventKind kind, RobotId robot, std::size_t count = 1) {
+    const auto events =
+        peer_events.wait_until([&](const auto& e) { return matching(e, kind, robot) >= count; });
+    return matching(events, kind, robot) >= count;
+  }
+  TopicTraffic traffic(const std::string& topic, Direction direction, TrafficCategory category) {
+    for (const TopicTraffic& t : bridge.traffic().topics)
+      if (t.topic == topic && t.direction == direction && t.category == category) return t;
+    return {};
+  }
+
+  DdsParticipant participant;
+  Topic<RobotStatus> status_out, status_in;
+  Topic<Ping> pings_out, pings_in, addressed_in;
+  Topic<Addressed<Ping>> addressed_out;
+  DdsBridge bridge;
+  RobotStatusNode status;
+  Inbox<PeerEvent> peer_events;
+  Inbox<Ping> received, received_addressed;
+};
+
+}  // namespace km
