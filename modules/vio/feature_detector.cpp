@@ -1,0 +1,154 @@
+#include "modules/vio/feature_detector.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/features2d.hpp>
+
+namespace km {
+namespace {
+
+constexpr int kRimPx = 8;             // Windows of corners nearer to the rim would hang over it.
+constexpr int kScoreRadius = 3;       // Window of the gradient matrix: 7 x 7.
+constexpr float kMinScore = 6.0F;     // Smaller eigenvalue, (grey levels per px)^2 in the mean.
+constexpr int kStrongThreshold = 35;  // FAST threshold tried first.
+
+// Smaller eigenvalue of the mean gradient matrix around `px`.
+float shi_tomasi_score(const cv::Mat& derivatives, const cv::Point2i& px) {
+  int xx = 0;
+  int xy = 0;
+  int yy = 0;
+  for (int y = px.y - kScoreRadius; y <= px.y + kScoreRadius; ++y) {
+    const short* row = derivatives.ptr<short>(y) + 2 * (px.x - kScoreRadius);
+    for (int i = 0; i <= 2 * kScoreRadius; ++i) {
+      const int dx = row[2 * i];
+      const int dy = row[2 * i + 1];
+      xx += dx * dx >> 5;  // 49 sums of 13-bit squares would not fit into 31 bits.
+      xy += dx * dy >> 5;
+      yy += dy * dy >> 5;
+    }
+  }
+  constexpr int kPixels = (2 * kScoreRadius + 1) * (2 * kScoreRadius + 1);
+  constexpr float kUnit = 32.0F / (32.0F * 32.0F * static_cast<float>(kPixels));
+  const float a = static_cast<float>(xx) * kUnit;
+  const float b = static_cast<float>(xy) * kUnit;
+  const float c = static_cast<float>(yy) * kUnit;
+  return 0.5F * (a + c - std::sqrt((a - c) * (a - c) + 4.0F * b * b));
+}
+
+// Points in square buckets of side `distance`, so that all within `distance` of a place are in the
+// nine buckets around it.
+class DistanceGrid {
+ public:
+  DistanceGrid(const cv::Size& size, float distance)
+      : distance_(distance),
+        columns_(static_cast<int>(static_cast<float>(size.width) / distance) + 1),
+        rows_(static_cast<int>(static_cast<float>(size.height) / distance) + 1),
+        buckets_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_)) {}
+
+  void add(const Eigen::Vector2f& px) { buckets_[index(column(px), row(px))].push_back(px); }
+
+  [[nodiscard]] bool is_free(const Eigen::Vector2f& px) const {
+    for (int r = std::max(row(px) - 1, 0); r <= std::min(row(px) + 1, rows_ - 1); ++r) {
+      for (int c = std::max(column(px) - 1, 0); c <= std::min(column(px) + 1, columns_ - 1); ++c) {
+        for (const Eigen::Vector2f& other : buckets_[index(c, r)]) {
+          if ((other - px).squaredNorm() < distance_ * distance_) return false;
+        }
+      }
+    }
+    return true;
+  }
+
+ private:
+  [[nodiscard]] int column(const Eigen::Vector2f& px) const {
+    return std::clamp(static_cast<int>(px.x() / distance_), 0, columns_ - 1);
+  }
+  [[nodiscard]] int row(const Eigen::Vector2f& px) const {
+    return std::clamp(static_cast<int>(px.y() / distance_), 0, rows_ - 1);
+  }
+  [[nodiscard]] std::size_t index(int column, int row) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+           static_cast<std::size_t>(column);
+  }
+
+  float distance_;
+  int columns_;
+  int rows_;
+  std::vector<std::vector<Eigen::Vector2f>> buckets_;
+};
+
+// FAST corners of `cell`, found in it and the ring of pixels that the circle test reads around it.
+std::vector<cv::Point2i> fast_corners(const cv::Mat& image, const cv::Rect& cell, int threshold) {
+  constexpr int kRing = 4;  // Radius 3, and one more for the non-maximum suppression.
+  const cv::Rect window(cell.x - kRing, cell.y - kRing, cell.width + 2 * kRing,
+                        cell.height + 2 * kRing);
+  std::vector<cv::KeyPoint> corners;
+  cv::FAST(image(window), corners, threshold, true);
+  std::vector<cv::Point2i> result;
+  for (const cv::KeyPoint& corner : corners) {
+    const cv::Point2i px = cv::Point2i(corner.pt) + window.tl();
+    if (cell.contains(px)) result.push_back(px);
+  }
+  return result;
+}
+
+}  // namespace
+
+void FeatureDetector::add_corners_of(const cv::Rect& cell, int features_there,
+                                     const ImagePyramid& image) {
+  std::vector<Candidate> found;
+  for (const int threshold :
+       {std::max(kStrongThreshold, config_.fast_threshold), config_.fast_threshold}) {
+    for (const cv::Point2i& px : fast_corners(image.level(0), cell, threshold)) {
+      const float score = shi_tomasi_score(image.derivatives(), px);
+      if (score >= kMinScore) found.push_back({px, score, 0});
+    }
+    if (!found.empty()) break;
+  }
+  std::sort(found.begin(), found.end(), Candidate::better);
+  for (Candidate& candidate : found) candidate.rank = features_there++;
+  candidates_.insert(candidates_.end(), found.begin(), found.end());
+}
+
+std::vector<Eigen::Vector2f> FeatureDetector::detect(const ImagePyramid& image,
+                                                     std::span<const Eigen::Vector2f> occupied,
+                                                     int count) {
+  std::vector<Eigen::Vector2f> result;
+  const cv::Size size = image.level(0).size();
+  const cv::Rect inside(kRimPx, kRimPx, size.width - 2 * kRimPx, size.height - 2 * kRimPx);
+  if (count <= 0 || inside.width <= 0 || inside.height <= 0) return result;
+
+  // One cell for each feature wanted.
+  const int side = std::max(8, static_cast<int>(std::sqrt(inside.area() / config_.max_features)));
+  const int columns = (inside.width + side - 1) / side;
+  const int rows = (inside.height + side - 1) / side;
+  std::vector<int> features(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), 0);
+  DistanceGrid grid(size, static_cast<float>(config_.min_distance_px));
+  for (const Eigen::Vector2f& px : occupied) {
+    grid.add(px);
+    const int column = std::clamp((static_cast<int>(px.x()) - kRimPx) / side, 0, columns - 1);
+    const int row = std::clamp((static_cast<int>(px.y()) - kRimPx) / side, 0, rows - 1);
+    ++features[static_cast<std::size_t>(row * columns + column)];
+  }
+
+  candidates_.clear();
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      const cv::Rect cell =
+          cv::Rect(kRimPx + column * side, kRimPx + row * side, side, side) & inside;
+      const int there = features[static_cast<std::size_t>(row * columns + column)];
+      if (there < kMaxInCell) add_corners_of(cell, there, image);
+    }
+  }
+  std::sort(candidates_.begin(), candidates_.end(), Candidate::earlier);
+  for (const Candidate& candidate : candidates_) {
+    if (static_cast<int>(result.size()) == count) break;
+    const Eigen::Vector2f px(static_cast<float>(candidate.px.x),
+                             static_cast<float>(candidate.px.y));
+    if (!grid.is_free(px)) continue;
+    grid.add(px);
+    result.push_back(px);
+  }
+  return result;
+}
+
+}  // namespace km

@@ -1,0 +1,274 @@
+#include "modules/vio/feature_tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "modules/vio/klt.hpp"
+#include "modules/vio/stereo_motion.hpp"
+#include "modules/vio/two_point_ransac.hpp"
+
+namespace km {
+namespace {
+
+constexpr float kMinSpacing = 0.4F;  // Of min_distance_px: tracks may come nearer than corners.
+constexpr double kMaxInverseDepth = 20.0;  // [1/m]; a carried depth beyond is no use.
+
+void check_rig(const StereoRig& rig) {
+  for (const PinholeCamera& camera : rig.cameras) {
+    if (camera.width > 0 && camera.height > 0 && camera.fx > 0.0 && camera.fy > 0.0) continue;
+    throw std::invalid_argument("FeatureTracker: a camera of " + std::to_string(camera.width) +
+                                " x " + std::to_string(camera.height) + " px with focal lengths " +
+                                std::to_string(camera.fx) + ", " + std::to_string(camera.fy));
+  }
+}
+
+void check_image(const GrayImage& image, const PinholeCamera& camera, const char* side) {
+  const auto pixels =
+      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  if (image.width == camera.width && image.height == camera.height &&
+      image.pixels.size() == pixels) {
+    return;
+  }
+  throw std::invalid_argument("FeatureTracker::track: the " + std::string(side) + " image is " +
+                              std::to_string(image.width) + " x " + std::to_string(image.height) +
+                              " px with " + std::to_string(image.pixels.size()) +
+                              " bytes, its camera " + std::to_string(camera.width) + " x " +
+                              std::to_string(camera.height));
+}
+
+}  // namespace
+
+FeatureTracker::FeatureTracker(const StereoRig& rig, const TrackerConfig& config)
+    : rig_(rig),
+      config_(checked(config)),
+      focal_px_(rig.cameras[0].fx),
+      detector_(config_),
+      matcher_(rig, config_),
+      rng_(static_cast<std::mt19937::result_type>(config_.seed)) {
+  check_rig(rig);
+}
+
+TrackedFrame FeatureTracker::track(const StereoFrame& frame,
+                                   const Eigen::Matrix3d& R_previous_current_body) {
+  check_image(frame.left, rig_.cameras[0], "left");
+  check_image(frame.right, rig_.cameras[1], "right");
+  ImagePyramid left(frame.left, config_, true);
+  const ImagePyramid right(frame.right, config_, false);
+
+  statistics_ = {};
+  const SE3 guess = predicted_motion(frame.stamp, R_previous_current_body);
+  std::vector<Step> steps = follow(left, guess);
+  drop_crowded(steps);
+  const std::optional<SE3> motion = drop_outliers(steps, guess);
+  const double dt_s = seconds_between(stamp_, frame.stamp);
+  velocity_.setZero();
+  if (motion && dt_s > 0.0) {
+    velocity_ = motion->linear().transpose() * motion->translation() / dt_s;
+  }
+
+  tracks_.clear();
+  for (const Step& step : steps) tracks_.push_back(step.now);
+  statistics_.tracked = static_cast<int>(tracks_.size());
+  statistics_.motion_known = motion.has_value();
+  add_corners(left);
+  match_right(left, right);
+  previous_left_ = std::move(left);
+  stamp_ = frame.stamp;
+  return output();
+}
+
+SE3 FeatureTracker::predicted_motion(Stamp stamp, const Eigen::Matrix3d& R_body) const {
+  const Eigen::Matrix3d R_body_cam = rig_.cameras[0].T_body_cam.linear();
+  const double dt_s = previous_left_.empty() ? 0.0 : seconds_between(stamp_, stamp);
+  return make_pose(R_body_cam.transpose() * R_body * R_body_cam, velocity_ * dt_s);
+}
+
+std::vector<Eigen::Vector2f> FeatureTracker::predicted_px(const SE3& T_previous_current) const {
+  std::vector<Eigen::Vector2f> result;
+  result.reserve(tracks_.size());
+  for (const Track& track : tracks_) {
+    const std::optional<double> depth =
+        track.inverse_depth ? track.inverse_depth : depth_nearby(track.px);
+    const Eigen::Vector3d X =
+        transfer({track.left, depth.value_or(0.0), track.left}, T_previous_current);
+    // Behind the camera there is no prediction: the old place is as good as any.
+    const bool in_front = X.z() > 0.1;
+    result.push_back(in_front
+                         ? Eigen::Vector2f(rig_.cameras[0].project(X.hnormalized()).cast<float>())
+                         : track.px);
+  }
+  return result;
+}
+
+std::optional<double> FeatureTracker::depth_nearby(const Eigen::Vector2f& px) const {
+  constexpr float kReachPx = 80.0F;
+  float nearest = kReachPx * kReachPx;
+  std::optional<double> depth;
+  for (const Track& track : tracks_) {
+    const float distance = (track.px - px).squaredNorm();
+    if (!track.inverse_depth || distance >= nearest) continue;
+    nearest = distance;
+    depth = track.inverse_depth;
+  }
+  return depth;
+}
+
+std::vector<FeatureTracker::Step> FeatureTracker::follow(const ImagePyramid& left,
+                                                         const SE3& guess) {
+  std::vector<Step> steps;
+  if (tracks_.empty()) return steps;
+  std::vector<Eigen::Vector2f> from;
+  for (const Track& track : tracks_) from.push_back(track.px);
+  const KltResult there = track_klt(previous_left_, left, from, predicted_px(guess),
+                                    config_.window_px, config_.pyramid_levels);
+  KltResult back;
+  if (config_.max_forward_backward_px > 0.0) {
+    back = track_klt(left, previous_left_, there.px, from, config_.window_px, 0);
+  }
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    const std::optional<Eigen::Vector2d> bearing =
+        there.found[i] ? rig_.cameras[0].unproject(there.px[i].cast<double>()) : std::nullopt;
+    if (!bearing) {
+      ++statistics_.lost;
+    } else if (!back.px.empty() &&
+               (!back.found[i] || (back.px[i] - from[i]).norm() >
+                                      static_cast<float>(config_.max_forward_backward_px))) {
+      ++statistics_.backward;
+    } else {
+      Track now;
+      now.id = tracks_[i].id;
+      now.length = tracks_[i].length + 1;
+      now.px = there.px[i];
+      now.left = *bearing;
+      steps.push_back({tracks_[i], now});
+    }
+  }
+  return steps;
+}
+
+void FeatureTracker::drop_crowded(std::vector<Step>& steps) {
+  const float spacing = kMinSpacing * static_cast<float>(config_.min_distance_px);
+  std::vector<Step> kept;
+  for (const Step& step : steps) {  // The older of two comes first.
+    const bool crowded = std::any_of(kept.begin(), kept.end(), [&](const Step& other) {
+      return (other.now.px - step.now.px).squaredNorm() < spacing * spacing;
+    });
+    if (crowded) {
+      ++statistics_.crowded;
+    } else {
+      kept.push_back(step);
+    }
+  }
+  steps = std::move(kept);
+}
+
+std::optional<SE3> FeatureTracker::drop_outliers(std::vector<Step>& steps, const SE3& guess) {
+  std::vector<DepthPair> pairs;
+  for (const Step& step : steps) {
+    if (!step.before.inverse_depth) continue;
+    pairs.push_back({step.before.left, *step.before.inverse_depth, step.now.left});
+  }
+  constexpr double kNoisePx = 1.0;
+  const std::optional<SE3> motion = estimate_motion(pairs, guess, kNoisePx / focal_px_, rng_);
+  if (motion) {
+    drop_by_motion(steps, *motion);
+  } else {
+    drop_by_two_points(steps, guess);
+  }
+  return motion;
+}
+
+void FeatureTracker::drop_by_motion(std::vector<Step>& steps, const SE3& T_previous_current) {
+  const double threshold = config_.max_reprojection_px / focal_px_;
+  std::vector<Step> kept;
+  for (Step& step : steps) {
+    if (step.before.inverse_depth) {
+      const DepthPair pair{step.before.left, *step.before.inverse_depth, step.now.left};
+      if (reprojection_distance(pair, T_previous_current) < threshold) {
+        step.now.inverse_depth = pair.inverse_depth / transfer(pair, T_previous_current).z();
+        kept.push_back(step);
+        continue;
+      }
+    }
+    // Without a depth, or with a wrong one, the landmark still lies on its epipolar line.
+    if (epipolar_distance({step.before.left, step.now.left}, T_previous_current.linear(),
+                          T_previous_current.translation()) < threshold) {
+      kept.push_back(step);
+    } else {
+      ++statistics_.motion;
+    }
+  }
+  steps = std::move(kept);
+}
+
+void FeatureTracker::drop_by_two_points(std::vector<Step>& steps, const SE3& guess) {
+  std::vector<BearingPair> pairs;
+  for (const Step& step : steps) pairs.push_back({step.before.left, step.now.left});
+  const TwoPointResult result =
+      two_point_ransac(pairs, guess.linear(), config_.max_reprojection_px / focal_px_, rng_);
+  std::vector<Step> kept;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    if (!result.inlier[i]) {
+      ++statistics_.motion;
+      continue;
+    }
+    steps[i].now.inverse_depth = steps[i].before.inverse_depth;
+    kept.push_back(steps[i]);
+  }
+  steps = std::move(kept);
+}
+
+void FeatureTracker::add_corners(const ImagePyramid& left) {
+  std::vector<Eigen::Vector2f> occupied;
+  for (const Track& track : tracks_) occupied.push_back(track.px);
+  const int wanted = config_.max_features - static_cast<int>(tracks_.size());
+  for (const Eigen::Vector2f& px : detector_.detect(left, occupied, wanted)) {
+    const std::optional<Eigen::Vector2d> bearing = rig_.cameras[0].unproject(px.cast<double>());
+    if (!bearing) continue;
+    Track track;
+    track.id = next_id_++;
+    track.px = px;
+    track.left = *bearing;
+    tracks_.push_back(track);
+    ++statistics_.detected;
+  }
+}
+
+void FeatureTracker::match_right(const ImagePyramid& left, const ImagePyramid& right) {
+  std::vector<StereoQuery> queries;
+  for (const Track& track : tracks_) queries.push_back({track.px, track.left, track.inverse_depth});
+  const auto matches = matcher_.match(left, right, queries);
+  statistics_.stereo = matcher_.statistics();
+  const double threshold = config_.max_reprojection_px / focal_px_;
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    Track& track = tracks_[i];
+    if (!matches[i]) {
+      if (track.inverse_depth > kMaxInverseDepth) track.inverse_depth.reset();
+      continue;
+    }
+    if (track.inverse_depth) {
+      const Eigen::Vector2d expected = matcher_.right_bearing(track.left, *track.inverse_depth);
+      if ((expected - matches[i]->right).norm() > threshold) {
+        // One of two depths is wrong: both go, and the next image searches again.
+        track.inverse_depth.reset();
+        ++statistics_.stereo_motion;
+        continue;
+      }
+    }
+    track.right = matches[i]->right;
+    track.inverse_depth = matches[i]->inverse_depth;
+  }
+}
+
+TrackedFrame FeatureTracker::output() const {
+  TrackedFrame result;
+  result.stamp = stamp_;
+  for (const Track& track : tracks_) {
+    result.features.push_back({track.id, track.left, track.right, track.length});
+  }
+  return result;
+}
+
+}  // namespace km

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <random>
+#include <span>
+#include <vector>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/frame.hpp"
+#include "modules/vio/feature_detector.hpp"
+#include "modules/vio/image_pyramid.hpp"
+#include "modules/vio/stereo_matcher.hpp"
+#include "modules/vio/tracked_frame.hpp"
+#include "modules/vio/tracker_config.hpp"
+
+namespace km {
+
+/// What happened in the last image: every feature of the image before is tracked or counted under
+/// the first test that it failed.
+struct TrackerStatistics {
+  int tracked = 0;   ///< From the image before.
+  int detected = 0;  ///< New.
+  int lost = 0;      ///< KLT failed, or left the image.
+  int backward = 0;  ///< Forward-backward check.
+  int crowded = 0;   ///< Ran into another feature.
+  int motion = 0;    ///< Against the motion of the others.
+  StereoStatistics stereo;
+  int stereo_motion = 0;  ///< Right image points dropped against the motion; the left one stays.
+  bool motion_known = false;  ///< The stereo features agreed on a motion.
+};
+
+/// Tracks corners through a stereo recording. Not thread-safe, starts no threads of its own;
+/// deterministic for equal images and config.
+///
+/// Left image to left image by pyramidal KLT (Bouguet 2001) from a predicted start: the gyroscope's
+/// rotation, the last translation, and the depth of the feature or of its neighbours. Outliers are
+/// rejected against the one motion that the stereo features agree on (estimate_motion()), by
+/// two-point RANSAC where these are too few. Left to right by StereoMatcher from the depth that the
+/// motion predicts. Then corners are added where there are none.
+class FeatureTracker {
+ public:
+  /// Throws ConfigError, and std::invalid_argument for cameras without size or focal length.
+  FeatureTracker(const StereoRig& rig, const TrackerConfig& config);
+
+  /// The features of `frame`, possibly none. `R_previous_current_body` is the rotation of the body
+  /// since the frame before, p_previous = R * p_current; identity if it is not known.
+  /// Throws std::invalid_argument if an image does not have the size of its camera.
+  [[nodiscard]] TrackedFrame track(const StereoFrame& frame,
+                                   const Eigen::Matrix3d& R_previous_current_body);
+
+  /// Of the last track().
+  [[nodiscard]] const TrackerStatistics& statistics() const { return statistics_; }
+
+ private:
+  struct Track {
+    std::uint64_t id = 0;
+    int length = 1;
+    Eigen::Vector2f px = Eigen::Vector2f::Zero();    // In the left image.
+    Eigen::Vector2d left = Eigen::Vector2d::Zero();  // Bearings.
+    std::optional<Eigen::Vector2d> right;
+    std::optional<double> inverse_depth;  // Measured here, or carried on by the motion [1/m].
+  };
+  // A track and where it is in the new image.
+  struct Step {
+    Track before;
+    Track now;
+  };
+
+  [[nodiscard]] SE3 predicted_motion(Stamp stamp, const Eigen::Matrix3d& R_body) const;
+  [[nodiscard]] std::vector<Eigen::Vector2f> predicted_px(const SE3& T_previous_current) const;
+  [[nodiscard]] std::optional<double> depth_nearby(const Eigen::Vector2f& px) const;
+  [[nodiscard]] std::vector<Step> follow(const ImagePyramid& left, const SE3& guess);
+  void drop_crowded(std::vector<Step>& steps);
+  [[nodiscard]] std::optional<SE3> drop_outliers(std::vector<Step>& steps, const SE3& guess);
+  void drop_by_motion(std::vector<Step>& steps, const SE3& T_previous_current);
+  void drop_by_two_points(std::vector<Step>& steps, const SE3& guess);
+  void add_corners(const ImagePyramid& left);
+  void match_right(const ImagePyramid& left, const ImagePyramid& right);
+  [[nodiscard]] TrackedFrame output() const;
+
+  StereoRig rig_;
+  TrackerConfig config_;
+  double focal_px_;
+  FeatureDetector detector_;
+  StereoMatcher matcher_;
+  std::mt19937 rng_;
+  std::uint64_t next_id_ = 0;
+  std::vector<Track> tracks_;  // Of the last image, ascending ids.
+  ImagePyramid previous_left_;
+  Stamp stamp_ = 0;                                     // Of the last image.
+  Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();  // Of the left camera, in its frame [m/s].
+  TrackerStatistics statistics_;
+};
+
+}  // namespace km

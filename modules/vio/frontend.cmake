@@ -1,0 +1,4 @@
+km_module(vio_frontend
+  SOURCES feature_detector.cpp feature_tracker.cpp image_pyramid.cpp klt.cpp patch.cpp
+          stereo_matcher.cpp stereo_motion.cpp two_point_ransac.cpp
+  LINK km_opencv)

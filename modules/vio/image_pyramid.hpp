@@ -1,0 +1,38 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "modules/core/frame.hpp"
+#include "modules/vio/tracker_config.hpp"
+
+namespace km {
+
+/// The image pyramid of one camera image, built once and shared by all that track, match and score
+/// in that image. Owns its pixels.
+class ImagePyramid {
+ public:
+  ImagePyramid() = default;
+
+  /// Copies `image` into a bordered pyramid of config.pyramid_levels + 1 levels. Derivatives are
+  /// needed in the image that windows are taken from, not in the one they are searched in.
+  ImagePyramid(const GrayImage& image, const TrackerConfig& config, bool with_derivatives);
+
+  [[nodiscard]] bool empty() const { return maps_.empty(); }
+
+  /// What cv::calcOpticalFlowPyrLK takes: levels, interleaved with derivatives if there are any.
+  [[nodiscard]] const std::vector<cv::Mat>& maps() const { return maps_; }
+
+  /// Grey image of `level`, 0 being the full one; its pixel (x, y) is (2^level x, 2^level y) there.
+  [[nodiscard]] const cv::Mat& level(int level) const;
+
+  /// Scharr derivatives (d/dx, d/dy) of the full image, 32 times the grey levels per pixel, as
+  /// 16-bit integers. Precondition: built with derivatives.
+  [[nodiscard]] const cv::Mat& derivatives() const { return maps_[1]; }
+
+ private:
+  std::vector<cv::Mat> maps_;
+  bool with_derivatives_ = false;
+};
+
+}  // namespace km

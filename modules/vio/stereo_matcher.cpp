@@ -1,0 +1,131 @@
+#include "modules/vio/stereo_matcher.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "modules/vio/klt.hpp"
+#include "modules/vio/patch.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kMinCorrelation = 0.75;       // Of a match, full resolution.
+constexpr float kMinSearchCorrelation = 0.7F;  // Half resolution, whole pixels.
+// The second best place must be this much less similar. A fence or a net has many alike.
+constexpr float kMinDistinction = 0.05F;
+constexpr int kPeakWidth = 2;             // Steps at which a correlation peak still counts as one.
+constexpr double kMinDisparityPx = -1.0;  // Noise of a point at infinity.
+
+}  // namespace
+
+StereoMatcher::StereoMatcher(const StereoRig& rig, const TrackerConfig& config)
+    : rig_(rig), config_(config), T_right_left_(rig.T_left_right().inverse()) {}
+
+Eigen::Vector2d StereoMatcher::right_bearing(const Eigen::Vector2d& left,
+                                             double inverse_depth) const {
+  return (T_right_left_.linear() * left.homogeneous() + inverse_depth * T_right_left_.translation())
+      .hnormalized();
+}
+
+std::optional<Eigen::Vector2f> StereoMatcher::search(const ImagePyramid& left,
+                                                     const ImagePyramid& right,
+                                                     const StereoQuery& query) const {
+  const cv::Mat& image = right.level(1);
+  const Eigen::Vector2i centre = (0.5F * query.left_px).array().round().cast<int>();
+  if (!PatchTemplate::covered_by(left.level(1), centre.x(), centre.y())) return std::nullopt;
+  const PatchTemplate patch(left.level(1), centre.x(), centre.y());
+  if (!patch.has_contrast()) return std::nullopt;
+
+  // Equal steps of inverse depth are equal steps of disparity, here about one pixel of level 1.
+  const double nearest = 1.0 / config_.min_depth_m;
+  const int steps = std::max(
+      2, static_cast<int>(0.5 * rig_.cameras[1].fx * T_right_left_.translation().norm() * nearest));
+  std::vector<float> scores(static_cast<std::size_t>(steps) + 1, -1.0F);
+  std::vector<Eigen::Vector2i> places(scores.size());
+  std::size_t best = 0;
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    const double inverse_depth = nearest * static_cast<double>(i) / steps;
+    const Eigen::Vector2d px =
+        0.5 * rig_.cameras[1].project(right_bearing(query.left, inverse_depth));
+    places[i] = px.array().round().cast<int>();
+    if (!PatchTemplate::covered_by(image, places[i].x(), places[i].y())) continue;
+    scores[i] = patch.correlation(image, places[i].x(), places[i].y());
+    if (scores[i] > scores[best]) best = i;
+  }
+  if (scores[best] < kMinSearchCorrelation) return std::nullopt;
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    const bool same_peak = i + kPeakWidth >= best && i <= best + kPeakWidth;
+    if (!same_peak && scores[i] > scores[best] - kMinDistinction) return std::nullopt;
+  }
+  const Eigen::Vector2f rounding = query.left_px - 2.0F * centre.cast<float>();
+  return 2.0F * places[best].cast<float>() + rounding;
+}
+
+std::optional<Eigen::Vector2f> StereoMatcher::start_of(const ImagePyramid& left,
+                                                       const ImagePyramid& right,
+                                                       const StereoQuery& query) const {
+  if (!query.inverse_depth) return search(left, right, query);
+  const Eigen::Vector2d expected = right_bearing(query.left, *query.inverse_depth);
+  return rig_.cameras[1].project(expected).cast<float>();
+}
+
+std::optional<StereoMatch> StereoMatcher::triangulate(const StereoQuery& query,
+                                                      const Eigen::Vector2f& right_px) const {
+  const std::optional<Eigen::Vector2d> right = rig_.cameras[1].unproject(right_px.cast<double>());
+  if (!right) return std::nullopt;
+  // The epipolar line runs from the bearing at infinity along `along`; both components are pixels.
+  const double f = rig_.cameras[1].fx;
+  const Eigen::Vector2d infinity = right_bearing(query.left, 0.0);
+  const Eigen::Vector2d along =
+      (right_bearing(query.left, 1.0 / config_.min_depth_m) - infinity).normalized();
+  const Eigen::Vector2d offset = f * (*right - infinity);
+  const double across_px = along.x() * offset.y() - along.y() * offset.x();
+  if (std::abs(across_px) > config_.max_epipolar_px) return std::nullopt;
+  if (along.dot(offset) < kMinDisparityPx) return std::nullopt;
+
+  // (c + rho t) parallel to the right bearing, in the direction of the line.
+  const Eigen::Vector3d c = T_right_left_.linear() * query.left.homogeneous();
+  const Eigen::Vector3d& t = T_right_left_.translation();
+  const double rho = along.dot(*right * c.z() - c.head<2>()) /
+                     along.dot(Eigen::Vector2d(t.head<2>() - *right * t.z()));
+  return StereoMatch{*right, std::max(rho, 0.0)};
+}
+
+std::vector<std::optional<StereoMatch>> StereoMatcher::match(const ImagePyramid& left,
+                                                             const ImagePyramid& right,
+                                                             std::span<const StereoQuery> queries) {
+  statistics_ = {};
+  std::vector<std::optional<StereoMatch>> result(queries.size());
+  std::vector<std::size_t> index;
+  std::vector<Eigen::Vector2f> from;
+  std::vector<Eigen::Vector2f> starts;
+  for (std::size_t i = 0; i < queries.size(); ++i) {
+    if (const auto start = start_of(left, right, queries[i])) {
+      index.push_back(i);
+      from.push_back(queries[i].left_px);
+      starts.push_back(*start);
+    } else {
+      ++statistics_.no_start;
+    }
+  }
+
+  const KltResult klt =
+      track_klt(left, right, from, starts, config_.window_px, std::min(1, config_.pyramid_levels));
+  for (std::size_t k = 0; k < index.size(); ++k) {
+    const StereoQuery& query = queries[index[k]];
+    if (!klt.found[k]) {
+      ++statistics_.lost;
+    } else if (patch_correlation(left.level(0), query.left_px, right.level(0), klt.px[k]) <
+               kMinCorrelation) {
+      ++statistics_.dissimilar;
+    } else if (const auto match = triangulate(query, klt.px[k])) {
+      result[index[k]] = match;
+      ++statistics_.matched;
+    } else {
+      ++statistics_.epipolar;
+    }
+  }
+  return result;
+}
+
+}  // namespace km

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "modules/core/camera.hpp"
+#include "modules/vio/image_pyramid.hpp"
+#include "modules/vio/tracker_config.hpp"
+
+namespace km {
+
+/// A point of the left image to be found in the right one.
+struct StereoQuery {
+  Eigen::Vector2f left_px = Eigen::Vector2f::Zero();
+  Eigen::Vector2d left = Eigen::Vector2d::Zero();  ///< Its bearing, undistorted.
+  std::optional<double> inverse_depth;             ///< Expected 1/z in the left camera [1/m].
+};
+
+/// Where a query was found.
+struct StereoMatch {
+  Eigen::Vector2d right = Eigen::Vector2d::Zero();  ///< Bearing in the right camera.
+  double inverse_depth = 0.0;  ///< 1/z in the left camera [1/m]; not negative, 0 is infinity.
+};
+
+/// What became of the queries of one image.
+struct StereoStatistics {
+  int matched = 0;
+  int no_start = 0;    ///< No distinct similar patch along the epipolar line.
+  int lost = 0;        ///< KLT left the image or did not converge.
+  int dissimilar = 0;  ///< The patches differ too much.
+  int epipolar = 0;    ///< Too far from the epipolar line, or behind the cameras.
+};
+
+/// Finds points of the left image in the right one to a fraction of a pixel. Not thread-safe.
+///
+/// Points without an expected depth are searched at half resolution along their epipolar curve (the
+/// images are not rectified) by zero-mean normalised correlation, and refused if a second place is
+/// about as similar. All are then refined by KLT, which is not bound to the curve, so that the
+/// distance from it is a test of the match.
+class StereoMatcher {
+ public:
+  StereoMatcher(const StereoRig& rig, const TrackerConfig& config);
+
+  /// One entry for each query. `left` needs derivatives.
+  [[nodiscard]] std::vector<std::optional<StereoMatch>> match(const ImagePyramid& left,
+                                                              const ImagePyramid& right,
+                                                              std::span<const StereoQuery> queries);
+
+  /// Bearing in the right camera of a left bearing at `inverse_depth` [1/m].
+  [[nodiscard]] Eigen::Vector2d right_bearing(const Eigen::Vector2d& left,
+                                              double inverse_depth) const;
+
+  /// Of the last match().
+  [[nodiscard]] const StereoStatistics& statistics() const { return statistics_; }
+
+ private:
+  [[nodiscard]] std::optional<Eigen::Vector2f> start_of(const ImagePyramid& left,
+                                                        const ImagePyramid& right,
+                                                        const StereoQuery& query) const;
+  [[nodiscard]] std::optional<Eigen::Vector2f> search(const ImagePyramid& left,
+                                                      const ImagePyramid& right,
+                                                      const StereoQuery& query) const;
+  [[nodiscard]] std::optional<StereoMatch> triangulate(const StereoQuery& query,
+                                                       const Eigen::Vector2f& right_px) const;
+
+  StereoRig rig_;
+  TrackerConfig config_;
+  SE3 T_right_left_;
+  StereoStatistics statistics_;
+};
+
+}  // namespace km

@@ -1,0 +1,259 @@
+#include "recorded_tracking.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <numbers>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+
+#include "modules/core/lie.hpp"
+#include "modules/sensors/euroc_reader.hpp"
+#include "modules/vio/stereo_motion.hpp"
+#include "modules/vio/two_point_ransac.hpp"
+
+namespace km {
+namespace {
+
+struct StampedPose {
+  Stamp stamp;
+  SE3 T;
+};
+
+std::vector<StampedPose> read_tum(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  std::vector<StampedPose> result;
+  for (std::string line; std::getline(file, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    std::istringstream row(line);
+    long double t = 0;
+    Eigen::Vector3d p;
+    Eigen::Quaterniond q;
+    row >> t >> p.x() >> p.y() >> p.z() >> q.x() >> q.y() >> q.z() >> q.w();
+    result.push_back({static_cast<Stamp>(t * 1e9L), make_pose(q.normalized().matrix(), p)});
+  }
+  return result;
+}
+
+SE3 pose_at(const std::vector<StampedPose>& poses, Stamp stamp) {
+  const auto after =
+      std::lower_bound(poses.begin(), poses.end(), stamp,
+                       [](const StampedPose& pose, Stamp value) { return pose.stamp < value; });
+  if (after == poses.begin() || after == poses.end()) throw std::runtime_error("no true pose");
+  const StampedPose& a = *(after - 1);
+  const StampedPose& b = *after;
+  const double share = seconds_between(a.stamp, stamp) / seconds_between(a.stamp, b.stamp);
+  return a.T * se3_exp(share * se3_log(a.T.inverse() * b.T));
+}
+
+// Trapezoidal rule over the samples of a packet, cut to the interval between the images.
+Eigen::Matrix3d integrate_gyro(const std::vector<ImuSample>& imu, Stamp from, Stamp to,
+                               const Eigen::Vector3d& bias) {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  for (std::size_t i = 1; i < imu.size(); ++i) {
+    const Stamp begin = std::max(imu[i - 1].stamp, from);
+    const Stamp end = std::min(imu[i].stamp, to);
+    if (end <= begin) continue;
+    const Eigen::Vector3d rate = 0.5 * (imu[i - 1].gyro + imu[i].gyro) - bias;
+    R = R * so3_exp(rate * seconds_between(begin, end));
+  }
+  return R;
+}
+
+// Gyroscope bias under the true rotations: mean of the difference.
+Eigen::Vector3d gyro_bias(const Recording& recording) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double seconds = 0.0;
+  for (std::size_t i = 1; i < recording.packets.size(); ++i) {
+    const Stamp from = recording.packets[i - 1].frame->stamp;
+    const Stamp to = recording.packets[i].frame->stamp;
+    const Eigen::Matrix3d R =
+        integrate_gyro(recording.packets[i].imu, from, to, Eigen::Vector3d::Zero());
+    const SE3 T = recording.T_world_body[i - 1].inverse() * recording.T_world_body[i];
+    sum += so3_log(T.linear().transpose() * R);
+    seconds += seconds_between(from, to);
+  }
+  return sum / seconds;
+}
+
+std::map<std::uint64_t, const TrackedFeature*> by_id(const TrackedFrame& frame) {
+  std::map<std::uint64_t, const TrackedFeature*> result;
+  for (const TrackedFeature& feature : frame.features) result[feature.id] = &feature;
+  return result;
+}
+
+struct View {
+  SE3 T_cam_world;
+  Eigen::Vector2d bearing;
+};
+
+Eigen::Vector2d view_error(const View& view, const Eigen::Vector3d& p_world) {
+  return (view.T_cam_world * p_world).hnormalized() - view.bearing;
+}
+
+// Least squares on z = 1, from the linear solution.
+std::optional<Eigen::Vector3d> triangulated(const std::vector<View>& views) {
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  for (const View& view : views) {
+    const SE3 T = view.T_cam_world.inverse();
+    const Eigen::Vector3d ray = (T.linear() * view.bearing.homogeneous()).normalized();
+    const Eigen::Matrix3d P = Eigen::Matrix3d::Identity() - ray * ray.transpose();
+    A += P;
+    b += P * T.translation();
+  }
+  Eigen::Vector3d p = A.ldlt().solve(b);
+  for (int step = 0; step < 8; ++step) {
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d g = Eigen::Vector3d::Zero();
+    for (const View& view : views) {
+      const Eigen::Vector3d X = view.T_cam_world * p;
+      if (X.z() < 0.05) return std::nullopt;
+      Eigen::Matrix<double, 2, 3> J;
+      J << 1 / X.z(), 0, -X.x() / (X.z() * X.z()), 0, 1 / X.z(), -X.y() / (X.z() * X.z());
+      J = J * view.T_cam_world.linear();
+      H += J.transpose() * J;
+      g -= J.transpose() * view_error(view, p);
+    }
+    H.diagonal().array() *= 1.0 + 1e-9;
+    p += H.ldlt().solve(g);
+  }
+  return p.allFinite() ? std::optional(p) : std::nullopt;
+}
+
+SE3 camera_from_world(const Recording& recording, std::size_t frame, std::size_t camera) {
+  return (recording.T_world_body[frame] * recording.rig.stereo.cameras[camera].T_body_cam)
+      .inverse();
+}
+
+std::vector<View> views_of(const Recording& recording, std::size_t frame,
+                           const TrackedFeature& feature) {
+  std::vector<View> views = {{camera_from_world(recording, frame, 0), feature.left}};
+  if (feature.right) views.push_back({camera_from_world(recording, frame, 1), *feature.right});
+  return views;
+}
+
+}  // namespace
+
+Recording read_recording(const std::filesystem::path& folder, double from_s, double to_s) {
+  EurocOptions options;
+  options.from_s = from_s;
+  options.to_s = to_s;
+  EurocReader reader(folder, options);
+  Recording result;
+  result.rig = reader.rig();
+  const auto truth =
+      read_tum(folder / "mav0" / "state_groundtruth_estimate0" / "groundtruth_tum.txt");
+  while (auto packet = reader.next()) {
+    result.T_world_body.push_back(pose_at(truth, packet->frame->stamp));
+    result.packets.push_back(std::move(*packet));
+  }
+  return result;
+}
+
+TrackingRun run_tracker(const Recording& recording, const TrackerConfig& config,
+                        RotationHint hint) {
+  FeatureTracker tracker(recording.rig.stereo, config);
+  const Eigen::Vector3d bias =
+      hint == RotationHint::kCalibratedGyro ? gyro_bias(recording) : Eigen::Vector3d::Zero();
+  TrackingRun run;
+  for (std::size_t i = 0; i < recording.packets.size(); ++i) {
+    const SensorPacket& packet = recording.packets[i];
+    Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+    if (i > 0 && hint != RotationHint::kNone) {
+      R = integrate_gyro(packet.imu, recording.packets[i - 1].frame->stamp, packet.frame->stamp,
+                         bias);
+    }
+    const auto start = std::chrono::steady_clock::now();
+    run.frames.push_back(tracker.track(*packet.frame, R));
+    const auto end = std::chrono::steady_clock::now();
+    run.milliseconds.push_back(std::chrono::duration<double, std::milli>(end - start).count());
+    run.statistics.push_back(tracker.statistics());
+  }
+  return run;
+}
+
+ErrorSummary summarize(std::vector<double> errors_px) {
+  ErrorSummary result;
+  result.count = errors_px.size();
+  if (errors_px.empty()) return result;
+  std::sort(errors_px.begin(), errors_px.end());
+  result.median_px = errors_px[errors_px.size() / 2];
+  result.p90_px = errors_px[errors_px.size() * 9 / 10];
+  constexpr double kOutlierPx = 3.0;
+  const auto outliers =
+      errors_px.end() - std::upper_bound(errors_px.begin(), errors_px.end(), kOutlierPx);
+  result.outlier_share = static_cast<double>(outliers) / static_cast<double>(errors_px.size());
+  return result;
+}
+
+ReprojectionErrors reprojection_errors(const Recording& recording, const TrackingRun& run,
+                                       std::size_t gap) {
+  const double f = recording.rig.stereo.cameras[0].fx;
+  std::mt19937 rng(1);
+  std::vector<double> left;
+  std::vector<double> right;
+  std::vector<double> fitted;
+  std::vector<double> fit_translation;
+  std::vector<double> fit_rotation;
+  for (std::size_t i = 0; i + gap < run.frames.size(); ++i) {
+    const auto later = by_id(run.frames[i + gap]);
+    std::vector<DepthPair> pairs;
+    for (const TrackedFeature& feature : run.frames[i].features) {
+      const auto found = later.find(feature.id);
+      if (!feature.right || found == later.end()) continue;
+      const auto p_world = triangulated(views_of(recording, i, feature));
+      if (!p_world) continue;
+      const auto views = views_of(recording, i + gap, *found->second);
+      left.push_back(f * view_error(views[0], *p_world).norm());
+      if (views.size() > 1) right.push_back(f * view_error(views[1], *p_world).norm());
+      const double depth = (camera_from_world(recording, i, 0) * *p_world).z();
+      pairs.push_back({feature.left, 1.0 / depth, found->second->left});
+    }
+    const SE3 truth =
+        camera_from_world(recording, i, 0) * camera_from_world(recording, i + gap, 0).inverse();
+    const auto fit = estimate_motion(pairs, truth, 1.0 / f, rng);
+    if (!fit) continue;
+    for (const DepthPair& pair : pairs) fitted.push_back(f * reprojection_distance(pair, *fit));
+    const SE3 error = truth.inverse() * *fit;
+    fit_translation.push_back(1e3 * error.translation().norm());
+    fit_rotation.push_back(angle_of(error.linear()) * 180.0 / std::numbers::pi);
+  }
+  return {summarize(std::move(left)), summarize(std::move(right)), summarize(std::move(fitted)),
+          summarize(std::move(fit_translation)).median_px,
+          summarize(std::move(fit_rotation)).median_px};
+}
+
+ErrorSummary epipolar_errors(const Recording& recording, const TrackingRun& run) {
+  const SE3 T_left_right = recording.rig.stereo.T_left_right();
+  const double f = recording.rig.stereo.cameras[0].fx;
+  std::vector<double> errors;
+  for (const TrackedFrame& frame : run.frames) {
+    for (const TrackedFeature& feature : frame.features) {
+      if (!feature.right) continue;
+      errors.push_back(f * epipolar_distance({feature.left, *feature.right}, T_left_right.linear(),
+                                             T_left_right.translation()));
+    }
+  }
+  return summarize(std::move(errors));
+}
+
+double survival(const TrackingRun& run, std::size_t gap) {
+  double sum = 0.0;
+  std::size_t images = 0;
+  for (std::size_t i = 0; i + gap < run.frames.size(); ++i) {
+    if (run.frames[i].features.empty()) continue;
+    const auto later = by_id(run.frames[i + gap]);
+    std::size_t alive = 0;
+    for (const TrackedFeature& feature : run.frames[i].features) alive += later.count(feature.id);
+    sum += static_cast<double>(alive) / static_cast<double>(run.frames[i].features.size());
+    ++images;
+  }
+  return images > 0 ? sum / static_cast<double>(images) : 0.0;
+}
+
+}  // namespace km

@@ -1,0 +1,105 @@
+#include "modules/vio/feature_detector.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "modules/vio/patch.hpp"
+#include "textured_plane.hpp"
+
+namespace km {
+namespace {
+
+// White squares of 20 px every 40 px on black from (first, first) on. Their shading varies a
+// little: in equal levels a corner would tie with its neighbours.
+GrayImage squares(int width, int height, int first) {
+  GrayImage image{width, height, {}};
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const bool inside =
+          x >= first && y >= first && (x - first) % 40 < 20 && (y - first) % 40 < 20;
+      const int shading = (7 * x + 13 * y) % 11;
+      image.pixels.push_back(static_cast<std::uint8_t>((inside ? 230 : 20) + shading));
+    }
+  }
+  return image;
+}
+
+TEST_CASE("Corners are found where the corners are", "[vio]") {
+  TrackerConfig config;
+  config.max_features = 1000;
+  config.min_distance_px = 8;
+  const ImagePyramid image(squares(240, 160, 30), config, true);
+  FeatureDetector detector(config);
+  const auto corners = detector.detect(image, {}, 1000);
+  // 6 x 4 squares, the last row and column cut: four corners each in 30..229 x 30..149.
+  CHECK(corners.size() >= 4 * 5 * 3);
+  for (const Eigen::Vector2f& px : corners) {
+    const auto off = [](float v) {
+      const float phase = std::fmod(v - 30.0F + 0.5F, 20.0F);  // Edges are between pixels.
+      return std::min(phase, 20.0F - phase);
+    };
+    CAPTURE(px.transpose());
+    CHECK(off(px.x()) < 3.0F);
+    CHECK(off(px.y()) < 3.0F);
+  }
+}
+
+TEST_CASE("Corners keep their distance, avoid occupied places and cover the image", "[vio]") {
+  const StereoRig rig = test_rig();
+  const GrayImage picture = TexturedPlane{}.render(rig.cameras[0], SE3::Identity());
+  TrackerConfig config;
+  config.max_features = 60;
+  config.min_distance_px = 15;
+  const ImagePyramid image(picture, config, true);
+  FeatureDetector detector(config);
+  const std::vector<Eigen::Vector2f> occupied = {{100, 100}, {200, 50}, {103, 108}};
+  const auto corners = detector.detect(image, occupied, 57);
+  REQUIRE(corners.size() > 40);
+  REQUIRE(corners.size() <= 57);
+  std::vector<int> quadrants(4, 0);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    for (const Eigen::Vector2f& px : occupied) CHECK((corners[i] - px).norm() >= 15.0F);
+    for (std::size_t j = 0; j < i; ++j) CHECK((corners[i] - corners[j]).norm() >= 15.0F);
+    ++quadrants[(corners[i].x() > 188 ? 1U : 0U) + (corners[i].y() > 120 ? 2U : 0U)];
+  }
+  for (const int count : quadrants) CHECK(count >= 8);
+}
+
+TEST_CASE("No corners are asked for, none are possible", "[vio]") {
+  TrackerConfig config;
+  FeatureDetector detector(config);
+  const ImagePyramid image(squares(240, 160, 30), config, true);
+  CHECK(detector.detect(image, {}, 0).empty());
+  CHECK(detector.detect(image, {}, -3).empty());
+  const ImagePyramid small(squares(32, 16, 5), config, true);
+  CHECK(detector.detect(small, {}, 10).empty());
+}
+
+TEST_CASE("Patch correlation is blind to gain and offset and nothing else", "[vio]") {
+  const StereoRig rig = test_rig();
+  const GrayImage picture = TexturedPlane{}.render(rig.cameras[0], SE3::Identity());
+  GrayImage dimmed = picture;
+  for (auto& level : dimmed.pixels) level = static_cast<std::uint8_t>(level / 2 + 30);
+  const TrackerConfig config;
+  const ImagePyramid a(picture, config, false);
+  const ImagePyramid b(dimmed, config, false);
+  const Eigen::Vector2f at(150.3F, 80.6F);
+  CHECK(patch_correlation(a.level(0), at, b.level(0), at) > 0.999);
+  CHECK(patch_correlation(a.level(0), at, b.level(0), {90.0F, 150.0F}) < 0.7);
+  CHECK(patch_correlation(a.level(0), at, b.level(0), {2.0F, 80.0F}) == 0.0);  // Over the rim.
+  const PatchTemplate patch(a.level(0), 150, 80);
+  CHECK(patch.correlation(b.level(0), 150, 80) > 0.999F);
+  CHECK(patch.correlation(b.level(0), 90, 150) < 0.7F);
+}
+
+TEST_CASE("A flat patch is like no other", "[vio]") {
+  const StereoRig rig = test_rig();
+  const TrackerConfig config;
+  const ImagePyramid flat(flat_image(rig.cameras[0], 100), config, false);
+  const ImagePyramid other(TexturedPlane{}.render(rig.cameras[0], SE3::Identity()), config, false);
+  CHECK(patch_correlation(flat.level(0), {90, 90}, other.level(0), {90, 90}) == 0.0);
+  CHECK_FALSE(PatchTemplate(flat.level(0), 90, 90).has_contrast());
+  CHECK(PatchTemplate(other.level(0), 90, 90).correlation(flat.level(0), 90, 90) == 0.0F);
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,245 @@
+#include "modules/vio/feature_tracker.hpp"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <map>
+#include <set>
+
+#include "modules/core/lie.hpp"
+#include "textured_plane.hpp"
+
+namespace km {
+namespace {
+
+constexpr Stamp kFrameNs = 50'000'000;
+
+TrackerConfig small_image_config() {
+  TrackerConfig config;
+  config.max_features = 80;
+  config.min_distance_px = 14;
+  return config;
+}
+
+const TrackedFeature* find(const TrackedFrame& frame, std::uint64_t id) {
+  for (const TrackedFeature& feature : frame.features) {
+    if (feature.id == id) return &feature;
+  }
+  return nullptr;
+}
+
+double quantile(std::vector<double> values, double share) {
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+SE3 camera_pose(int frame, const Vector6& twist_per_frame) {
+  return se3_exp(static_cast<double>(frame) * twist_per_frame);
+}
+
+Vector6 twist(double rx, double ry, double rz, double x, double y, double z) {
+  Vector6 xi;
+  xi << rx, ry, rz, x, y, z;
+  return xi;
+}
+
+void require_ascending(const TrackedFrame& frame) {
+  const bool ascending = std::adjacent_find(frame.features.begin(), frame.features.end(),
+                                            [](const TrackedFeature& a, const TrackedFeature& b) {
+                                              return a.id >= b.id;
+                                            }) == frame.features.end();
+  REQUIRE(ascending);
+}
+
+TEST_CASE("Features of a moving camera stay on their landmarks to a tenth of a pixel", "[vio]") {
+  const Vector6 motion = GENERATE(twist(0, 0, 0, 0.02, 0.01, 0),     // sideways, 3 px
+                                  twist(0.01, 0.02, 0.03, 0, 0, 0),  // turning only
+                                  twist(0.01, -0.02, 0.01, 0.01, 0, 0.03));
+  const bool gyro = GENERATE(true, false);
+  CAPTURE(motion.transpose(), gyro);
+  const StereoRig rig = test_rig();
+  const TexturedPlane plane;
+  FeatureTracker tracker(rig, small_image_config());
+
+  std::map<std::uint64_t, Eigen::Vector3d> landmarks;  // Where the feature was first seen.
+  std::vector<double> errors_px;
+  constexpr int kFrames = 8;
+  for (int i = 0; i < kFrames; ++i) {
+    const SE3 T_world_body = camera_pose(i, motion);
+    const Eigen::Matrix3d R = gyro ? so3_exp(motion.head<3>()) : Eigen::Matrix3d::Identity();
+    const TrackedFrame frame = tracker.track(plane.render(rig, T_world_body, i * kFrameNs), R);
+    require_ascending(frame);
+    REQUIRE(frame.stamp == i * kFrameNs);
+    for (const TrackedFeature& feature : frame.features) {
+      const auto [landmark, is_new] =
+          landmarks.try_emplace(feature.id, plane.meet(T_world_body, feature.left));
+      CHECK(is_new == (feature.length == 1));
+      if (is_new) continue;
+      const Eigen::Vector2d expected = (T_world_body.inverse() * landmark->second).hnormalized();
+      errors_px.push_back(rig.cameras[0].fx * (expected - feature.left).norm());
+    }
+  }
+  // Up to seven steps of drift on 8-bit images; a wrong pixel convention would show as 0.5 px.
+  REQUIRE(errors_px.size() > 6 * 50);
+  CHECK(quantile(errors_px, 0.5) < 0.25);
+  CHECK(quantile(errors_px, 0.95) < 1.0);
+}
+
+TEST_CASE("Stereo matches of a plane have its depth", "[vio]") {
+  // 63 px of disparity (126 in an image of twice the size), 13 px, 2.5 px.
+  const double depth_m = GENERATE(0.4, 2.0, 10.0);
+  CAPTURE(depth_m);
+  const StereoRig rig = test_rig();
+  const TexturedPlane plane{depth_m, 0.03 * depth_m, 3};
+  FeatureTracker tracker(rig, small_image_config());
+  const TrackedFrame frame =
+      tracker.track(plane.render(rig, SE3::Identity(), 0), Eigen::Matrix3d::Identity());
+
+  const double disparity_px = rig.cameras[0].fx * rig.baseline_m() / depth_m;
+  std::vector<double> errors_px;
+  int visible = 0;  // To the right camera.
+  for (const TrackedFeature& feature : frame.features) {
+    const Eigen::Vector2d expected = feature.left - Eigen::Vector2d(0.11 / depth_m, 0.0);
+    visible += rig.cameras[1].project(expected).x() > 16.0 ? 1 : 0;
+    if (!feature.right) continue;
+    errors_px.push_back(rig.cameras[0].fx * (*feature.right - expected).norm());
+  }
+  CAPTURE(disparity_px, visible, frame.features.size());
+  REQUIRE(visible > 40);
+  REQUIRE(static_cast<int>(errors_px.size()) > visible * 8 / 10);
+  CHECK(quantile(errors_px, 0.5) < 0.4);
+  CHECK(quantile(errors_px, 0.95) < 1.2);
+}
+
+TEST_CASE("Features that move by themselves are dropped", "[vio]") {
+  const StereoRig rig = test_rig();
+  const TexturedPlane plane;
+  FeatureTracker tracker(rig, small_image_config());
+  // A textured square of 90 x 90 px slides down the left image, across the epipolar lines.
+  const auto frame_with_sticker = [&](int i, int top) {
+    StereoFrame frame = plane.render(rig, camera_pose(i, twist(0, 0, 0, 0.01, 0, 0)), i * kFrameNs);
+    for (int r = 0; r < 90; ++r) {
+      for (int c = 0; c < 90; ++c) {
+        const double value = smooth_noise(c / 6.0, r / 6.0, 99);
+        frame.left.pixels[static_cast<std::size_t>((top + r) * frame.left.width + 100 + c)] =
+            static_cast<std::uint8_t>(255.0 * value);
+      }
+    }
+    return frame;
+  };
+  const Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  const auto on_sticker = [&](const TrackedFeature& feature, int top) {
+    const Eigen::Vector2d px = rig.cameras[0].project(feature.left);
+    return px.x() > 108 && px.x() < 182 && px.y() > top + 8 && px.y() < top + 82;
+  };
+  const TrackedFrame first = tracker.track(frame_with_sticker(0, 80), R);
+  const auto there = std::count_if(first.features.begin(), first.features.end(),
+                                   [&](const auto& f) { return on_sticker(f, 80); });
+  REQUIRE(there >= 3);
+  const TrackedFrame second = tracker.track(frame_with_sticker(1, 88), R);
+  int stayed = 0;
+  int tracked = 0;
+  for (const TrackedFeature& feature : second.features) {
+    if (feature.length < 2) continue;
+    ++tracked;
+    const TrackedFeature* before = find(first, feature.id);
+    REQUIRE(before != nullptr);
+    stayed += on_sticker(*before, 80) ? 1 : 0;
+  }
+  CHECK(stayed == 0);
+  CHECK(tracker.statistics().motion >= there);
+  CHECK(tracker.statistics().motion_known);
+  CHECK(tracked > 40);
+}
+
+TEST_CASE("Images without texture give frames without features", "[vio]") {
+  const auto level = static_cast<std::uint8_t>(GENERATE(0, 128, 255));
+  const StereoRig rig = test_rig();
+  FeatureTracker tracker(rig, small_image_config());
+  for (int i = 0; i < 3; ++i) {
+    const StereoFrame frame{i * kFrameNs, flat_image(rig.cameras[0], level),
+                            flat_image(rig.cameras[1], level)};
+    const TrackedFrame result = tracker.track(frame, Eigen::Matrix3d::Identity());
+    CHECK(result.features.empty());
+    CHECK(result.stamp == frame.stamp);
+  }
+}
+
+TEST_CASE("After a second of darkness features return under new ids", "[vio]") {
+  const StereoRig rig = test_rig();
+  const TexturedPlane plane;
+  FeatureTracker tracker(rig, small_image_config());
+  const Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  const StereoFrame bright = plane.render(rig, SE3::Identity(), 0);
+  std::set<std::uint64_t> before;
+  for (const TrackedFeature& feature : tracker.track(bright, R).features) before.insert(feature.id);
+  REQUIRE(before.size() > 40);
+  for (int i = 1; i <= 20; ++i) {
+    const StereoFrame dark{i * kFrameNs, flat_image(rig.cameras[0], 3),
+                           flat_image(rig.cameras[1], 3)};
+    CHECK(tracker.track(dark, R).features.empty());
+  }
+  StereoFrame again = bright;
+  again.stamp = 21 * kFrameNs;
+  const TrackedFrame after = tracker.track(again, R);
+  CHECK(after.features.size() > 40);
+  for (const TrackedFeature& feature : after.features) {
+    CHECK(before.count(feature.id) == 0);
+    CHECK(feature.length == 1);
+  }
+}
+
+TEST_CASE("One dark eye leaves features without a right point", "[vio]") {
+  const StereoRig rig = test_rig();
+  const TexturedPlane plane;
+  FeatureTracker tracker(rig, small_image_config());
+  for (int i = 0; i < 4; ++i) {
+    StereoFrame frame = plane.render(rig, camera_pose(i, twist(0, 0, 0, 0.02, 0, 0)), i * kFrameNs);
+    if (i > 0) frame.right = flat_image(rig.cameras[1], 0);
+    const TrackedFrame result = tracker.track(frame, Eigen::Matrix3d::Identity());
+    const auto seen_right = std::count_if(result.features.begin(), result.features.end(),
+                                          [](const auto& f) { return f.right.has_value(); });
+    CHECK(result.features.size() > 40);
+    CHECK((seen_right > 0) == (i == 0));
+  }
+}
+
+TEST_CASE("An image of the wrong size is refused and changes nothing", "[vio]") {
+  const StereoRig rig = test_rig();
+  const TexturedPlane plane;
+  const Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  const StereoFrame first = plane.render(rig, SE3::Identity(), 0);
+  const StereoFrame second =
+      plane.render(rig, camera_pose(1, twist(0, 0, 0, 0.02, 0, 0)), kFrameNs);
+  FeatureTracker tracker(rig, small_image_config());
+  FeatureTracker untouched(rig, small_image_config());
+  (void)tracker.track(first, R);
+  (void)untouched.track(first, R);
+
+  StereoFrame narrow = second;
+  narrow.right.width -= 1;
+  CHECK_THROWS_AS(tracker.track(narrow, R), std::invalid_argument);
+  StereoFrame cut = second;
+  cut.left.pixels.pop_back();
+  CHECK_THROWS_AS(tracker.track(cut, R), std::invalid_argument);
+  CHECK_THROWS_AS(tracker.track(StereoFrame{}, R), std::invalid_argument);
+
+  const TrackedFrame a = tracker.track(second, R);
+  const TrackedFrame b = untouched.track(second, R);
+  REQUIRE(a.features.size() == b.features.size());
+  for (std::size_t i = 0; i < a.features.size(); ++i) {
+    CHECK(a.features[i].id == b.features[i].id);
+    CHECK(a.features[i].left == b.features[i].left);
+  }
+}
+
+TEST_CASE("A rig or a configuration without sense is refused", "[vio]") {
+  StereoRig rig = test_rig();
+  TrackerConfig config;
+  config.window_px = 0;
+  CHECK_THROWS_AS(FeatureTracker(rig, config), ConfigError);
+  rig.cameras[1].fx = 0.0;
+  CHECK_THROWS_AS(FeatureTracker(rig, TrackerConfig{}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,58 @@
+#include <catch2/catch.hpp>
+
+#include "recorded_tracking.hpp"
+#include "test/support/shared_data.hpp"
+
+namespace km {
+namespace {
+
+TEST_CASE("Five seconds of MH_01_easy are tracked as well as measured", "[vio]") {
+  const auto folder = shared_data("euroc/MH_01_easy");
+  if (!folder) return;
+  const Recording recording = read_recording(*folder, 2.0, 7.0);
+  const TrackerConfig config;
+  const TrackingRun run = run_tracker(recording, config, RotationHint::kRawGyro);
+
+  double stereo_share = 0.0;
+  for (const TrackedFrame& frame : run.frames) {
+    const auto matched = std::count_if(frame.features.begin(), frame.features.end(),
+                                       [](const auto& f) { return f.right.has_value(); });
+    CHECK(frame.features.size() >= 120);
+    stereo_share += static_cast<double>(matched) / static_cast<double>(frame.features.size());
+  }
+  stereo_share /= static_cast<double>(run.frames.size());
+  CHECK(stereo_share > 0.5);
+  CHECK(survival(run, 1) > 0.92);
+  CHECK(survival(run, 10) > 0.6);
+  CHECK(epipolar_errors(recording, run).median_px < 0.4);
+
+  const ReprojectionErrors next = reprojection_errors(recording, run, 1);
+  CHECK(next.fitted_left.median_px < 0.2);
+  CHECK(next.fitted_left.outlier_share < 0.01);
+  CHECK(next.left.median_px < 0.5);
+  CHECK(next.left.outlier_share < 0.02);
+}
+
+TEST_CASE("Two runs over the same recording are identical", "[vio]") {
+  const auto folder = shared_data("euroc/MH_01_easy");
+  if (!folder) return;
+  const Recording recording = read_recording(*folder, 0.0, 1.5);
+  const TrackerConfig config;
+  const TrackingRun a = run_tracker(recording, config, RotationHint::kRawGyro);
+  const TrackingRun b = run_tracker(recording, config, RotationHint::kRawGyro);
+  REQUIRE(a.frames.size() == b.frames.size());
+  for (std::size_t i = 0; i < a.frames.size(); ++i) {
+    REQUIRE(a.frames[i].features.size() == b.frames[i].features.size());
+    bool equal = true;
+    for (std::size_t k = 0; k < a.frames[i].features.size(); ++k) {
+      const TrackedFeature& x = a.frames[i].features[k];
+      const TrackedFeature& y = b.frames[i].features[k];
+      equal =
+          equal && x.id == y.id && x.left == y.left && x.right == y.right && x.length == y.length;
+    }
+    CHECK(equal);
+  }
+}
+
+}  // namespace
+}  // namespace km
