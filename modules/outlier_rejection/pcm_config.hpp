@@ -44,6 +44,10 @@ struct PcmConfig {
   /// Bound on the search tree after one closure; beyond it the best set found so far is kept.
   int max_search_nodes = 100000;
 
+  /// Sets that changed are published together this often [s]: while closures pour in, not every
+  /// intermediate set has to travel.
+  double publish_period_s = 0.5;
+
   void visit_fields(auto& visitor) {
     visitor.field(
         "criterion", criterion,
@@ -61,6 +65,7 @@ struct PcmConfig {
     visitor.field("odometry_gate", odometry_gate, "closures inside one robot against its odometry");
     visitor.field("min_inliers", min_inliers, {1, 1000}, "smaller sets are not trusted");
     visitor.field("max_search_nodes", max_search_nodes, {1, 1000000000}, "per closure");
+    visitor.field("publish_period_s", publish_period_s, {0.01, 60.0}, "[s] of changed sets");
   }
 };
 

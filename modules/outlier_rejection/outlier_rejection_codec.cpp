@@ -1,0 +1,47 @@
+#include "modules/outlier_rejection/outlier_rejection_codec.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "runtime/dds/wire_pose.hpp"
+
+namespace km {
+
+Codec<InlierSet>::Encoded Codec<InlierSet>::encode(const InlierSet& set) {
+  Encoded encoded;
+  encoded.closures.reserve(set.closures.size());
+  for (const ClosureId& id : set.closures)
+    encoded.closures.push_back({.from = to_wire(id.from), .to = to_wire(id.to)});
+  encoded.wire.a = set.a;
+  encoded.wire.b = set.b;
+  encoded.wire.set_version = set.version;
+  const auto size = static_cast<std::uint32_t>(encoded.closures.size());
+  encoded.wire.closures = {
+      ._maximum = size, ._length = size, ._buffer = encoded.closures.data(), ._release = false};
+  return encoded;
+}
+
+Decoded<InlierSet> Codec<InlierSet>::decode(const Wire& wire) {
+  using Result = Decoded<InlierSet>;
+  if (wire.a > wire.b) return Result::refuse("the pair is not in ascending order");
+  if (wire.header.robot != wire.a) return Result::refuse("decided by another robot than the lower");
+  if (wire.closures._length > kMaxInliers) return Result::refuse("too many closures");
+  if (wire.closures._length != 0 && wire.closures._buffer == nullptr)
+    return Result::refuse("closures are missing");
+
+  InlierSet set{.a = wire.a, .b = wire.b, .version = wire.set_version, .closures = {}};
+  set.closures.reserve(wire.closures._length);
+  for (std::uint32_t i = 0; i < wire.closures._length; ++i) {
+    const km_wire_ClosureRef& ref = wire.closures._buffer[i];
+    const ClosureId id{from_wire(ref.from), from_wire(ref.to)};
+    const auto [low, high] = std::minmax(id.from.robot, id.to.robot);
+    if (low != set.a || high != set.b) return Result::refuse("a closure of another pair");
+    if (id.from == id.to) return Result::refuse("a closure from a keyframe to itself");
+    if (!set.closures.empty() && !(set.closures.back() < id))
+      return Result::refuse("closures are not ascending");
+    set.closures.push_back(id);
+  }
+  return Result::accept(std::move(set));
+}
+
+}  // namespace km

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <outlier_rejection.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "modules/core/pose_graph.hpp"
+#include "runtime/dds/codec.hpp"
+
+namespace km {
+
+/// A message that claims more closures for one robot pair is refused.
+inline constexpr std::size_t kMaxInliers = 1U << 16U;
+
+/// Only the decider `a` may write a set, and only of closures between `a` and `b`, ascending.
+template <>
+struct Codec<InlierSet> {
+  using Wire = km_wire_InlierSet;
+  static constexpr const char* kTopic = "inlier_sets";
+  static constexpr std::uint16_t kVersion = 1;
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_InlierSet_desc; }
+
+  struct Encoded {
+    Wire wire{};
+    std::vector<km_wire_ClosureRef> closures;
+  };
+  static Encoded encode(const InlierSet& set);
+  static Decoded<InlierSet> decode(const Wire& wire);
+};
+
+}  // namespace km

@@ -1,0 +1,136 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <limits>
+#include <mutex>
+#include <random>
+#include <vector>
+
+#include "modules/outlier_rejection/pcm_node.hpp"
+#include "test/modules/outlier_rejection/chain.hpp"
+
+namespace km {
+namespace {
+
+// Collects what a topic publishes; usable from any thread.
+class Recorder {
+ public:
+  explicit Recorder(Topic<InlierSet>& topic) {
+    topic.subscribe([this](const auto& message) {
+      const std::lock_guard lock(mutex_);
+      sets_.push_back(*message);
+    });
+  }
+  std::vector<InlierSet> sets() const {
+    const std::lock_guard lock(mutex_);
+    return sets_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<InlierSet> sets_;
+};
+
+struct Team {
+  std::mt19937 rng{1};
+  Topic<Closure> closures;
+  Topic<InlierSet> inlier_sets;
+  Recorder recorder{inlier_sets};
+
+  // Exact to a millimetre, weighed as such: all agree.
+  std::vector<Closure> agreeing(RobotId a, RobotId b, std::size_t count) {
+    const TwoRobots robots(a, b, count, 1e-3, rng);
+    std::vector<Closure> result;
+    for (std::size_t i = 0; i < count; ++i)
+      result.push_back(robots.measure(i, count - 1 - i, 1e-3, rng));
+    return result;
+  }
+
+  std::vector<Closure> agreeing_inside(RobotId robot, std::size_t count) {
+    const TwoRobots twice(robot, robot, count + 1, 1e-3, rng);
+    std::vector<Closure> result;
+    for (std::size_t i = 0; i < count; ++i) {
+      const SE3 T_last_i = twice.T_world_a[count].inverse() * twice.T_world_a[i];
+      result.push_back(closure(twice.a.at(count), twice.a.at(i), T_last_i, 1e-6));
+    }
+    return result;
+  }
+};
+
+PcmConfig tolerant() {
+  PcmConfig config;
+  config.confidence = 0.9999999;
+  config.min_inliers = 3;
+  return config;
+}
+
+TEST_CASE("The PCM node publishes sets that grew, with rising versions", "[node]") {
+  Team team;
+  PcmNode node(tolerant(), 2, team.closures, team.inlier_sets);
+  const auto closures = team.agreeing(2, 5, 5);
+
+  node.step(closures[0]);
+  node.step(closures[1]);
+  node.publish_changes();
+  CHECK(team.recorder.sets().empty());  // below min_inliers
+  node.step(closures[2]);
+  node.publish_changes();
+  node.publish_changes();  // nothing new
+  node.step(closures[2]);  // repeated
+  node.publish_changes();
+  node.step(closures[3]);
+  node.step(closures[4]);
+  node.publish_changes();
+
+  const auto sets = team.recorder.sets();
+  REQUIRE(sets.size() == 2);
+  CHECK(sets[0].closures.size() == 3);
+  CHECK(sets[1].closures.size() == 5);
+  CHECK(sets[0].version < sets[1].version);
+  CHECK(std::ranges::is_sorted(sets[1].closures));
+  for (const InlierSet& set : sets) {
+    CHECK(set.a == 2);
+    CHECK(set.b == 5);
+  }
+}
+
+TEST_CASE("The PCM node decides for the pairs in which it is the lower, and for itself", "[node]") {
+  Team team;
+  PcmNode node(tolerant(), 4, team.closures, team.inlier_sets);
+  for (const Closure& closure : team.agreeing_inside(4, 4)) node.step(closure);
+  for (const auto& [a, b] : {std::pair<RobotId, RobotId>{9, 4}, {3, 4}, {5, 6}})
+    for (const Closure& closure : team.agreeing(a, b, 4)) node.step(closure);
+  node.publish_changes();
+
+  const auto sets = team.recorder.sets();
+  REQUIRE(sets.size() == 2);
+  CHECK((sets[0].a == 4 && sets[0].b == 4));
+  CHECK((sets[1].a == 4 && sets[1].b == 9));
+}
+
+TEST_CASE("The PCM node survives closures that cannot be weighed", "[node]") {
+  Team team;
+  PcmNode node(tolerant(), 0, team.closures, team.inlier_sets);
+  auto closures = team.agreeing(0, 1, 4);
+  closures[1].T_from_to.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  for (const Closure& closure : closures) node.step(closure);
+  node.publish_changes();
+  REQUIRE(team.recorder.sets().size() == 1);
+  CHECK(team.recorder.sets()[0].closures.size() == 3);
+}
+
+TEST_CASE("The PCM node's thread handles what was published before it stops", "[node]") {
+  Team team;
+  PcmNode node(tolerant(), 0, team.closures, team.inlier_sets);
+  node.start();
+  for (const Closure& closure : team.agreeing(0, 1, 40)) team.closures.publish(closure);
+  node.stop();  // drains the queue, then publishes the last set
+  CHECK(node.error() == nullptr);
+  const auto sets = team.recorder.sets();
+  REQUIRE_FALSE(sets.empty());
+  CHECK(sets.back().closures.size() == 40);
+  CHECK(sets.size() == sets.back().version);
+}
+
+}  // namespace
+}  // namespace km
