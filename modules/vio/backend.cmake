@@ -1,0 +1,7 @@
+km_module(vio
+  SOURCES fixed_lag_smoother.cpp initialization.cpp marginalization.cpp preintegration.cpp
+          residuals/imu_cost.cpp residuals/pose_block.cpp residuals/prior_cost.cpp
+          residuals/reprojection_cost.cpp stereo_odometry.cpp triangulation.cpp vio.cpp
+          vio_keyframes.cpp window.cpp window_equations.cpp window_optimizer.cpp
+          window_sliding.cpp
+  LINK km_vio_frontend Ceres::ceres)

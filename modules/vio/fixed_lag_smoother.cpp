@@ -1,0 +1,208 @@
+#include "modules/vio/fixed_lag_smoother.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "modules/core/lie.hpp"
+#include "modules/vio/residuals/pose_block.hpp"
+#include "modules/vio/triangulation.hpp"
+#include "modules/vio/window_equations.hpp"
+
+namespace km {
+namespace {
+
+constexpr int kStartIterations = 30;
+constexpr int kMinKeyframeFeatures = 20;   // fewer are no ground to make a keyframe on
+constexpr double kStartKeyframe_s = 0.15;  // spacing of keyframes among the images of the start
+
+}  // namespace
+
+FixedLagSmoother::FixedLagSmoother(const SensorRig& rig, const VioConfig& config)
+    : config_(checked(config)), noise_(rig.imu) {
+  noise_.gyro_noise_density *= config_.gyro_noise_factor;
+  noise_.accel_noise_density *= config_.accel_noise_factor;
+  for (std::size_t c = 0; c < 2; ++c)
+    window_.views[c] = view_model(rig.stereo.cameras[c], config_.noise_px);
+  window_.gravity_mps2 = config_.gravity_mps2;
+  window_.loss_scale = config_.loss_scale;
+  focal_px_ = window_.views[0].weight * config_.noise_px;
+  R_cam_body_ = window_.views[0].R_cam_body;
+}
+
+std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
+    std::span<const InertialFrame> frames, std::span<const OdometryState> guess) {
+  window_.frames.clear();
+  window_.landmarks.clear();
+  window_.prior = {};
+  Stamp last_keyframe = 0;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    append(frames[k], guess[k]);
+    observe(window_, frames[k].tracked);
+    const Stamp stamp = frames[k].tracked.stamp;
+    if (k > 0 && k + 1 < frames.size() && seconds_between(last_keyframe, stamp) < kStartKeyframe_s)
+      continue;
+    window_.frames.back().keyframe = true;
+    last_keyframe = stamp;
+  }
+  hold_first();
+  for (int pass = 0; pass < 2; ++pass) {
+    locate_landmarks();
+    if (!optimize_by_ceres(window_, kStartIterations).usable) return std::nullopt;
+    reject_outliers();
+  }
+  // The prior stays at the guess of the biases; heading and position have not moved.
+  std::vector<OdometryState> states;
+  for (const WindowFrame& frame : window_.frames) states.push_back(frame.state);
+  return states;
+}
+
+SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame) {
+  slide();
+  append(frame, window_.frames.back().state);
+  WindowFrame& newest = window_.frames.back();
+  const OdometryState predicted = predict(window_.frames[window_.frames.size() - 2].state,
+                                          newest.imu->imu(), config_.gravity_mps2);
+  newest.state = predicted;
+  newest.state.stamp = frame.tracked.stamp;
+  observe(window_, frame.tracked);
+  decide_keyframe();
+  locate_landmarks();
+  SmootherUpdate update;
+  update.solution = optimize(window_, config_.iterations);
+  update.outliers = reject_outliers();
+  update.state = newest.state;
+  update.keyframe = newest.keyframe;
+  update.landmarks = static_cast<int>(std::count_if(
+      window_.landmarks.begin(), window_.landmarks.end(), [](const auto& l) { return l.located; }));
+  return update;
+}
+
+void FixedLagSmoother::append(const InertialFrame& frame, const OdometryState& state) {
+  WindowFrame& added = window_.frames.emplace_back();
+  added.id = next_id_++;
+  added.state = state;
+  added.state.stamp = frame.tracked.stamp;
+  if (window_.frames.size() == 1) return;
+  added.samples = frame.samples;
+  set_imu(window_.frames.size() - 1);
+}
+
+void FixedLagSmoother::set_imu(std::size_t frame) {
+  const OdometryState& before = window_.frames[frame - 1].state;
+  WindowFrame& f = window_.frames[frame];
+  ImuPreintegration imu(noise_, before.gyro_bias, before.accel_bias);
+  if (!imu.add(f.samples, before.stamp, f.state.stamp))
+    throw std::invalid_argument("FixedLagSmoother: inertial samples do not cover the image at " +
+                                std::to_string(f.state.stamp) + " ns");
+  f.imu.emplace(imu, config_.gravity_mps2);
+}
+
+std::size_t FixedLagSmoother::keyframes() const {
+  return static_cast<std::size_t>(std::count_if(window_.frames.begin(), window_.frames.end(),
+                                                [](const auto& f) { return f.keyframe; }));
+}
+
+void FixedLagSmoother::decide_keyframe() {
+  const std::size_t now = window_.frames.size() - 1;
+  std::size_t last = now - 1;
+  while (last > 0 && !window_.frames[last].keyframe) --last;
+  WindowFrame& newest = window_.frames[now];
+  const WindowFrame& keyframe = window_.frames[last];
+  if (seconds_between(keyframe.state.stamp, newest.state.stamp) >= config_.keyframe_interval_s) {
+    newest.keyframe = true;
+    return;
+  }
+  const Eigen::Matrix3d R_last_now = R_cam_body_ * keyframe.state.T_odom_body.linear().transpose() *
+                                     newest.state.T_odom_body.linear() * R_cam_body_.transpose();
+  std::vector<double> parallax;
+  int seen_in_keyframe = 0, seen_now = 0;
+  for (const WindowLandmark& landmark : window_.landmarks) {
+    const auto in_keyframe =
+        std::find_if(landmark.observations.begin(), landmark.observations.end(),
+                     [&](const WindowObservation& o) { return o.frame == last; });
+    const bool in_newest = tracked_now(window_, landmark);
+    seen_now += in_newest;
+    if (in_keyframe == landmark.observations.end()) continue;
+    ++seen_in_keyframe;
+    if (!in_newest) continue;
+    const Eigen::Vector3d p = R_last_now * landmark.observations.back().bearings[0]->homogeneous();
+    parallax.push_back((p.head<2>() / p.z() - *in_keyframe->bearings[0]).norm());
+  }
+  if (seen_now < kMinKeyframeFeatures) return;
+  if (static_cast<double>(parallax.size()) <= config_.keyframe_tracked_share * seen_in_keyframe ||
+      parallax.empty()) {
+    newest.keyframe = true;
+    return;
+  }
+  const auto median = parallax.begin() + static_cast<std::ptrdiff_t>(parallax.size() / 2);
+  std::nth_element(parallax.begin(), median, parallax.end());
+  newest.keyframe = *median * focal_px_ > config_.keyframe_parallax_px;
+}
+
+void FixedLagSmoother::locate_landmarks() {
+  const double max_error = config_.outlier_px / config_.noise_px;
+  for (WindowLandmark& landmark : window_.landmarks)
+    if (!landmark.located && landmark.observations.size() >= 2)
+      locate(window_, max_error, landmark);
+}
+
+int FixedLagSmoother::reject_outliers() {
+  const double limit = config_.outlier_px / config_.noise_px;
+  int dropped = 0;
+  Eigen::Vector2d r;
+  for (WindowLandmark& landmark : window_.landmarks) {
+    if (!landmark.located) continue;
+    for (WindowObservation& o : landmark.observations)
+      for (std::size_t c = 0; c < 2; ++c) {
+        if (!o.bearings[c]) continue;
+        if (reprojection_error(window_.views[c], *o.bearings[c],
+                               window_.frames[o.frame].state.T_odom_body, landmark.p_odom, r) &&
+            r.squaredNorm() <= limit * limit)
+          continue;
+        o.bearings[c].reset();
+        ++dropped;
+      }
+    std::erase_if(landmark.observations, [](const WindowObservation& o) { return !o.bearings[0]; });
+    if (landmark.observations.size() < 2) landmark.located = false;
+  }
+  std::erase_if(window_.landmarks, [](const auto& l) { return l.observations.empty(); });
+  return dropped;
+}
+
+bool FixedLagSmoother::leaving(Stamp stamp) const {
+  const auto too_many = keyframes() > static_cast<std::size_t>(config_.window_keyframes);
+  return window_.frames.empty() || stamp < window_.frames.front().state.stamp ||
+         (too_many && stamp == window_.frames.front().state.stamp);
+}
+
+std::optional<UncertainPose> FixedLagSmoother::relative_pose(Stamp from, Stamp to) const {
+  const auto index = [&](Stamp stamp) {
+    return static_cast<Eigen::Index>(
+        std::find_if(window_.frames.begin(), window_.frames.end(),
+                     [&](const WindowFrame& f) { return f.state.stamp == stamp; }) -
+        window_.frames.begin());
+  };
+  const auto count = static_cast<Eigen::Index>(window_.frames.size());
+  const Eigen::Index i = index(from), j = index(to);
+  if (i == count || j == count) return std::nullopt;
+  WindowEquations equations(window_, 0.0);
+  equations.add_all();
+  Eigen::MatrixXd H = equations.H();
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(H);
+  if (llt.info() != Eigen::Success) return std::nullopt;
+
+  const SE3& T_from = window_.frames[static_cast<std::size_t>(i)].state.T_odom_body;
+  const SE3& T_to = window_.frames[static_cast<std::size_t>(j)].state.T_odom_body;
+  UncertainPose result;
+  result.T = T_from.inverse() * T_to;
+  // xi = -Ad(T_to_from) xi_from + xi_to; Sigma = D H^-1 D^T = |L^-1 D^T|^2.
+  Eigen::MatrixXd D_T = Eigen::MatrixXd::Zero(15 * count, 6);
+  D_T.middleRows<6>(15 * i) = -adjoint(result.T.inverse()).transpose();
+  D_T.middleRows<6>(15 * j) += Matrix6::Identity();
+  llt.matrixL().solveInPlace(D_T);
+  result.Sigma = D_T.transpose() * D_T;
+  return result;
+}
+
+}  // namespace km

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/covariance.hpp"
+#include "modules/vio/tracked_frame.hpp"
+#include "modules/vio/vio_config.hpp"
+#include "modules/vio/window.hpp"
+#include "modules/vio/window_optimizer.hpp"
+
+namespace km {
+
+/// An image as it enters the smoother: its features and the inertial samples that cover the time
+/// since the image before.
+struct InertialFrame {
+  TrackedFrame tracked;
+  std::vector<ImuSample> samples;
+};
+
+/// What one image did to the smoother.
+struct SmootherUpdate {
+  OdometryState state;  ///< Of the newest image.
+  bool keyframe = false;
+  int landmarks = 0;  ///< That took part.
+  int outliers = 0;   ///< Observations dropped.
+  WindowSolution solution;
+};
+
+/// Fixed-lag smoother over the poses, velocities, biases and landmarks of a few keyframes and the
+/// most recent images.
+///
+/// The window slides in two ways. An image that is not a keyframe and no longer recent is taken out
+/// with its observations, and the inertial factors on its two sides become one, integrated anew.
+/// The oldest keyframe is marginalised: its inertial factor, the prior, and the landmarks that are
+/// not tracked any more are replaced by a prior on the rest (marginalization.hpp); of landmarks
+/// still tracked only its observations are dropped, so that they stay out of the prior and keep the
+/// equations sparse (as in OKVIS). Derivatives by states in the prior are first estimates.
+/// Deterministic; not thread-safe.
+class FixedLagSmoother {
+ public:
+  /// Throws ConfigError if `config` is out of bounds.
+  FixedLagSmoother(const SensorRig& rig, const VioConfig& config);
+
+  /// Starts from guessed states of consecutive images, one for each of `frames`; what was before is
+  /// forgotten. The first position and heading are held, the biases weakly kept at their guess.
+  /// Returns the refined states, or nullopt if the optimisation failed.
+  [[nodiscard]] std::optional<std::vector<OdometryState>> start(
+      std::span<const InertialFrame> frames, std::span<const OdometryState> guess);
+
+  /// Adds the next image. Precondition: start() succeeded, and frame.samples cover the time since
+  /// the image before.
+  [[nodiscard]] SmootherUpdate add(const InertialFrame& frame);
+
+  /// States now in the window, in order of time.
+  [[nodiscard]] const Window& window() const { return window_; }
+
+  /// The current estimate of the relative pose of two images in the window with its marginal
+  /// covariance; nullopt if one has left or the information is singular.
+  [[nodiscard]] std::optional<UncertainPose> relative_pose(Stamp from, Stamp to) const;
+
+  /// True if the image at `stamp` will not be in the window any more after the next add().
+  [[nodiscard]] bool leaving(Stamp stamp) const;
+
+ private:
+  void append(const InertialFrame& frame, const OdometryState& state);
+  void decide_keyframe();
+  int reject_outliers();
+  void locate_landmarks();
+  void slide();
+  void merge_out(std::size_t frame);
+  void marginalize_oldest();
+  void forget_frame(std::size_t frame);
+  void set_imu(std::size_t frame);
+  void hold_first();
+  [[nodiscard]] std::size_t keyframes() const;
+
+  VioConfig config_;
+  ImuNoise noise_;
+  double focal_px_;
+  Eigen::Matrix3d R_cam_body_;
+  Window window_;
+  std::uint64_t next_id_ = 0;
+};
+
+}  // namespace km

@@ -1,0 +1,220 @@
+#include "modules/vio/initialization.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <stdexcept>
+
+#include "modules/core/lie.hpp"
+#include "modules/vio/stereo_odometry.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kMaxGravityError = 0.25;    // of its length, for stereo and samples to agree
+constexpr double kStereoPosition_m = 0.003;  // noise of a relative position from stereo
+constexpr double kVelocityStep_mps = 0.005;  // noise of a preintegrated change of velocity
+constexpr int kGyroBiasSteps = 4;
+constexpr int kGravitySteps = 5;
+
+using Preintegrations = std::vector<ImuPreintegration>;  // k: from image k to k + 1
+
+std::optional<Preintegrations> preintegrate(std::span<const InertialFrame> frames,
+                                            const ImuNoise& noise, const Eigen::Vector3d& bias) {
+  Preintegrations all;
+  for (std::size_t k = 1; k < frames.size(); ++k) {
+    ImuPreintegration& imu = all.emplace_back(noise, bias, Eigen::Vector3d::Zero());
+    if (!imu.add(frames[k].samples, frames[k - 1].tracked.stamp, frames[k].tracked.stamp))
+      return std::nullopt;
+  }
+  return all;
+}
+
+// Median distance of the features seen in both images [px]; nullopt if they are too few to tell.
+std::optional<double> image_motion(const TrackedFrame& a, const TrackedFrame& b, double focal_px) {
+  constexpr std::size_t kMinFeatures = 15;
+  std::map<std::uint64_t, Eigen::Vector2d> first;
+  for (const TrackedFeature& feature : a.features) first.emplace(feature.id, feature.left);
+  std::vector<double> distances;
+  for (const TrackedFeature& feature : b.features)
+    if (const auto it = first.find(feature.id); it != first.end())
+      distances.push_back(focal_px * (feature.left - it->second).norm());
+  if (distances.size() < kMinFeatures) return std::nullopt;
+  const auto median = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), median, distances.end());
+  return *median;
+}
+
+struct InertialMean {
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero(), accel = Eigen::Vector3d::Zero();
+  double gyro_deviation = 0.0, accel_deviation = 0.0;  // root mean square of the norm
+};
+
+InertialMean inertial_mean(std::span<const InertialFrame> frames) {
+  InertialMean mean;
+  double n = 0.0;
+  const auto each = [&](const auto& function) {
+    for (std::size_t k = 1; k < frames.size(); ++k)
+      for (const ImuSample& sample : frames[k].samples) function(sample);
+  };
+  each([&](const ImuSample& s) { mean.gyro += s.gyro, mean.accel += s.accel, n += 1.0; });
+  mean.gyro /= n;
+  mean.accel /= n;
+  each([&](const ImuSample& s) {
+    mean.gyro_deviation += (s.gyro - mean.gyro).squaredNorm() / n;
+    mean.accel_deviation += (s.accel - mean.accel).squaredNorm() / n;
+  });
+  mean.gyro_deviation = std::sqrt(mean.gyro_deviation);
+  mean.accel_deviation = std::sqrt(mean.accel_deviation);
+  return mean;
+}
+
+// Gyro bias for which the preintegrated rotations are those of stereo (Gauss-Newton).
+std::optional<Eigen::Vector3d> gyro_bias_from(std::span<const InertialFrame> frames,
+                                              const std::vector<SE3>& poses,
+                                              const ImuNoise& noise) {
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();
+  for (int step = 0; step < kGyroBiasSteps; ++step) {
+    const auto imus = preintegrate(frames, noise, bias);
+    if (!imus) return std::nullopt;
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d g = Eigen::Vector3d::Zero();
+    for (std::size_t k = 0; k < imus->size(); ++k) {
+      const Eigen::Matrix3d R = poses[k].linear().transpose() * poses[k + 1].linear();
+      const Eigen::Vector3d r = so3_log((*imus)[k].motion().dR.transpose() * R);
+      H += (*imus)[k].dR_dbg().transpose() * (*imus)[k].dR_dbg();
+      g += (*imus)[k].dR_dbg().transpose() * r;
+    }
+    bias += H.ldlt().solve(g);
+  }
+  return bias;
+}
+
+struct LinearAlignment {
+  std::vector<Eigen::Vector3d> velocities;  // in the frame of the first body
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
+};
+
+// Velocities, accelerometer bias and gravity = base + tangent * w from the linear relations
+//   p_j - p_i = v_i dt + g dt^2/2 + R_i (dp + dp_dba b),   v_j - v_i = g dt + R_i (dv + dv_dba b).
+LinearAlignment solve_alignment(const std::vector<SE3>& poses, const Preintegrations& imus,
+                                double accel_bias_sigma, const Eigen::Vector3d& base,
+                                const Eigen::MatrixXd& tangent) {
+  const auto n = static_cast<Eigen::Index>(poses.size());
+  const Eigen::Index at_g = 3 * n, at_b = at_g + tangent.cols();
+  const Eigen::Index rows = 6 * (n - 1);
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(rows + 3, at_b + 3);
+  Eigen::VectorXd y = Eigen::VectorXd::Zero(rows + 3);
+  for (Eigen::Index k = 0; k + 1 < n; ++k) {
+    const ImuPreintegration& imu = imus[static_cast<std::size_t>(k)];
+    const SE3& T_i = poses[static_cast<std::size_t>(k)];
+    const SE3& T_j = poses[static_cast<std::size_t>(k) + 1];
+    const double dt = imu.dt_s();
+    const double wp = 1.0 / kStereoPosition_m, wv = 1.0 / kVelocityStep_mps;
+    auto p = A.middleRows<3>(6 * k);
+    p.middleCols<3>(3 * k).diagonal().setConstant(wp * dt);
+    p.middleCols(at_g, tangent.cols()) = wp * 0.5 * dt * dt * tangent;
+    p.middleCols<3>(at_b) = wp * T_i.linear() * imu.dp_dba();
+    y.segment<3>(6 * k) = wp * (T_j.translation() - T_i.translation() - 0.5 * dt * dt * base -
+                                T_i.linear() * imu.motion().dp);
+    auto v = A.middleRows<3>(6 * k + 3);
+    v.middleCols<3>(3 * k + 3).diagonal().setConstant(wv);
+    v.middleCols<3>(3 * k).diagonal().setConstant(-wv);
+    v.middleCols(at_g, tangent.cols()) = -wv * dt * tangent;
+    v.middleCols<3>(at_b) = -wv * T_i.linear() * imu.dv_dba();
+    y.segment<3>(6 * k + 3) = wv * (dt * base + T_i.linear() * imu.motion().dv);
+  }
+  A.block<3, 3>(rows, at_b).diagonal().setConstant(1.0 / accel_bias_sigma);
+  const Eigen::VectorXd x = A.colPivHouseholderQr().solve(y);
+  LinearAlignment result;
+  for (Eigen::Index k = 0; k < n; ++k) result.velocities.push_back(x.segment<3>(3 * k));
+  result.gravity = base + tangent * x.segment(at_g, tangent.cols());
+  result.accel_bias = x.tail<3>();
+  return result;
+}
+
+// solve_alignment() with gravity on the sphere of its known length.
+LinearAlignment align_gravity(const std::vector<SE3>& poses, const Preintegrations& imus,
+                              double accel_bias_sigma, double gravity_mps2,
+                              Eigen::Vector3d gravity) {
+  LinearAlignment result;
+  for (int step = 0; step < kGravitySteps; ++step) {
+    const Eigen::Vector3d direction = gravity.normalized();
+    Eigen::MatrixXd tangent(3, 2);
+    tangent.col(0) = direction.unitOrthogonal();
+    tangent.col(1) = direction.cross(tangent.col(0).head<3>());
+    result = solve_alignment(poses, imus, accel_bias_sigma, gravity_mps2 * direction, tangent);
+    gravity = result.gravity;
+  }
+  return result;
+}
+
+std::vector<OdometryState> states_at_rest(std::span<const InertialFrame> frames,
+                                          const InertialMean& mean) {
+  OdometryState state;
+  state.T_odom_body.linear() = upright(mean.accel);
+  state.gyro_bias = mean.gyro;
+  std::vector<OdometryState> states(frames.size(), state);
+  for (std::size_t k = 0; k < frames.size(); ++k) states[k].stamp = frames[k].tracked.stamp;
+  return states;
+}
+
+}  // namespace
+
+Eigen::Matrix3d upright(const Eigen::Vector3d& accel) {
+  if (!(accel.norm() > 0.0)) throw std::invalid_argument("upright: the specific force is zero");
+  return Eigen::Quaterniond::FromTwoVectors(accel, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+}
+
+StartGuess guess_start(std::span<const InertialFrame> frames, const SensorRig& rig,
+                       const VioConfig& config) {
+  StartGuess guess;
+  if (frames.size() < kMinStartImages) return guess;
+  const InertialMean mean = inertial_mean(frames);
+  const double focal_px = rig.stereo.cameras[0].fx;
+  const auto motion_px = image_motion(frames.front().tracked, frames.back().tracked, focal_px);
+  guess.image_motion_px = motion_px.value_or(0.0);
+  if (motion_px && *motion_px < config.rest_parallax_px &&
+      mean.accel_deviation < config.rest_accel_mps2 &&
+      mean.gyro_deviation < config.rest_gyro_radps) {
+    guess.status = StartStatus::kAtRest;
+    guess.states = states_at_rest(frames, mean);
+    return guess;
+  }
+  guess.status = StartStatus::kInconsistent;
+  const auto rotations = preintegrate(frames, rig.imu, Eigen::Vector3d::Zero());
+  if (!rotations) return guess;
+  std::vector<Eigen::Matrix3d> R_previous_current;
+  for (const auto& imu : *rotations) R_previous_current.push_back(imu.motion().dR);
+  const auto poses = stereo_odometry(frames, R_previous_current, rig, config);
+  if (!poses) {
+    guess.status = StartStatus::kTooFewFeatures;
+    return guess;
+  }
+  const auto gyro_bias = gyro_bias_from(frames, *poses, rig.imu);
+  const auto imus = preintegrate(frames, rig.imu, *gyro_bias);
+  const LinearAlignment free =
+      solve_alignment(*poses, *imus, config.accel_bias_sigma, Eigen::Vector3d::Zero(),
+                      Eigen::MatrixXd::Identity(3, 3));
+  guess.gravity_mps2 = free.gravity.norm();
+  if (!(std::abs(guess.gravity_mps2 / config.gravity_mps2 - 1.0) < kMaxGravityError)) return guess;
+  const LinearAlignment aligned =
+      align_gravity(*poses, *imus, config.accel_bias_sigma, config.gravity_mps2, free.gravity);
+  const Eigen::Matrix3d R_odom_first = upright(-aligned.gravity);
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    OdometryState& state = guess.states.emplace_back();
+    state.stamp = frames[k].tracked.stamp;
+    state.T_odom_body = make_pose(R_odom_first, Eigen::Vector3d::Zero()) * (*poses)[k];
+    state.v_odom = R_odom_first * aligned.velocities[k];
+    state.gyro_bias = *gyro_bias;
+    state.accel_bias = aligned.accel_bias;
+  }
+  guess.status = StartStatus::kInMotion;
+  return guess;
+}
+
+}  // namespace km

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "modules/core/odometry.hpp"
+
+namespace km {
+
+/// Quadratic cost 1/2 |J dx + r|^2.
+struct SquareRootPrior {
+  Eigen::MatrixXd J;
+  Eigen::VectorXd r;
+};
+
+/// Takes the first `count` variables out of the quadratic 1/2 dx^T H dx + g^T dx by their Schur
+/// complement and returns what is left on the others, in square-root form: J^T J and J^T r are the
+/// marginal H and g. Directions without information (below 1e-12 of the largest, after scaling the
+/// diagonal to one) get no rows. H symmetric, positive semi-definite; 0 <= count <= size. Cubic in
+/// the size. The method is that of OKVIS (Leutenegger et al., IJRR 2015, Sec. 4.3) and VINS-Mono
+/// (Qin et al., TRO 2018, Sec. VI-D).
+[[nodiscard]] SquareRootPrior marginalize(const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
+                                          Eigen::Index count);
+
+/// What marginalised states left behind on the oldest states of a window: a square-root prior on
+/// dx = [pose_0 (6), motion_0 (9), pose_1 (6), pose_2 (6), ...], the retracted differences to
+/// `linearization`. Only the first state has its velocity and biases in it.
+struct StatePrior {
+  std::vector<std::uint64_t> frames;         ///< Ids; equally long as linearization.
+  std::vector<OdometryState> linearization;  ///< Where the prior was made: the first estimates.
+  Eigen::MatrixXd J;
+  Eigen::VectorXd r;
+
+  [[nodiscard]] Eigen::Index dimension() const {
+    return frames.empty() ? 0 : 9 + 6 * static_cast<Eigen::Index>(frames.size());
+  }
+};
+
+/// dx of StatePrior for the current `states`, one for each of prior.frames.
+[[nodiscard]] Eigen::VectorXd prior_offset(const StatePrior& prior,
+                                           std::span<const OdometryState* const> states);
+
+}  // namespace km

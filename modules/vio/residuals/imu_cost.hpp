@@ -1,0 +1,59 @@
+#pragma once
+
+#include <ceres/sized_cost_function.h>
+
+#include "modules/core/odometry.hpp"
+#include "modules/vio/preintegration.hpp"
+
+namespace km {
+
+using Vector15 = Eigen::Matrix<double, 15, 1>;
+using Matrix15 = Eigen::Matrix<double, 15, 15>;
+
+/// The linearised inertial error between states i and j, whitened. Rows: rotation, velocity,
+/// position, gyro bias, accelerometer bias. Columns of each state: rotation, translation (see
+/// retract()), velocity, gyro bias, accelerometer bias.
+struct ImuTerm {
+  Vector15 r;
+  Matrix15 J_i;
+  Matrix15 J_j;
+};
+
+/// Preintegrated inertial factor between two states (Forster et al., TRO 2017, Sec. VI-E and
+/// appendix) together with the random walk of both biases.
+class ImuFactor {
+ public:
+  /// Throws std::invalid_argument if `imu` is empty or has no noise: it cannot be whitened.
+  ImuFactor(const ImuPreintegration& imu, double gravity_mps2);
+
+  [[nodiscard]] const ImuPreintegration& imu() const { return imu_; }
+
+  /// Whitened error.
+  [[nodiscard]] Vector15 error(const OdometryState& i, const OdometryState& j) const;
+
+  /// error(i, j) with derivatives taken at `lin_i`, `lin_j` (first-estimate Jacobians; pass the
+  /// states themselves otherwise).
+  [[nodiscard]] ImuTerm linearize(const OdometryState& i, const OdometryState& j,
+                                  const OdometryState& lin_i, const OdometryState& lin_j) const;
+
+ private:
+  ImuPreintegration imu_;
+  Eigen::Vector3d gravity_odom_;
+  Matrix9 sqrt_information_;
+  double gyro_walk_weight_ = 0.0;
+  double accel_walk_weight_ = 0.0;
+};
+
+/// ImuFactor for Ceres. Blocks: pose i (7), motion i (9), pose j (7), motion j (9).
+class ImuCost final : public ceres::SizedCostFunction<15, 7, 9, 7, 9> {
+ public:
+  explicit ImuCost(const ImuFactor& factor) : factor_(factor) {}
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  ImuFactor factor_;
+};
+
+}  // namespace km

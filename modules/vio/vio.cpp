@@ -1,0 +1,181 @@
+#include "modules/vio/vio.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "modules/core/lie.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kMaxCostPerObservation = 100.0;  // a fit has less than 1
+
+}  // namespace
+
+Vio::Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, const VioConfig& config)
+    : robot_(robot),
+      rig_(rig),
+      config_(checked(config)),
+      tracker_(rig.stereo, tracker),
+      smoother_(rig, config) {}
+
+VioResult Vio::process(const SensorPacket& packet) {
+  VioResult result;
+  const int refused = take_samples(packet.imu);
+  if (refused > 0) result.problem = VioProblem::kBadSamples;
+  statistics_.refused_samples += refused;
+  const auto fits = [](const GrayImage& image, const PinholeCamera& camera) {
+    return image.width == camera.width && image.height == camera.height &&
+           image.pixels.size() == static_cast<std::size_t>(image.width * image.height);
+  };
+  const Frame& frame = packet.frame;
+  const bool usable = frame != nullptr && fits(frame->left, rig_.stereo.cameras[0]) &&
+                      fits(frame->right, rig_.stereo.cameras[1]);
+  if (!usable || (last_image_ && frame->stamp <= *last_image_)) {
+    result.problem = usable ? VioProblem::kUnorderedImage : VioProblem::kNoImage;
+    ++statistics_.refused_images;
+    return result;
+  }
+  ++statistics_.images;
+  const Stamp before = last_image_.value_or(frame->stamp);
+  const auto samples = samples_since(before, frame->stamp);
+  Held held{{{}, samples.value_or(std::vector<ImuSample>{})}, frame};
+  held.data.tracked = tracker_.track(*frame, turn(held.data.samples, before, frame->stamp));
+  result.tracking = tracker_.statistics();
+  const bool first = !last_image_.has_value();
+  last_image_ = frame->stamp;
+  while (samples_.size() > 1 && samples_[1].stamp <= frame->stamp) samples_.erase(samples_.begin());
+
+  if (!samples && !first) {
+    ++statistics_.gaps;
+    result.problem = VioProblem::kInertialGap;
+    restart(std::move(held));
+  } else if (running_) {
+    advance(held, result);
+  } else {
+    held_.push_back(std::move(held));
+    try_start(result);
+  }
+  if (!result.states.empty()) last_ = result.states.back();
+  return result;
+}
+
+int Vio::take_samples(std::span<const ImuSample> samples) {
+  int refused = 0;
+  for (const ImuSample& sample : samples) {
+    const bool repeated = !samples_.empty() && sample.stamp == samples_.back().stamp;
+    if (repeated) continue;  // the border sample of two packets
+    if (!sample.gyro.allFinite() || !sample.accel.allFinite() ||
+        (!samples_.empty() && sample.stamp < samples_.back().stamp))
+      ++refused;
+    else
+      samples_.push_back(sample);
+  }
+  return refused;
+}
+
+std::optional<std::vector<ImuSample>> Vio::samples_since(Stamp last, Stamp now) const {
+  std::vector<ImuSample> covering;
+  for (std::size_t k = 0; k < samples_.size(); ++k) {
+    const bool before = k + 1 < samples_.size() && samples_[k + 1].stamp <= last;
+    const bool after = k > 0 && samples_[k - 1].stamp >= now;
+    if (!before && !after) covering.push_back(samples_[k]);
+  }
+  if (covering.empty() || covering.front().stamp > last) return std::nullopt;
+  if (covering.back().stamp < now) {  // held: the last sample before the image is late
+    covering.push_back(covering.back());
+    covering.back().stamp = now;
+  }
+  for (std::size_t k = 1; k < covering.size(); ++k)
+    if (seconds_between(covering[k - 1].stamp, covering[k].stamp) > config_.max_imu_gap_s)
+      return std::nullopt;
+  return covering;
+}
+
+Eigen::Matrix3d Vio::turn(const std::vector<ImuSample>& samples, Stamp from, Stamp to) const {
+  ImuPreintegration imu(rig_.imu, last_ ? last_->gyro_bias : Eigen::Vector3d::Zero(),
+                        Eigen::Vector3d::Zero());
+  return imu.add(samples, from, to) ? imu.motion().dR : Eigen::Matrix3d::Identity();
+}
+
+void Vio::try_start(VioResult& result) {
+  const double span_s =
+      seconds_between(held_.front().data.tracked.stamp, held_.back().data.tracked.stamp);
+  if (span_s < config_.start_s - 1e-3) return;
+  ++statistics_.start_attempts;
+  std::vector<InertialFrame> frames;
+  for (const Held& held : held_) frames.push_back(held.data);
+  StartGuess guess = guess_start(frames, rig_, config_);
+  result.start = guess.status;
+  if (started(guess.status)) {
+    continue_from_last_pose(guess.states);
+    if (const auto states = smoother_.start(frames, guess.states)) {
+      ++statistics_.starts;
+      result.states = *states;
+      running_ = true;
+      for (std::size_t k = 0; k < held_.size(); ++k) {
+        if (k == 0)
+          hand_on_first((*states)[k], held_[k].frame, result);
+        else if (due((*states)[k]))
+          hand_on((*states)[k], held_[k].frame, result);
+      }
+      held_.clear();
+      return;
+    }
+    result.start = StartStatus::kInconsistent;
+  }
+  if (span_s < config_.start_timeout_s) return;
+  result.problem = VioProblem::kStartTimeout;
+  while (seconds_between(held_.front().data.tracked.stamp, held_.back().data.tracked.stamp) >
+         0.5 * config_.start_s) {
+    held_.erase(held_.begin());
+    ++statistics_.images_without_pose;
+  }
+}
+
+// A start defines its own first position and heading: both become those of the last pose.
+void Vio::continue_from_last_pose(std::vector<OdometryState>& states) const {
+  if (!last_) return;
+  const auto heading = [](const SE3& T) { return std::atan2(T.linear()(1, 0), T.linear()(0, 0)); };
+  const SE3 first = states.front().T_odom_body;
+  const Eigen::Matrix3d R =
+      so3_exp((heading(last_->T_odom_body) - heading(first)) * Eigen::Vector3d::UnitZ());
+  const SE3 T = make_pose(R, last_->T_odom_body.translation() - R * first.translation());
+  for (OdometryState& state : states) {
+    state.T_odom_body = T * state.T_odom_body;
+    state.v_odom = R * state.v_odom;
+  }
+}
+
+void Vio::advance(const Held& held, VioResult& result) {
+  result.smoother = smoother_.add(held.data);
+  if (!plausible(*result.smoother)) {
+    ++statistics_.divergences;
+    result.problem = VioProblem::kDiverged;
+    restart(held);
+    return;
+  }
+  result.states.push_back(result.smoother->state);
+  const bool last_chance = last_keyframe_ && smoother_.leaving(last_keyframe_->stamp);
+  if (result.smoother->keyframe && (last_chance || due(result.smoother->state)))
+    hand_on(result.smoother->state, held.frame, result);
+}
+
+bool Vio::plausible(const SmootherUpdate& update) const {
+  const OdometryState& s = update.state;
+  if (!update.solution.usable || !s.T_odom_body.matrix().allFinite() || !s.v_odom.allFinite())
+    return false;
+  const double allowed = kMaxCostPerObservation * (50.0 + update.landmarks);
+  return update.solution.final_cost < allowed && s.v_odom.norm() < config_.max_speed_mps &&
+         s.gyro_bias.norm() < config_.max_gyro_bias_radps &&
+         s.accel_bias.norm() < config_.max_accel_bias_mps2;
+}
+
+void Vio::restart(Held held) {
+  running_ = false;
+  held_.clear();
+  held_.push_back(std::move(held));
+}
+
+}  // namespace km

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/frame.hpp"
+#include "modules/core/odometry.hpp"
+#include "modules/vio/feature_tracker.hpp"
+#include "modules/vio/fixed_lag_smoother.hpp"
+#include "modules/vio/initialization.hpp"
+#include "modules/vio/vio_config.hpp"
+
+namespace km {
+
+/// What kept a packet from being used in full. The first that applies.
+enum class VioProblem {
+  kNone,
+  kNoImage,         ///< The packet holds none, or of the wrong size: inertial samples are kept.
+  kUnorderedImage,  ///< Not later than the image before: dropped.
+  kBadSamples,      ///< Some inertial samples are not finite or not in order: those are dropped.
+  kInertialGap,     ///< Too long without inertial samples: a new start from the last pose.
+  kDiverged,        ///< The estimate was impossible: a new start from the last pose.
+  kStartTimeout,    ///< Could not start: the oldest images held back are given up, without a pose.
+};
+
+/// Counts since construction.
+struct VioStatistics {
+  int images = 0;  ///< Accepted.
+  int refused_images = 0;
+  int refused_samples = 0;
+  int gaps = 0;
+  int divergences = 0;
+  int starts = 0;
+  int start_attempts = 0;
+  int images_without_pose = 0;  ///< Given up after a timeout of the start.
+};
+
+/// What came out of one packet.
+struct VioResult {
+  VioProblem problem = VioProblem::kNone;
+  std::vector<OdometryState> states;        ///< In order of time; several at a start.
+  std::vector<KeyframeOdometry> keyframes;  ///< New keyframes; several at a start.
+  std::optional<StartStatus> start;         ///< Outcome, if a start was attempted.
+  TrackerStatistics tracking;               ///< Of this image.
+  std::optional<SmootherUpdate> smoother;   ///< Not before the start.
+};
+
+/// Stereo-inertial odometry: one call per image, a pose for every image.
+///
+/// Images of the first VioConfig::start_s are held back; then all their poses come at once, and
+/// from there one pose per image. Bad input is refused and reported, an estimate that diverges
+/// starts anew from the last pose; neither throws. Deterministic; not thread-safe.
+class Vio {
+ public:
+  /// Throws ConfigError, and std::invalid_argument for an unusable rig.
+  Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, const VioConfig& config);
+
+  [[nodiscard]] VioResult process(const SensorPacket& packet);
+
+  [[nodiscard]] const VioStatistics& statistics() const { return statistics_; }
+
+ private:
+  using Frame = std::shared_ptr<const StereoFrame>;
+  struct Held {
+    InertialFrame data;
+    Frame frame;
+  };
+
+  int take_samples(std::span<const ImuSample> samples);
+  [[nodiscard]] std::optional<std::vector<ImuSample>> samples_since(Stamp last, Stamp now) const;
+  [[nodiscard]] Eigen::Matrix3d turn(const std::vector<ImuSample>& samples, Stamp from,
+                                     Stamp to) const;
+  void try_start(VioResult& result);
+  void advance(const Held& held, VioResult& result);
+  void restart(Held held);
+  [[nodiscard]] bool plausible(const SmootherUpdate& update) const;
+  void continue_from_last_pose(std::vector<OdometryState>& states) const;
+  void hand_on_first(const OdometryState& state, const Frame& frame, VioResult& result);
+  void hand_on(const OdometryState& state, const Frame& frame, VioResult& result);
+  [[nodiscard]] bool due(const OdometryState& state) const;
+
+  RobotId robot_;
+  SensorRig rig_;
+  VioConfig config_;
+  FeatureTracker tracker_;
+  FixedLagSmoother smoother_;
+  VioStatistics statistics_;
+  std::vector<ImuSample> samples_;  // From the last one not after the last image on.
+  std::optional<Stamp> last_image_;
+  std::vector<Held> held_;  // Not empty: starting.
+  bool running_ = false;
+  std::optional<OdometryState> last_;              // Last state that was given out.
+  std::optional<KeyframeOdometry> last_keyframe_;  // Without its images.
+};
+
+}  // namespace km

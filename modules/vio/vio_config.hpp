@@ -1,0 +1,107 @@
+#pragma once
+
+#include "modules/core/config.hpp"
+
+namespace km {
+
+/// Parameters of Vio without its feature tracker. Field names are the YAML keys below `vio:`.
+struct VioConfig {
+  static constexpr const char* kSection = "vio";
+
+  /// Keyframes that the smoother keeps. More: smoother and slower.
+  int window_keyframes = 7;
+
+  /// Most recent images kept besides keyframes. Fewer: faster.
+  int window_recent = 3;
+
+  /// Steps of the optimisation for every image.
+  int iterations = 3;
+
+  /// Standard deviation of a tracked image point [px].
+  double noise_px = 0.7;
+
+  /// Scale of the Cauchy loss on reprojection errors, in standard deviations.
+  double loss_scale = 1.5;
+
+  /// Observations farther than this from their landmark are dropped [px].
+  double outlier_px = 3.0;
+
+  /// The sensor's noise densities are multiplied by these: vibration, imperfect time stamps and
+  /// calibration add to the noise of the data sheet.
+  double gyro_noise_factor = 1.0;
+  double accel_noise_factor = 4.0;
+
+  /// Gravity where the robots are [m/s^2].
+  double gravity_mps2 = 9.81;
+
+  /// Standard deviation of an accelerometer's bias before anything is known of it [m/s^2].
+  double accel_bias_sigma = 0.1;
+
+  /// A new keyframe of the smoother: when the image has moved by this much, rotation taken out
+  /// [px],
+  double keyframe_parallax_px = 12.0;
+  /// or when this share of the last keyframe's features, or less, is still tracked,
+  double keyframe_tracked_share = 0.6;
+  /// or after this long [s].
+  double keyframe_interval_s = 1.0;
+
+  /// Images held back to start from [s]; all their poses come when it is over.
+  double start_s = 0.75;
+
+  /// Still unable to start after this long, odometry starts again with newer images [s].
+  double start_timeout_s = 3.0;
+
+  /// A start at rest needs less image motion than this over the images held back [px],
+  double rest_parallax_px = 1.0;
+  /// and less deviation of the accelerometer [m/s^2] and of the gyroscope [rad/s] than this.
+  double rest_accel_mps2 = 0.5;
+  double rest_gyro_radps = 0.05;
+
+  /// A keyframe is handed on at least this long after the one before [s], and then
+  double output_interval_s = 0.3;
+  /// when the body has moved by this much [m]
+  double output_distance_m = 0.1;
+  /// or turned by this much [rad]
+  double output_rotation_rad = 0.1;
+  /// or, even at rest, after this long [s].
+  double output_rest_interval_s = 2.0;
+
+  /// Longest time between two inertial samples that is interpolated [s]; longer: a new start.
+  double max_imu_gap_s = 0.1;
+
+  /// A faster body means that the estimate has diverged [m/s]; so do larger biases.
+  double max_speed_mps = 30.0;
+  double max_gyro_bias_radps = 0.5;
+  double max_accel_bias_mps2 = 3.0;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("window_keyframes", window_keyframes, {3, 50});
+    visitor.field("window_recent", window_recent, {1, 20});
+    visitor.field("iterations", iterations, {1, 50});
+    visitor.field("noise_px", noise_px, {0.01, 20.0});
+    visitor.field("loss_scale", loss_scale, {0.1, 1e3});
+    visitor.field("outlier_px", outlier_px, {0.1, 100.0});
+    visitor.field("gyro_noise_factor", gyro_noise_factor, {0.1, 1e3});
+    visitor.field("accel_noise_factor", accel_noise_factor, {0.1, 1e3});
+    visitor.field("gravity_mps2", gravity_mps2, {9.7, 9.9});
+    visitor.field("accel_bias_sigma", accel_bias_sigma, {1e-4, 5.0});
+    visitor.field("keyframe_parallax_px", keyframe_parallax_px, {0.5, 200.0});
+    visitor.field("keyframe_tracked_share", keyframe_tracked_share, {0.0, 1.0});
+    visitor.field("keyframe_interval_s", keyframe_interval_s, {0.05, 5.0});
+    visitor.field("start_s", start_s, {0.2, 5.0});
+    visitor.field("start_timeout_s", start_timeout_s, {0.5, 60.0});
+    visitor.field("rest_parallax_px", rest_parallax_px, {0.0, 20.0});
+    visitor.field("rest_accel_mps2", rest_accel_mps2, {0.0, 10.0});
+    visitor.field("rest_gyro_radps", rest_gyro_radps, {0.0, 1.0});
+    visitor.field("output_interval_s", output_interval_s, {0.0, 10.0});
+    visitor.field("output_distance_m", output_distance_m, {0.0, 10.0});
+    visitor.field("output_rotation_rad", output_rotation_rad, {0.0, 3.2});
+    visitor.field("output_rest_interval_s", output_rest_interval_s, {0.1, 1e3});
+    visitor.field("max_imu_gap_s", max_imu_gap_s, {1e-3, 1.0});
+    visitor.field("max_speed_mps", max_speed_mps, {0.1, 1e3});
+    visitor.field("max_gyro_bias_radps", max_gyro_bias_radps, {1e-3, 10.0});
+    visitor.field("max_accel_bias_mps2", max_accel_bias_mps2, {1e-2, 50.0});
+  }
+};
+
+}  // namespace km

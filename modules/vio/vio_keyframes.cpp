@@ -1,0 +1,61 @@
+#include <algorithm>
+
+#include "modules/vio/vio.hpp"
+
+// Which keyframes Vio hands on, and with what relative pose.
+namespace km {
+namespace {
+
+// The relative pose across a new start is hardly known: standard deviations [rad], [m].
+constexpr double kRestartRotation = 0.3;
+constexpr double kRestartTranslation = 1.0;
+
+Matrix6 restart_covariance() {
+  Vector6 sigma;
+  sigma << Eigen::Vector3d::Constant(kRestartRotation),
+      Eigen::Vector3d::Constant(kRestartTranslation);
+  return sigma.cwiseAbs2().asDiagonal();
+}
+
+}  // namespace
+
+bool Vio::due(const OdometryState& state) const {
+  const double dt = seconds_between(last_keyframe_->stamp, state.stamp);
+  if (dt < config_.output_interval_s - 1e-3) return false;
+  if (dt >= config_.output_rest_interval_s) return true;
+  const auto previous = smoother_.relative_pose(last_keyframe_->stamp, state.stamp);
+  return !previous || previous->T.translation().norm() >= config_.output_distance_m ||
+         angle_of(previous->T.linear()) >= config_.output_rotation_rad;
+}
+
+void Vio::hand_on_first(const OdometryState& state, const Frame& frame, VioResult& result) {
+  KeyframeOdometry keyframe;
+  keyframe.stamp = state.stamp;
+  keyframe.T_odom_kf = state.T_odom_body;
+  keyframe.T_previous_kf = state.T_odom_body;
+  keyframe.id = {robot_, 0};
+  if (last_keyframe_) {  // a new start
+    keyframe.id.index = last_keyframe_->id.index + 1;
+    keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * state.T_odom_body;
+    keyframe.covariance = restart_covariance();
+  }
+  last_keyframe_ = keyframe;
+  result.keyframes.push_back(keyframe);
+  result.keyframes.back().frame = frame;
+}
+
+void Vio::hand_on(const OdometryState& state, const Frame& frame, VioResult& result) {
+  const auto relative = smoother_.relative_pose(last_keyframe_->stamp, state.stamp);
+  KeyframeOdometry keyframe;
+  keyframe.id = {robot_, last_keyframe_->id.index + 1};
+  keyframe.stamp = state.stamp;
+  keyframe.T_previous_kf =
+      relative ? relative->T : last_keyframe_->T_odom_kf.inverse() * state.T_odom_body;
+  keyframe.covariance = relative ? relative->Sigma : restart_covariance();
+  keyframe.T_odom_kf = last_keyframe_->T_odom_kf * keyframe.T_previous_kf;
+  last_keyframe_ = keyframe;
+  result.keyframes.push_back(keyframe);
+  result.keyframes.back().frame = frame;
+}
+
+}  // namespace km

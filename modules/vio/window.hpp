@@ -1,0 +1,59 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "modules/core/frame.hpp"
+#include "modules/core/odometry.hpp"
+#include "modules/vio/marginalization.hpp"
+#include "modules/vio/residuals/imu_cost.hpp"
+#include "modules/vio/residuals/reprojection_cost.hpp"
+#include "modules/vio/tracked_frame.hpp"
+
+namespace km {
+
+/// A state of the smoother's window.
+struct WindowFrame {
+  std::uint64_t id = 0;  ///< Ascending along the window.
+  OdometryState state;
+  bool keyframe = false;
+  std::vector<ImuSample> samples;  ///< Cover the time since the frame before; empty for the first.
+  std::optional<ImuFactor> imu;    ///< From the frame before; none for the first.
+};
+
+/// Bearings of one landmark in one frame of the window.
+struct WindowObservation {
+  std::size_t frame = 0;                                   ///< Index into Window::frames.
+  std::array<std::optional<Eigen::Vector2d>, 2> bearings;  ///< Left, right.
+};
+
+struct WindowLandmark {
+  std::uint64_t id = 0;
+  Eigen::Vector3d p_odom = Eigen::Vector3d::Zero();
+  bool located = false;                         ///< p_odom is known: the landmark takes part.
+  std::vector<WindowObservation> observations;  ///< Ascending frames.
+};
+
+/// Everything that the optimisation works on.
+struct Window {
+  std::array<ViewModel, 2> views;
+  double gravity_mps2 = 9.81;
+  double loss_scale = 1.5;  ///< Of the Cauchy loss on reprojection errors [standard deviations].
+  std::vector<WindowFrame> frames;        ///< In order of time.
+  std::vector<WindowLandmark> landmarks;  ///< Ascending ids.
+  StatePrior prior;
+};
+
+/// Index of the frame with `id`; frames.size() if there is none.
+[[nodiscard]] std::size_t frame_index(const Window& window, std::uint64_t id);
+
+/// Enters what was seen in the window's last frame: known landmarks gain an observation, new ones
+/// are added, not located yet.
+void observe(Window& window, const TrackedFrame& tracked);
+
+/// True if the landmark was seen in the last frame.
+[[nodiscard]] bool tracked_now(const Window& window, const WindowLandmark& landmark);
+
+}  // namespace km

@@ -1,0 +1,179 @@
+// Odometry on EuRoC MH_01_easy as in the table of results: three pieces and 21 starts.
+//   bench_vio DATASET [starts] [KEY=VALUE ...]   keys of the sections vio and tracker
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <iostream>
+#include <map>
+#include <sstream>
+#include <string>
+
+#include "modules/core/lie.hpp"
+#include "odometry_errors.hpp"
+#include "odometry_run.hpp"
+
+namespace km {
+namespace {
+
+// Sets fields by name from the command line.
+struct Overrides {
+  std::map<std::string, std::string> values;
+  std::map<std::string, bool> used;
+
+  template <typename T>
+  void field(const char* name, T& value, const Bounds<std::type_identity_t<T>>& /*bounds*/) {
+    const auto it = values.find(name);
+    if (it == values.end()) return;
+    std::istringstream(it->second) >> value;
+    used[name] = true;
+  }
+};
+
+double percentile(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+OdometryErrors errors_since(const OdometryRun& run, double seconds) {
+  std::size_t first = 0;
+  while (first < run.states.size() &&
+         seconds_between(run.states.front().stamp, run.states[first].stamp) < seconds)
+    ++first;
+  return odometry_errors(std::span(run.states).subspan(first), std::span(run.truth).subspan(first));
+}
+
+std::size_t packet_at(const Recording& recording, double seconds) {
+  std::size_t k = 0;
+  const Stamp start = recording.packets.front().frame->stamp;
+  while (k < recording.packets.size() &&
+         seconds_between(start, recording.packets[k].frame->stamp) < seconds - 1e-3)
+    ++k;
+  return k;
+}
+
+// Share of keyframe steps whose error is inside the 95 % bound of their covariance, and the mean
+// squared Mahalanobis distance (6 if calibrated).
+void print_consistency(const OdometryRun& run) {
+  std::map<Stamp, const SE3*> truth;
+  for (std::size_t k = 0; k < run.states.size(); ++k) truth[run.states[k].stamp] = &run.truth[k];
+  double inside = 0.0, mean = 0.0, n = 0.0, rotation = 0.0, translation = 0.0;
+  for (std::size_t k = 1; k < run.keyframes.size(); ++k) {
+    const auto a = truth.find(run.keyframes[k - 1].stamp), b = truth.find(run.keyframes[k].stamp);
+    if (a == truth.end() || b == truth.end()) continue;
+    const SE3 T = a->second->inverse() * *b->second;
+    const Vector6 e = se3_log(run.keyframes[k].T_previous_kf.inverse() * T);
+    const Matrix6& S = run.keyframes[k].covariance;
+    const double d = e.dot(S.ldlt().solve(e));
+    rotation += e.head<3>().dot(S.topLeftCorner<3, 3>().ldlt().solve(e.head<3>()));
+    translation += e.tail<3>().dot(S.bottomRightCorner<3, 3>().ldlt().solve(e.tail<3>()));
+    inside += d < 12.592;  // chi-squared, 6 degrees of freedom, 95 %
+    mean += d;
+    n += 1.0;
+  }
+  std::printf(
+      "    keyframes %zu: chi2 mean %.2f (rotation %.2f, translation %.2f), inside 95%%: %.0f%%\n",
+      run.keyframes.size(), mean / n, rotation / n, translation / n, 100.0 * inside / n);
+}
+
+void print_piece(const char* name, const OdometryRun& run, std::size_t images) {
+  if (run.states.size() < 3) {
+    std::printf("%s: no poses\n", name);
+    return;
+  }
+  const OdometryErrors all = errors_since(run, 0.0), late = errors_since(run, 2.4);
+  std::vector<double> cpu;
+  std::vector<double> iterations, landmarks;
+  int keyframes = 0;
+  for (std::size_t k = 0; k < run.results.size(); ++k) {
+    if (!run.results[k].smoother) continue;
+    cpu.push_back(run.cpu_ms[k]);
+    iterations.push_back(run.results[k].smoother->solution.iterations);
+    landmarks.push_back(run.results[k].smoother->landmarks);
+    keyframes += run.results[k].smoother->keyframe;
+  }
+  std::printf(
+      "%s %4zu/%zu  ATE %6.2f mm max %6.2f  RPE %5.2f mm %5.3f deg  tilt %4.2f  scale %.3f  "
+      "| +2.4s ATE %5.2f RPE %5.2f %5.3f tilt %4.2f | cpu %.2f/%.2f/%.2f ms | it %.0f lm %.0f kf "
+      "%d restarts %d\n",
+      name, run.states.size(), images, 1e3 * all.ate_m, 1e3 * all.max_m, 1e3 * all.rpe_m,
+      all.rpe_deg, all.tilt_deg, all.scale, 1e3 * late.ate_m, 1e3 * late.rpe_m, late.rpe_deg,
+      late.tilt_deg, percentile(cpu, 0.5), percentile(cpu, 0.95), percentile(run.cpu_ms, 1.0),
+      percentile(iterations, 0.5), percentile(landmarks, 0.5), keyframes,
+      run.statistics.starts - 1);
+}
+
+int run(int argc, char** argv) {
+  bool starts = false;
+  Overrides overrides;
+  for (int a = 2; a < argc; ++a) {
+    const char* equals = std::strchr(argv[a], '=');
+    if (equals != nullptr)
+      overrides.values[std::string(argv[a], static_cast<std::size_t>(equals - argv[a]))] =
+          equals + 1;
+    else
+      starts |= std::strcmp(argv[a], "starts") == 0;
+  }
+  TrackerConfig tracker;
+  VioConfig config;
+  tracker.visit_fields(overrides);
+  config.visit_fields(overrides);
+  for (const auto& [name, value] : overrides.values)
+    if (!overrides.used[name]) throw std::invalid_argument("unknown key " + name);
+
+  const Recording recording = read_recording(argv[1], 0.0, 16.0);
+  const struct {
+    const char* name;
+    double from, to;
+  } pieces[] = {{"a  0.0- 7.5", 0.0, 7.5}, {"b  7.5-15.0", 7.5, 15.0}, {"c  0.0-15.0", 0.0, 15.0}};
+  for (const auto& piece : pieces) {
+    const std::size_t first = packet_at(recording, piece.from),
+                      last = packet_at(recording, piece.to);
+    const OdometryRun run = run_odometry(recording, first, last, tracker, config);
+    print_piece(piece.name, run, last - first);
+    if (run.states.size() >= 3) print_consistency(run);
+  }
+  if (!starts) return 0;
+  std::vector<double> ate, late, rotation, tilt;
+  int lost = 0;
+  for (int s = 0; s <= 20; ++s) {
+    const std::size_t first = packet_at(recording, 0.5 * s),
+                      last = packet_at(recording, 0.5 * s + 5.0);
+    const OdometryRun run = run_odometry(recording, first, last, tracker, config);
+    if (run.states.size() != last - first || run.statistics.starts != 1) {
+      ++lost;
+      std::printf("start %.1f: %zu of %zu poses, %d starts\n", 0.5 * s, run.states.size(),
+                  last - first, run.statistics.starts);
+      if (run.states.size() < 3) continue;
+    }
+    const OdometryErrors errors = errors_since(run, 0.0);
+    ate.push_back(1e3 * errors.ate_m);
+    late.push_back(1e3 * errors_since(run, 2.0).ate_m);
+    rotation.push_back(errors.rpe_deg);
+    tilt.push_back(errors.tilt_deg);
+    std::printf("%.1f:%.1f(%.2fdeg) ", 0.5 * s, ate.back(), rotation.back());
+  }
+  std::printf(
+      "\n21 starts: lost %d, ATE median %.1f p90 %.1f max %.1f mm; from +2 s %.1f %.1f %.1f; "
+      "RPE %.3f max %.3f deg; tilt %.2f max %.2f deg\n",
+      lost, percentile(ate, 0.5), percentile(ate, 0.9), percentile(ate, 1.0), percentile(late, 0.5),
+      percentile(late, 0.9), percentile(late, 1.0), percentile(rotation, 0.5),
+      percentile(rotation, 1.0), percentile(tilt, 0.5), percentile(tilt, 1.0));
+  return 0;
+}
+
+}  // namespace
+}  // namespace km
+
+int main(int argc, char** argv) try {
+  if (argc < 2) {
+    std::cerr << "usage: bench_vio DATASET [starts] [KEY=VALUE ...]\n";
+    return 2;
+  }
+  return km::run(argc, argv);
+} catch (const std::exception& error) {
+  std::cerr << "bench_vio: " << error.what() << '\n';
+  return 1;
+}
