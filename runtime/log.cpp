@@ -11,6 +11,7 @@
 #include <mutex>
 #include <utility>
 
+#include "runtime/clock.hpp"
 #include "runtime/status_line.hpp"
 
 namespace km {
@@ -33,10 +34,6 @@ RateLimit::Verdict RateLimit::ask(const std::string& key, double now_s) {
 namespace {
 
 constexpr double kLimitedInterval_s = 5.0;
-
-double steady_now_s() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 // The terminal is one per process, and so is this: log lines and the status line share it.
 struct Console {

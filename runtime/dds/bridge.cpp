@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 
+#include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 #include "runtime/thread_name.hpp"
 
@@ -17,10 +18,6 @@ constexpr dds_duration_t kWakeUp = DDS_MSECS(250);  // for what only time tells
 // Attachment numbers of the wait set; incoming topics follow.
 constexpr dds_attach_t kOther = 0;
 constexpr dds_attach_t kFirstTopic = 1;
-
-double steady_now_s() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 }  // namespace
 

@@ -36,11 +36,11 @@ struct Addressed {
 /// wait for that. What is received is published on the bridge's receive thread, one for all
 /// topics. A topic that is received must not be the one that is sent: messages would echo.
 ///
-/// The bridge starts first and stops last of the nodes. stop() sends what is queued, and waits up
-/// to two seconds until the peers have acknowledged it.
+/// The bridge is the last of the nodes to stop: it then sends what is queued, and waits up to two
+/// seconds until the peers have acknowledged it.
 class DdsBridge final : public Node {
  public:
-  /// Robots per message type: each T has one DDS topic, named by its codec.
+  /// `participant` outlives the bridge.
   explicit DdsBridge(const DdsParticipant& participant);
   ~DdsBridge() override;
 

@@ -1,0 +1,63 @@
+#include "runtime/clock.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace km {
+
+double steady_now_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+double wall_now_s() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+ReplayClock::ReplayClock(double rate) : rate_(rate) {
+  if (!(rate > 0.0))
+    throw std::invalid_argument("ReplayClock: rate " + std::to_string(rate) + " is not positive");
+}
+
+bool ReplayClock::wait_until(Stamp stamp) {
+  std::unique_lock lock(mutex_);
+  const TimePoint now = std::chrono::steady_clock::now();
+  const auto due = due_locked(stamp, now);
+  if (due) {
+    lag_s_ = std::max(0.0, std::chrono::duration<double>(now - *due).count());
+    wake_.wait_until(lock, *due, [this] { return stopped_; });
+  }
+  return !stopped_;
+}
+
+std::optional<ReplayClock::TimePoint> ReplayClock::due(Stamp stamp, TimePoint now) {
+  const std::lock_guard lock(mutex_);
+  return due_locked(stamp, now);
+}
+
+std::optional<ReplayClock::TimePoint> ReplayClock::due_locked(Stamp stamp, TimePoint now) {
+  if (std::isinf(rate_)) return std::nullopt;
+  if (!started_) {
+    started_ = true;
+    first_stamp_ = stamp;
+    first_time_ = now;
+  }
+  const std::chrono::duration<double> since(seconds_between(first_stamp_, stamp) / rate_);
+  return first_time_ + std::chrono::duration_cast<TimePoint::duration>(since);
+}
+
+double ReplayClock::lag_s() const {
+  const std::lock_guard lock(mutex_);
+  return lag_s_;
+}
+
+void ReplayClock::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+  }
+  wake_.notify_all();
+}
+
+}  // namespace km

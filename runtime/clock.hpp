@@ -1,0 +1,53 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+
+#include "modules/core/stamp.hpp"
+
+namespace km {
+
+/// Time that only goes forward, from any origin [s].
+[[nodiscard]] double steady_now_s();
+
+/// Time since 1970 [s].
+[[nodiscard]] double wall_now_s();
+
+/// Paces the playing of a recording: sensor time passes `rate` times as fast as real time, from
+/// the first stamp asked for. Thread-safe.
+class ReplayClock {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  /// An infinite `rate` never waits. Throws std::invalid_argument unless `rate` is positive.
+  explicit ReplayClock(double rate);
+
+  /// Waits until `stamp` is due. False if stopped: the source should end.
+  bool wait_until(Stamp stamp);
+
+  /// When `stamp` is due; the first call, at `now`, fixes the origin. Nullopt: at once.
+  [[nodiscard]] std::optional<TimePoint> due(Stamp stamp, TimePoint now);
+
+  /// How far wait_until() was behind when it was last called [s]: above zero, the robot does not
+  /// keep up.
+  [[nodiscard]] double lag_s() const;
+
+  /// Ends every wait, now and later. Idempotent.
+  void stop();
+
+ private:
+  std::optional<TimePoint> due_locked(Stamp stamp, TimePoint now);
+
+  const double rate_;
+  mutable std::mutex mutex_;  // guards what follows
+  std::condition_variable wake_;
+  bool started_ = false;
+  bool stopped_ = false;
+  Stamp first_stamp_ = 0;
+  TimePoint first_time_;
+  double lag_s_ = 0.0;
+};
+
+}  // namespace km

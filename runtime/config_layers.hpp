@@ -1,0 +1,58 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "runtime/config_text.hpp"
+#include "runtime/yaml_config.hpp"
+
+namespace km {
+
+/// A configuration put together from files and command-line overrides: what is added later wins,
+/// key by key. Problems are collected over all layers and sections and thrown together by
+/// finish(), each with the file and line it comes from:
+///
+///     ConfigLayers layers;
+///     layers.add_file("config/robot.yaml");
+///     layers.add_override("vio.max_features=300");
+///     const auto vio = layers.load<VioConfig>();
+///     const auto pcm = layers.load<PcmConfig>();
+///     layers.finish();
+class ConfigLayers {
+ public:
+  /// A YAML file with a map of sections.
+  void add_file(const std::filesystem::path& file);
+
+  /// YAML `text`; `origin` stands for the file in messages.
+  void add_text(const std::string& text, const std::string& origin);
+
+  /// "section.key=value", the value in YAML: numbers, words, [a, b].
+  void add_override(const std::string& assignment);
+
+  /// The section Config::kSection; fields that are absent or wrong keep their defaults.
+  template <typename Config>
+  [[nodiscard]] Config load() {
+    known_.insert(Config::kSection);
+    Config config;
+    problems_ += fill_config(sections_[Config::kSection], config);
+    effective_ += (effective_.empty() ? "" : "\n") + to_yaml(config);
+    return config;
+  }
+
+  /// Throws ConfigError that lists every problem, sections nobody loaded included.
+  void finish() const;
+
+  /// What was loaded, as a file that gives the same configuration again.
+  [[nodiscard]] const std::string& effective() const { return effective_; }
+
+ private:
+  std::map<std::string, ConfigSection> sections_;
+  std::set<std::string> known_;
+  std::string problems_;
+  std::string effective_;
+};
+
+}  // namespace km
