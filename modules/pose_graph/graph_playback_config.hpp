@@ -1,0 +1,21 @@
+#pragma once
+
+#include "modules/core/config.hpp"
+
+namespace km {
+
+/// Parameters of the playback of recorded pose graphs. Field names are the YAML keys below
+/// `graph_playback:`.
+struct GraphPlaybackConfig {
+  static constexpr const char* kSection = "graph_playback";
+
+  /// Recorded graphs carry no time: keyframe i is stamped i / poses_per_second.
+  double poses_per_second = 1.0;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("poses_per_second", poses_per_second, {1e-3, 1e6},
+                  "[1/s] graphs carry no time: keyframe i is stamped i / poses_per_second");
+  }
+};
+
+}  // namespace km
