@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "modules/place_recognition/bow_vector.hpp"
+
+namespace km {
+
+/// An image of the database and its score against a query.
+struct BowMatch {
+  std::size_t index = 0;  ///< In order of add().
+  float score = 0.0F;
+
+  bool operator==(const BowMatch&) const = default;
+};
+
+/// What a query asks for.
+struct BowQuery {
+  std::size_t first = 0;  ///< Only images first, ..., last - 1 are compared.
+  std::size_t last = std::numeric_limits<std::size_t>::max();
+  double min_score = 0.0;  ///< Images below are counted, not listed.
+  std::size_t max_matches = std::numeric_limits<std::size_t>::max();
+};
+
+/// What came of it.
+struct BowMatches {
+  std::vector<BowMatch> best;  ///< By descending score, then ascending index.
+  std::size_t compared = 0;    ///< Images that share a word with the query.
+  std::size_t above = 0;       ///< Of these, images of at least min_score.
+  float best_score = 0.0F;     ///< Of all compared.
+};
+
+/// Images by the words they contain (inverted index), searched for the ones most alike.
+///
+/// score(), see bow_vector.hpp, needs only the words two images share: a query walks the postings
+/// of its own words and adds up min(v_i, w_i) per image. Time is that of the postings touched, and
+/// does not depend on thresholds. Const members are thread-safe.
+class BowDatabase {
+ public:
+  /// For vectors of a vocabulary of `words` words.
+  explicit BowDatabase(std::size_t words) : postings_(words) {}
+
+  /// Adds an image. Returns its index, counted from 0. Throws std::invalid_argument if words are
+  /// not ascending or not of the vocabulary, or if weights are not positive, finite and as many;
+  /// state is unchanged then.
+  std::size_t add(const BowVector& vector);
+
+  /// Precondition: `vector` would be accepted by add().
+  BowMatches query(const BowVector& vector, const BowQuery& query = {}) const;
+
+  /// Number of images.
+  std::size_t size() const { return size_; }
+
+ private:
+  struct Posting {
+    std::uint32_t image;
+    float weight;
+  };
+  // Scores of images [first, last) against `vector`.
+  std::vector<float> accumulate(const BowVector& vector, std::size_t first, std::size_t last) const;
+
+  std::vector<std::vector<Posting>> postings_;  // by word, images ascending
+  std::size_t size_ = 0;
+};
+
+}  // namespace km

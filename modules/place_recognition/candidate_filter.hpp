@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "modules/core/stamp.hpp"
+#include "modules/place_recognition/bow_database.hpp"
+#include "modules/place_recognition/place_recognition_config.hpp"
+
+namespace km {
+
+/// A keyframe that may show the same place as the query.
+struct PlaceCandidate {
+  std::size_t index = 0;    ///< In order of add().
+  double similarity = 0.0;  ///< Normalised, see CandidateFilter.
+};
+
+enum class SearchStatus {
+  kSearched,
+  kNoPrevious,     ///< The query has no keyframe before it to be normalised by.
+  kLowNormalizer,  ///< It resembles the keyframe before it too little.
+};
+
+/// What came of one query.
+struct CandidateSearch {
+  SearchStatus status = SearchStatus::kSearched;
+  double normalizer = 0.0;                 ///< s(query, keyframe before it).
+  std::size_t compared = 0;                ///< Keyframes that share a word with the query.
+  std::size_t above = 0;                   ///< Of these, at or above the threshold.
+  double best_similarity = 0.0;            ///< Of all compared.
+  std::vector<PlaceCandidate> candidates;  ///< By descending similarity; a part of those `above`.
+};
+
+/// The keyframes of one robot, in order of time, searched for places seen before.
+///
+/// The score of two images depends on how much texture they have; divided by the score of the query
+/// against the keyframe before it, eta = s(v_t, v_j) / s(v_t, v_(t-1)), one threshold serves all
+/// places (Galvez-Lopez and Tardos, TRO 2012; threshold 0.5 in Tian et al., "Kimera-Multi", Sec.
+/// III-A). Unlike there, candidates need no temporal consistency: geometric verification and
+/// outlier rejection follow. Const members are thread-safe.
+class CandidateFilter {
+ public:
+  /// For vectors of a vocabulary of `words` words. Throws ConfigError if `config` is out of bounds.
+  CandidateFilter(const PlaceRecognitionConfig& config, std::size_t words);
+
+  /// Candidates among all keyframes for a keyframe of another robot. `previous`: the keyframe
+  /// before it there, or null.
+  CandidateSearch search(const BowVector& query, const BowVector* previous) const;
+
+  /// Candidates for a keyframe of this robot taken at `stamp`, not yet added, among those at least
+  /// min_gap_s older. It is normalised by the keyframe added last.
+  CandidateSearch search_own(const BowVector& query, Stamp stamp) const;
+
+  /// Adds a keyframe; returns its index. Throws std::invalid_argument if `stamp` is before the last
+  /// one or as BowDatabase::add(); state is unchanged then.
+  std::size_t add(BowVector vector, Stamp stamp);
+
+  std::size_t size() const { return stamps_.size(); }
+
+ private:
+  CandidateSearch search_among(const BowVector& query, const BowVector* previous,
+                               std::size_t count) const;
+  std::vector<PlaceCandidate> choose(const std::vector<BowMatch>& matches, double normalizer) const;
+
+  PlaceRecognitionConfig config_;
+  BowDatabase database_;
+  std::vector<Stamp> stamps_;  // ascending
+  BowVector last_;
+};
+
+}  // namespace km

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "modules/core/keyframe.hpp"
+
+namespace km {
+
+/// A 256-bit descriptor as machine words.
+struct alignas(32) Bits256 {
+  std::array<std::uint64_t, 4> word{};
+};
+
+[[nodiscard]] Bits256 to_bits(const OrbDescriptor& descriptor);
+[[nodiscard]] OrbDescriptor to_descriptor(const Bits256& bits);
+
+/// Number of differing bits.
+[[gnu::always_inline]] inline unsigned hamming_distance(const Bits256& a, const Bits256& b) {
+  unsigned distance = 0;
+  for (std::size_t i = 0; i < 4; ++i)
+    distance += static_cast<unsigned>(__builtin_popcountll(a.word[i] ^ b.word[i]));
+  return distance;
+}
+
+/// The descriptor of `candidates` nearest to a query; of equally near ones the first.
+struct NearestBits {
+  std::uint32_t index = 0;
+  std::uint32_t distance = 0;
+};
+
+/// Precondition: `count` > 0. Without branches on the data: the distances of quantisation are too
+/// alike for an early exit to be predicted.
+[[gnu::always_inline]] inline NearestBits nearest(const Bits256& query, const Bits256* candidates,
+                                                  std::uint32_t count) {
+  std::uint32_t best = ~0U;  // distance in the upper, index in the lower half
+  for (std::uint32_t c = 0; c < count; ++c) {
+    const std::uint32_t key = (hamming_distance(query, candidates[c]) << 16U) | c;
+    best = key < best ? key : best;
+  }
+  return {best & 0xFFFFU, best >> 16U};
+}
+
+/// For each query its nearest candidate. Chooses the instructions of this processor at run time.
+/// Precondition: 0 < candidates.size() < 65536.
+[[nodiscard]] std::vector<NearestBits> nearest_of_each(std::span<const Bits256> queries,
+                                                       std::span<const Bits256> candidates);
+
+/// True if this processor counts bits in one instruction. Kernels that are worth it come twice,
+/// once compiled for such processors; always_inline functions above adapt to their caller.
+[[nodiscard]] bool has_popcount();
+
+}  // namespace km

@@ -1,0 +1,54 @@
+#include "modules/place_recognition/peer_history.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+namespace km {
+
+std::vector<PeerQuery> PeerHistory::add(std::uint32_t index, BowVector vector) {
+  std::vector<PeerQuery> released;
+  const auto [added, is_new] = keyframes_.try_emplace(index, nullptr);
+  if (!is_new) return released;
+  added->second = std::make_shared<const BowVector>(std::move(vector));
+  deadlines_[index] = keyframes_.size() + max_waiting_;
+
+  for (auto waiting = deadlines_.begin(); waiting != deadlines_.end();) {
+    const auto keyframe = keyframes_.find(waiting->first);
+    const bool overdue = keyframes_.size() >= waiting->second && waiting->first != index;
+    if (!overdue && !follows_its_predecessor(keyframe)) {
+      ++waiting;
+      continue;
+    }
+    waiting = deadlines_.erase(waiting);
+    released.push_back(release(keyframe));
+  }
+  return released;
+}
+
+bool PeerHistory::follows_its_predecessor(Keyframes::const_iterator keyframe) const {
+  if (keyframe->first == 0) return true;  // nothing to wait for
+  return keyframe != keyframes_.begin() && std::prev(keyframe)->first + 1 == keyframe->first;
+}
+
+PeerQuery PeerHistory::release(Keyframes::iterator keyframe) {
+  PeerQuery query{keyframe->first, keyframe->second, nullptr};
+  if (keyframe != keyframes_.begin()) {
+    // The nearest earlier keyframe still has its vector: only its successor frees it.
+    const auto before = std::prev(keyframe);
+    query.previous = before->second;
+    forget_if_done(before);
+  }
+  forget_if_done(keyframe);
+  return query;
+}
+
+void PeerHistory::forget_if_done(Keyframes::iterator keyframe) {
+  const auto after = std::next(keyframe);
+  const bool successor_is_known = after != keyframes_.end() && follows_its_predecessor(after);
+  if (successor_is_known && !deadlines_.contains(keyframe->first) &&
+      !deadlines_.contains(after->first))
+    keyframe->second.reset();
+}
+
+}  // namespace km

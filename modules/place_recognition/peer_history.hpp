@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "modules/place_recognition/bow_vector.hpp"
+
+namespace km {
+
+/// A peer's keyframe that can be searched for now.
+struct PeerQuery {
+  std::uint32_t index = 0;
+  std::shared_ptr<const BowVector> vector;
+  std::shared_ptr<const BowVector> previous;  ///< Its normaliser; null if there is none.
+};
+
+/// The keyframes of one peer, put into a form in which they can be searched for.
+///
+/// A query is normalised by the keyframe before it, but messages arrive in any order, and a peer
+/// that was out of reach delivers its history in a burst. A keyframe whose predecessor is missing
+/// waits for it while `max_waiting` further keyframes arrive; then the nearest earlier keyframe
+/// stands in. Keyframe 0, and one before which nothing has arrived by then, have no normaliser.
+/// What stays in memory are vectors that may still be needed: one per gap, and the newest.
+class PeerHistory {
+ public:
+  explicit PeerHistory(std::size_t max_waiting) : max_waiting_(max_waiting) {}
+
+  /// Takes keyframe `index`. Returns the queries that became possible, by ascending index. Each
+  /// keyframe is returned once; a repeated one is ignored, see has().
+  std::vector<PeerQuery> add(std::uint32_t index, BowVector vector);
+
+  /// True if keyframe `index` has been added.
+  bool has(std::uint32_t index) const { return keyframes_.contains(index); }
+
+  /// Keyframes that wait for their predecessor.
+  std::size_t waiting() const { return deadlines_.size(); }
+
+ private:
+  using Vector = std::shared_ptr<const BowVector>;
+  using Keyframes = std::map<std::uint32_t, Vector>;
+  PeerQuery release(Keyframes::iterator keyframe);
+  void forget_if_done(Keyframes::iterator keyframe);
+  bool follows_its_predecessor(Keyframes::const_iterator keyframe) const;
+
+  std::size_t max_waiting_;
+  Keyframes keyframes_;                             // null once it and its successor are released
+  std::map<std::uint32_t, std::size_t> deadlines_;  // of waiting keyframes, in keyframes_.size()
+};
+
+}  // namespace km

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <exception>
+#include <map>
+#include <memory>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "modules/core/keyframe.hpp"
+#include "modules/core/pose_graph.hpp"
+#include "modules/place_recognition/candidate_filter.hpp"
+#include "modules/place_recognition/keyframe_bow.hpp"
+#include "modules/place_recognition/peer_history.hpp"
+#include "modules/place_recognition/place_query.hpp"
+#include "modules/place_recognition/vocabulary.hpp"
+#include "runtime/node.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+
+/// Channels of the place recognition node; they must outlive it.
+struct PlaceRecognitionTopics {
+  Topic<Keyframe>& keyframes;              ///< In: own, ascending.
+  Topic<KeyframeBow>& peer_bows;           ///< In: of peers; own ones that come back are ignored.
+  const Topic<KeyframeBow>& own_bows;      ///< Out: every own keyframe, for the peers.
+  const Topic<LoopCandidate>& candidates;  ///< Out.
+  const Topic<PlaceQuery>& queries;        ///< Out: one per keyframe heard of.
+};
+
+/// Finds places seen before: own keyframes among earlier own ones, and keyframes of peers, as they
+/// arrive, among own ones (Tian et al., "Kimera-Multi", Sec. III-A).
+///
+/// A pair of keyframes (a_i, b_j) of two robots is never missed while messages get through in both
+/// directions: either a knew a_i when b_j arrived, and finds the pair; or it did not, then a_i was
+/// published after b_j and b, which knows b_j, finds it. Both find it if the two messages crossed:
+/// with keyframes of the same instant, and with all of the past when robots meet again. Whoever
+/// takes the candidates must expect a pair from either side. Keyframe 0 of a robot has no
+/// normaliser and is found only as the one that is known already.
+///
+/// A keyframe index stands for one keyframe for ever: a robot that starts anew needs another id.
+class PlaceRecognitionNode final : public Node {
+ public:
+  /// Throws ConfigError if `config` is out of bounds.
+  PlaceRecognitionNode(const PlaceRecognitionConfig& config, RobotId self,
+                       std::shared_ptr<const Vocabulary> vocabulary,
+                       const PlaceRecognitionTopics& topics);
+
+  std::string_view name() const override { return "place_recognition"; }
+  void start() override { worker_.start(); }
+  void stop() noexcept override { worker_.stop(); }
+  std::exception_ptr error() const override { return worker_.error(); }
+
+  /// Handle one input synchronously. The thread calls only these; so can tests and replay.
+  void step(const Keyframe& keyframe);
+  void step(const KeyframeBow& peer_bow);
+
+ private:
+  using Input = std::variant<Topic<Keyframe>::Message, Topic<KeyframeBow>::Message>;
+
+  void publish(const KeyframeId& query, CandidateSearch search) const;
+  void publish_refusal(const KeyframeId& query, PlaceQueryStatus status) const;
+
+  const PlaceRecognitionConfig config_;
+  const RobotId self_;
+  const std::shared_ptr<const Vocabulary> vocabulary_;
+  const PlaceRecognitionTopics topics_;
+  CandidateFilter own_;
+  std::vector<KeyframeId> own_ids_;  // by index in own_
+  std::map<RobotId, PeerHistory> peers_;
+  Worker<Input> worker_;  // last member: stops first
+};
+
+}  // namespace km

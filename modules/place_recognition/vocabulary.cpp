@@ -1,0 +1,145 @@
+#include "modules/place_recognition/vocabulary.hpp"
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+#include <utility>
+
+namespace km {
+namespace {
+
+// So many descriptors descend together: while one waits for the memory of its next node, the others
+// compute.
+constexpr std::size_t kBatch = 32;
+
+void sort_words(std::vector<std::uint32_t>& words, std::size_t vocabulary_size) {
+  // Radix sort, 11 bits a pass: words are small numbers, and comparing them costs as much as
+  // finding them.
+  constexpr unsigned kBits = 11;
+  constexpr std::uint32_t kMask = (1U << kBits) - 1U;
+  std::vector<std::uint32_t> other(words.size());
+  for (unsigned shift = 0; shift < 32 && (vocabulary_size - 1) >> shift != 0; shift += kBits) {
+    std::array<std::uint32_t, kMask + 2> start{};
+    for (const std::uint32_t word : words) ++start[((word >> shift) & kMask) + 1];
+    for (std::size_t i = 1; i < start.size(); ++i) start[i] += start[i - 1];
+    for (const std::uint32_t word : words) other[start[(word >> shift) & kMask]++] = word;
+    words.swap(other);
+  }
+}
+
+}  // namespace
+
+// The descent of many descriptors, compiled twice (see has_popcount()).
+struct Vocabulary::Descent {
+  const Node* nodes;
+  const Bits256* centers;
+  std::span<const OrbDescriptor> descriptors;
+  std::uint32_t* words;
+
+  [[gnu::always_inline]] void batch(std::size_t begin, std::size_t size) const {
+    std::array<Bits256, kBatch> query;
+    std::array<Node, kBatch> at;
+    for (std::size_t i = 0; i < size; ++i) {
+      query[i] = to_bits(descriptors[begin + i]);
+      at[i] = nodes[0];
+    }
+    for (bool descended = true; descended;) {
+      descended = false;
+      std::array<std::uint32_t, kBatch> child{};
+      for (std::size_t i = 0; i < size; ++i) {
+        if (at[i].children == 0) continue;
+        child[i] = at[i].first + nearest(query[i], centers + at[i].first, at[i].children).index;
+        __builtin_prefetch(nodes + child[i]);
+        descended = true;
+      }
+      for (std::size_t i = 0; i < size; ++i) {
+        if (at[i].children == 0) continue;
+        at[i] = nodes[child[i]];
+        // Two descriptors to a cache line.
+        for (std::uint32_t c = 0; c < at[i].children; c += 2)
+          __builtin_prefetch(centers + at[i].first + c);
+      }
+    }
+    for (std::size_t i = 0; i < size; ++i) words[begin + i] = at[i].first;
+  }
+
+  [[gnu::always_inline]] void run() const {
+    for (std::size_t begin = 0; begin < descriptors.size(); begin += kBatch)
+      batch(begin, std::min(kBatch, descriptors.size() - begin));
+  }
+
+  void portable() const { run(); }
+#if defined(__x86_64__)
+  [[gnu::target("popcnt")]] void with_popcount() const {
+    run();
+  }
+#endif
+};
+
+Vocabulary::Vocabulary(VocabularyData data) : data_(std::move(data)) {
+  if (const std::string problem = problem_of(data_); !problem.empty())
+    throw std::invalid_argument("Vocabulary: " + problem);
+  id_ = fingerprint(data_);
+  nodes_.reserve(data_.children.size());
+  centers_.reserve(data_.children.size());
+  std::uint32_t child = 1;
+  std::uint32_t word = 0;
+  for (std::size_t i = 0; i < data_.children.size(); ++i) {
+    const std::uint32_t children = data_.children[i];
+    nodes_.push_back({children == 0 ? word++ : child, children});
+    child += children;
+    centers_.push_back(to_bits(data_.centers[i]));
+  }
+}
+
+std::vector<std::uint32_t> Vocabulary::words(std::span<const OrbDescriptor> descriptors) const {
+  std::vector<std::uint32_t> result(descriptors.size());
+  const Descent descent{nodes_.data(), centers_.data(), descriptors, result.data()};
+#if defined(__x86_64__)
+  if (has_popcount()) {
+    descent.with_popcount();
+    return result;
+  }
+#endif
+  descent.portable();
+  return result;
+}
+
+BagOfWords Vocabulary::count(std::span<const OrbDescriptor> descriptors) const {
+  std::vector<std::uint32_t> sorted = words(descriptors);
+  sort_words(sorted, size());
+  BagOfWords bag;
+  bag.reserve(sorted.size());
+  for (const std::uint32_t word : sorted) {
+    if (bag.empty() || bag.back().word != word) bag.push_back({word, 0});
+    ++bag.back().count;
+  }
+  return bag;
+}
+
+BowVector Vocabulary::weigh(const BagOfWords& bag) const {
+  BowVector vector;
+  vector.words.reserve(bag.size());
+  vector.weights.reserve(bag.size());
+  double norm = 0.0;
+  for (const auto& [word, count] : bag) {
+    const float weight = static_cast<float>(count) * data_.idf[word];
+    if (weight == 0.0F) continue;
+    vector.words.push_back(word);
+    vector.weights.push_back(weight);
+    norm += static_cast<double>(weight);
+  }
+  const auto scale = static_cast<float>(1.0 / norm);
+  for (float& weight : vector.weights) weight *= scale;
+  return vector;
+}
+
+BowVector Vocabulary::transform(std::span<const OrbDescriptor> descriptors) const {
+  return weigh(count(descriptors));
+}
+
+bool Vocabulary::knows(const BagOfWords& bag) const {
+  return bag.empty() || bag.back().word < size();  // ascending
+}
+
+}  // namespace km

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "modules/core/keyframe.hpp"
+#include "modules/place_recognition/bag_of_words.hpp"
+#include "modules/place_recognition/bow_vector.hpp"
+#include "modules/place_recognition/hamming.hpp"
+#include "modules/place_recognition/vocabulary_data.hpp"
+
+namespace km {
+
+/// Tree that assigns a visual word to a binary descriptor (Nister and Stewenius, "Scalable
+/// Recognition with a Vocabulary Tree", CVPR 2006, with the binary medians of Galvez-Lopez and
+/// Tardos, TRO 2012). A descriptor descends from the root to the nearest child until it meets a
+/// leaf: at most k * L distances. Immutable, hence thread-safe.
+class Vocabulary {
+ public:
+  /// Throws std::invalid_argument with problem_of(data) if there is one.
+  explicit Vocabulary(VocabularyData data);
+
+  /// Identity: vectors of vocabularies with different ids cannot be compared.
+  std::uint64_t id() const { return id_; }
+
+  /// Number of words.
+  std::size_t size() const { return data_.idf.size(); }
+
+  const VocabularyData& data() const { return data_; }
+
+  /// The word of each descriptor, in order.
+  std::vector<std::uint32_t> words(std::span<const OrbDescriptor> descriptors) const;
+
+  /// The words of an image and how often each occurs.
+  BagOfWords count(std::span<const OrbDescriptor> descriptors) const;
+
+  /// TF-IDF: weight of word i = count_i * idf_i, scaled to L1 norm 1. Words of no weight (those in
+  /// every training image) are left out. Precondition: words below size(), see knows().
+  BowVector weigh(const BagOfWords& bag) const;
+
+  /// weigh(count(descriptors)).
+  BowVector transform(std::span<const OrbDescriptor> descriptors) const;
+
+  /// True if every word of `bag` is one of this vocabulary.
+  bool knows(const BagOfWords& bag) const;
+
+ private:
+  VocabularyData data_;
+  std::uint64_t id_ = 0;
+  struct Node {
+    std::uint32_t first;     // child; for a leaf: its word
+    std::uint32_t children;  // 0 for a leaf
+  };
+  struct Descent;
+  std::vector<Node> nodes_;
+  std::vector<Bits256> centers_;  // of nodes_, for the descent
+};
+
+}  // namespace km

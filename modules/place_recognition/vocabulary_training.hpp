@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "modules/core/config.hpp"
+#include "modules/core/keyframe.hpp"
+#include "modules/place_recognition/vocabulary_data.hpp"
+
+namespace km {
+
+/// Shape of a vocabulary and the seed of its training.
+struct VocabularyTrainingConfig {
+  static constexpr const char* kSection = "vocabulary_training";
+
+  /// k: clusters a node is split into.
+  int branching = 10;
+
+  /// L: levels below the root; at most k^L words.
+  int depth = 5;
+
+  /// Of the random choice of the first cluster centres.
+  std::uint32_t seed = 1;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("branching", branching, {2, kMaxBranching});
+    visitor.field("depth", depth, {1, kMaxDepth});
+    visitor.field("seed", seed, {0U, ~0U});
+  }
+};
+
+/// Trains a vocabulary: descriptors[i] holds the descriptors of image i.
+///
+/// Every node's descriptors are split into at most k clusters by k-medians: centres start by
+/// k-means++ (Arthur and Vassilvitskii, SODA 2007; the squared Euclidean distance of binary vectors
+/// is their Hamming distance), a centre is the bitwise majority of its cluster (ties: 0), and
+/// Lloyd's iteration ends when no descriptor changes its cluster or after 20 rounds. Nodes with at
+/// most k different descriptors get one leaf each. idf_i = ln(N / n_i), N images, n_i of them with
+/// word i (Nister and Stewenius, CVPR 2006).
+///
+/// The same input and seed give the same result on every run. `progress`, if given, is called
+/// after each level of the tree with the number of levels done.
+/// Throws ConfigError for `config` out of bounds, std::invalid_argument if there is no descriptor.
+[[nodiscard]] VocabularyData train_vocabulary(
+    std::span<const std::vector<OrbDescriptor>> descriptors, const VocabularyTrainingConfig& config,
+    const std::function<void(int levels_done)>& progress = {});
+
+}  // namespace km

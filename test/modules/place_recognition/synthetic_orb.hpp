@@ -1,0 +1,77 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "modules/core/keyframe.hpp"
+
+namespace km {
+
+/// Descriptors with the structure that makes a vocabulary tree worthwhile: a random tree of
+/// branching 10 whose nodes differ from their parents by 70, 45, 28, 18, 12, 8 bits, level by
+/// level. Its leaves stand for the points of a world, some seen more often than others (log-normal
+/// popularity, sigma 1); a sighting flips a few bits more.
+class SyntheticOrb {
+ public:
+  SyntheticOrb(int depth, std::uint32_t seed) : rng_(seed) {
+    constexpr std::array kFlips = {70, 45, 28, 18, 12, 8};
+    OrbDescriptor root{};
+    for (std::uint8_t& byte : root) byte = static_cast<std::uint8_t>(rng_());
+    leaves_ = {root};
+    for (int level = 0; level < depth; ++level) {
+      std::vector<OrbDescriptor> next;
+      next.reserve(leaves_.size() * 10);
+      for (const OrbDescriptor& parent : leaves_)
+        for (int child = 0; child < 10; ++child)
+          next.push_back(flipped(parent, kFlips[static_cast<std::size_t>(level)]));
+      leaves_ = std::move(next);
+    }
+    std::lognormal_distribution<double> popularity(0.0, 1.0);
+    double total = 0.0;
+    for (std::size_t i = 0; i < leaves_.size(); ++i)
+      cumulative_.push_back(total += popularity(rng_));
+  }
+
+  /// An image: `count` sightings of independently drawn leaves, `flips` bits from them.
+  std::vector<OrbDescriptor> image(std::size_t count, int flips) {
+    std::uniform_real_distribution<double> uniform(0.0, cumulative_.back());
+    std::vector<OrbDescriptor> result;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto drawn = std::lower_bound(cumulative_.begin(), cumulative_.end(), uniform(rng_));
+      result.push_back(
+          flipped(leaves_[static_cast<std::size_t>(drawn - cumulative_.begin())], flips));
+    }
+    return result;
+  }
+
+  std::vector<std::vector<OrbDescriptor>> images(std::size_t number, std::size_t count, int flips) {
+    std::vector<std::vector<OrbDescriptor>> result;
+    for (std::size_t i = 0; i < number; ++i) result.push_back(image(count, flips));
+    return result;
+  }
+
+ private:
+  // `flips` different bits, inverted.
+  OrbDescriptor flipped(OrbDescriptor descriptor, int flips) {
+    OrbDescriptor changed{};
+    for (int done = 0; done < flips;) {
+      const auto bit = static_cast<std::size_t>(rng_() % 256U);
+      const auto mask = static_cast<std::uint8_t>(1U << (bit % 8));
+      if ((changed[bit / 8] & mask) != 0) continue;
+      changed[bit / 8] = static_cast<std::uint8_t>(changed[bit / 8] | mask);
+      descriptor[bit / 8] = static_cast<std::uint8_t>(descriptor[bit / 8] ^ mask);
+      ++done;
+    }
+    return descriptor;
+  }
+
+  std::mt19937 rng_;
+  std::vector<OrbDescriptor> leaves_;
+  std::vector<double> cumulative_;
+};
+
+}  // namespace km

@@ -1,0 +1,195 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <set>
+
+#include "modules/place_recognition/vocabulary.hpp"
+#include "modules/place_recognition/vocabulary_training.hpp"
+#include "test/modules/place_recognition/synthetic_orb.hpp"
+
+using Catch::Matchers::Contains;
+
+namespace km {
+namespace {
+
+using Images = std::vector<std::vector<OrbDescriptor>>;
+
+constexpr float kFloatTolerance = 1e-6F;  // weights are floats of order one
+
+int distance(const OrbDescriptor& a, const OrbDescriptor& b) {
+  int bits = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    bits += std::popcount(static_cast<unsigned>(a[i] ^ b[i]));
+  return bits;
+}
+
+// Descriptor whose first `bits` bits are set.
+OrbDescriptor ladder(int bits) {
+  OrbDescriptor descriptor{};
+  for (int i = 0; i < bits; ++i)
+    descriptor[static_cast<std::size_t>(i / 8)] |= static_cast<std::uint8_t>(1U << (i % 8));
+  return descriptor;
+}
+
+// Index of the first child of every node.
+std::vector<std::size_t> first_children(const VocabularyData& data) {
+  std::vector<std::size_t> first;
+  std::size_t next = 1;
+  for (const std::uint8_t children : data.children) {
+    first.push_back(next);
+    next += children;
+  }
+  return first;
+}
+
+// The node a descriptor ends in, by plain comparison.
+std::size_t leaf_of(const VocabularyData& data, const OrbDescriptor& descriptor) {
+  const std::vector<std::size_t> first = first_children(data);
+  std::size_t node = 0;
+  while (data.children[node] != 0) {
+    std::size_t best = first[node];
+    for (std::size_t c = best; c < first[node] + data.children[node]; ++c)
+      if (distance(descriptor, data.centers[c]) < distance(descriptor, data.centers[best]))
+        best = c;
+    node = best;
+  }
+  return node;
+}
+
+std::uint32_t word_of_leaf(const VocabularyData& data, std::size_t leaf) {
+  const auto end = data.children.begin() + static_cast<std::ptrdiff_t>(leaf);
+  return static_cast<std::uint32_t>(std::count(data.children.begin(), end, std::uint8_t{0}));
+}
+
+TEST_CASE("A descriptor gets the word that plain descent finds", "[place_recognition]") {
+  const auto seed = GENERATE(1U, 2U, 3U);
+  const int branching = GENERATE(2, 7, 10, 40);
+  CAPTURE(seed, branching);
+  SyntheticOrb world(3, seed);
+  const Vocabulary vocabulary(train_vocabulary(world.images(20, 100, 5),
+                                               {.branching = branching, .depth = 3, .seed = seed}));
+  const auto image = world.image(301, 8);  // no multiple of the batch
+  const std::vector<std::uint32_t> words = vocabulary.words(image);
+  REQUIRE(words.size() == image.size());
+  for (std::size_t i = 0; i < image.size(); ++i)
+    CHECK(words[i] == word_of_leaf(vocabulary.data(), leaf_of(vocabulary.data(), image[i])));
+}
+
+TEST_CASE("A bag counts every descriptor once, words ascending", "[place_recognition]") {
+  SyntheticOrb world(4, 1);
+  const Vocabulary vocabulary(train_vocabulary(world.images(30, 300, 5), {.depth = 4}));
+  REQUIRE(vocabulary.size() > 2048);  // needs two passes of the sort
+  const auto image = world.image(1000, 8);
+  std::vector<std::uint32_t> words = vocabulary.words(image);
+  std::sort(words.begin(), words.end());
+  std::vector<std::uint32_t> from_bag;
+  for (const auto& [word, count] : vocabulary.count(image))
+    from_bag.insert(from_bag.end(), count, word);
+  CHECK(from_bag == words);
+  CHECK(vocabulary.count({}).empty());
+  CHECK(vocabulary.transform({}).words.empty());
+}
+
+TEST_CASE("Few different descriptors become one word each", "[place_recognition]") {
+  const Images images = {{ladder(0), ladder(100), ladder(200), ladder(100), ladder(200)}};
+  const VocabularyData data = train_vocabulary(images, {.branching = 5, .depth = 4});
+  CHECK(data.children == std::vector<std::uint8_t>{3, 0, 0, 0});
+  std::set<OrbDescriptor> centers(data.centers.begin() + 1, data.centers.end());
+  CHECK(centers == std::set{ladder(0), ladder(100), ladder(200)});
+}
+
+TEST_CASE("A centre is the bitwise majority of its cluster", "[place_recognition]") {
+  // Two far groups; in the first, bits 0-9 are set in 2 of 3 descriptors, bits 10-19 in 1 of 3.
+  const Images images = {
+      {ladder(0), ladder(10), ladder(20), ladder(240), ladder(250), ladder(256)}};
+  const VocabularyData data = train_vocabulary(images, {.branching = 2, .depth = 1});
+  REQUIRE(data.children == std::vector<std::uint8_t>{2, 0, 0});
+  CHECK(std::set(data.centers.begin() + 1, data.centers.end()) ==
+        std::set{ladder(10), ladder(250)});
+}
+
+TEST_CASE("Weights are term counts times ln(N / n), scaled to norm 1", "[place_recognition]") {
+  const OrbDescriptor everywhere = ladder(0);
+  const OrbDescriptor in_two = ladder(100);
+  const OrbDescriptor in_one = ladder(200);
+  const Images images = {{everywhere, in_two}, {everywhere, in_two, in_one}, {everywhere}};
+  const Vocabulary vocabulary(train_vocabulary(images, {.branching = 3, .depth = 1}));
+  const auto word = [&](const OrbDescriptor& d) { return vocabulary.words({&d, 1})[0]; };
+  const auto idf = [&](const OrbDescriptor& d) { return vocabulary.data().idf[word(d)]; };
+  CHECK(idf(everywhere) == 0.0F);
+  CHECK(idf(in_two) == Approx(std::log(3.0 / 2.0)).epsilon(kFloatTolerance));
+  CHECK(idf(in_one) == Approx(std::log(3.0)).epsilon(kFloatTolerance));
+
+  const std::vector<OrbDescriptor> image = {in_two, everywhere, in_two, in_one};
+  const BowVector vector = vocabulary.transform(image);
+  REQUIRE(vector.words.size() == 2);  // the word that is everywhere says nothing
+  const double total = 2.0 * std::log(1.5) + std::log(3.0);
+  const std::size_t at = vector.words[0] == word(in_two) ? 0 : 1;
+  CHECK(vector.weights[at] == Approx(2.0 * std::log(1.5) / total).epsilon(kFloatTolerance));
+  CHECK(vector.weights[1 - at] == Approx(std::log(3.0) / total).epsilon(kFloatTolerance));
+}
+
+TEST_CASE("Training depends on the seed and on nothing else", "[place_recognition]") {
+  SyntheticOrb world(3, 5);
+  const Images images = world.images(10, 200, 5);
+  const VocabularyTrainingConfig config{.branching = 6, .depth = 3, .seed = 11};
+  const VocabularyData first = train_vocabulary(images, config);
+  CHECK(train_vocabulary(images, config) == first);
+  CHECK(train_vocabulary(images, {.branching = 6, .depth = 3, .seed = 12}) != first);
+  CHECK(problem_of(first).empty());
+}
+
+TEST_CASE("Two sightings of one place are more alike than two places", "[place_recognition]") {
+  SyntheticOrb world(4, 3);
+  const Vocabulary vocabulary(train_vocabulary(world.images(50, 400, 5), {.depth = 4}));
+  const auto place = world.image(500, 0);
+  auto again = place;
+  for (OrbDescriptor& d : again) d[7] ^= 0x11U;  // two bits of noise
+  const BowVector v = vocabulary.transform(place);
+  const double same = score(v, vocabulary.transform(again));
+  const double other = score(v, vocabulary.transform(world.image(500, 0)));
+  CHECK(score(v, v) == Approx(1.0).margin(1e-5));  // a sum of 500 floats
+  CHECK(same > 2.0 * other);
+}
+
+TEST_CASE("What is no vocabulary is refused with the reason", "[place_recognition]") {
+  CHECK_THROWS_WITH(train_vocabulary(Images{{}, {}}, {}), Contains("no descriptors"));
+  CHECK_THROWS_WITH(train_vocabulary(Images{{ladder(3), ladder(3)}}, {}), Contains("are equal"));
+  CHECK_THROWS_AS(train_vocabulary(Images{{ladder(3)}}, {.branching = 1}), ConfigError);
+
+  const VocabularyData good = train_vocabulary(Images{{ladder(0), ladder(9)}}, {.depth = 1});
+  VocabularyData bad = good;
+  const auto check_refused = [&](const char* reason) {
+    CHECK_THROWS_WITH(Vocabulary(bad), Contains(reason));
+    bad = good;
+  };
+  bad.idf[1] = std::nanf("");
+  check_refused("weight of word 1");
+  bad.idf.push_back(0.0F);
+  check_refused("3 weights for 2 words");
+  bad.centers.pop_back();
+  check_refused("2 centres for 3 nodes");
+  bad.branching = 1;
+  check_refused("node 0 has 2 children, branching is 1");
+  bad.depth = 0;
+  check_refused("depth 0 is outside");
+  bad = {.branching = 2, .depth = 1, .children = {2, 2, 0, 0, 0}, .centers = {}, .idf = {}};
+  bad.centers.resize(5);
+  bad.idf.resize(3);
+  check_refused("node 1 at depth 1 has children");
+  bad = {.branching = 9, .depth = 1, .children = {9, 0, 0}, .centers = {}, .idf = {}};
+  bad.centers.resize(3);
+  bad.idf.resize(2);
+  check_refused("lie beyond the last node");
+  bad = {.branching = 9, .depth = 2, .children = {1, 0, 0}, .centers = {}, .idf = {}};
+  bad.centers.resize(3);
+  bad.idf.resize(2);
+  check_refused("node 2 has no parent");
+}
+
+}  // namespace
+}  // namespace km
