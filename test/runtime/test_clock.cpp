@@ -1,0 +1,73 @@
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <future>
+#include <limits>
+
+#include "runtime/clock.hpp"
+#include "runtime/periodic.hpp"
+
+namespace km {
+namespace {
+
+TEST_CASE("Stamps are due in proportion to the rate, from the first one on", "[clock]") {
+  const double rate = GENERATE(0.5, 1.0, 4.0);
+  ReplayClock clock(rate);
+  const auto start = ReplayClock::TimePoint{} + std::chrono::hours(1);
+  const Stamp first = 1403636579763555584;
+  CHECK(clock.due(first, start) == start);
+  const auto due = clock.due(first + nanoseconds(10.0), start + std::chrono::seconds(3));
+  REQUIRE(due.has_value());
+  CHECK(std::chrono::duration<double>(*due - start).count() == Approx(10.0 / rate));
+}
+
+TEST_CASE("Playing as fast as possible never waits", "[clock]") {
+  ReplayClock clock(std::numeric_limits<double>::infinity());
+  CHECK(clock.wait_until(0));
+  CHECK(clock.wait_until(nanoseconds(1e9)));
+  CHECK(clock.lag_s() == 0.0);
+}
+
+TEST_CASE("Stopping a replay releases the source that waits", "[clock]") {
+  ReplayClock clock(1.0);
+  CHECK(clock.wait_until(0));
+  auto waiting = std::async(std::launch::async, [&] { return clock.wait_until(nanoseconds(1e6)); });
+  clock.stop();
+  CHECK_FALSE(waiting.get());
+  CHECK_FALSE(clock.wait_until(0));
+}
+
+TEST_CASE("A rate that is not positive is refused", "[clock]") {
+  CHECK_THROWS_AS(ReplayClock(0.0), std::invalid_argument);
+  CHECK_THROWS_AS(ReplayClock(std::nan("")), std::invalid_argument);
+}
+
+TEST_CASE("A periodic ticks until it is stopped, however long its period", "[periodic]") {
+  std::promise<void> ticked;
+  Periodic hourly(std::chrono::hours(1), [&] { ticked.set_value(); });
+  hourly.start();
+  ticked.get_future().get();
+  hourly.stop();
+  CHECK(hourly.error() == nullptr);
+
+  std::atomic<int> ticks = 0;
+  std::promise<void> enough;
+  Periodic quick(std::chrono::microseconds(10), [&] {
+    if (++ticks == 100) enough.set_value();
+  });
+  quick.start();
+  enough.get_future().get();
+  quick.stop();
+  const int after = ticks;
+  CHECK(after >= 100);
+}
+
+TEST_CASE("A periodic that throws keeps the exception", "[periodic]") {
+  Periodic failing(std::chrono::hours(1), [] { throw std::runtime_error("no"); });
+  failing.start();
+  while (failing.error() == nullptr) std::this_thread::yield();
+  failing.stop();
+  CHECK_THROWS_WITH(std::rethrow_exception(failing.error()), "no");
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,139 @@
+#include <catch2/catch.hpp>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "runtime/config_layers.hpp"
+
+using Catch::Matchers::Contains;
+
+namespace km {
+namespace {
+
+enum class Colour { kRed, kGreen };
+
+struct ToyConfig {
+  static constexpr const char* kSection = "toy";
+  int count = 3;
+  double length_m = 0.1;
+  std::uint8_t level = 1;
+  bool flag = false;
+  std::string name = "a \"b\": c";
+  Colour colour = Colour::kGreen;
+  std::vector<std::string> hosts = {"x"};
+
+  void visit_fields(auto& visitor) {
+    visitor.field("count", count, {1, 10}, "how many");
+    visitor.field("length_m", length_m, {0.0, 1.0});
+    visitor.field("level", level, {0, 200});
+    visitor.field("flag", flag, "on or off");
+    visitor.field("name", name);
+    visitor.field("colour", colour, {{"red", Colour::kRed}, {"green", Colour::kGreen}});
+    visitor.field("hosts", hosts);
+  }
+  bool operator==(const ToyConfig&) const = default;
+};
+
+ToyConfig loaded(ConfigLayers& layers) {
+  const auto config = layers.load<ToyConfig>();
+  layers.finish();
+  return config;
+}
+
+std::string complaint(const std::string& yaml) try {
+  ConfigLayers layers;
+  layers.add_text(yaml, "a.yaml");
+  loaded(layers);
+  return "";
+} catch (const ConfigError& error) {
+  return error.what();
+}
+
+TEST_CASE("A key that is absent keeps its default", "[config]") {
+  ConfigLayers layers;
+  layers.add_text("toy:\n  count: 5\n", "a.yaml");
+  ToyConfig expected;
+  expected.count = 5;
+  CHECK(loaded(layers) == expected);
+  ConfigLayers nothing;
+  CHECK(loaded(nothing) == ToyConfig{});
+  CHECK(load_config<ToyConfig>(YAML::Load("toy: {count: 5}")) == expected);
+}
+
+TEST_CASE("Every kind of field is read", "[config]") {
+  ConfigLayers layers;
+  layers.add_text(
+      "toy: {count: 9, length_m: 2e-1, level: 65, flag: true, name: n, colour: red, hosts: [a, b]}",
+      "a.yaml");
+  CHECK(loaded(layers) == ToyConfig{9, 0.2, 65, true, "n", Colour::kRed, {"a", "b"}});
+}
+
+TEST_CASE("A configuration error names every problem with file and line", "[config]") {
+  const std::string text = complaint(
+      "toy:\n  count: many\n  length_m: 7\n  level: 256\n  flag: perhaps\n  colour: blue\n"
+      "  hosts: {a: b}\n  cuont: 1\n  length_m: .nan\nelsewhere:\n  x: 1\n");
+  CHECK_THAT(text, Contains("a.yaml:2: toy.count = many is not a whole number"));
+  CHECK_THAT(text, Contains("a.yaml:3: toy.length_m = 7 is outside [0, 1]"));
+  CHECK_THAT(text, Contains("a.yaml:4: toy.level = 256 is not a whole number in range"));
+  CHECK_THAT(text, Contains("a.yaml:5: toy.flag = perhaps is not true or false"));
+  CHECK_THAT(text, Contains("a.yaml:6: toy.colour = blue is not one of: red, green"));
+  CHECK_THAT(text, Contains("a.yaml:7: toy.hosts = {a: b} is not a list of texts"));
+  CHECK_THAT(text, Contains("a.yaml:8: unknown key toy.cuont (did you mean count?)"));
+  CHECK_THAT(text, Contains("a.yaml:9: toy.length_m is repeated, see a.yaml:3"));
+  CHECK_THAT(text, Contains("a.yaml:10: unknown section elsewhere"));
+}
+
+TEST_CASE("NaN and fractions are outside every bound", "[config]") {
+  CHECK_THAT(complaint("toy: {length_m: .nan}"), Contains("toy.length_m = nan is outside"));
+  CHECK_THAT(complaint("toy: {count: 1.5}"), Contains("toy.count = 1.5 is not a whole number"));
+  CHECK_THAT(complaint("toy: {count: [1]}"), Contains("toy.count = [1] is not a whole number"));
+}
+
+TEST_CASE("A file that is not YAML is reported where it breaks", "[config]") {
+  CHECK_THAT(complaint("toy:\n  count: [1, 2\nmore"), Contains("a.yaml:") && Contains("not YAML"));
+  CHECK_THAT(complaint("- 1\n"), Contains("a.yaml:1: not a map of sections"));
+  CHECK_THAT(complaint("\ntoy: 3\n"), Contains("a.yaml:2: section toy is not a map of keys"));
+  ConfigLayers layers;
+  layers.add_file("no/such/file.yaml");
+  CHECK_THROWS_WITH(layers.finish(), Contains("no/such/file.yaml: cannot open"));
+}
+
+TEST_CASE("Later layers win key by key, the command line last", "[config]") {
+  ConfigLayers layers;
+  layers.add_text("toy:\n  count: 2\n  length_m: 0.5\n  name: first\n", "default.yaml");
+  layers.add_text("toy:\n  length_m: 0.6\n  name: second\n", "robot.yaml");
+  layers.add_override("toy.name=third");
+  layers.add_override("toy.hosts=[10.0.0.1, 10.0.0.2]");
+  const ToyConfig config = loaded(layers);
+  CHECK(config.count == 2);
+  CHECK(config.length_m == 0.6);
+  CHECK(config.name == "third");
+  CHECK(config.hosts == std::vector<std::string>{"10.0.0.1", "10.0.0.2"});
+}
+
+TEST_CASE("A bad value is blamed on the layer it came from", "[config]") {
+  ConfigLayers layers;
+  layers.add_text("toy:\n  count: 99\n  length_m: 9\n", "default.yaml");
+  layers.add_text("\ntoy:\n\n  count: 98\n", "robot.yaml");
+  layers.add_override("toy.length_m=-1");
+  layers.add_override("toy=1");
+  CHECK_THROWS_WITH(loaded(layers),
+                    Contains("robot.yaml:4: toy.count = 98 is outside [1, 10]") &&
+                        Contains("command line, toy.length_m=-1: toy.length_m = -1 is outside") &&
+                        Contains("command line, toy=1: not of the form section.key=value") &&
+                        !Contains("default.yaml"));
+}
+
+TEST_CASE("The effective configuration reads back to itself", "[config]") {
+  ConfigLayers layers;
+  layers.add_text("toy: {length_m: 0.30000000000000004, name: 'x: #y', hosts: ['1', 'b, c']}", "a");
+  const ToyConfig config = loaded(layers);
+  CHECK_THAT(layers.effective(), Contains("# how many; 1 .. 10") && Contains("# red | green"));
+  ConfigLayers again;
+  again.add_text(layers.effective(), "effective.yaml");
+  CHECK(loaded(again) == config);
+}
+
+}  // namespace
+}  // namespace km

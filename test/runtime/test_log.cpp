@@ -1,0 +1,105 @@
+#include <catch2/catch.hpp>
+#include <regex>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "runtime/log.hpp"
+#include "runtime/status_line.hpp"
+
+namespace km {
+namespace {
+
+// Redirects the log while it lives.
+class CapturedLog {
+ public:
+  CapturedLog() : previous_(log::set_output(&text_)) {}
+  ~CapturedLog() { log::set_output(previous_); }
+  CapturedLog(const CapturedLog&) = delete;
+  CapturedLog& operator=(const CapturedLog&) = delete;
+
+  std::vector<std::string> lines() const {
+    std::vector<std::string> result;
+    std::istringstream input(text_.str());
+    for (std::string line; std::getline(input, line);) result.push_back(line);
+    return result;
+  }
+  std::ostringstream& stream() { return text_; }
+
+ private:
+  std::ostringstream text_;
+  std::ostream* previous_;
+};
+
+TEST_CASE("A rate limit passes one message per interval and tells how many it held", "[log]") {
+  RateLimit limit(5.0);
+  CHECK(limit.ask("a", 0.0).pass);
+  CHECK_FALSE(limit.ask("a", 1.0).pass);
+  CHECK_FALSE(limit.ask("a", 4.9).pass);
+  CHECK(limit.ask("b", 1.0).pass);  // another key, its own interval
+  const auto verdict = limit.ask("a", 5.0);
+  CHECK(verdict.pass);
+  CHECK(verdict.held_back == 2);
+  CHECK(limit.ask("a", 10.0).held_back == 0);
+}
+
+TEST_CASE("A limited log line appears once per key", "[log]") {
+  const CapturedLog captured;
+  for (int i = 0; i < 100; ++i)
+    log::limited(log::Level::kWarn, "test", "this test") << "line " << i;
+  REQUIRE(captured.lines().size() == 1);
+  CHECK_THAT(captured.lines()[0], Catch::Matchers::EndsWith("warn test: line 0"));
+}
+
+TEST_CASE("Levels below the limit are not written", "[log]") {
+  const CapturedLog captured;
+  log::debug("test") << "not this";
+  log::set_level(log::Level::kError);
+  log::warn("test") << "nor this";
+  log::error("test") << "but this";
+  log::set_level(log::Level::kInfo);
+  REQUIRE(captured.lines().size() == 1);
+  CHECK_THAT(captured.lines()[0], Catch::Matchers::Contains("but this"));
+}
+
+TEST_CASE("Lines of several threads are never mixed", "[log]") {
+  const CapturedLog captured;
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 4; ++t)
+    threads.emplace_back([] {
+      for (int i = 0; i < 200; ++i) log::info("test") << "begin " << i << " middle " << i << " end";
+    });
+  for (std::thread& thread : threads) thread.join();
+  const auto lines = captured.lines();
+  CHECK(lines.size() == 800);
+  const std::regex whole("[0-9:.]+ info test: begin [0-9]+ middle [0-9]+ end");
+  for (const std::string& line : lines) CHECK(std::regex_match(line, whole));
+}
+
+TEST_CASE("On a terminal the status line is redrawn below the log lines", "[log]") {
+  CapturedLog captured;
+  {
+    StatusLine status(captured.stream(), true);
+    status.update("state 1");
+    log::info("test") << "news";
+    status.update("state 2");
+  }
+  const std::string text =
+      std::regex_replace(captured.stream().str(), std::regex("[0-9:.]+ info"), "info");
+  const std::string erase = "\r\033[K";
+  CHECK(text ==
+        erase + "state 1" + erase + "info test: news\n" + erase + "state 1" + erase + "state 2\n");
+}
+
+TEST_CASE("Without a terminal the status is printed as plain lines, the last one always", "[log]") {
+  std::ostringstream output;
+  {
+    StatusLine status(output, false, 1000.0);
+    for (int i = 0; i < 10; ++i) status.update("state " + std::to_string(i));
+  }
+  CHECK(output.str() == "state 0\nstate 9\n");
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,67 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+#include <sstream>
+#include <vector>
+
+#include "runtime/metrics.hpp"
+
+namespace km {
+namespace {
+
+// Half a bucket of 1 %, and rounding.
+constexpr double kTolerance = 0.00505;
+
+double nearest_rank(std::vector<double> values, double p) {
+  std::ranges::sort(values);
+  const double rank = std::max(1.0, std::ceil(p * static_cast<double>(values.size())));
+  return values[static_cast<std::size_t>(rank) - 1];
+}
+
+TEST_CASE("Quantiles agree with sorting all values", "[metrics]") {
+  const auto seed = GENERATE(range(0U, 20U));
+  const auto count = GENERATE(1, 2, 3, 10, 1000);
+  CAPTURE(seed, count);
+  std::mt19937 rng(seed);
+  std::lognormal_distribution<double> duration(std::log(3e-3), 2.0);
+  DurationHistogram histogram;
+  std::vector<double> values;
+  double sum = 0.0;
+  for (int i = 0; i < count; ++i) {
+    values.push_back(duration(rng));
+    sum += values.back();
+    histogram.add(values.back());
+  }
+  for (const double p : {0.01, 0.25, 0.5, 0.95, 0.99, 1.0}) {
+    CAPTURE(p);
+    CHECK(histogram.quantile_s(p) == Approx(nearest_rank(values, p)).epsilon(kTolerance));
+  }
+  CHECK(histogram.count() == values.size());
+  CHECK(histogram.max_s() == *std::ranges::max_element(values));
+  CHECK(histogram.total_s() == sum);
+}
+
+TEST_CASE("Durations off the scale are still counted", "[metrics]") {
+  DurationHistogram histogram;
+  CHECK(histogram.quantile_s(0.5) == 0.0);
+  histogram.add(0.0);
+  CHECK(histogram.quantile_s(0.5) == 0.0);
+  histogram.add(5000.0);
+  CHECK(histogram.max_s() == 5000.0);
+  CHECK(histogram.count() == 2);
+}
+
+TEST_CASE("Timings are written as one row per module", "[metrics]") {
+  Timings timings;
+  for (int i = 0; i < 10; ++i) timings.of("vio").add(0.010);
+  { const auto scope = timings.of("pgo").measure(); }
+  std::ostringstream csv;
+  timings.write_csv(csv);
+  CHECK_THAT(csv.str(),
+             Catch::Matchers::StartsWith("module,calls,median_ms,p95_ms,max_ms,total_s\npgo,1,") &&
+                 Catch::Matchers::Contains("\nvio,10,10,10,10,0.1\n"));
+}
+
+}  // namespace
+}  // namespace km

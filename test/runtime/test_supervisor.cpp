@@ -1,0 +1,169 @@
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <csignal>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "runtime/log.hpp"
+#include "runtime/supervisor.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+namespace {
+
+// Notes when it is started and stopped; fails on demand.
+class ToyNode final : public Node {
+ public:
+  ToyNode(std::string name, std::vector<std::string>& diary)
+      : name_(std::move(name)), diary_(diary), worker_(4, Overflow::kBlock, [](bool fail) {
+          if (fail) throw std::runtime_error("the reason");
+        }) {}
+
+  void post(bool fail) { worker_.post(fail); }
+
+  std::string_view name() const override { return name_; }
+  void start() override {
+    diary_.push_back("start " + name_);
+    worker_.start();
+  }
+  void stop() noexcept override {
+    if (worker_.error() == nullptr) diary_.push_back("stop " + name_);
+    worker_.stop();
+  }
+  std::exception_ptr error() const override { return worker_.error(); }
+
+ private:
+  std::string name_;
+  std::vector<std::string>& diary_;
+  Worker<bool> worker_;
+};
+
+TEST_CASE("Nodes are started in order and stopped in order, sources first", "[supervisor]") {
+  std::vector<std::string> diary;
+  SignalWatch signals;
+  {
+    Supervisor supervisor(signals);
+    supervisor.emplace<ToyNode>("camera", diary);
+    supervisor.emplace<ToyNode>("odometry", diary);
+    int polls = 0;
+    const RunResult result = supervisor.run([&] { return ++polls == 3; }, 0.001);
+    CHECK_FALSE(result.failure.has_value());
+    CHECK_FALSE(result.interrupted);
+    CHECK(diary == std::vector<std::string>{"start camera", "start odometry", "stop camera",
+                                            "stop odometry"});
+  }
+}
+
+TEST_CASE("A failed node ends the run with its name and its message", "[supervisor]") {
+  std::ostringstream captured;
+  std::ostream* previous = log::set_output(&captured);
+  std::vector<std::string> diary;
+  SignalWatch signals;
+  Supervisor supervisor(signals);
+  supervisor.emplace<ToyNode>("camera", diary);
+  supervisor.emplace<ToyNode>("odometry", diary).post(true);
+  const RunResult result = supervisor.run([] { return false; }, 0.001);
+  log::set_output(previous);
+  REQUIRE(result.failure.has_value());
+  CHECK(result.failure->node == "odometry");
+  CHECK(result.failure->message == "the reason");
+  CHECK_THAT(captured.str(), Catch::Matchers::Contains("odometry failed: the reason"));
+}
+
+TEST_CASE("A node that fails while it finishes its work is still reported", "[supervisor]") {
+  std::ostringstream captured;
+  std::ostream* previous = log::set_output(&captured);
+  std::vector<std::string> diary;
+  SignalWatch signals;
+  Supervisor supervisor(signals);
+  ToyNode& node = supervisor.emplace<ToyNode>("odometry", diary);
+  const RunResult result = supervisor.run([&] {
+    node.post(true);
+    return true;
+  });
+  log::set_output(previous);
+  REQUIRE(result.failure.has_value());
+}
+
+TEST_CASE("Two nodes of one name are refused", "[supervisor]") {
+  std::vector<std::string> diary;
+  SignalWatch signals;
+  Supervisor supervisor(signals);
+  supervisor.emplace<ToyNode>("camera", diary);
+  CHECK_THROWS_AS(supervisor.emplace<ToyNode>("camera", diary), std::invalid_argument);
+}
+
+TEST_CASE("The first signal ends the run in order", "[supervisor]") {
+  const int signal = GENERATE(SIGINT, SIGTERM);
+  std::ostringstream captured;
+  std::ostream* previous = log::set_output(&captured);
+  std::vector<std::string> diary;
+  SignalWatch signals;
+  Supervisor supervisor(signals);
+  supervisor.emplace<ToyNode>("camera", diary);
+  bool sent = false;
+  const RunResult result = supervisor.run([&] {
+    if (!std::exchange(sent, true)) kill(getpid(), signal);
+    return false;
+  });
+  log::set_output(previous);
+  CHECK(result.interrupted);
+  CHECK(diary.back() == "stop camera");
+}
+
+// A node that never ends, in a process of its own: only the second signal can help.
+[[noreturn]] void run_stubborn_robot(int ready) {
+  class Stubborn final : public Node {
+   public:
+    explicit Stubborn(int pipe) : pipe_(pipe) {}
+    std::string_view name() const override { return "stubborn"; }
+    void start() override {}
+    void stop() noexcept override {
+      const char stopping = 's';
+      if (write(pipe_, &stopping, 1) != 1) _exit(9);
+      while (true) pause();
+    }
+    std::exception_ptr error() const override { return nullptr; }
+
+   private:
+    int pipe_;
+  };
+  log::set_level(log::Level::kError);
+  SignalWatch signals;
+  Supervisor supervisor(signals);
+  supervisor.emplace<Stubborn>(ready);
+  const char running = 'r';
+  bool told = false;
+  (void)supervisor.run([&] {
+    if (!std::exchange(told, true) && write(ready, &running, 1) != 1) _exit(9);
+    return false;
+  });
+  _exit(0);
+}
+
+TEST_CASE("A second signal ends the process at once", "[supervisor]") {
+  int ends[2];
+  REQUIRE(pipe(ends) == 0);
+  const pid_t child = fork();
+  if (child == 0) run_stubborn_robot(ends[1]);
+  char told = 0;
+  REQUIRE(read(ends[0], &told, 1) == 1);
+  REQUIRE(told == 'r');
+  kill(child, SIGINT);
+  REQUIRE(read(ends[0], &told, 1) == 1);
+  REQUIRE(told == 's');
+  kill(child, SIGINT);
+  int status = 0;
+  REQUIRE(waitpid(child, &status, 0) == child);
+  CHECK(WIFSIGNALED(status));
+  CHECK(WTERMSIG(status) == SIGINT);
+  close(ends[0]);
+  close(ends[1]);
+}
+
+}  // namespace
+}  // namespace km
