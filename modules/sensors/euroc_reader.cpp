@@ -1,0 +1,125 @@
+#include "modules/sensors/euroc_reader.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <sstream>
+#include <string>
+
+#include "modules/sensors/euroc_rig.hpp"
+#include "modules/sensors/ordered_rows.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kGapPeriods = 2.5;  // one lost sample is no gap
+
+std::filesystem::path find_mav0(const std::filesystem::path& folder) {
+  if (!std::filesystem::is_directory(folder))
+    throw DatasetError(folder.string() + ": no such folder");
+  if (std::filesystem::is_directory(folder / "mav0")) return folder / "mav0";
+  for (const char* sensor : {"cam0", "cam1", "imu0"})
+    if (!std::filesystem::is_directory(folder / sensor))
+      throw DatasetError(folder.string() + ": neither a folder mav0 nor " + sensor +
+                         " in it: not a EuRoC recording");
+  return folder;
+}
+
+std::vector<ImuSample> read_imu(const std::filesystem::path& file, ReaderReport& report) {
+  std::vector<ImuSample> samples;
+  read_ordered_rows(file, 7, report, [&](Stamp stamp, const TextRow& row) -> std::string {
+    Vector6 values;
+    for (int i = 0; i < 6; ++i) {
+      const std::string_view field = row.fields[static_cast<std::size_t>(i) + 1];
+      const auto value = parse_double(field);
+      if (!value) return std::string(field) + " is not a number";
+      values[i] = *value;
+    }
+    if (values.allFinite())
+      samples.push_back({stamp, values.head<3>(), values.tail<3>()});
+    else
+      report.add(ReaderFault::kNotFinite, at_line(file, row.line));
+    return {};
+  });
+  if (samples.empty()) throw DatasetError(file.string() + ": holds no inertial sample");
+  return samples;
+}
+
+bool is_before(const ImuSample& sample, Stamp stamp) {
+  return sample.stamp < stamp;
+}
+
+ReaderFault fault_of(ImageStatus status) {
+  if (status == ImageStatus::kMissing) return ReaderFault::kMissingImage;
+  return status == ImageStatus::kWrongSize ? ReaderFault::kWrongImageSize
+                                           : ReaderFault::kUnreadableImage;
+}
+
+}  // namespace
+
+EurocReader::EurocReader(const std::filesystem::path& folder, const EurocOptions& options)
+    : mav0_(find_mav0(folder)),
+      rig_(read_euroc_rig(mav0_)),
+      pairs_(list_euroc_pairs(mav0_, options.stereo_tolerance_s, report_)),
+      imu_(read_imu(mav0_ / "imu0" / "data.csv", report_)),
+      recording_start_(pairs_.front().stamp) {
+  if (!(options.from_s < options.to_s))
+    throw std::invalid_argument("EurocReader: the window from " + std::to_string(options.from_s) +
+                                " s to " + std::to_string(options.to_s) + " s is empty");
+  select(options);
+}
+
+void EurocReader::select(const EurocOptions& options) {
+  const double end_s = seconds_between(recording_start_, pairs_.back().stamp);
+  std::erase_if(pairs_, [&](const StereoPairFile& pair) {
+    const double t_s = seconds_between(recording_start_, pair.stamp);
+    return t_s < options.from_s || t_s >= options.to_s;
+  });
+  if (!pairs_.empty()) return;
+  std::ostringstream message;
+  message << mav0_.string() << ": no stereo pair from " << options.from_s << " s to "
+          << options.to_s << " s; the recording has them from 0 s to " << end_s << " s";
+  throw DatasetError(message.str());
+}
+
+bool EurocReader::has_imu(const StereoPairFile& pair) {
+  if (imu_.front().stamp <= pair.stamp && pair.stamp <= imu_.back().stamp) return true;
+  report_.add(ReaderFault::kPairWithoutImu,
+              at_line(mav0_ / "cam0" / "data.csv", pair.line) + ": the inertial samples " +
+                  (pair.stamp < imu_.front().stamp ? "start later" : "end before it"));
+  return false;
+}
+
+std::vector<ImuSample> EurocReader::imu_until(Stamp stamp) {
+  const auto last = std::lower_bound(imu_.begin(), imu_.end(), stamp, is_before);
+  const auto first =
+      last_imu_ ? imu_.begin() + static_cast<std::ptrdiff_t>(*last_imu_)
+                : std::lower_bound(imu_.begin(), last, stamp - nanoseconds(kLeadIn_s), is_before);
+  last_imu_ = static_cast<std::size_t>(last - imu_.begin());
+
+  const double max_period_s = kGapPeriods / rig_.imu.rate_hz;
+  for (auto sample = first; sample != last; ++sample) {
+    const double period_s = seconds_between(sample->stamp, std::next(sample)->stamp);
+    if (period_s > max_period_s)
+      report_.add(ReaderFault::kImuGap, (mav0_ / "imu0" / "data.csv").string() + ": " +
+                                            std::to_string(period_s) + " s after " +
+                                            std::to_string(sample->stamp));
+  }
+  return {first, std::next(last)};
+}
+
+std::optional<SensorPacket> EurocReader::next() {
+  while (next_pair_ < pairs_.size()) {
+    const StereoPairFile& pair = pairs_[next_pair_++];
+    if (!has_imu(pair)) continue;
+    StereoPairResult loaded = load_stereo_pair(pair, rig_.stereo);
+    if (loaded.status == ImageStatus::kOk)
+      return SensorPacket{std::make_shared<const StereoFrame>(std::move(loaded.frame)),
+                          imu_until(pair.stamp)};
+    report_.add(fault_of(loaded.status),
+                at_line(mav0_ / "cam0" / "data.csv", pair.line) + ": " + loaded.problem);
+  }
+  return std::nullopt;
+}
+
+}  // namespace km

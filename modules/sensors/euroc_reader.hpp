@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <limits>
+#include <vector>
+
+#include "modules/sensors/dataset_reader.hpp"
+#include "modules/sensors/stereo_pairs.hpp"
+
+namespace km {
+
+/// Part of a recording, in seconds since the first stereo pair of the WHOLE recording.
+struct EurocOptions {
+  double from_s = 0.0;                                    ///< First instant that belongs to it.
+  double to_s = std::numeric_limits<double>::infinity();  ///< First that does not.
+  double stereo_tolerance_s = 1e-3;                       ///< Left to right stamp, at most.
+};
+
+/// Reads a EuRoC/ASL folder: mav0/{cam0,cam1,imu0} with data.csv and sensor.yaml, images in any
+/// format OpenCV decodes, as the csv names them.
+///
+/// The first packet starts up to kLeadIn_s before its frame, also where that lies before `from_s`:
+/// odometry can begin with what the inertial sensor felt before the first image.
+class EurocReader final : public DatasetReader {
+ public:
+  static constexpr double kLeadIn_s = 1.0;
+
+  /// `folder` holds `mav0` or is it. Reads the calibration and the lists, no image. Throws
+  /// DatasetError for what is missing or unusable (see read_euroc_rig()) and for a window without
+  /// a stereo pair; std::invalid_argument for a window that is empty or not a number.
+  explicit EurocReader(const std::filesystem::path& folder, const EurocOptions& options = {});
+
+  [[nodiscard]] const SensorRig& rig() const override { return rig_; }
+  [[nodiscard]] std::optional<SensorPacket> next() override;
+  [[nodiscard]] const ReaderReport& report() const override { return report_; }
+  [[nodiscard]] std::size_t pair_count() const override { return pairs_.size(); }
+
+  /// First stereo pair of the whole recording: the origin of the window's times.
+  [[nodiscard]] Stamp recording_start() const { return recording_start_; }
+
+ private:
+  void select(const EurocOptions& options);
+  [[nodiscard]] bool has_imu(const StereoPairFile& pair);
+  [[nodiscard]] std::vector<ImuSample> imu_until(Stamp stamp);
+
+  std::filesystem::path mav0_;
+  ReaderReport report_;
+  SensorRig rig_;
+  std::vector<StereoPairFile> pairs_;  // of the window
+  std::vector<ImuSample> imu_;         // of the recording
+  Stamp recording_start_ = 0;
+  std::size_t next_pair_ = 0;
+  std::optional<std::size_t> last_imu_;  // last sample of the packet before
+};
+
+}  // namespace km

@@ -1,0 +1,73 @@
+#include "modules/sensors/sensors_node.hpp"
+
+#include <sstream>
+#include <string>
+#include <utility>
+
+#include "runtime/log.hpp"
+
+namespace km {
+
+SensorsNode::SensorsNode(const SensorsConfig& config, double rate,
+                         std::unique_ptr<DatasetReader> reader, const Topic<SensorPacket>& packets,
+                         const Topic<SensorsEnd>& end)
+    : reader_(std::move(reader)),
+      filter_(checked(config).max_lag_s),
+      clock_(rate),
+      packets_(packets),
+      end_(end),
+      worker_(
+          static_cast<std::size_t>(config.read_ahead), Overflow::kBlock,
+          [this](const Input& input) {
+            std::visit([this](const auto& message) { step(message); }, input);
+          },
+          "sensors") {}
+
+void SensorsNode::start() {
+  worker_.start();
+  decoder_ = std::thread(&SensorsNode::decode, this);
+}
+
+void SensorsNode::stop() noexcept {
+  stopped_ = true;
+  clock_.stop();
+  worker_.stop();  // refuses further posts, so that the decoder ends too
+  if (decoder_.joinable()) decoder_.join();
+}
+
+void SensorsNode::decode() {
+  try {
+    while (!stopped_) {
+      auto packet = reader_->next();
+      if (!packet) {
+        worker_.post(EndOfData{reader_->report()});
+        return;
+      }
+      if (!worker_.post(std::make_shared<const SensorPacket>(std::move(*packet)))) return;
+    }
+  } catch (...) {
+    worker_.post(std::current_exception());  // the worker ends with it, as any node does
+  }
+}
+
+void SensorsNode::step(const Packet& packet) {
+  if (!clock_.wait_until(packet->frame->stamp)) return;
+  if (const Packet due = filter_.take(packet, clock_.lag_s())) {
+    packets_.publish(due);
+    ++published_;
+  } else {
+    ++skipped_;
+    log::limited(log::Level::kWarn, name(), "lag")
+        << "pair skipped, consumers lag behind: " << skipped_ << " of " << reader_->pair_count();
+  }
+}
+
+void SensorsNode::step(const EndOfData& data) {
+  if (stopped_) return;
+  std::istringstream faults(to_string(data.faults));
+  for (std::string line; std::getline(faults, line);) log::warn(name()) << line;
+  log::info(name()) << "end of data: " << published_ << " pairs, " << skipped_ << " skipped";
+  end_.publish(SensorsEnd{published_, skipped_, data.faults});
+}
+
+}  // namespace km

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <exception>
+#include <memory>
+#include <string_view>
+#include <thread>
+#include <variant>
+
+#include "modules/sensors/dataset_reader.hpp"
+#include "modules/sensors/lag_filter.hpp"
+#include "modules/sensors/sensors_config.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/node.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+
+/// The recording is over; published once, after its last packet. Not published by a stop before.
+struct SensorsEnd {
+  std::size_t published = 0;  ///< Packets.
+  std::size_t skipped = 0;    ///< Pairs given up because consumers lagged behind the rate.
+  ReaderReport faults;        ///< Of the recording.
+};
+
+/// Plays a recording. Out: `packets`, `end`. One thread decodes ahead, another publishes each
+/// packet when it is due; a consumer whose queue is full (kBlock) holds publication up, and at a
+/// finite rate pairs that became later than max_lag_s are skipped, their inertial samples kept.
+class SensorsNode final : public Node {
+ public:
+  /// `rate`: dataset seconds per second; infinity: as fast as consumers take it. Throws ConfigError
+  /// if `config` is out of bounds and std::invalid_argument for a bad rate. Both topics must
+  /// outlive the node.
+  SensorsNode(const SensorsConfig& config, double rate, std::unique_ptr<DatasetReader> reader,
+              const Topic<SensorPacket>& packets, const Topic<SensorsEnd>& end);
+  ~SensorsNode() override { stop(); }
+
+  std::string_view name() const override { return "sensors"; }
+  void start() override;
+  /// Ends at once: what is decoded but not yet due has not happened.
+  void stop() noexcept override;
+  std::exception_ptr error() const override { return worker_.error(); }
+
+  /// Packets published and pairs skipped so far. Thread-safe.
+  std::size_t published() const { return published_; }
+  std::size_t skipped() const { return skipped_; }
+
+ private:
+  struct EndOfData {
+    ReaderReport faults;
+  };
+  using Packet = std::shared_ptr<const SensorPacket>;
+  using Input = std::variant<Packet, EndOfData, std::exception_ptr>;
+
+  void decode();
+  void step(const Packet& packet);
+  void step(const EndOfData& end);
+  void step(const std::exception_ptr& failure) { std::rethrow_exception(failure); }
+
+  std::unique_ptr<DatasetReader> reader_;
+  LagFilter filter_;
+  ReplayClock clock_;
+  const Topic<SensorPacket>& packets_;
+  const Topic<SensorsEnd>& end_;
+  std::atomic<std::size_t> published_ = 0;
+  std::atomic<std::size_t> skipped_ = 0;
+  std::atomic<bool> stopped_ = false;
+  std::thread decoder_;
+  Worker<Input> worker_;  // last member: stops first
+};
+
+}  // namespace km

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/frame.hpp"
+#include "modules/sensors/image_file.hpp"
+#include "modules/sensors/reader_report.hpp"
+
+namespace km {
+
+/// Where the two images of a stereo pair are listed and lie.
+struct StereoPairFile {
+  Stamp stamp = 0;              ///< Of the left image.
+  std::filesystem::path left;   ///< Image files.
+  std::filesystem::path right;  ///<
+  int line = 0;                 ///< Of the left image's row in the list.
+};
+
+/// The stereo pairs of a EuRoC folder: rows `stamp [ns], file` of cam0/data.csv and cam1/data.csv,
+/// matched by stamps at most `tolerance_s` apart; ascending. Faulty rows and images without a
+/// partner are counted in `report`. Throws DatasetError if a list is missing or holds no image.
+[[nodiscard]] std::vector<StereoPairFile> list_euroc_pairs(const std::filesystem::path& mav0,
+                                                           double tolerance_s,
+                                                           ReaderReport& report);
+
+/// The stereo pairs of a folder of keyframes: rows `stamp [ns], left file, right file` of its
+/// pairs.csv; ascending. Faults and errors as above.
+[[nodiscard]] std::vector<StereoPairFile> list_keyframe_pairs(const std::filesystem::path& folder,
+                                                              ReaderReport& report);
+
+/// A stereo pair from disk; `status` and `problem` are those of the first image that failed.
+struct StereoPairResult {
+  ImageStatus status = ImageStatus::kOk;
+  std::string problem;
+  StereoFrame frame;
+};
+
+[[nodiscard]] StereoPairResult load_stereo_pair(const StereoPairFile& files, const StereoRig& rig);
+
+}  // namespace km

@@ -1,0 +1,110 @@
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <random>
+#include <string>
+#include <vector>
+
+namespace km {
+
+/// A temporary folder with a small, faultless EuRoC recording: 8 stereo pairs at 20 Hz from 10 s
+/// on, 32x24 px, and inertial samples at 200 Hz from 8.5 s to 11 s. Tests spoil it file by file.
+class EurocFolder {
+ public:
+  static constexpr std::int64_t kFirstImage = 10'000'000'000;
+  static constexpr std::int64_t kImagePeriod = 50'000'000;
+  static constexpr std::int64_t kFirstImu = 8'500'000'000;
+  static constexpr std::int64_t kImuPeriod = 5'000'000;
+  static constexpr int kPairs = 8;
+  static constexpr int kImuSamples = 501;
+
+  explicit EurocFolder(const std::string& extension = ".png") {
+    std::random_device device;  // only the folder's name depends on it
+    root_ = std::filesystem::temp_directory_path() / ("km_euroc_" + std::to_string(device()));
+    for (const char* camera : {"cam0", "cam1"}) {
+      std::string list = "#timestamp [ns],filename\n";
+      for (int i = 0; i < kPairs; ++i) {
+        const std::string name = std::to_string(image_stamp(i)) + extension;
+        list += std::to_string(image_stamp(i)) + ',' + name + '\n';
+        write_image(std::string(camera) + "/data/" + name, 32, 24, 10 * (i + 1));
+      }
+      write(std::string(camera) + "/data.csv", list);
+    }
+    write("cam0/sensor.yaml", camera_yaml(0.0));
+    write("cam1/sensor.yaml", camera_yaml(0.1));
+    write("imu0/sensor.yaml", imu_yaml());
+    write("imu0/data.csv", imu_csv());
+  }
+  ~EurocFolder() { std::filesystem::remove_all(root_); }
+  EurocFolder(const EurocFolder&) = delete;
+  EurocFolder& operator=(const EurocFolder&) = delete;
+
+  static std::int64_t image_stamp(int i) { return kFirstImage + i * kImagePeriod; }
+
+  const std::filesystem::path& root() const { return root_; }
+  std::filesystem::path mav0() const { return root_ / "mav0"; }
+  std::filesystem::path image(const std::string& camera, int i) const {
+    return mav0() / camera / "data" / (std::to_string(image_stamp(i)) + ".png");
+  }
+
+  void write(const std::string& relative, const std::string& text) const {
+    const std::filesystem::path file = mav0() / relative;
+    std::filesystem::create_directories(file.parent_path());
+    std::ofstream(file, std::ios::binary) << text;
+  }
+  std::string read(const std::string& relative) const {
+    std::ifstream stream(mav0() / relative, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  /// Replaces the first `from` of a file; the file must contain it.
+  void replace(const std::string& relative, const std::string& from, const std::string& to) const {
+    std::string text = read(relative);
+    text.replace(text.find(from), from.size(), to);  // throws if it is not there
+    write(relative, text);
+  }
+  void write_image(const std::string& relative, int width, int height, int grey) const {
+    std::filesystem::create_directories((mav0() / relative).parent_path());
+    cv::imwrite((mav0() / relative).string(), cv::Mat(height, width, CV_8UC1, cv::Scalar(grey)));
+  }
+
+  static std::string camera_yaml(double x_m) {
+    return "sensor_type: camera\n"
+           "T_BS:\n"
+           "  cols: 4\n"
+           "  rows: 4\n"
+           "  data: [0, -1, 0, " +
+           std::to_string(x_m) +
+           ",\n"
+           "         1, 0, 0, 0.2, 0, 0, 1, 0.3,\n"
+           "         0, 0, 0, 1]\n"
+           "rate_hz: 20\n"
+           "resolution: [32, 24]\n"
+           "camera_model: pinhole\n"
+           "intrinsics: [30.0, 31.0, 16.0, 12.0] #fu, fv, cu, cv\n"
+           "distortion_model: radial-tangential\n"
+           "distortion_coefficients: [-0.2, 0.05, 0.001, 0.002]\n";
+  }
+  static std::string imu_yaml() {
+    return "sensor_type: imu\n"
+           "T_BS:\n"
+           "  data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n"
+           "rate_hz: 200\n"
+           "gyroscope_noise_density: 1.6e-04\n"
+           "gyroscope_random_walk: 1.9e-05\n"
+           "accelerometer_noise_density: 2.0e-3\n"
+           "accelerometer_random_walk: 3.0e-3\n";
+  }
+  static std::string imu_csv() {
+    std::string text = "#timestamp [ns],wx,wy,wz,ax,ay,az\n";
+    for (int i = 0; i < kImuSamples; ++i)
+      text += std::to_string(kFirstImu + i * kImuPeriod) + ",0.1,0.2,0.3,1.0,2.0,9.8\n";
+    return text;
+  }
+
+ private:
+  std::filesystem::path root_;
+};
+
+}  // namespace km

@@ -1,0 +1,123 @@
+#include "modules/sensors/sensors_node.hpp"
+
+#include <catch2/catch.hpp>
+#include <future>
+#include <limits>
+#include <utility>
+#include <vector>
+
+namespace km {
+namespace {
+
+constexpr double kMax = std::numeric_limits<double>::infinity();
+
+// `count` packets `period_s` apart without pixels; then the end, or an exception.
+class FakeReader final : public DatasetReader {
+ public:
+  explicit FakeReader(int count, double period_s = 0.05, bool fails = false)
+      : count_(count), period_s_(period_s), fails_(fails) {}
+
+  const SensorRig& rig() const override { return rig_; }
+  const ReaderReport& report() const override { return report_; }
+  std::size_t pair_count() const override { return static_cast<std::size_t>(count_); }
+  std::optional<SensorPacket> next() override {
+    if (read_ == count_ && fails_) throw DatasetError("disk gone");
+    if (read_ == count_) {
+      report_.add(ReaderFault::kMissingImage, "x.csv line 3");
+      return std::nullopt;
+    }
+    auto frame = std::make_shared<StereoFrame>();
+    frame->stamp = 1 + nanoseconds(period_s_ * read_++);
+    ImuSample sample;
+    sample.stamp = frame->stamp;
+    return SensorPacket{std::move(frame), {sample}};
+  }
+
+ private:
+  int count_;
+  double period_s_;
+  bool fails_;
+  int read_ = 0;
+  SensorRig rig_;
+  ReaderReport report_;
+};
+
+struct Run {
+  Topic<SensorPacket> packets;
+  Topic<SensorsEnd> end;
+  std::vector<Stamp> stamps;
+  std::promise<SensorsEnd> ended;
+
+  Run() {
+    packets.subscribe([this](const auto& packet) { stamps.push_back(packet->frame->stamp); });
+    end.subscribe([this](const auto& message) { ended.set_value(*message); });
+  }
+};
+
+}  // namespace
+
+TEST_CASE("Every packet is published in order, then the end", "[sensors]") {
+  const double rate = GENERATE(kMax, 1000.0);
+  Run run;
+  SensorsConfig config;
+  config.max_lag_s = 1e6;
+  SensorsNode node(config, rate, std::make_unique<FakeReader>(100), run.packets, run.end);
+  node.start();
+  const SensorsEnd end = run.ended.get_future().get();
+  node.stop();
+  REQUIRE(run.stamps.size() == 100);
+  CHECK(std::is_sorted(run.stamps.begin(), run.stamps.end()));
+  CHECK(end.published == 100);
+  CHECK(end.skipped == 0);
+  CHECK(end.faults.count(ReaderFault::kMissingImage) == 1);
+  CHECK(node.published() == 100);
+  CHECK(node.error() == nullptr);
+}
+
+TEST_CASE("Pairs that are late at a finite rate are skipped and counted", "[sensors]") {
+  Run run;
+  SensorsConfig config;
+  config.max_lag_s = 0.0;
+  // At this rate all packets are due with the first one: the others are late.
+  SensorsNode node(config, 1e12, std::make_unique<FakeReader>(10), run.packets, run.end);
+  node.start();
+  const SensorsEnd end = run.ended.get_future().get();
+  CHECK(end.published == 1);
+  CHECK(end.skipped == 9);
+}
+
+TEST_CASE("A node that waits for the next packet stops at once", "[sensors]") {
+  Run run;
+  std::promise<void> first;
+  run.packets.subscribe([&](const auto&) { first.set_value(); });
+  // The second packet is due in an hour; the reader is not exhausted either.
+  SensorsNode node({}, 1.0, std::make_unique<FakeReader>(1000, 3600.0), run.packets, run.end);
+  node.start();
+  first.get_future().get();
+  node.stop();
+  node.stop();
+  CHECK(run.stamps.size() == 1);
+  CHECK(node.published() == 1);
+}
+
+TEST_CASE("A reader that throws ends the node with its exception", "[sensors]") {
+  Run run;
+  SensorsNode node({}, kMax, std::make_unique<FakeReader>(3, 0.05, true), run.packets, run.end);
+  node.start();
+  while (node.error() == nullptr) std::this_thread::yield();
+  node.stop();
+  CHECK_THROWS_WITH(std::rethrow_exception(node.error()), "disk gone");
+  CHECK(run.stamps.size() == 3);
+}
+
+TEST_CASE("Unusable parameters of the node are refused", "[sensors]") {
+  Run run;
+  SensorsConfig config;
+  config.read_ahead = 0;
+  CHECK_THROWS_AS(SensorsNode(config, 1.0, std::make_unique<FakeReader>(1), run.packets, run.end),
+                  ConfigError);
+  CHECK_THROWS_AS(SensorsNode({}, 0.0, std::make_unique<FakeReader>(1), run.packets, run.end),
+                  std::invalid_argument);
+}
+
+}  // namespace km
