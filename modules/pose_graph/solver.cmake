@@ -1,4 +1,5 @@
 # Distributed pose graph optimisation: km_pose_graph is the algorithm, km_pose_graph_node its thread.
 km_module(pose_graph
-  SOURCES block_cholesky.cpp chordal.cpp quadratic_problem.cpp rounding.cpp stiefel.cpp
-          truncated_newton.cpp)
+  SOURCES block_cholesky.cpp chordal.cpp frame_alignment.cpp local_graph.cpp quadratic_problem.cpp
+          rbcd_agent.cpp rbcd_session.cpp round_ledger.cpp rounding.cpp session_block.cpp
+          session_plan.cpp stiefel.cpp truncated_newton.cpp)

@@ -22,6 +22,17 @@ double stiefel_error(const LiftedPoses& X) {
   return error;
 }
 
+LiftedPoses restore_stiefel(LiftedPoses X) {
+  // Newton-Schulz iteration for the polar factor: the error is squared each time.
+  constexpr int kIterations = 5;
+  for (Eigen::Index i = 0; i < pose_count(X); ++i) {
+    auto Y = X.middleCols<3>(4 * i);
+    for (int k = 0; k < kIterations; ++k)
+      Y = (Y * (1.5 * Eigen::Matrix3d::Identity() - 0.5 * (Y.transpose() * Y).eval())).eval();
+  }
+  return X;
+}
+
 LiftedPoses project_tangent(const LiftedPoses& X, const LiftedPoses& V) {
   LiftedPoses projected = V;
   dispatch_rank(X.rows(), [&]<int kRank>() {

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <vector>
+
+#include "modules/core/ids.hpp"
+#include "modules/pose_graph/stiefel.hpp"
+
+namespace km {
+
+/// A process of a robot: a restarted robot keeps its id and gets another boot.
+struct PgoPeer {
+  RobotId robot = 0;
+  std::uint64_t boot = 0;
+  auto operator<=>(const PgoPeer&) const = default;
+};
+
+/// The gauge that lifted poses are expressed in: the process whose own frame it was. Robots with
+/// equal frames need no alignment to each other.
+using PgoFrame = PgoPeer;
+
+/// Identity of the edges between two robots: both ends offer what they hold, and optimise what
+/// both hold. `hash` covers the version and the closures' ids.
+struct EdgeSetId {
+  std::uint32_t version = 0;
+  std::uint64_t hash = 0;
+  auto operator<=>(const EdgeSetId&) const = default;
+};
+
+struct EdgeSetOffer {
+  RobotId peer = 0;
+  std::uint32_t edges = 0;  ///< Number of closures, at least 1.
+  EdgeSetId id;
+  bool operator==(const EdgeSetOffer&) const = default;
+};
+
+/// What one robot brings to distributed optimisation; sent when it changes and now and then.
+struct PgoStatus {
+  PgoPeer sender;
+  PgoFrame frame;  ///< Of its present solution.
+  std::uint32_t keyframes = 0;
+  std::uint32_t revision = 0;  ///< Grows with its own keyframes and intra-robot closures.
+  std::vector<EdgeSetOffer> offers;
+  bool operator==(const PgoStatus&) const = default;
+};
+
+/// A session optimises one frozen graph. Its coordinator numbers them.
+struct PgoSessionId {
+  PgoPeer coordinator;
+  std::uint32_t number = 0;
+  auto operator<=>(const PgoSessionId&) const = default;
+};
+
+struct SessionMember {
+  PgoPeer peer;
+  std::uint32_t revision = 0;  ///< Of its status when the session was planned.
+  bool operator==(const SessionMember&) const = default;
+};
+
+struct SessionPair {
+  RobotId a = 0;  ///< a < b, both members.
+  RobotId b = 0;
+  EdgeSetId edges;
+  bool operator==(const SessionPair&) const = default;
+};
+
+/// Who optimises which edges, and in which order.
+struct SessionPlan {
+  PgoFrame frame;                      ///< Members in other frames are aligned to it first.
+  std::vector<SessionMember> members;  ///< In order of alignment and of the sweep.
+  std::vector<SessionPair> pairs;      ///< Ascending.
+  bool operator==(const SessionPlan&) const = default;
+};
+
+/// Sent by the coordinator: a new session, its progress, its end.
+struct PgoSession {
+  PgoSessionId id;
+  SessionPlan plan;
+  std::uint32_t rank = 0;
+  std::uint32_t max_rounds = 0;  ///< 0: no limit.
+  RobotId anchor = 0;            ///< Its keyframe 0 is the origin of `world`.
+  LiftedPoses anchor_pose = {};  ///< r x 4 if the anchor is no longer a member, else empty.
+  std::uint32_t round = 0;       ///< Last round that all members have finished.
+  double cost = 0.0;             ///< Team cost after it.
+  double gradient_norm = 0.0;    ///< Of the blocks, each before its update in that round.
+  bool finished = false;         ///< Members stop.
+};
+
+/// Poses of one robot that its peers' edges end on, and keyframe 0, after one of its updates.
+struct PublicPoses {
+  PgoPeer sender;
+  PgoSessionId session;
+  PgoFrame frame;
+  std::uint32_t round = 0;                    ///< 0: before the first update.
+  double cost = 0.0;                          ///< Share: own edges, and those to earlier members.
+  double squared_gradient = 0.0;              ///< Of the block before this update.
+  std::vector<std::uint32_t> keyframes = {};  ///< Ascending, 0 first.
+  LiftedPoses X = {};                         ///< r x 4 per keyframe, single precision.
+};
+
+}  // namespace km

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <numbers>
+
+#include "modules/core/config.hpp"
+
+namespace km {
+
+/// Parameters of distributed pose graph optimisation. Field names are the YAML keys below
+/// `pose_graph:`.
+struct PoseGraphConfig {
+  static constexpr const char* kSection = "pose_graph";
+
+  /// Rank r of the relaxation; the same on all robots.
+  int rank = 5;
+
+  /// Rounds after which a session ends even if it has not converged; 0: no limit. The paper's
+  /// early stopping is 50.
+  int max_rounds = 0;
+
+  /// A session has converged when a round lowers the team's cost by less than this part of it.
+  double min_relative_decrease = 1e-6;
+
+  /// Rounds that a session is given before new keyframes or closures replace it by the next.
+  int min_rounds_per_session = 10;
+
+  /// Newton steps of one block update, and products with the Hessian in each.
+  int max_newton_steps = 3;
+  int max_cg_iterations = 50;
+
+  /// Closures count as agreeing on where a new robot's frame lies up to this rotation [rad] and
+  /// this distance [m]: the drift of the odometry between them.
+  double alignment_rotation_rad = 0.3;
+  double alignment_translation_m = 10.0;
+
+  /// The trajectory is published at most this often while rounds go on [s].
+  double publish_period_s = 1.0;
+
+  /// Status is repeated this often [s]; a session that has not moved for three times as long sends
+  /// its last messages again.
+  double status_period_s = 1.0;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("rank", rank, {3, 10}, "rank of the relaxation, the same on all robots");
+    visitor.field("max_rounds", max_rounds, {0, 1000000}, "rounds per session, 0: no limit");
+    visitor.field("min_relative_decrease", min_relative_decrease, {0.0, 0.1},
+                  "of the team's cost in a round: less is convergence");
+    visitor.field("min_rounds_per_session", min_rounds_per_session, {0, 1000},
+                  "before new measurements open the next session");
+    visitor.field("max_newton_steps", max_newton_steps, {1, 100}, "per block update");
+    visitor.field("max_cg_iterations", max_cg_iterations, {1, 10000}, "per Newton step");
+    visitor.field("alignment_rotation_rad", alignment_rotation_rad, {1e-3, std::numbers::pi},
+                  "[rad] agreement of closures on a new robot's frame");
+    visitor.field("alignment_translation_m", alignment_translation_m, {1e-3, 1e4}, "[m] the same");
+    visitor.field("publish_period_s", publish_period_s, {0.01, 60.0}, "[s] of the trajectory");
+    visitor.field("status_period_s", status_period_s, {0.01, 60.0}, "[s] of the optimiser status");
+  }
+};
+
+}  // namespace km

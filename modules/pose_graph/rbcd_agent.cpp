@@ -1,0 +1,162 @@
+#include "modules/pose_graph/rbcd_agent.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "modules/pose_graph/rounding.hpp"
+
+namespace km {
+namespace {
+
+// A status that has changed is sent again after this part of the period at the earliest.
+constexpr double kEarlyStatus = 0.1;
+constexpr double kFeasible = 1e-3;  // single precision leaves 1e-6
+
+bool well_formed(const PublicPoses& poses, int rank) {
+  const auto& keyframes = poses.keyframes;
+  return !keyframes.empty() && keyframes.front() == 0 &&
+         std::adjacent_find(keyframes.begin(), keyframes.end(), std::greater_equal<>()) ==
+             keyframes.end() &&
+         poses.X.rows() == rank &&
+         poses.X.cols() == 4 * static_cast<Eigen::Index>(keyframes.size()) && poses.X.allFinite() &&
+         stiefel_error(poses.X) <= kFeasible && std::isfinite(poses.cost) &&
+         std::isfinite(poses.squared_gradient);
+}
+
+}  // namespace
+
+RbcdAgent::RbcdAgent(const PoseGraphConfig& config, PgoPeer self)
+    : config_(checked(config)), self_(self), graph_(self.robot), frame_(self) {}
+
+bool RbcdAgent::add(const KeyframeOdometry& keyframe) {
+  const bool taken = graph_.add(keyframe);
+  plan_outdated_ |= taken;
+  return taken;
+}
+
+bool RbcdAgent::add(const Closure& closure) {
+  const bool taken = graph_.add(closure);
+  plan_outdated_ |= taken;
+  return taken;
+}
+
+bool RbcdAgent::add(const InlierSet& set) {
+  const bool taken = graph_.add(set);
+  plan_outdated_ |= taken;
+  return taken;
+}
+
+void RbcdAgent::peer_alive(PgoPeer peer) {
+  if (peer.robot == self_.robot) return;
+  const auto known = peers_.find(peer.robot);
+  if (known != peers_.end() && known->second.boot != peer.boot) {
+    graph_.forget(peer.robot);
+    peers_.erase(known);
+  }
+  Peer& entry = peers_[peer.robot];
+  entry.boot = peer.boot;
+  entry.alive = true;
+  plan_outdated_ = true;
+}
+
+void RbcdAgent::peer_lost(RobotId robot) {
+  const auto known = peers_.find(robot);
+  if (known == peers_.end()) return;
+  known->second.alive = false;
+  plan_outdated_ = true;
+}
+
+const RbcdAgent::Peer* RbcdAgent::present(PgoPeer peer) const {
+  const auto known = peers_.find(peer.robot);
+  const bool is = known != peers_.end() && known->second.alive && known->second.boot == peer.boot;
+  return is ? &known->second : nullptr;
+}
+
+bool RbcdAgent::receive(const PgoStatus& status) {
+  if (present(status.sender) == nullptr) return false;
+  peers_.at(status.sender.robot).status = status;
+  plan_outdated_ = true;
+  return true;
+}
+
+bool RbcdAgent::receive(PublicPoses poses) {
+  if (present(poses.sender) == nullptr || !well_formed(poses, config_.rank)) return false;
+  auto& newest = peers_.at(poses.sender.robot).poses;
+  const bool stale = newest && newest->session.coordinator == poses.session.coordinator &&
+                     std::pair(poses.session.number, poses.round) <
+                         std::pair(newest->session.number, newest->round);
+  if (stale) return true;
+  poses.X = restore_stiefel(std::move(poses.X));
+  newest = std::move(poses);
+  count_share(*newest);
+  return true;
+}
+
+PgoOutput RbcdAgent::step(double now_s) {
+  now_s_ = now_s;
+  PgoOutput output;
+  if (graph_.keyframes() == 0) return output;
+  coordinate(output);
+  advance(output);
+  send_status(output);
+  publish(output);
+  return output;
+}
+
+PgoStatus RbcdAgent::make_status() const {
+  return {self_, frame_, graph_.keyframes(), graph_.revision(), graph_.offers()};
+}
+
+void RbcdAgent::send_status(PgoOutput& output) {
+  const double age_s = now_s_ - status_sent_s_;
+  if (age_s < kEarlyStatus * config_.status_period_s) return;
+  PgoStatus status = make_status();
+  if (age_s < config_.status_period_s && status == sent_status_) return;
+  status_sent_s_ = now_s_;
+  sent_status_ = status;
+  output.progress = make_progress();
+  output.status = std::move(status);
+}
+
+std::optional<Eigen::MatrixXd> RbcdAgent::pose_of_anchor(RobotId anchor) const {
+  if (anchor == self_.robot) return block_->X().leftCols<4>();
+  const auto peer = peers_.find(anchor);
+  if (peer != peers_.end() && peer->second.poses && peer->second.poses->frame == frame_)
+    return peer->second.poses->X.leftCols<4>();
+  const PgoSession& session = running_->session;
+  if (anchor == session.anchor && session.anchor_pose.cols() == 4) return session.anchor_pose;
+  return std::nullopt;
+}
+
+void RbcdAgent::publish(PgoOutput& output) {
+  const bool running = running_ && !running_->session.finished;
+  if (!block_ || !publish_due_ || (running && now_s_ - published_s_ < config_.publish_period_s))
+    return;
+  const bool in_frame = running_ && running_->round;
+  const RobotId anchor = in_frame ? running_->session.anchor : self_.robot;
+  const auto pose = pose_of_anchor(anchor);
+  if (!pose) return;  // it comes with the anchor's poses
+  publish_due_ = false;
+  published_s_ = now_s_;
+  output.trajectory = Trajectory{self_.robot, anchor, round_to_poses(block_->X(), *pose)};
+  output.progress = make_progress();
+}
+
+OptimizerProgress RbcdAgent::make_progress() const {
+  OptimizerProgress progress{.anchor = self_.robot, .members = {self_.robot}};
+  progress.round = total_rounds_;
+  progress.seconds = optimising_s_;
+  if (!running_) return progress;
+  const PgoSession& session = running_->session;
+  progress.anchor = session.anchor;
+  progress.members.clear();
+  for (const auto& [robot, position] : running_->position_of) progress.members.push_back(robot);
+  progress.cost = session.cost;
+  progress.gradient_norm = session.gradient_norm;
+  progress.seconds += running_->moved_s - running_->started_s;
+  const auto& self = session.plan.members[running_->position_of.at(self_.robot)];
+  progress.settled = session.finished && self.revision == graph_.revision();
+  return progress;
+}
+
+}  // namespace km

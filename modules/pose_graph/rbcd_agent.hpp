@@ -1,0 +1,139 @@
+#pragma once
+
+#include <map>
+#include <optional>
+
+#include "modules/pose_graph/local_graph.hpp"
+#include "modules/pose_graph/pgo_messages.hpp"
+#include "modules/pose_graph/pose_graph_config.hpp"
+#include "modules/pose_graph/round_ledger.hpp"
+#include "modules/pose_graph/session_block.hpp"
+#include "modules/pose_graph/session_plan.hpp"
+
+namespace km {
+
+/// What a step of the agent gives to the others and to its own robot.
+struct [[nodiscard]] PgoOutput {
+  std::optional<PgoStatus> status;
+  std::optional<PgoSession> session;
+  std::optional<PublicPoses> poses;
+  std::optional<Trajectory> trajectory;
+  std::optional<OptimizerProgress> progress;
+  bool more = false;  ///< The next step has work already, without further input.
+};
+
+/// One robot's part of distributed pose graph optimisation by Riemannian block-coordinate descent
+/// (Tian et al., TRO 2021, Alg. 2 and 3), as a state machine without threads and clocks.
+///
+/// Robots that share inlier closures, directly or through others, optimise together in sessions.
+/// A session freezes the graph: members, and for every pair of them the edge set that both hold.
+/// The present robot with the lowest id in the connected component coordinates it: opens a session
+/// when the graph has changed, sums up the team's cost, and ends it. A robot without partners
+/// coordinates its own.
+///
+/// Within a session members update in turn without a central clock: a member updates its block in
+/// round t once it has the poses of round t of all its neighbours before it in the session's order
+/// and of round t - 1 of those after it. This is a Gauss-Seidel sweep: two neighbours never move
+/// at once, so no update can raise the team's cost, whatever the delays; robots without common
+/// edges move at the same time. Members that are not in the session's frame yet are aligned
+/// before round 1 in the same order. Public poses are rounded to single precision by their sender,
+/// who goes on from the rounded ones: all compute with the same numbers.
+///
+/// A robot that has gone leaves its last public poses behind as fixed neighbours, so that the
+/// others keep their frame and what it told them; one that returns with another boot is forgotten.
+/// Deterministic: equal inputs in equal order give equal outputs. Not thread-safe.
+class RbcdAgent {
+ public:
+  /// Throws ConfigError if `config` is out of bounds.
+  RbcdAgent(const PoseGraphConfig& config, PgoPeer self);
+
+  /// Own measurements and decisions about them; see LocalGraph for what is ignored.
+  bool add(const KeyframeOdometry& keyframe);
+  bool add(const Closure& closure);
+  bool add(const InlierSet& set);
+
+  void peer_alive(PgoPeer peer);
+  void peer_lost(RobotId robot);
+
+  /// Messages of peers, in any order, repeated or lost. False if one is refused: of a robot that
+  /// is not alive or of another boot, infeasible, or inconsistent in itself.
+  bool receive(const PgoStatus& status);
+  bool receive(const PgoSession& session);
+  bool receive(PublicPoses poses);
+
+  /// Does what is due, at most one block update. Call it after every input and, for repetitions,
+  /// several times in a second; `now_s` [s] must not decrease.
+  PgoOutput step(double now_s);
+
+  /// The present solution before rounding, r x 4n; nullptr before the first step with a keyframe.
+  /// Blocks of members of one session, once past round 0, are in one frame.
+  [[nodiscard]] const LiftedPoses* lifted_poses() const { return block_ ? &block_->X() : nullptr; }
+
+ private:
+  struct Peer {
+    std::uint64_t boot = 0;
+    bool alive = false;
+    std::optional<PgoStatus> status;
+    std::optional<PublicPoses> poses;  // the newest
+  };
+  struct Running {
+    PgoSession session;
+    std::map<RobotId, std::size_t> position_of = {};
+    std::optional<std::uint32_t> round = {};  // own; nullopt until the block is in the frame
+    std::set<RobotId> counted = {};           // members before this one, and absent neighbours
+    double started_s = 0.0;
+    double moved_s = 0.0;  // last update or repetition
+  };
+  using EdgesTo = std::map<RobotId, std::vector<InterEdge>>;
+
+  // rbcd_agent.cpp: peers, status, results.
+  [[nodiscard]] const Peer* present(PgoPeer peer) const;
+  [[nodiscard]] PgoStatus make_status() const;
+  void send_status(PgoOutput& output);
+  void publish(PgoOutput& output);
+  [[nodiscard]] OptimizerProgress make_progress() const;
+  [[nodiscard]] std::optional<Eigen::MatrixXd> pose_of_anchor(RobotId anchor) const;
+
+  // rbcd_session.cpp: opening, joining and running sessions.
+  void coordinate(PgoOutput& output);
+  [[nodiscard]] SessionPlan make_plan() const;
+  [[nodiscard]] bool should_open() const;
+  void open_session();
+  [[nodiscard]] bool accepts(const PgoSession& session) const;
+  bool join(const PgoSession& session);
+  void follow(const PgoSession& session);
+  [[nodiscard]] std::optional<EdgesTo> edges_in(const SessionPlan& plan) const;
+  [[nodiscard]] EdgesTo edges_to_absent(const SessionPlan& plan) const;
+  [[nodiscard]] LiftedPoses extended_poses() const;
+  void start_block(const SessionPlan& plan, EdgesTo edges, const EdgesTo& absent);
+  void advance(PgoOutput& output);
+  [[nodiscard]] const PublicPoses* poses_in_session(RobotId robot, std::uint32_t round) const;
+  [[nodiscard]] bool hear_neighbours();
+  void finish_update(double squared_gradient, PgoOutput& output);
+  void count_share(const PublicPoses& poses);
+
+  PoseGraphConfig config_;
+  PgoPeer self_;
+  LocalGraph graph_;
+  std::map<RobotId, Peer> peers_;
+  PgoFrame frame_;
+  std::optional<SessionBlock> block_;
+  std::optional<Running> running_;
+  std::optional<RoundLedger> ledger_;  // if this robot coordinates the running session
+  SessionPlan plan_;                   // of what is known
+  bool plan_outdated_ = true;
+  std::uint32_t sessions_opened_ = 0;
+  std::uint32_t total_rounds_ = 0;
+  std::size_t intra_closures_tried_ = 0;
+  std::optional<PublicPoses> sent_poses_;
+  std::optional<PgoStatus> sent_status_;
+  bool announce_session_ = false;
+  bool publish_due_ = false;
+  double now_s_ = 0.0;
+  double status_sent_s_ = -1e9;
+  double session_sent_s_ = -1e9;
+  double published_s_ = -1e9;
+  double optimising_s_ = 0.0;  // in sessions before the running one
+};
+
+}  // namespace km

@@ -1,0 +1,91 @@
+#include <catch2/catch.hpp>
+
+#include "modules/pose_graph/frame_alignment.hpp"
+#include "modules/pose_graph/stiefel.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+Eigen::MatrixXd as_candidate(const SE3& T) {
+  return T.matrix().topRows<3>();
+}
+
+double angle_between(const Eigen::MatrixXd& a, const SE3& b) {
+  return angle_of(a.leftCols<3>().transpose() * b.linear());
+}
+
+}  // namespace
+
+TEST_CASE("ten equal candidates win over forty random ones", "[pose_graph]") {
+  const unsigned seed = GENERATE(range(0U, 50U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const SE3 truth = random_pose(rng);
+  std::vector<Eigen::MatrixXd> candidates(10, as_candidate(truth));
+  while (candidates.size() < 50) {
+    const SE3 other = random_pose(rng);
+    if (angle_between(candidates.front(), other) > 0.36) candidates.push_back(as_candidate(other));
+  }
+  const auto alignment = align_frames(candidates, {.rotation_rad = 0.3, .translation_m = 1.0});
+  REQUIRE(alignment);
+  CHECK(angle_between(alignment->L, truth) < 1e-6);
+  CHECK((alignment->L.col(3) - truth.translation()).norm() < 1e-9);
+  CHECK(alignment->inliers == std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9});
+}
+
+TEST_CASE("noise of the agreeing candidates averages out", "[pose_graph]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const SE3 truth = random_pose(rng);
+  std::vector<Eigen::MatrixXd> candidates;
+  for (int k = 0; k < 400; ++k) {
+    const Eigen::Vector3d phi = 0.05 * random_vector<3>(rng);
+    const Eigen::AngleAxisd R(phi.norm(), phi.normalized());
+    candidates.push_back(
+        as_candidate(truth * make_pose(R.toRotationMatrix(), 0.2 * random_vector<3>(rng))));
+  }
+  const auto alignment = align_frames(candidates, {.rotation_rad = 0.3, .translation_m = 2.0});
+  REQUIRE(alignment);
+  CHECK(alignment->inliers.size() == 400);
+  // Five standard deviations of a mean of 400: 0.05 sqrt(3) rad, 0.2 sqrt(3) m, over 20.
+  CHECK(angle_between(alignment->L, truth) < 0.022);
+  CHECK((alignment->L.col(3) - truth.translation()).norm() < 0.087);
+}
+
+TEST_CASE("alignment does not depend on the frame, lifted or not", "[pose_graph]") {
+  std::mt19937 rng(5);
+  std::vector<Eigen::MatrixXd> candidates;
+  std::vector<Eigen::MatrixXd> lifted;
+  Eigen::MatrixXd frame = Eigen::MatrixXd::Zero(5, 4);
+  for (double& x : frame.reshaped()) x = random_vector<1>(rng)(0);
+  frame.leftCols<3>() = nearest_stiefel(frame.leftCols<3>());
+  const SE3 centre = random_pose(rng);
+  for (int k = 0; k < 20; ++k) {
+    const SE3 T = k % 2 == 0
+                      ? centre * make_pose(Eigen::Matrix3d::Identity(), 0.1 * random_vector<3>(rng))
+                      : random_pose(rng);
+    candidates.push_back(as_candidate(T));
+    lifted.push_back(lift(frame, T));
+  }
+  const auto plain = align_frames(candidates, {});
+  const auto in_frame = align_frames(lifted, {});
+  REQUIRE(plain);
+  REQUIRE(in_frame);
+  CHECK(plain->inliers == in_frame->inliers);
+  SE3 T = SE3::Identity();
+  T.matrix().topRows<3>() = plain->L;
+  CHECK((lift(frame, T) - in_frame->L).norm() < 1e-9);
+}
+
+TEST_CASE("alignment without candidates has no answer, and bad ones are refused", "[pose_graph]") {
+  CHECK_FALSE(align_frames({}, {}).has_value());
+  std::vector<Eigen::MatrixXd> mixed{Eigen::MatrixXd::Identity(3, 4),
+                                     Eigen::MatrixXd::Identity(5, 4)};
+  CHECK_THROWS_AS(align_frames(mixed, {}), std::invalid_argument);
+  mixed.pop_back();
+  CHECK_THROWS_AS(align_frames(mixed, {.rotation_rad = 0.0}), std::invalid_argument);
+}
+
+}  // namespace km
