@@ -29,13 +29,13 @@ struct VioConfig {
   /// The sensor's noise densities are multiplied by these: vibration, imperfect time stamps and
   /// calibration add to the noise of the data sheet.
   double gyro_noise_factor = 1.0;
-  double accel_noise_factor = 4.0;
+  double accel_noise_factor = 12.0;
 
   /// Gravity where the robots are [m/s^2].
   double gravity_mps2 = 9.81;
 
   /// Standard deviation of an accelerometer's bias before anything is known of it [m/s^2].
-  double accel_bias_sigma = 0.1;
+  double accel_bias_sigma = 0.05;
 
   /// A new keyframe of the smoother: when the image has moved by this much, rotation taken out
   /// [px],

@@ -68,9 +68,7 @@ void FixedLagSmoother::marginalize_oldest() {
   involved[0] = involved[1] = true;
   for (const std::uint64_t id : window_.prior.frames) involved[frame_index(window_, id)] = true;
   for (const WindowLandmark& landmark : window_.landmarks) {
-    if (!landmark.located || landmark.observations.empty() ||
-        landmark.observations.front().frame != 0 || tracked_now(window_, landmark))
-      continue;
+    if (!landmark.located || landmark.observations.front().frame != 0) continue;
     equations.add_landmark(landmark, true);
     for (const WindowObservation& o : landmark.observations)
       if (window_.frames[o.frame].keyframe) involved[o.frame] = true;
@@ -103,12 +101,16 @@ void FixedLagSmoother::marginalize_oldest() {
     states.push_back(&window_.frames[frame_index(window_, id)].state);
   prior.r -= prior.J * prior_offset(prior, states);
   window_.prior = std::move(prior);
-  std::erase_if(window_.landmarks, [&](const WindowLandmark& landmark) {
-    return !landmark.observations.empty() && landmark.observations.front().frame == 0 &&
-           !tracked_now(window_, landmark);
-  });
+  // What the prior has used must not count again.
+  for (WindowLandmark& landmark : window_.landmarks) {
+    if (!landmark.located || landmark.observations.front().frame != 0) continue;
+    std::erase_if(landmark.observations,
+                  [&](const auto& o) { return window_.frames[o.frame].keyframe; });
+    landmark.located = false;
+  }
   window_.frames[1].keyframe = true;  // in the prior: it can only leave by marginalisation
   forget_frame(0);
+  std::erase_if(window_.landmarks, [](const auto& l) { return l.observations.empty(); });
 }
 
 }  // namespace km
