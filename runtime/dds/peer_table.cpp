@@ -21,11 +21,15 @@ void PeerTable::participant(const Guid& guid, std::string_view user_data,
   if (std::exchange(participant.announced, true)) return;
 
   const auto decoded = parse_user_data(user_data);
-  if (!decoded.value) return refuse({}, decoded.refusal);
+  if (!decoded.value) {
+    events_.push_back(
+        {PeerEventKind::kRefused, {}, "a robot at " + addresses + " refused: " + decoded.refusal});
+    return;
+  }
   if (decoded.value->protocol != self_.protocol)
-    return refuse(*decoded.value, "speaks protocol version " +
-                                      std::to_string(decoded.value->protocol) + ", this robot " +
-                                      std::to_string(self_.protocol));
+    return emit(PeerEventKind::kRefused, *decoded.value,
+                "refused: speaks protocol version " + std::to_string(decoded.value->protocol) +
+                    ", this robot " + std::to_string(self_.protocol));
   participant.identity = *decoded.value;
   met_.emplace(decoded.value->robot, decoded.value->boot);
   if (participant.alive) appear(guid, now_s);
@@ -90,10 +94,6 @@ std::optional<RobotIdentity> PeerTable::identity_of(const Guid& guid) const {
 
 bool PeerTable::has_met(RobotId robot, std::uint64_t boot) const {
   return met_.contains({robot, boot});
-}
-
-void PeerTable::refuse(const RobotIdentity& identity, const std::string& why) {
-  emit(PeerEventKind::kRefused, identity, "refused: " + why);
 }
 
 // The participant is accepted and its status writer alive.

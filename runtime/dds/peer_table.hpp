@@ -94,7 +94,6 @@ class PeerTable {
     double since_s = 0.0;
   };
 
-  void refuse(const RobotIdentity& identity, const std::string& why);
   void appear(const Guid& guid, double now_s);
   void meet_again(KnownPeer& known, const Guid& guid, const Participant& participant, double now_s);
   void emit(PeerEventKind kind, const RobotIdentity& identity, const std::string& text);

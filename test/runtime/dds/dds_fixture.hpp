@@ -9,9 +9,11 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "runtime/dds/bridge.hpp"
+#include "runtime/dds/qos.hpp"
 #include "runtime/dds/robot_status.hpp"
 #include "runtime/dds/robot_status_codec.hpp"
 #include "runtime/dds/robot_status_node.hpp"
@@ -31,6 +33,16 @@ inline DdsConfig loopback_config() {
   config.interface = "lo";
   config.spdp_interval_s = 0.2;
   return config;
+}
+
+/// Asks until `condition` holds; false if it never does. For counters that nobody announces.
+inline bool eventually(const std::function<bool()>& condition) {
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
 }
 
 /// Collects what a topic publishes; one may wait for it. Thread-safe.
@@ -63,6 +75,28 @@ class Inbox {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<T> messages_;
+};
+
+/// Writes pings with whatever header it is given, as a faulty or hostile program may.
+class RawPingWriter {
+ public:
+  RawPingWriter(dds_entity_t participant, const DdsConfig& config, TopicKind kind)
+      : topic_(dds_create_topic(participant, &km_wire_Ping_desc, Codec<Ping>::kTopic, nullptr,
+                                nullptr),
+               "topic"),
+        writer_(dds_create_writer(participant, topic_.handle(), make_topic_qos(kind, config).get(),
+                                  nullptr),
+                "writer") {}
+
+  void write(const km_wire_Header& header, const Ping& ping) {
+    auto encoded = Codec<Ping>::encode(ping);
+    encoded.wire.header = header;
+    check_dds(dds_write(writer_.handle(), &encoded.wire), "write");
+  }
+
+ private:
+  DdsEntity topic_;
+  DdsEntity writer_;
 };
 
 /// A robot that does nothing but talk: status, pings to all, pings to one.
@@ -116,10 +150,24 @@ struct TestRobot {
         peer_events.wait_until([&](const auto& e) { return matching(e, kind, robot) >= count; });
     return matching(events, kind, robot) >= count;
   }
-  TopicTraffic traffic(const std::string& topic, Direction direction, TrafficCategory category) {
+  /// Counts of the pings to all, or of those addressed to one robot.
+  TopicTraffic traffic(Direction direction, bool addressed = false) {
     for (const TopicTraffic& t : bridge.traffic().topics)
-      if (t.topic == topic && t.direction == direction && t.category == category) return t;
+      if (t.topic == Codec<Ping>::kTopic && t.direction == direction &&
+          t.category == category(addressed))
+        return t;
     return {};
+  }
+  /// The same, with one peer.
+  TrafficCount traffic_with(RobotId peer, Direction direction, bool addressed = false) {
+    for (const PeerTraffic& t : bridge.traffic().peers)
+      if (t.topic == Codec<Ping>::kTopic && t.direction == direction && t.peer == peer &&
+          t.category == category(addressed))
+        return t.count;
+    return {};
+  }
+  static TrafficCategory category(bool addressed) {
+    return addressed ? TrafficCategory::kGeometricVerification : TrafficCategory::kPlaceRecognition;
   }
 
   DdsParticipant participant;

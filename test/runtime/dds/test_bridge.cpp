@@ -1,6 +1,5 @@
-#include <catch2/catch.hpp>
-
 #include <algorithm>
+#include <catch2/catch.hpp>
 #include <numeric>
 
 #include "test/runtime/dds/dds_fixture.hpp"
@@ -21,10 +20,13 @@ std::vector<std::uint32_t> up_to(std::uint32_t count) {
   return result;
 }
 
+km_wire_Header header(const RobotIdentity& identity, std::uint32_t number) {
+  return {.version = 1, .robot = identity.robot, .boot = identity.boot, .number = number};
+}
+
 TEST_CASE("What one robot publishes arrives at the other, unchanged and once", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  TestRobot a(domain, 3);
-  TestRobot b(domain, 60000);
+  TestRobot a(domain, 3), b(domain, 60000);
   a.start();
   b.start();
   REQUIRE(a.hears(PeerEventKind::kJoined, 60000));
@@ -39,6 +41,244 @@ TEST_CASE("What one robot publishes arrives at the other, unchanged and once", "
   CHECK(large->payload == payload);
   CHECK(large->robot == 3);
   CHECK(a.received.messages().empty());  // nobody hears himself
+}
+
+TEST_CASE("The status of each robot reaches the others", "[dds]") {
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3), b(domain, 4);
+  a.start();
+  b.start();
+  REQUIRE(eventually([&] { return b.status.peers().size() == 1; }));
+  const RobotStatus status = b.status.peers()[0];
+  CHECK(status.robot == 3);
+  CHECK(status.name == "robot3");
+  CHECK(status.phase == RobotPhase::kRunning);
+}
+
+TEST_CASE("A robot that joins late gets every event, the newest state, and no request", "[dds]") {
+  const auto kind = GENERATE(TopicKind::kEvent, TopicKind::kState, TopicKind::kRequest);
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3, kind), witness(domain, 4, kind);
+  a.start();
+  witness.start();
+  REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+  // Keys 0 and 1 each written twice.
+  for (const std::uint8_t round : std::vector<std::uint8_t>{1, 2})
+    for (const std::uint32_t key : {0U, 1U}) a.ping(key, {round});
+  REQUIRE(eventually([&] { return witness.traffic(Direction::kIn).count.messages >= 2; }));
+
+  TestRobot late(domain, 5, kind);
+  late.start();
+  REQUIRE(a.hears(PeerEventKind::kJoined, 5));
+  a.ping(2);
+  if (kind == TopicKind::kRequest) {
+    CHECK(indices(late.received.wait_for(1)) == std::vector<std::uint32_t>{2});
+  } else {
+    const auto pings = late.received.wait_for(3);
+    CHECK(indices(pings) == up_to(3));
+    for (const Ping& ping : pings)
+      if (ping.index < 2) CHECK(ping.payload == std::vector<std::uint8_t>{2});
+  }
+}
+
+TEST_CASE("What is sent again is dropped", "[dds]") {
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3), b(domain, 4);
+  a.start();
+  b.start();
+  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  for (std::uint32_t i = 0; i < 20; ++i) a.ping(i);
+  REQUIRE(b.received.wait_for(20).size() == 20);
+
+  RawPingWriter again(a.participant.handle(), domain->config(), TopicKind::kEvent);
+  for (std::uint32_t i = 0; i < 20; ++i)
+    again.write(header(a.participant.identity(), i), {3, i, {}});
+  CHECK(eventually([&] { return b.traffic(Direction::kIn).duplicates == 20; }));
+  CHECK(b.received.messages().size() == 20);
+  CHECK(b.traffic(Direction::kIn).count.messages == 20);
+}
+
+TEST_CASE("Numbers that do not arrive are counted until they do", "[dds]") {
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3), b(domain, 4);
+  b.start();
+  a.start();
+  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  RawPingWriter writer(a.participant.handle(), domain->config(), TopicKind::kEvent);
+  for (const std::uint32_t number : {0U, 1U, 5U})
+    writer.write(header(a.participant.identity(), number), {3, number, {}});
+  REQUIRE(b.received.wait_for(3).size() == 3);
+  CHECK(b.traffic(Direction::kIn).missing == 3);
+  for (const std::uint32_t number : {3U, 2U})
+    writer.write(header(a.participant.identity(), number), {3, number, {}});
+  REQUIRE(b.received.wait_for(5).size() == 5);
+  CHECK(b.traffic(Direction::kIn).missing == 1);
+}
+
+TEST_CASE("An addressed message reaches its addressee, and nobody else gets a byte", "[dds]") {
+  const auto kind = GENERATE(TopicKind::kRequest, TopicKind::kEvent);
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3, kind), b(domain, 4, kind), c(domain, 5, kind);
+  for (TestRobot* robot : {&a, &b, &c}) robot->start();
+  REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+  REQUIRE(a.hears(PeerEventKind::kJoined, 5));
+
+  for (std::uint32_t i = 0; i < 10; ++i) a.ping_one(4, i, std::vector<std::uint8_t>(1000));
+  CHECK(indices(b.received_addressed.wait_for(10)) == up_to(10));
+  a.ping_one(5, 77);
+  CHECK(indices(c.received_addressed.wait_for(1)) == std::vector<std::uint32_t>{77});
+
+  CHECK(c.traffic(Direction::kIn, true).count.messages == 1);
+  CHECK(c.traffic(Direction::kIn, true).missing == 0);  // counted per addressee
+  REQUIRE(eventually([&] { return a.traffic(Direction::kOut, true).count.messages == 11; }));
+  CHECK(a.traffic_with(4, Direction::kOut, true).messages == 10);
+  CHECK(a.traffic_with(5, Direction::kOut, true).messages == 1);
+  CHECK(a.traffic_with(4, Direction::kOut, true) == b.traffic_with(3, Direction::kIn, true));
+  CHECK(a.traffic_with(5, Direction::kOut, true) == c.traffic_with(3, Direction::kIn, true));
+  CHECK(a.traffic(Direction::kOut).count.messages == 0);
+}
+
+TEST_CASE("Sender and receiver count the same bytes, whatever the size", "[dds]") {
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3), b(domain, 4), c(domain, 5);
+  for (TestRobot* robot : {&a, &b, &c}) robot->start();
+  REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+  REQUIRE(a.hears(PeerEventKind::kJoined, 5));
+  constexpr std::uint32_t kCount = 50;
+  for (std::uint32_t i = 0; i < kCount; ++i) a.ping(i, std::vector<std::uint8_t>(i));
+  for (TestRobot* robot : {&b, &c}) REQUIRE(robot->received.wait_for(kCount).size() == kCount);
+
+  REQUIRE(eventually([&] { return a.traffic(Direction::kOut).count.messages == kCount; }));
+  const TrafficCount once = a.traffic(Direction::kOut).count;
+  CHECK(a.traffic_with(4, Direction::kOut) == once);
+  CHECK(a.traffic_with(5, Direction::kOut) == once);
+  CHECK(b.traffic_with(3, Direction::kIn) == once);
+  CHECK(b.traffic(Direction::kIn).count == once);
+  // Encoding header 4, length of the appendable struct 4, header 16, robot 2 and padding 2, index
+  // 4, sequence length 4, payload padded to 4.
+  std::uint64_t expected = 0;
+  for (std::uint32_t i = 0; i < kCount; ++i)
+    expected += 4 + 4 + 16 + 2 + 2 + 4 + 4 + (i + 3) / 4 * 4;
+  CHECK(once.bytes == expected);
+}
+
+TEST_CASE("A hostile peer is counted by reason and harms nobody", "[dds]") {
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3), b(domain, 4), foe(domain, 9);
+  for (TestRobot* robot : {&a, &b, &foe}) robot->start();
+  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  REQUIRE(b.hears(PeerEventKind::kJoined, 9));
+
+  RawPingWriter writer(foe.participant.handle(), domain->config(), TopicKind::kEvent);
+  const RobotIdentity self = foe.participant.identity();
+  RobotIdentity other_boot = self;
+  other_boot.boot ^= 1U;
+  km_wire_Header no_version = header(self, 3);
+  no_version.version = 0;
+  writer.write(header(a.participant.identity(), 0), {9, 0, {}});
+  writer.write(header(b.participant.identity(), 0), {9, 1, {}});
+  writer.write(header(other_boot, 0), {9, 2, {}});
+  writer.write(no_version, {9, 3, {}});
+  writer.write(header(self, 4), {9, 4, {0xFF}});
+  writer.write(header(self, 0), {9, 5, {}});
+
+  CHECK(indices(b.received.wait_for(1)) == std::vector<std::uint32_t>{5});
+  const std::map<std::string, std::uint64_t> expected{{"claims another robot's id", 1},
+                                                      {"claims this robot's id", 1},
+                                                      {"from no known robot", 1},
+                                                      {"unknown version of the topic", 1},
+                                                      {"payload starts with 0xFF", 1}};
+  CHECK(eventually([&] { return b.traffic(Direction::kIn).refused == expected; }));
+  a.ping(0);  // the number that the foe tried to use up
+  CHECK(b.received.wait_for(2).size() == 2);
+  CHECK(b.bridge.error() == nullptr);
+}
+
+TEST_CASE("Programs without an identity, or with a broken one, are not heard", "[dds]") {
+  const std::string user_data =
+      GENERATE(std::string(), std::string("robot=7;name=\033[2J;proto=1;boot=1"),
+               std::string("robot=") + std::string(5000, '9'));
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3), b(domain, 4);
+  const DdsQos qos = make_dds_qos();
+  dds_qset_userdata(qos.get(), user_data.data(), user_data.size());
+  const DdsEntity stranger(
+      dds_create_participant(static_cast<dds_domainid_t>(domain->config().domain), qos.get(),
+                             nullptr),
+      "participant");
+  a.start();
+  b.start();
+  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  RawPingWriter writer(stranger.handle(), domain->config(), TopicKind::kEvent);
+  writer.write(header(a.participant.identity(), 0), {3, 0, {}});
+  CHECK(eventually([&] { return b.traffic(Direction::kIn).refused["from no known robot"] == 1; }));
+  CHECK(b.received.messages().empty());
+  const auto refusals =
+      TestRobot::matching(b.peer_events.messages(), PeerEventKind::kRefused, RobotId{0});
+  CHECK(refusals == (user_data.empty() ? 0 : 1));
+  CHECK(b.bridge.peers().list().size() == 1);
+}
+
+TEST_CASE("Robots of another protocol version are refused and not heard", "[dds]") {
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3), newer(domain, 4, TopicKind::kEvent, kProtocolVersion + 1);
+  a.start();
+  newer.start();
+  CHECK(a.hears(PeerEventKind::kRefused, 4));
+  newer.ping(0);
+  CHECK(eventually([&] { return a.traffic(Direction::kIn).refused["from no known robot"] == 1; }));
+  CHECK(a.received.messages().empty());
+  CHECK(a.bridge.peers().list().empty());
+}
+
+TEST_CASE("A robot that leaves and starts again is recognised by its boot", "[dds]") {
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3);
+  a.start();
+  {
+    TestRobot first(domain, 4);
+    first.start();
+    first.ping(0, {1});
+    REQUIRE(a.received.wait_for(1).size() == 1);
+  }
+  REQUIRE(a.hears(PeerEventKind::kLeft, 4));
+  TestRobot second(domain, 4);
+  second.start();
+  CHECK(a.hears(PeerEventKind::kRestarted, 4));
+  second.ping(0, {2});  // number 0 again, but of another boot
+  const auto pings = a.received.wait_for(2);
+  REQUIRE(pings.size() == 2);
+  CHECK(pings[1].payload == std::vector<std::uint8_t>{2});
+  REQUIRE(a.bridge.peers().list().size() == 1);
+  CHECK(a.bridge.peers().list()[0].identity == second.participant.identity());
+}
+
+TEST_CASE("Two robots with one id are told so", "[dds]") {
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3), twin(domain, 3);
+  a.start();
+  twin.start();
+  CHECK(a.hears(PeerEventKind::kConflict, 3));
+  CHECK(twin.hears(PeerEventKind::kConflict, 3));
+  twin.ping(0);
+  CHECK(
+      eventually([&] { return a.traffic(Direction::kIn).refused["claims this robot's id"] == 1; }));
+}
+
+TEST_CASE("A subscriber that throws does not stop the robot from hearing", "[dds]") {
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3), b(domain, 4);
+  b.pings_in.subscribe([](const auto& ping) {
+    if (ping->index == 0) throw std::runtime_error("subscriber");
+  });
+  a.start();
+  b.start();
+  REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+  a.ping(0);
+  a.ping(1);
+  CHECK(b.received.wait_for(2).size() == 2);
+  CHECK(eventually(
+      [&] { return b.traffic(Direction::kIn).refused["its handling threw an exception"] == 1; }));
 }
 
 }  // namespace

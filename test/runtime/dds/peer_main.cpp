@@ -1,0 +1,100 @@
+// A robot that only talks, as a process of its own, driven by lines on standard input:
+//   ping FIRST LAST    events with these indices, to all
+//   one ROBOT INDEX    to one robot
+//   quit
+// It prints what happens: "joined 7", "lost 7", ..., "ping 7 INDEX", "one 7 INDEX", and at the end
+// "summary RECEIVED DUPLICATES MISSING".
+#include <iostream>
+#include <mutex>
+#include <sstream>
+#include <string>
+
+#include "runtime/config_layers.hpp"
+#include "runtime/log.hpp"
+#include "test/runtime/dds/dds_fixture.hpp"
+
+namespace km {
+namespace {
+
+std::mutex output_mutex;
+
+void say(const std::string& line) {
+  const std::lock_guard lock(output_mutex);
+  std::cout << line << std::endl;
+}
+
+const char* name_of(PeerEventKind kind) {
+  switch (kind) {
+    case PeerEventKind::kJoined:
+      return "joined";
+    case PeerEventKind::kLost:
+      return "lost";
+    case PeerEventKind::kReturned:
+      return "returned";
+    case PeerEventKind::kLeft:
+      return "left";
+    case PeerEventKind::kRestarted:
+      return "restarted";
+    case PeerEventKind::kRefused:
+      return "refused";
+    case PeerEventKind::kConflict:
+      break;
+  }
+  return "conflict";
+}
+
+void report(TestRobot& robot) {
+  robot.bridge.peers().events().subscribe([](const auto& event) {
+    say(std::string(name_of(event->kind)) + ' ' + std::to_string(event->identity.robot));
+  });
+  const auto print = [](const char* what) {
+    return [what](const std::shared_ptr<const Ping>& ping) {
+      say(std::string(what) + ' ' + std::to_string(ping->robot) + ' ' +
+          std::to_string(ping->index));
+    };
+  };
+  robot.pings_in.subscribe(print("ping"));
+  robot.addressed_in.subscribe(print("one"));
+}
+
+void obey(TestRobot& robot) {
+  for (std::string line; std::getline(std::cin, line);) {
+    std::istringstream words(line);
+    std::string command;
+    std::uint32_t a = 0, b = 0;
+    words >> command >> a >> b;
+    if (command == "quit") return;
+    if (command == "one") robot.ping_one(static_cast<RobotId>(a), b);
+    if (command == "ping")
+      for (std::uint32_t i = a; i <= b; ++i) robot.ping(i, std::vector<std::uint8_t>(300));
+  }
+}
+
+int run(int argc, char** argv) {
+  log::set_level(log::Level::kWarn);
+  ConfigLayers layers;
+  for (int i = 2; i < argc; ++i) layers.add_override(argv[i]);
+  const auto config = layers.load<DdsConfig>();
+  layers.finish();
+
+  TestRobot robot(std::make_shared<const DdsDomain>(config),
+                  static_cast<RobotId>(std::stoi(argv[1])));
+  report(robot);
+  robot.start();
+  obey(robot);
+  robot.stop();
+  const TopicTraffic traffic = robot.traffic(Direction::kIn);
+  say("summary " + std::to_string(traffic.count.messages) + ' ' +
+      std::to_string(traffic.duplicates) + ' ' + std::to_string(traffic.missing));
+  return 0;
+}
+
+}  // namespace
+}  // namespace km
+
+int main(int argc, char** argv) try {
+  return argc < 2 ? 2 : km::run(argc, argv);
+} catch (const std::exception& error) {
+  std::cerr << "test_dds_peer: " << error.what() << std::endl;
+  return 1;
+}

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "test/runtime/dds/dds_fixture.hpp"
+#include "test/support/process.hpp"
+
+namespace km {
+
+/// Starts test_dds_peer as robot `id` with the settings of the section dds.
+inline std::unique_ptr<Process> start_peer(RobotId id, const std::vector<std::string>& settings,
+                                           pid_t network_of = 0) {
+  std::vector<std::string> command{KM_BIN_DIR "/test_dds_peer", std::to_string(id)};
+  for (const std::string& setting : settings) command.push_back("dds." + setting);
+  return std::make_unique<Process>(command, network_of);
+}
+
+/// Domain and team of this test alone.
+inline std::vector<std::string> own_team() {
+  const DdsConfig config = loopback_config();
+  return {"domain=" + std::to_string(config.domain), "team=" + config.team};
+}
+
+inline double seconds_between(std::chrono::steady_clock::time_point a,
+                              std::chrono::steady_clock::time_point b) {
+  return std::chrono::duration<double>(b - a).count();
+}
+
+inline std::vector<std::string> operator+(std::vector<std::string> a,
+                                          const std::vector<std::string>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+}  // namespace km

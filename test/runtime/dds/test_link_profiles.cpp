@@ -1,0 +1,94 @@
+#include <catch2/catch.hpp>
+#include <string>
+#include <vector>
+
+#include "runtime/config_layers.hpp"
+#include "runtime/dds/cyclone_xml.hpp"
+#include "runtime/dds/participant.hpp"
+#include "test/runtime/dds/dds_fixture.hpp"
+
+using Catch::Matchers::Contains;
+
+namespace km {
+namespace {
+
+const NetworkInterface kLoopback{"lo", "127.0.0.1", false, true};
+const NetworkInterface kCable{"eth0", "10.0.0.1", true, false};
+const NetworkInterface kRadio{"wlan0", "10.1.0.1", true, false};
+const NetworkInterface kTunnel{"tun0", "10.2.0.1", false, false};
+
+DdsConfig profile(const std::string& name, const std::vector<std::string>& overrides) {
+  ConfigLayers layers;
+  layers.add_file("config/qos/" + name + ".yaml");
+  for (const std::string& o : overrides) layers.add_override(o);
+  const auto config = layers.load<DdsConfig>();
+  layers.finish();
+  return config;
+}
+
+TEST_CASE("Every shipped profile gives a participant, by multicast and by peers", "[profiles]") {
+  const std::string name = GENERATE("wired", "wifi", "intermittent");
+  const std::string discovery = GENERATE("multicast", "peers");
+  CAPTURE(name, discovery);
+  const DdsConfig test = loopback_config();
+  const DdsConfig config = profile(
+      name, {"dds.discovery=" + discovery, "dds.peers=[127.0.0.1, 127.0.0.2]", "dds.interface=lo",
+             "dds.domain=" + std::to_string(test.domain), "dds.team=" + test.team});
+  CHECK_NOTHROW(DdsParticipant(config, {1, "a", kProtocolVersion, 1}));
+}
+
+TEST_CASE("The profiles leave room for more than ten robots on one host", "[profiles]") {
+  const std::string name = GENERATE("wired", "wifi", "intermittent");
+  CHECK(profile(name, {}).max_participant_index >= 32);
+  // Ports of the last one stay below those of the next domain and inside 16 bits.
+  CHECK(11 + 2 * profile(name, {}).max_participant_index < 250);
+}
+
+TEST_CASE("The wired profile is the default configuration", "[profiles]") {
+  CHECK(to_yaml(profile("wired", {})) == to_yaml(DdsConfig{}));
+}
+
+TEST_CASE("Found by address, a robot takes a fixed port; by multicast, any", "[profiles]") {
+  DdsConfig config;
+  CHECK_THAT(cyclone_xml(config, kCable), Contains("<ParticipantIndex>none<") &&
+                                              Contains("<AllowMulticast>spdp<") &&
+                                              !Contains("<Peers>"));
+  config.discovery = Discovery::kPeers;
+  config.peers = {"10.0.0.2", "10.0.0.1"};
+  CHECK_THAT(cyclone_xml(config, kCable),
+             Contains("<ParticipantIndex>auto<") && Contains("<AllowMulticast>false<") &&
+                 Contains("<Peers><Peer address='10.0.0.1'/><Peer address='10.0.0.2'/></Peers>"));
+}
+
+TEST_CASE("Loopback is told to carry multicast", "[profiles]") {
+  const DdsConfig config;
+  CHECK_THAT(cyclone_xml(config, kLoopback), Contains("name='lo' multicast='true'"));
+  CHECK_THAT(cyclone_xml(config, kCable), !Contains("multicast='true'"));
+}
+
+TEST_CASE("What a configuration says cannot break out of the document", "[profiles]") {
+  DdsConfig config;
+  config.team = "a</Tag><evil b='\"&";
+  CHECK_THAT(cyclone_xml(config, kCable),
+             Contains("<Tag>a&lt;/Tag&gt;&lt;evil b=&apos;&quot;&amp;</Tag>"));
+}
+
+TEST_CASE("The interface is the one named, else the likeliest", "[profiles]") {
+  CHECK(select_interface({kLoopback, kCable, kRadio}, "wlan0").name == "wlan0");
+  CHECK(select_interface({kLoopback, kCable, kRadio}, "").name == "eth0");
+  CHECK(select_interface({kLoopback, kTunnel, kRadio}, "").name == "wlan0");
+  CHECK(select_interface({kLoopback, kTunnel}, "").name == "tun0");
+  CHECK(select_interface({kLoopback}, "").name == "lo");
+  CHECK_THROWS_WITH(select_interface({kLoopback, kCable}, "wlan9"),
+                    Contains("dds.interface = wlan9") && Contains("eth0 (10.0.0.1)"));
+  CHECK_THROWS_AS(select_interface({}, ""), ConfigError);
+}
+
+TEST_CASE("A configuration out of bounds makes no domain", "[profiles]") {
+  DdsConfig config = loopback_config();
+  config.domain = 231;
+  CHECK_THROWS_AS(DdsDomain(config), ConfigError);
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,97 @@
+#include <catch2/catch.hpp>
+#include <csignal>
+#include <iostream>
+#include <set>
+
+#include "test/runtime/dds/peer_process.hpp"
+
+namespace km {
+namespace {
+
+// A second is asked for; only a failure takes longer than this.
+constexpr double kDiscoveryBound_s = 5.0;
+
+TEST_CASE("Two processes on one host discover each other", "[dds][processes]") {
+  const std::string discovery = GENERATE("multicast", "peers");
+  const auto settings =
+      own_team() + std::vector<std::string>{"interface=lo", "discovery=" + discovery};
+  const auto a = start_peer(3, settings);
+  const auto b = start_peer(4, settings);
+  const auto a_sees = a->wait_for("joined 4");
+  const auto b_sees = b->wait_for("joined 3");
+  REQUIRE(a_sees);
+  REQUIRE(b_sees);
+  const double seconds = seconds_between(b->started(), std::max(a_sees->time, b_sees->time));
+  std::cout << "discovery by " << discovery << ", loopback: " << seconds
+            << " s from the launch of the second process\n";
+  CHECK(seconds < kDiscoveryBound_s);
+
+  a->tell("ping 0 99");
+  a->tell("one 4 7");
+  CHECK(b->wait_for("ping 3 99"));
+  CHECK(b->wait_for("one 3 7"));
+  a->tell("quit");
+  CHECK(b->wait_for("left 3"));
+  b->tell("quit");
+  CHECK(b->wait_for("summary 100 0 0"));
+  CHECK(a->wait() == 0);
+  CHECK(b->wait() == 0);
+}
+
+TEST_CASE("A killed robot is lost within the liveliness time, and restarts as another boot",
+          "[dds][processes]") {
+  const auto settings = own_team() + std::vector<std::string>{"interface=lo", "liveliness_s=0.5"};
+  const auto a = start_peer(3, settings);
+  auto b = start_peer(4, settings);
+  REQUIRE(a->wait_for("joined 4"));
+  a->tell("ping 0 9");
+  REQUIRE(b->wait_for("ping 3 9"));
+  const auto killed = std::chrono::steady_clock::now();
+  b->kill(SIGKILL);
+  const auto lost = a->wait_for("lost 4");
+  REQUIRE(lost);
+  std::cout << "killed robot lost after " << seconds_between(killed, lost->time)
+            << " s (liveliness 0.5 s)\n";
+  b = start_peer(4, settings);
+  CHECK(a->wait_for("restarted 4"));
+  CHECK(b->wait_for("ping 3 9"));  // events of before it was born
+  b->tell("ping 0 0");
+  CHECK(a->wait_for("ping 4 0"));
+}
+
+TEST_CASE("A dozen robots on one host all meet, with either discovery", "[dds][processes]") {
+  const std::string discovery = GENERATE("multicast", "peers");
+  constexpr RobotId kRobots = 12;
+  const auto settings =
+      own_team() + std::vector<std::string>{"interface=lo", "discovery=" + discovery};
+  std::vector<std::unique_ptr<Process>> robots;
+  for (RobotId id = 0; id < kRobots; ++id)
+    robots.push_back(start_peer(static_cast<RobotId>(100 * id), settings));
+  double last_s = 0.0;
+  for (RobotId id = 0; id < kRobots; ++id) {
+    for (RobotId other = 0; other < kRobots; ++other) {
+      if (other == id) continue;
+      const auto line = robots[id]->wait_for("joined " + std::to_string(100 * other));
+      REQUIRE(line);
+      last_s = std::max(last_s, seconds_between(robots.back()->started(), line->time));
+    }
+  }
+  std::cout << "12 robots by " << discovery << ": all 132 meetings within " << last_s
+            << " s from the last launch\n";
+  robots[0]->tell("ping 5 5");
+  for (RobotId id = 1; id < kRobots; ++id) CHECK(robots[id]->wait_for("ping 0 5"));
+}
+
+TEST_CASE("Teams in one domain do not see each other", "[dds][processes]") {
+  const auto team = own_team() + std::vector<std::string>{"interface=lo"};
+  const auto a = start_peer(3, team);
+  const auto other = start_peer(5, team + std::vector<std::string>{"team=other"});
+  const auto b = start_peer(4, team);
+  REQUIRE(a->wait_for("joined 4"));
+  REQUIRE(b->wait_for("joined 3"));
+  CHECK(a->lines("joined 5").empty());
+  CHECK(other->lines().empty());
+}
+
+}  // namespace
+}  // namespace km

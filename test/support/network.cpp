@@ -1,0 +1,98 @@
+#include "test/support/network.hpp"
+
+#include <sched.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <iostream>
+#include <sstream>
+#include <stdexcept>
+
+#include "test/support/process.hpp"
+
+namespace km {
+namespace {
+
+void end(pid_t process) {
+  if (process <= 0) return;
+  kill(process, SIGKILL);
+  waitpid(process, nullptr, 0);
+}
+
+// Starts a process that does nothing but own a new network namespace; 0 if it may not.
+pid_t hold_namespace() {
+  int ready[2];
+  if (pipe(ready) != 0) throw std::runtime_error("VirtualNetwork: no pipe");
+  const pid_t process = fork();
+  if (process == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    const char answer = unshare(CLONE_NEWNET) == 0 ? 'y' : 'n';
+    if (write(ready[1], &answer, 1) != 1) _exit(1);
+    while (true) pause();
+  }
+  char answer = 'n';
+  const bool heard = read(ready[0], &answer, 1) == 1;
+  close(ready[0]);
+  close(ready[1]);
+  if (heard && answer == 'y') return process;
+  end(process);
+  return 0;
+}
+
+bool run_ip(pid_t network_of, const std::string& arguments) {
+  std::vector<std::string> command{"ip"};
+  std::istringstream words(arguments);
+  for (std::string word; words >> word;) command.push_back(word);
+  return Process(command, network_of).wait() == 0;
+}
+
+void ip(pid_t network_of, const std::string& arguments) {
+  if (!run_ip(network_of, arguments))
+    throw std::runtime_error("VirtualNetwork: failed: ip " + arguments);
+}
+
+}  // namespace
+
+bool VirtualNetwork::available() {
+  const pid_t probe = geteuid() == 0 ? hold_namespace() : 0;
+  const bool possible = probe != 0 && run_ip(probe, "link add veth_a type veth peer name veth_b") &&
+                        run_ip(probe, "link add br0 type bridge");
+  end(probe);
+  if (!possible) std::cout << "SKIPPED: needs root, network namespaces, veth and bridge\n";
+  return possible;
+}
+
+VirtualNetwork::VirtualNetwork(int count) : switch_(hold_namespace()) {
+  ip(switch_, "link add br0 type bridge mcast_snooping 0");
+  ip(switch_, "link set br0 up");
+  for (int n = 1; n <= count; ++n) {
+    const pid_t host = hold_namespace();
+    hosts_.push_back(host);
+    const std::string port = "port" + std::to_string(n);
+    ip(switch_, "link add " + port + " type veth peer name eth0 netns " + std::to_string(host));
+    ip(switch_, "link set " + port + " master br0 up");
+    ip(host, "addr add " + address(n) + "/24 dev eth0");
+    ip(host, "link set lo up");
+    ip(host, "link set eth0 up");
+  }
+}
+
+VirtualNetwork::~VirtualNetwork() {
+  for (const pid_t host : hosts_) end(host);
+  end(switch_);
+}
+
+void VirtualNetwork::set_link(int host, bool up) {
+  ip(switch_, "link set port" + std::to_string(host) + (up ? " up" : " down"));
+}
+
+void VirtualNetwork::add_dead_interface(int host) {
+  const pid_t network = hosts_[static_cast<std::size_t>(host) - 1];
+  ip(network, "link add eth1 type veth peer name nowhere");
+  ip(network, "addr add 10.99.0." + std::to_string(host) + "/24 dev eth1");
+  ip(network, "link set eth1 up");
+}
+
+}  // namespace km

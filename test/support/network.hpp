@@ -1,0 +1,39 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace km {
+
+/// Hosts on one switch, as network namespaces of this machine. They belong to processes that die
+/// with this one, and vanish with them: nothing is left behind, however a test ends.
+class VirtualNetwork {
+ public:
+  /// True if this process may make namespaces; else says SKIPPED, for ctest.
+  static bool available();
+
+  /// Hosts 1 to `count` with addresses 10.77.0.<n> on interface eth0. Throws std::runtime_error.
+  explicit VirtualNetwork(int count);
+  ~VirtualNetwork();
+  VirtualNetwork(const VirtualNetwork&) = delete;
+  VirtualNetwork& operator=(const VirtualNetwork&) = delete;
+
+  /// A process in whose network namespace programs of `host` run.
+  [[nodiscard]] pid_t host(int host) const { return hosts_[static_cast<std::size_t>(host) - 1]; }
+  [[nodiscard]] static std::string address(int host) { return "10.77.0." + std::to_string(host); }
+
+  /// Pulls the cable of `host`, or plugs it in.
+  void set_link(int host, bool up);
+
+  /// Gives `host` a second interface, "eth1", that leads nowhere.
+  void add_dead_interface(int host);
+
+ private:
+  pid_t switch_ = 0;
+  std::vector<pid_t> hosts_;
+};
+
+}  // namespace km

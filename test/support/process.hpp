@@ -1,0 +1,69 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace km {
+
+/// A line a process printed, and when this process read it.
+struct TimedLine {
+  std::string text;
+  std::chrono::steady_clock::time_point time;
+};
+
+/// A child process whose output is read line by line and that is killed, if need be, with this.
+class Process {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  /// Starts `command` (program and arguments; stderr is shared), in the network namespace of
+  /// process `network_of` if that is not 0.
+  explicit Process(const std::vector<std::string>& command, pid_t network_of = 0);
+  ~Process();
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  [[nodiscard]] TimePoint started() const { return started_; }
+
+  /// Writes a line to its standard input.
+  void tell(const std::string& line);
+
+  /// Waits until it has printed `line` `times` times; the last of them, or nullopt after
+  /// `patience`.
+  std::optional<TimedLine> wait_for(const std::string& line, std::size_t times = 1,
+                                    std::chrono::seconds patience = std::chrono::seconds(20));
+
+  /// Waits for a line that begins so.
+  std::optional<TimedLine> wait_for_prefix(const std::string& prefix);
+
+  /// Lines so far that begin so.
+  [[nodiscard]] std::vector<TimedLine> lines(const std::string& prefix = {}) const;
+
+  void kill(int signal) const;
+
+  /// Waits for its end: the exit code, or minus the signal that killed it.
+  int wait();
+
+ private:
+  void read_lines();
+
+  TimePoint started_;
+  pid_t pid_ = -1;
+  int input_ = -1;
+  int output_ = -1;
+  std::optional<int> result_;
+  mutable std::mutex mutex_;  // guards lines_ and ended_
+  std::condition_variable changed_;
+  std::vector<TimedLine> lines_;
+  bool ended_ = false;
+  std::thread reader_;
+};
+
+}  // namespace km
