@@ -21,7 +21,7 @@
 
 namespace km {
 
-/// A message for one robot alone.
+/// A message for one other robot alone.
 template <typename T>
 struct Addressed {
   RobotId to = 0;

@@ -64,12 +64,13 @@ void OutgoingTopic::write(std::optional<RobotId> to, km_wire_Header& header, con
 
   const dds_return_t result = dds_write(writer.writer.handle(), wire);
   refresh_readers(writer);
-  const std::lock_guard lock(mutex_);
-  if (result != DDS_RETCODE_OK) {
-    ++writer.failures;
+  if (result != DDS_RETCODE_OK)
     log::limited(log::Level::kError, "dds", "write " + spec_.name)
         << spec_.name << ": message " << header.number << " of " << size
         << " bytes not written: " << dds_strretcode(result);
+  const std::lock_guard lock(mutex_);
+  if (result != DDS_RETCODE_OK) {
+    ++writer.failures;
     return;
   }
   writer.written.add(size);

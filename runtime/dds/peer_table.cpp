@@ -22,8 +22,9 @@ void PeerTable::participant(const Guid& guid, std::string_view user_data,
 
   const auto decoded = parse_user_data(user_data);
   if (!decoded.value) {
-    events_.push_back(
-        {PeerEventKind::kRefused, {}, "a robot at " + addresses + " refused: " + decoded.refusal});
+    const RobotIdentity unreadable;
+    const std::string text = "a robot at " + addresses + " refused: " + decoded.refusal;
+    events_.push_back({PeerEventKind::kRefused, unreadable, text});
     return;
   }
   if (decoded.value->protocol != self_.protocol)

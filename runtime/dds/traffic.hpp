@@ -43,9 +43,9 @@ struct TopicTraffic {
   std::string topic;
   TrafficCategory category = TrafficCategory::kOther;
   Direction direction = Direction::kOut;
-  TrafficCount count;            ///< Out: once per message. In: new messages that were accepted.
+  TrafficCount count;            ///< Out: once per message. In: new messages from known robots.
   std::uint64_t duplicates = 0;  ///< In: arrived before.
-  std::uint64_t missing = 0;     ///< In: numbers that have not arrived (yet).
+  std::uint64_t missing = 0;     ///< In: numbers not arrived (yet), overtaken states included.
   std::uint64_t failures = 0;    ///< Out: refused by DDS.
   std::map<std::string, std::uint64_t> refused;  ///< In: by reason.
 };

@@ -84,15 +84,18 @@ VirtualNetwork::~VirtualNetwork() {
   end(switch_);
 }
 
-void VirtualNetwork::set_link(int host, bool up) {
-  ip(switch_, "link set port" + std::to_string(host) + (up ? " up" : " down"));
+void VirtualNetwork::set_link(int n, bool up) {
+  ip(switch_, "link set port" + std::to_string(n) + (up ? " up" : " down"));
 }
 
-void VirtualNetwork::add_dead_interface(int host) {
-  const pid_t network = hosts_[static_cast<std::size_t>(host) - 1];
-  ip(network, "link add eth1 type veth peer name nowhere");
-  ip(network, "addr add 10.99.0." + std::to_string(host) + "/24 dev eth1");
-  ip(network, "link set eth1 up");
+void VirtualNetwork::remove_interface(int n) {
+  ip(host(n), "link del eth0");
+}
+
+void VirtualNetwork::add_dead_interface(int n) {
+  ip(host(n), "link add eth1 type veth peer name nowhere");
+  ip(host(n), "addr add 10.99.0." + std::to_string(n) + "/24 dev eth1");
+  ip(host(n), "link set eth1 up");
 }
 
 }  // namespace km

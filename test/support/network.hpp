@@ -28,6 +28,9 @@ class VirtualNetwork {
   /// Pulls the cable of `host`, or plugs it in.
   void set_link(int host, bool up);
 
+  /// Leaves `host` with nothing but loopback.
+  void remove_interface(int host);
+
   /// Gives `host` a second interface, "eth1", that leads nowhere.
   void add_dead_interface(int host);
 

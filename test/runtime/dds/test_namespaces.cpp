@@ -63,6 +63,19 @@ TEST_CASE("On a host with several interfaces the robot uses the one it is told",
   CHECK(robots.b->wait_for("joined 3"));
 }
 
+TEST_CASE("On a host with nothing but loopback robots meet without being told to use it",
+          "[dds][namespaces]") {
+  if (!VirtualNetwork::available()) return;
+  const std::string discovery = GENERATE("multicast", "peers");
+  VirtualNetwork network(1);
+  network.remove_interface(1);
+  const auto settings = own_team() + std::vector<std::string>{"discovery=" + discovery};
+  const auto a = start_peer(3, settings, network.host(1));
+  const auto b = start_peer(4, settings, network.host(1));
+  CHECK(a->wait_for("joined 4"));
+  CHECK(b->wait_for("joined 3"));
+}
+
 TEST_CASE("A link that fails and returns loses no event", "[dds][namespaces]") {
   if (!VirtualNetwork::available()) return;
   const std::string discovery = GENERATE("multicast", "peers");
