@@ -1,0 +1,147 @@
+#include <algorithm>
+#include <fstream>
+#include <iomanip>
+#include <iostream>
+#include <numbers>
+#include <span>
+#include <stdexcept>
+
+#include "apps/vocabulary/commands.hpp"
+#include "apps/vocabulary/image_list.hpp"
+#include "apps/vocabulary/orb_images.hpp"
+#include "apps/vocabulary/truth_poses.hpp"
+#include "modules/place_recognition/vocabulary_file.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kTruthTolerance_s = 0.05;  // ground truth comes at 20 Hz or faster
+
+struct View {
+  BowVector vector;
+  SE3 T_world_body;
+};
+
+// Views in order of time; images without ground truth are left out.
+std::vector<View> views_of(const std::vector<std::string>& inputs, const Vocabulary& vocabulary,
+                           const std::vector<StampedPose>& truth, const EvaluateCommand& command) {
+  auto images = list_images(inputs, command.every);
+  std::sort(images.begin(), images.end(),
+            [](const auto& a, const auto& b) { return stamp_of_image(a) < stamp_of_image(b); });
+  const auto descriptors = orb_descriptors(images, command.features);
+  std::vector<View> views;
+  for (std::size_t i = 0; i < images.size(); ++i)
+    if (const auto T = pose_at(truth, stamp_of_image(images[i]), kTruthTolerance_s))
+      views.push_back({vocabulary.transform(descriptors[i]), *T});
+  if (views.empty()) throw std::runtime_error("no image has a pose in " + command.truth);
+  return views;
+}
+
+// A pair of views with a usable normaliser.
+struct Pair {
+  std::size_t query;
+  double similarity;
+  bool same_place;
+};
+
+// Of the pairs of one query, only the best can become candidates.
+void drop_all_but_best(std::span<Pair> pairs, std::size_t count) {
+  std::vector<Pair*> order;
+  for (Pair& pair : pairs) order.push_back(&pair);
+  std::stable_sort(order.begin(), order.end(),
+                   [](const Pair* a, const Pair* b) { return a->similarity > b->similarity; });
+  for (std::size_t i = count; i < order.size(); ++i) order[i]->similarity = 0.0;
+}
+
+std::vector<Pair> compare(const std::vector<View>& queries, const std::vector<View>& known,
+                          const EvaluateCommand& command) {
+  std::vector<Pair> pairs;
+  for (std::size_t i = 1; i < queries.size(); ++i) {
+    const double normalizer = score(queries[i].vector, queries[i - 1].vector);
+    for (const View& view : known) {
+      const SE3 T_query_known = queries[i].T_world_body.inverse() * view.T_world_body;
+      const bool same =
+          T_query_known.translation().norm() <= command.max_distance_m &&
+          angle_of(T_query_known.linear()) <= command.max_angle_deg * std::numbers::pi / 180.0;
+      const bool usable = normalizer > 0.0 && normalizer >= command.min_normalizer;
+      const double similarity = usable ? score(queries[i].vector, view.vector) / normalizer : 0.0;
+      pairs.push_back({i, similarity, same});
+    }
+    drop_all_but_best({pairs.end() - static_cast<std::ptrdiff_t>(known.size()), pairs.end()},
+                      command.max_candidates);
+  }
+  return pairs;
+}
+
+struct Row {
+  double threshold = 0.0;
+  std::size_t candidates = 0;  // pairs at or above the threshold
+  std::size_t correct = 0;     // of these, same place
+  std::size_t queries = 0;     // queries that see a known place
+  std::size_t recognised = 0;  // of these, with a correct candidate
+  double precision() const { return candidates == 0 ? 1.0 : ratio(correct, candidates); }
+  double query_recall() const { return queries == 0 ? 1.0 : ratio(recognised, queries); }
+  static double ratio(std::size_t a, std::size_t b) {
+    return static_cast<double>(a) / static_cast<double>(b);
+  }
+};
+
+Row row_at(double threshold, const std::vector<Pair>& pairs, std::size_t query_count) {
+  Row row{.threshold = threshold};
+  std::vector<bool> has_place(query_count, false);
+  std::vector<bool> is_recognised(query_count, false);
+  for (const Pair& pair : pairs) {
+    if (pair.same_place) has_place[pair.query] = true;
+    if (pair.similarity < threshold) continue;
+    ++row.candidates;
+    if (!pair.same_place) continue;
+    ++row.correct;
+    is_recognised[pair.query] = true;
+  }
+  row.queries = static_cast<std::size_t>(std::count(has_place.begin(), has_place.end(), true));
+  row.recognised =
+      static_cast<std::size_t>(std::count(is_recognised.begin(), is_recognised.end(), true));
+  return row;
+}
+
+void print(const std::vector<Row>& rows, std::size_t same, std::size_t all) {
+  std::cout << same << " of " << all << " pairs show the same place, seen by " << rows[0].queries
+            << " queries\nthreshold  candidates  precision  pair recall  query recall\n"
+            << std::fixed;
+  for (const Row& row : rows)
+    std::cout << std::setprecision(2) << std::setw(9) << row.threshold << std::setw(12)
+              << row.candidates << std::setprecision(3) << std::setw(11) << row.precision()
+              << std::setw(13) << Row::ratio(row.correct, std::max<std::size_t>(1, same))
+              << std::setw(14) << row.query_recall() << '\n';
+}
+
+void write_json(const std::string& file, const std::vector<Row>& rows, std::size_t same) {
+  std::ofstream json(file);
+  json << "{\"pairs_of_same_place\": " << same << ", \"rows\": [";
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    json << (i == 0 ? "" : ", ") << "{\"threshold\": " << rows[i].threshold
+         << ", \"candidates\": " << rows[i].candidates << ", \"correct\": " << rows[i].correct
+         << ", \"queries\": " << rows[i].queries << ", \"recognised\": " << rows[i].recognised
+         << '}';
+  json << "]}\n";
+  if (!json.flush()) throw std::runtime_error(file + " cannot be written");
+}
+
+}  // namespace
+
+int evaluate(const EvaluateCommand& command) {
+  const Vocabulary vocabulary = load_vocabulary(command.vocabulary);
+  const std::vector<StampedPose> truth = read_truth(command.truth);
+  const std::vector<View> known = views_of(command.known, vocabulary, truth, command);
+  const std::vector<View> queries = views_of(command.queries, vocabulary, truth, command);
+  const std::vector<Pair> pairs = compare(queries, known, command);
+  const auto same = static_cast<std::size_t>(
+      std::count_if(pairs.begin(), pairs.end(), [](const Pair& pair) { return pair.same_place; }));
+  std::vector<Row> rows;
+  for (int step = 4; step <= 20; ++step) rows.push_back(row_at(0.05 * step, pairs, queries.size()));
+  print(rows, same, pairs.size());
+  if (!command.json.empty()) write_json(command.json, rows, same);
+  return 0;
+}
+
+}  // namespace km
