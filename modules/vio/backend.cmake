@@ -5,3 +5,4 @@ km_module(vio
           vio_keyframes.cpp window.cpp window_equations.cpp window_optimizer.cpp
           window_sliding.cpp
   LINK km_vio_frontend Ceres::ceres)
+km_node(vio SOURCES vio_node.cpp)

@@ -66,6 +66,12 @@ struct VioConfig {
   /// or, even at rest, after this long [s].
   double output_rest_interval_s = 2.0;
 
+  /// Error of the relative pose of two keyframes that the smoother cannot know of (calibration,
+  /// drifting tracks, synchronisation), a random walk added to its covariance, each axis
+  /// [rad/sqrt(s)], [m/sqrt(s)].
+  double drift_rotation = 7e-4;
+  double drift_translation = 4e-3;
+
   /// Longest time between two inertial samples that is interpolated [s]; longer: a new start.
   double max_imu_gap_s = 0.1;
 
@@ -97,6 +103,8 @@ struct VioConfig {
     visitor.field("output_distance_m", output_distance_m, {0.0, 10.0});
     visitor.field("output_rotation_rad", output_rotation_rad, {0.0, 3.2});
     visitor.field("output_rest_interval_s", output_rest_interval_s, {0.1, 1e3});
+    visitor.field("drift_rotation", drift_rotation, {0.0, 0.1});
+    visitor.field("drift_translation", drift_translation, {0.0, 1.0});
     visitor.field("max_imu_gap_s", max_imu_gap_s, {1e-3, 1.0});
     visitor.field("max_speed_mps", max_speed_mps, {0.1, 1e3});
     visitor.field("max_gyro_bias_radps", max_gyro_bias_radps, {1e-3, 10.0});

@@ -51,7 +51,15 @@ void Vio::hand_on(const OdometryState& state, const Frame& frame, VioResult& res
   keyframe.stamp = state.stamp;
   keyframe.T_previous_kf =
       relative ? relative->T : last_keyframe_->T_odom_kf.inverse() * state.T_odom_body;
-  keyframe.covariance = relative ? relative->Sigma : restart_covariance();
+  keyframe.covariance = restart_covariance();
+  if (relative) {
+    const double dt = seconds_between(last_keyframe_->stamp, state.stamp);
+    Vector6 drift;  // variance
+    drift.head<3>().setConstant(dt * config_.drift_rotation * config_.drift_rotation);
+    drift.tail<3>().setConstant(dt * config_.drift_translation * config_.drift_translation);
+    keyframe.covariance = relative->Sigma;
+    keyframe.covariance.diagonal() += drift;
+  }
   keyframe.T_odom_kf = last_keyframe_->T_odom_kf * keyframe.T_previous_kf;
   last_keyframe_ = keyframe;
   result.keyframes.push_back(keyframe);

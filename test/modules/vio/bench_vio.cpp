@@ -1,5 +1,6 @@
 // Odometry on EuRoC MH_01_easy as in the table of results: three pieces and 21 starts.
-//   bench_vio DATASET [starts] [KEY=VALUE ...]   keys of the sections vio and tracker
+//   bench_vio DATASET [starts] [black] [KEY=VALUE ...]   keys of the sections vio and tracker
+// "starts" adds the 21 starts, "black" runs with one second of black images at each of 12 places.
 
 #include <algorithm>
 #include <cstdio>
@@ -54,18 +55,20 @@ std::size_t packet_at(const Recording& recording, double seconds) {
   return k;
 }
 
-// Share of keyframe steps whose error is inside the 95 % bound of their covariance, and the mean
-// squared Mahalanobis distance (6 if calibrated).
-void print_consistency(const OdometryRun& run) {
+// Squared Mahalanobis distance of `steps` consecutive keyframe steps (6 on average if the
+// covariances are right) and the share inside their 95 % bound.
+void print_consistency(const OdometryRun& run, std::size_t steps) {
   std::map<Stamp, const SE3*> truth;
   for (std::size_t k = 0; k < run.states.size(); ++k) truth[run.states[k].stamp] = &run.truth[k];
   double inside = 0.0, mean = 0.0, n = 0.0, rotation = 0.0, translation = 0.0;
-  for (std::size_t k = 1; k < run.keyframes.size(); ++k) {
-    const auto a = truth.find(run.keyframes[k - 1].stamp), b = truth.find(run.keyframes[k].stamp);
-    if (a == truth.end() || b == truth.end()) continue;
-    const SE3 T = a->second->inverse() * *b->second;
-    const Vector6 e = se3_log(run.keyframes[k].T_previous_kf.inverse() * T);
-    const Matrix6& S = run.keyframes[k].covariance;
+  for (std::size_t k = steps; k < run.keyframes.size(); ++k) {
+    const SE3 T =
+        truth.at(run.keyframes[k - steps].stamp)->inverse() * *truth.at(run.keyframes[k].stamp);
+    UncertainPose estimate;
+    for (std::size_t i = k - steps + 1; i <= k; ++i)
+      estimate = compose(estimate, {run.keyframes[i].T_previous_kf, run.keyframes[i].covariance});
+    const Vector6 e = se3_log(estimate.T.inverse() * T);
+    const Matrix6& S = estimate.Sigma;
     const double d = e.dot(S.ldlt().solve(e));
     rotation += e.head<3>().dot(S.topLeftCorner<3, 3>().ldlt().solve(e.head<3>()));
     translation += e.tail<3>().dot(S.bottomRightCorner<3, 3>().ldlt().solve(e.tail<3>()));
@@ -74,8 +77,9 @@ void print_consistency(const OdometryRun& run) {
     n += 1.0;
   }
   std::printf(
-      "    keyframes %zu: chi2 mean %.2f (rotation %.2f, translation %.2f), inside 95%%: %.0f%%\n",
-      run.keyframes.size(), mean / n, rotation / n, translation / n, 100.0 * inside / n);
+      "    keyframes %zu, over %zu: chi2 mean %.2f (rotation %.2f, translation %.2f), inside 95%%: "
+      "%.0f%%\n",
+      run.keyframes.size(), steps, mean / n, rotation / n, translation / n, 100.0 * inside / n);
 }
 
 void print_piece(const char* name, const OdometryRun& run, std::size_t images) {
@@ -105,8 +109,34 @@ void print_piece(const char* name, const OdometryRun& run, std::size_t images) {
       run.statistics.starts - 1);
 }
 
+Recording with_black_images(Recording recording, double from_s, double to_s) {
+  const Stamp start = recording.packets.front().frame->stamp;
+  for (SensorPacket& packet : recording.packets) {
+    const double t = seconds_between(start, packet.frame->stamp);
+    if (t < from_s || t >= to_s) continue;
+    StereoFrame frame = *packet.frame;
+    std::fill(frame.left.pixels.begin(), frame.left.pixels.end(), std::uint8_t{0});
+    std::fill(frame.right.pixels.begin(), frame.right.pixels.end(), std::uint8_t{0});
+    packet.frame = std::make_shared<const StereoFrame>(std::move(frame));
+  }
+  return recording;
+}
+
+void run_black(const Recording& recording, const TrackerConfig& tracker, const VioConfig& config) {
+  for (double from = 1.5; from < 13.0; from += 1.0) {
+    const Recording black = with_black_images(recording, from, from + 1.0);
+    const OdometryRun run = run_odometry(black, 0, packet_at(black, 15.0), tracker, config);
+    const OdometryErrors errors = errors_since(run, 0.0);
+    std::printf(
+        "black %4.1f-%4.1f: %zu poses, %d starts, %d divergences, ATE %.1f mm, max %.1f mm, %.3f "
+        "deg\n",
+        from, from + 1.0, run.states.size(), run.statistics.starts, run.statistics.divergences,
+        1e3 * errors.ate_m, 1e3 * errors.max_m, errors.rpe_deg);
+  }
+}
+
 int run(int argc, char** argv) {
-  bool starts = false;
+  bool starts = false, black = false;
   Overrides overrides;
   for (int a = 2; a < argc; ++a) {
     const char* equals = std::strchr(argv[a], '=');
@@ -114,7 +144,7 @@ int run(int argc, char** argv) {
       overrides.values[std::string(argv[a], static_cast<std::size_t>(equals - argv[a]))] =
           equals + 1;
     else
-      starts |= std::strcmp(argv[a], "starts") == 0;
+      (std::strcmp(argv[a], "starts") == 0 ? starts : black) = true;
   }
   TrackerConfig tracker;
   VioConfig config;
@@ -133,17 +163,26 @@ int run(int argc, char** argv) {
                       last = packet_at(recording, piece.to);
     const OdometryRun run = run_odometry(recording, first, last, tracker, config);
     print_piece(piece.name, run, last - first);
-    if (run.states.size() >= 3) print_consistency(run);
+    if (run.states.size() >= 3)
+      for (const std::size_t steps : {1U, 3U, 8U}) print_consistency(run, steps);
     if (std::getenv("DUMP")) {
       const SE3 A = run.truth.back() * run.states.back().T_odom_body.inverse();
       for (std::size_t k = 0; k < run.states.size(); k += 5) {
         const auto& x = run.states[k];
-        const Eigen::Vector3d e = 57.3 * so3_log(A.linear() * x.T_odom_body.linear() * run.truth[k].linear().transpose());
-        const Eigen::Vector3d up = 57.3 * x.T_odom_body.linear().row(2).transpose().cross(run.truth[k].linear().row(2).transpose());
-        std::printf("%5.2f err_w %6.3f %6.3f %6.3f  tilt_b %6.3f %6.3f %6.3f bg %8.5f %8.5f %8.5f ba %6.3f %6.3f %6.3f v %5.2f\n", seconds_between(run.states[0].stamp, x.stamp), e.x(), e.y(), e.z(), up.x(), up.y(), up.z(), x.gyro_bias.x(), x.gyro_bias.y(), x.gyro_bias.z(), x.accel_bias.x(), x.accel_bias.y(), x.accel_bias.z(), x.v_odom.norm());
+        const Eigen::Vector3d e =
+            57.3 * so3_log(A.linear() * x.T_odom_body.linear() * run.truth[k].linear().transpose());
+        const Eigen::Vector3d up = 57.3 * x.T_odom_body.linear().row(2).transpose().cross(
+                                              run.truth[k].linear().row(2).transpose());
+        std::printf(
+            "%5.2f err_w %6.3f %6.3f %6.3f  tilt_b %6.3f %6.3f %6.3f bg %8.5f %8.5f %8.5f ba %6.3f "
+            "%6.3f %6.3f v %5.2f\n",
+            seconds_between(run.states[0].stamp, x.stamp), e.x(), e.y(), e.z(), up.x(), up.y(),
+            up.z(), x.gyro_bias.x(), x.gyro_bias.y(), x.gyro_bias.z(), x.accel_bias.x(),
+            x.accel_bias.y(), x.accel_bias.z(), x.v_odom.norm());
       }
     }
   }
+  if (black) run_black(recording, tracker, config);
   if (!starts) return 0;
   std::vector<double> ate, late, rotation, tilt;
   int lost = 0;

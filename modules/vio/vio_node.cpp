@@ -1,0 +1,88 @@
+#include "modules/vio/vio_node.hpp"
+
+#include "runtime/log.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kQueuedPackets = 4;  // the sensors hold back no more than 0.2 s at 20 Hz
+
+const char* text(VioProblem problem) {
+  switch (problem) {
+    case VioProblem::kNone:
+      return "no problem";
+    case VioProblem::kNoImage:
+      return "packet without images of the right size, refused";
+    case VioProblem::kUnorderedImage:
+      return "image not later than the one before, refused";
+    case VioProblem::kBadSamples:
+      return "inertial samples out of order or not finite, refused";
+    case VioProblem::kInertialGap:
+      return "gap in the inertial samples, starting anew";
+    case VioProblem::kDiverged:
+      return "estimate diverged, starting anew from the last pose";
+    case VioProblem::kStartTimeout:
+      return "cannot start, giving up the oldest images held back";
+  }
+  return "unknown problem";
+}
+
+const char* text(StartStatus status) {
+  switch (status) {
+    case StartStatus::kAtRest:
+      return "started at rest";
+    case StartStatus::kInMotion:
+      return "started in motion";
+    case StartStatus::kTooFewImages:
+      return "too few images to start";
+    case StartStatus::kTooFewFeatures:
+      return "too few features to start";
+    case StartStatus::kInconsistent:
+      return "stereo and inertial data disagree, no start";
+  }
+  return "unknown start";
+}
+
+}  // namespace
+
+VioNode::VioNode(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker,
+                 const VioConfig& config, const VioTopics& topics)
+    : vio_(robot, rig, tracker, config),
+      topics_(topics),
+      worker_(
+          kQueuedPackets, Overflow::kBlock, [this](const auto& packet) { step(*packet); },
+          VioConfig::kSection) {
+  topics_.packets.subscribe([this](const auto& packet) { worker_.post(packet); });
+}
+
+void VioNode::stop() noexcept {
+  worker_.stop();
+  if (stopped_) return;
+  stopped_ = true;
+  const VioStatistics& s = vio_.statistics();
+  log::info(name()) << s.images << " images, " << s.images_without_pose << " without a pose, "
+                    << s.starts << " starts in " << s.start_attempts << " attempts, "
+                    << s.divergences << " divergences, " << s.gaps << " inertial gaps; refused "
+                    << s.refused_images << " images, " << s.refused_samples << " samples";
+}
+
+void VioNode::step(const SensorPacket& packet) {
+  const VioResult result = vio_.process(packet);
+  report(result, packet.frame ? packet.frame->stamp : 0);
+  for (const OdometryState& state : result.states) topics_.odometry.publish(state);
+  for (const KeyframeOdometry& keyframe : result.keyframes) topics_.keyframes.publish(keyframe);
+}
+
+void VioNode::report(const VioResult& result, Stamp stamp) const {
+  if (result.problem != VioProblem::kNone)
+    log::limited(log::Level::kWarn, name(), text(result.problem))
+        << "at " << stamp << " ns: " << text(result.problem);
+  if (!result.start) return;
+  if (started(*result.start))
+    log::info(name()) << text(*result.start) << " with " << result.states.size() << " images";
+  else
+    log::limited(log::Level::kWarn, name(), text(*result.start))
+        << "at " << stamp << " ns: " << text(*result.start);
+}
+
+}  // namespace km

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <exception>
+#include <string_view>
+
+#include "modules/vio/vio.hpp"
+#include "runtime/node.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+
+/// Channels of the odometry node; they must outlive it.
+struct VioTopics {
+  Topic<SensorPacket>& packets;              ///< In, in order of time.
+  const Topic<OdometryState>& odometry;      ///< Out: one per image, in order of time.
+  const Topic<KeyframeOdometry>& keyframes;  ///< Out: indices without gaps.
+};
+
+/// Stereo-inertial odometry as a thread: one Vio. A full queue holds the sensors up.
+class VioNode final : public Node {
+ public:
+  /// Throws ConfigError if a config is out of bounds, std::invalid_argument for an unusable rig.
+  VioNode(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker,
+          const VioConfig& config, const VioTopics& topics);
+  ~VioNode() override { stop(); }
+
+  std::string_view name() const override { return VioConfig::kSection; }
+  void start() override { worker_.start(); }
+  /// Finishes queued packets and says in the log what odometry met with.
+  void stop() noexcept override;
+  std::exception_ptr error() const override { return worker_.error(); }
+
+  /// Handles one packet synchronously. The thread calls only this; so can tests and replay.
+  void step(const SensorPacket& packet);
+
+ private:
+  void report(const VioResult& result, Stamp stamp) const;
+
+  Vio vio_;
+  const VioTopics topics_;
+  bool stopped_ = false;
+  Worker<Topic<SensorPacket>::Message> worker_;  // last member: stops first
+};
+
+}  // namespace km
