@@ -31,6 +31,7 @@ class PcmNode final : public Node {
   /// Publishes what is left to publish.
   void stop() noexcept override;
   std::exception_ptr error() const override;
+  DurationHistogram timing() const override { return worker_.timing(); }
 
   /// Handles one closure synchronously. The thread calls only this and publish_changes().
   void step(const Closure& closure);

@@ -30,6 +30,7 @@ class VioNode final : public Node {
   /// Finishes queued packets and says in the log what odometry met with.
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
+  DurationHistogram timing() const override { return worker_.timing(); }
 
   /// Handles one packet synchronously. The thread calls only this; so can tests and replay.
   void step(const SensorPacket& packet);
