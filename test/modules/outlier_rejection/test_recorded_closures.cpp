@@ -1,0 +1,83 @@
+#include <yaml-cpp/yaml.h>
+#include <catch2/catch.hpp>
+
+#include <string>
+#include <vector>
+
+#include "runtime/yaml_config.hpp"
+#include "test/modules/outlier_rejection/chain.hpp"
+#include "test/modules/outlier_rejection/recorded_closures.hpp"
+#include "test/support/shared_data.hpp"
+
+namespace km {
+namespace {
+
+// The files <prefix>0<suffix> ... of a team; empty if they are not there.
+std::vector<std::filesystem::path> team(const std::string& prefix, int robots,
+                                        const std::string& suffix) {
+  std::vector<std::filesystem::path> files;
+  for (int robot = 0; robot < robots; ++robot) {
+    const auto file = shared_data(prefix + std::to_string(robot) + suffix);
+    if (!file) return {};
+    files.push_back(*file);
+  }
+  return files;
+}
+
+TEST_CASE("PCM keeps exactly the true half of DOOR-SLAM's simulated closures", "[recorded]") {
+  const auto [name, robots, true_per_pair] = GENERATE(table<std::string, int, std::size_t>({
+      {"spoiled/simulation_not_in_order/example_2robots/", 2, 10},
+      {"spoiled/simulation/example_4robots/", 4, 4},
+      {"clean/simulation/example_2robots/", 2, 10},
+  }));
+  CAPTURE(name);
+  const auto files =
+      team("multi_robot/door_slam/pairwise_consistency_maximization/" + name, robots, ".g2o");
+  if (files.empty()) return;
+  PcmConfig config;
+  config.confidence = 0.99;  // chi-squared 16.8
+  const auto pcms = reject_outliers(recorded_closures(files), config);
+  CHECK(pcms.size() == static_cast<std::size_t>(robots * (robots - 1) / 2));
+  for (const auto& [pair, pcm] : pcms) {
+    CHECK(pcm.inliers().size() == true_per_pair);
+    CHECK(pcm.size() == (name.starts_with("clean") ? 1 : 2) * true_per_pair);
+  }
+}
+
+TEST_CASE("The shipped configuration keeps a good set of the tunnels closures", "[recorded]") {
+  const auto files = team("multi_robot/tunnels_8robots/robot", 8, ".csv");
+  if (files.empty()) return;
+  const auto config = load_config<PcmConfig>(YAML::LoadFile("config/datasets/tunnels.yaml"));
+  const std::vector<Closure> closures = recorded_closures(files);
+  REQUIRE(closures.size() == 96 + 3548);
+
+  std::size_t inter = 0;
+  for (const auto& [pair, pcm] : reject_outliers(closures, config)) {
+    CAPTURE(pair.first, pair.second);
+    CHECK(pcm.proven());
+    if (pair.first == pair.second) continue;
+    inter += pcm.inliers().size();
+    // Every pair of robots has a fifth of its closures agreeing: all end in one frame.
+    CHECK(pcm.inliers().size() * 5 >= pcm.size());
+  }
+  // Robust solvers agree on 2669 to 2987 of them, half or less at the scale of the nominal noise.
+  CHECK(inter >= 2200);
+  CHECK(inter <= 2669);
+}
+
+TEST_CASE("PCM keeps as many tunnels closures whichever way round they are given", "[recorded]") {
+  const auto files = team("multi_robot/tunnels_8robots/robot", 8, ".csv");
+  if (files.empty()) return;
+  const auto config = load_config<PcmConfig>(YAML::LoadFile("config/datasets/tunnels.yaml"));
+  std::vector<Closure> closures;
+  for (const Closure& closure : recorded_closures(files))
+    if (pair_of(closure) == RobotPair{3, 7}) closures.push_back(closure);
+  std::vector<Closure> turned;
+  for (std::size_t n = 0; n < closures.size(); ++n)
+    turned.push_back(n % 2 == 0 ? reversed(closures[n]) : closures[n]);
+  CHECK(reject_outliers(turned, config).at({3, 7}).inliers().size() ==
+        reject_outliers(closures, config).at({3, 7}).inliers().size());
+}
+
+}  // namespace
+}  // namespace km
