@@ -48,7 +48,7 @@ TEST_CASE("The wired profile is the default configuration", "[profiles]") {
   CHECK(to_yaml(profile("wired", {})) == to_yaml(DdsConfig{}));
 }
 
-TEST_CASE("Found by address, a robot takes a fixed port; by multicast, any", "[profiles]") {
+TEST_CASE("Found by address a robot takes a fixed port, by multicast any", "[profiles]") {
   DdsConfig config;
   CHECK_THAT(cyclone_xml(config, kCable), Contains("<ParticipantIndex>none<") &&
                                               Contains("<AllowMulticast>spdp<") &&
