@@ -51,22 +51,4 @@ DurationHistogram Timing::histogram() const {
   return histogram_;
 }
 
-Timing& Timings::of(const std::string& name) {
-  const std::lock_guard lock(mutex_);
-  auto& timing = timings_[name];
-  if (timing == nullptr) timing = std::make_unique<Timing>();
-  return *timing;
-}
-
-void Timings::write_csv(std::ostream& output) const {
-  const std::lock_guard lock(mutex_);
-  output << "module,calls,median_ms,p95_ms,max_ms,total_s\n";
-  for (const auto& [name, timing] : timings_) {
-    const DurationHistogram histogram = timing->histogram();
-    output << name << ',' << histogram.count() << ',' << histogram.quantile_s(0.5) * 1e3 << ','
-           << histogram.quantile_s(0.95) * 1e3 << ',' << histogram.max_s() * 1e3 << ','
-           << histogram.total_s() << '\n';
-  }
-}
-
 }  // namespace km

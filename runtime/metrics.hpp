@@ -2,11 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
-#include <map>
-#include <memory>
 #include <mutex>
-#include <ostream>
-#include <string>
 #include <vector>
 
 namespace km {
@@ -59,20 +55,6 @@ class Timing {
  private:
   mutable std::mutex mutex_;
   DurationHistogram histogram_;
-};
-
-/// The timings of a robot, by name. Thread-safe.
-class Timings {
- public:
-  /// The timing called `name`, made if absent. The reference stays valid.
-  [[nodiscard]] Timing& of(const std::string& name);
-
-  /// timing.csv: module, calls, median_ms, p95_ms, max_ms, total_s; by name.
-  void write_csv(std::ostream& output) const;
-
- private:
-  mutable std::mutex mutex_;
-  std::map<std::string, std::unique_ptr<Timing>> timings_;
 };
 
 }  // namespace km

@@ -70,6 +70,7 @@ class DdsBridge final : public Node {
   void start() override;
   void stop() noexcept override;
   std::exception_ptr error() const override;
+  DurationHistogram timing() const override { return sender_.timing(); }
 
  private:
   using Job = std::function<void()>;
