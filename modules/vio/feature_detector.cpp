@@ -35,47 +35,6 @@ float shi_tomasi_score(const cv::Mat& derivatives, const cv::Point2i& px) {
   return 0.5F * (a + c - std::sqrt((a - c) * (a - c) + 4.0F * b * b));
 }
 
-// Points in square buckets of side `distance`, so that all within `distance` of a place are in the
-// nine buckets around it.
-class DistanceGrid {
- public:
-  DistanceGrid(const cv::Size& size, float distance)
-      : distance_(distance),
-        columns_(static_cast<int>(static_cast<float>(size.width) / distance) + 1),
-        rows_(static_cast<int>(static_cast<float>(size.height) / distance) + 1),
-        buckets_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_)) {}
-
-  void add(const Eigen::Vector2f& px) { buckets_[index(column(px), row(px))].push_back(px); }
-
-  [[nodiscard]] bool is_free(const Eigen::Vector2f& px) const {
-    for (int r = std::max(row(px) - 1, 0); r <= std::min(row(px) + 1, rows_ - 1); ++r) {
-      for (int c = std::max(column(px) - 1, 0); c <= std::min(column(px) + 1, columns_ - 1); ++c) {
-        for (const Eigen::Vector2f& other : buckets_[index(c, r)]) {
-          if ((other - px).squaredNorm() < distance_ * distance_) return false;
-        }
-      }
-    }
-    return true;
-  }
-
- private:
-  [[nodiscard]] int column(const Eigen::Vector2f& px) const {
-    return std::clamp(static_cast<int>(px.x() / distance_), 0, columns_ - 1);
-  }
-  [[nodiscard]] int row(const Eigen::Vector2f& px) const {
-    return std::clamp(static_cast<int>(px.y() / distance_), 0, rows_ - 1);
-  }
-  [[nodiscard]] std::size_t index(int column, int row) const {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-           static_cast<std::size_t>(column);
-  }
-
-  float distance_;
-  int columns_;
-  int rows_;
-  std::vector<std::vector<Eigen::Vector2f>> buckets_;
-};
-
 // FAST corners of `cell`, found in it and the ring of pixels that the circle test reads around it.
 std::vector<cv::Point2i> fast_corners(const cv::Mat& image, const cv::Rect& cell, int threshold) {
   constexpr int kRing = 4;  // Radius 3, and one more for the non-maximum suppression.
@@ -109,6 +68,18 @@ void FeatureDetector::add_corners_of(const cv::Rect& cell, int features_there,
   candidates_.insert(candidates_.end(), found.begin(), found.end());
 }
 
+void FeatureDetector::take_best(int count, DistanceGrid& grid,
+                                std::vector<Eigen::Vector2f>& taken) const {
+  for (const Candidate& candidate : candidates_) {
+    if (static_cast<int>(taken.size()) == count) break;
+    const Eigen::Vector2f px(static_cast<float>(candidate.px.x),
+                             static_cast<float>(candidate.px.y));
+    if (!grid.is_free(px)) continue;
+    grid.add(px);
+    taken.push_back(px);
+  }
+}
+
 std::vector<Eigen::Vector2f> FeatureDetector::detect(const ImagePyramid& image,
                                                      std::span<const Eigen::Vector2f> occupied,
                                                      int count) {
@@ -130,23 +101,18 @@ std::vector<Eigen::Vector2f> FeatureDetector::detect(const ImagePyramid& image,
     ++features[static_cast<std::size_t>(row * columns + column)];
   }
 
-  candidates_.clear();
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      const cv::Rect cell =
-          cv::Rect(kRimPx + column * side, kRimPx + row * side, side, side) & inside;
-      const int there = features[static_cast<std::size_t>(row * columns + column)];
-      if (there < kMaxInCell) add_corners_of(cell, there, image);
+  // Empty cells first; cells with features only if these do not suffice.
+  for (int there = 0; there < kMaxInCell && static_cast<int>(result.size()) < count; ++there) {
+    candidates_.clear();
+    for (int row = 0; row < rows; ++row) {
+      for (int column = 0; column < columns; ++column) {
+        if (features[static_cast<std::size_t>(row * columns + column)] != there) continue;
+        const cv::Point2i corner(kRimPx + column * side, kRimPx + row * side);
+        add_corners_of(cv::Rect(corner, cv::Size(side, side)) & inside, there, image);
+      }
     }
-  }
-  std::sort(candidates_.begin(), candidates_.end(), Candidate::earlier);
-  for (const Candidate& candidate : candidates_) {
-    if (static_cast<int>(result.size()) == count) break;
-    const Eigen::Vector2f px(static_cast<float>(candidate.px.x),
-                             static_cast<float>(candidate.px.y));
-    if (!grid.is_free(px)) continue;
-    grid.add(px);
-    result.push_back(px);
+    std::sort(candidates_.begin(), candidates_.end(), Candidate::earlier);
+    take_best(count, grid, result);
   }
   return result;
 }

@@ -5,6 +5,7 @@
 #include <tuple>
 #include <vector>
 
+#include "modules/vio/distance_grid.hpp"
 #include "modules/vio/image_pyramid.hpp"
 #include "modules/vio/tracker_config.hpp"
 
@@ -43,6 +44,8 @@ class FeatureDetector {
   static constexpr int kMaxInCell = 3;  // Cells with so many features are left alone.
 
   void add_corners_of(const cv::Rect& cell, int features_there, const ImagePyramid& image);
+
+  void take_best(int count, DistanceGrid& grid, std::vector<Eigen::Vector2f>& taken) const;
 
   TrackerConfig config_;
   std::vector<Candidate> candidates_;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "modules/vio/klt.hpp"
+#include "modules/vio/local_warp.hpp"
 #include "modules/vio/stereo_motion.hpp"
 #include "modules/vio/two_point_ransac.hpp"
 
@@ -13,6 +14,9 @@ namespace km {
 namespace {
 
 constexpr float kMinSpacing = 0.4F;  // Of min_distance_px: tracks may come nearer than corners.
+constexpr float kMinCorrelation = 0.85F;   // Of a track with the patch it began with.
+constexpr float kMaxCorrectionPx = 2.0F;   // By which the patch may correct KLT.
+constexpr int kSearchEvery = 4;            // Images, for features that stereo has not found.
 constexpr double kMaxInverseDepth = 20.0;  // [1/m]; a carried depth beyond is no use.
 
 void check_rig(const StereoRig& rig) {
@@ -62,6 +66,7 @@ TrackedFrame FeatureTracker::track(const StereoFrame& frame,
   std::vector<Step> steps = follow(left, guess);
   drop_crowded(steps);
   const std::optional<SE3> motion = drop_outliers(steps, guess);
+  align(steps, left, motion.value_or(guess));
   const double dt_s = seconds_between(stamp_, frame.stamp);
   velocity_.setZero();
   if (motion && dt_s > 0.0) {
@@ -220,6 +225,36 @@ void FeatureTracker::drop_by_two_points(std::vector<Step>& steps, const SE3& gue
   steps = std::move(kept);
 }
 
+void FeatureTracker::align(std::vector<Step>& steps, const ImagePyramid& left,
+                           const SE3& T_previous_current) const {
+  const SE3 T_current_previous = T_previous_current.inverse();
+  for (Step& step : steps) {
+    const auto depth =
+        step.before.inverse_depth ? step.before.inverse_depth : depth_nearby(step.before.px);
+    step.now.A = local_warp(rig_.cameras[0], rig_.cameras[0], step.before.left, depth.value_or(0.0),
+                            T_current_previous) *
+                 step.before.A;
+    step.now.patch = step.before.patch;
+    if (step.now.patch && place_on_patch(step.now, left)) continue;
+    // It looks too different by now, or half of it is hidden: what KLT found starts anew.
+    step.now.patch = AlignmentPatch::cut(left.level(0), step.now.px);
+    step.now.A.setIdentity();
+  }
+}
+
+bool FeatureTracker::place_on_patch(Track& track, const ImagePyramid& left) const {
+  const auto found = track.patch->align(left.level(0), track.px, track.A);
+  if (!found || found->correlation < kMinCorrelation ||
+      (found->px - track.px).norm() > kMaxCorrectionPx) {
+    return false;
+  }
+  const auto bearing = rig_.cameras[0].unproject(found->px.cast<double>());
+  if (!bearing) return false;
+  track.px = found->px;
+  track.left = *bearing;
+  return true;
+}
+
 void FeatureTracker::add_corners(const ImagePyramid& left) {
   std::vector<Eigen::Vector2f> occupied;
   for (const Track& track : tracks_) occupied.push_back(track.px);
@@ -231,6 +266,7 @@ void FeatureTracker::add_corners(const ImagePyramid& left) {
     track.id = next_id_++;
     track.px = px;
     track.left = *bearing;
+    track.patch = AlignmentPatch::cut(left.level(0), px);
     tracks_.push_back(track);
     ++statistics_.detected;
   }
@@ -238,12 +274,17 @@ void FeatureTracker::add_corners(const ImagePyramid& left) {
 
 void FeatureTracker::match_right(const ImagePyramid& left, const ImagePyramid& right) {
   std::vector<StereoQuery> queries;
-  for (const Track& track : tracks_) queries.push_back({track.px, track.left, track.inverse_depth});
+  std::vector<Track*> asked;
+  for (Track& track : tracks_) {
+    if (!track.inverse_depth && (track.length - 1) % kSearchEvery != 0) continue;
+    queries.push_back({track.px, track.left, track.inverse_depth});
+    asked.push_back(&track);
+  }
   const auto matches = matcher_.match(left, right, queries);
   statistics_.stereo = matcher_.statistics();
   const double threshold = config_.max_reprojection_px / focal_px_;
-  for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    Track& track = tracks_[i];
+  for (std::size_t i = 0; i < asked.size(); ++i) {
+    Track& track = *asked[i];
     if (!matches[i]) {
       if (track.inverse_depth > kMaxInverseDepth) track.inverse_depth.reset();
       continue;

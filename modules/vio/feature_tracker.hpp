@@ -10,6 +10,7 @@
 #include "modules/core/frame.hpp"
 #include "modules/vio/feature_detector.hpp"
 #include "modules/vio/image_pyramid.hpp"
+#include "modules/vio/patch_alignment.hpp"
 #include "modules/vio/stereo_matcher.hpp"
 #include "modules/vio/tracked_frame.hpp"
 #include "modules/vio/tracker_config.hpp"
@@ -34,7 +35,8 @@ struct TrackerStatistics {
 /// deterministic for equal images and config.
 ///
 /// Left image to left image by pyramidal KLT (Bouguet 2001) from a predicted start: the gyroscope's
-/// rotation, the last translation, and the depth of the feature or of its neighbours. Outliers are
+/// rotation, the last translation, and the depth of the feature or of its neighbours; then to the
+/// patch that the track began with, so that errors do not add up (AlignmentPatch). Outliers are
 /// rejected against the one motion that the stereo features agree on (estimate_motion()), by
 /// two-point RANSAC where these are too few. Left to right by StereoMatcher from the depth that the
 /// motion predicts. Then corners are added where there are none.
@@ -60,6 +62,8 @@ class FeatureTracker {
     Eigen::Vector2d left = Eigen::Vector2d::Zero();  // Bearings.
     std::optional<Eigen::Vector2d> right;
     std::optional<double> inverse_depth;  // Measured here, or carried on by the motion [1/m].
+    std::optional<AlignmentPatch> patch;  // From the image where the track began.
+    Eigen::Matrix2f A = Eigen::Matrix2f::Identity();  // Patch to this image.
   };
   // A track and where it is in the new image.
   struct Step {
@@ -75,6 +79,9 @@ class FeatureTracker {
   [[nodiscard]] std::optional<SE3> drop_outliers(std::vector<Step>& steps, const SE3& guess);
   void drop_by_motion(std::vector<Step>& steps, const SE3& T_previous_current);
   void drop_by_two_points(std::vector<Step>& steps, const SE3& guess);
+  void align(std::vector<Step>& steps, const ImagePyramid& left,
+             const SE3& T_previous_current) const;
+  [[nodiscard]] bool place_on_patch(Track& track, const ImagePyramid& left) const;
   void add_corners(const ImagePyramid& left);
   void match_right(const ImagePyramid& left, const ImagePyramid& right);
   [[nodiscard]] TrackedFrame output() const;

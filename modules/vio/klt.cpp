@@ -5,8 +5,8 @@
 namespace km {
 namespace {
 
-constexpr int kMaxSteps = 20;
-constexpr double kStopPx = 0.01;
+constexpr int kMaxSteps = 8;
+constexpr double kStopPx = 0.05;         // AlignmentPatch does the rest.
 constexpr double kMinEigenvalue = 1e-4;  // As OpenCV scales it: rejects flat windows.
 
 std::vector<cv::Point2f> to_cv(std::span<const Eigen::Vector2f> points) {

@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "modules/vio/klt.hpp"
-#include "modules/vio/patch.hpp"
+#include "modules/vio/local_warp.hpp"
+#include "modules/vio/patch_alignment.hpp"
+#include "modules/vio/patch_template.hpp"
 
 namespace km {
 namespace {
 
-constexpr double kMinCorrelation = 0.75;       // Of a match, full resolution.
+constexpr float kMinCorrelation = 0.8F;        // Of a match, full resolution.
 constexpr float kMinSearchCorrelation = 0.7F;  // Half resolution, whole pixels.
 // The second best place must be this much less similar. A fence or a net has many alike.
 constexpr float kMinDistinction = 0.05F;
@@ -27,9 +28,9 @@ Eigen::Vector2d StereoMatcher::right_bearing(const Eigen::Vector2d& left,
       .hnormalized();
 }
 
-std::optional<Eigen::Vector2f> StereoMatcher::search(const ImagePyramid& left,
-                                                     const ImagePyramid& right,
-                                                     const StereoQuery& query) const {
+std::optional<StereoMatcher::Start> StereoMatcher::search(const ImagePyramid& left,
+                                                          const ImagePyramid& right,
+                                                          const StereoQuery& query) const {
   const cv::Mat& image = right.level(1);
   const Eigen::Vector2i centre = (0.5F * query.left_px).array().round().cast<int>();
   if (!PatchTemplate::covered_by(left.level(1), centre.x(), centre.y())) return std::nullopt;
@@ -58,15 +59,16 @@ std::optional<Eigen::Vector2f> StereoMatcher::search(const ImagePyramid& left,
     if (!same_peak && scores[i] > scores[best] - kMinDistinction) return std::nullopt;
   }
   const Eigen::Vector2f rounding = query.left_px - 2.0F * centre.cast<float>();
-  return 2.0F * places[best].cast<float>() + rounding;
+  return Start{2.0F * places[best].cast<float>() + rounding,
+               nearest * static_cast<double>(best) / steps};
 }
 
-std::optional<Eigen::Vector2f> StereoMatcher::start_of(const ImagePyramid& left,
-                                                       const ImagePyramid& right,
-                                                       const StereoQuery& query) const {
+std::optional<StereoMatcher::Start> StereoMatcher::start_of(const ImagePyramid& left,
+                                                            const ImagePyramid& right,
+                                                            const StereoQuery& query) const {
   if (!query.inverse_depth) return search(left, right, query);
   const Eigen::Vector2d expected = right_bearing(query.left, *query.inverse_depth);
-  return rig_.cameras[1].project(expected).cast<float>();
+  return Start{rig_.cameras[1].project(expected).cast<float>(), *query.inverse_depth};
 }
 
 std::optional<StereoMatch> StereoMatcher::triangulate(const StereoQuery& query,
@@ -91,40 +93,35 @@ std::optional<StereoMatch> StereoMatcher::triangulate(const StereoQuery& query,
   return StereoMatch{*right, std::max(rho, 0.0)};
 }
 
+std::optional<StereoMatch> StereoMatcher::match_one(const ImagePyramid& left,
+                                                    const ImagePyramid& right,
+                                                    const StereoQuery& query) {
+  const std::optional<Start> start = start_of(left, right, query);
+  if (!start) {
+    ++statistics_.no_start;
+    return std::nullopt;
+  }
+  const std::optional<AlignmentPatch> patch = AlignmentPatch::cut(left.level(0), query.left_px);
+  const Eigen::Matrix2f A =
+      local_warp(rig_.cameras[0], rig_.cameras[1], query.left, start->inverse_depth, T_right_left_);
+  const std::optional<PatchAlignment> found =
+      patch ? patch->align(right.level(0), start->right_px, A) : std::nullopt;
+  if (!found || found->correlation < kMinCorrelation) {
+    ++statistics_.dissimilar;
+    return std::nullopt;
+  }
+  const std::optional<StereoMatch> match = triangulate(query, found->px);
+  ++(match ? statistics_.matched : statistics_.epipolar);
+  return match;
+}
+
 std::vector<std::optional<StereoMatch>> StereoMatcher::match(const ImagePyramid& left,
                                                              const ImagePyramid& right,
                                                              std::span<const StereoQuery> queries) {
   statistics_ = {};
-  std::vector<std::optional<StereoMatch>> result(queries.size());
-  std::vector<std::size_t> index;
-  std::vector<Eigen::Vector2f> from;
-  std::vector<Eigen::Vector2f> starts;
-  for (std::size_t i = 0; i < queries.size(); ++i) {
-    if (const auto start = start_of(left, right, queries[i])) {
-      index.push_back(i);
-      from.push_back(queries[i].left_px);
-      starts.push_back(*start);
-    } else {
-      ++statistics_.no_start;
-    }
-  }
-
-  const KltResult klt =
-      track_klt(left, right, from, starts, config_.window_px, std::min(1, config_.pyramid_levels));
-  for (std::size_t k = 0; k < index.size(); ++k) {
-    const StereoQuery& query = queries[index[k]];
-    if (!klt.found[k]) {
-      ++statistics_.lost;
-    } else if (patch_correlation(left.level(0), query.left_px, right.level(0), klt.px[k]) <
-               kMinCorrelation) {
-      ++statistics_.dissimilar;
-    } else if (const auto match = triangulate(query, klt.px[k])) {
-      result[index[k]] = match;
-      ++statistics_.matched;
-    } else {
-      ++statistics_.epipolar;
-    }
-  }
+  std::vector<std::optional<StereoMatch>> result;
+  result.reserve(queries.size());
+  for (const StereoQuery& query : queries) result.push_back(match_one(left, right, query));
   return result;
 }
 

@@ -27,9 +27,8 @@ struct StereoMatch {
 /// What became of the queries of one image.
 struct StereoStatistics {
   int matched = 0;
-  int no_start = 0;    ///< No distinct similar patch along the epipolar line.
-  int lost = 0;        ///< KLT left the image or did not converge.
-  int dissimilar = 0;  ///< The patches differ too much.
+  int no_start = 0;    ///< No similar patch along the epipolar line, or several alike.
+  int dissimilar = 0;  ///< The patches differ too much, or lie at a rim.
   int epipolar = 0;    ///< Too far from the epipolar line, or behind the cameras.
 };
 
@@ -37,8 +36,9 @@ struct StereoStatistics {
 ///
 /// Points without an expected depth are searched at half resolution along their epipolar curve (the
 /// images are not rectified) by zero-mean normalised correlation, and refused if a second place is
-/// about as similar. All are then refined by KLT, which is not bound to the curve, so that the
-/// distance from it is a test of the match.
+/// about as similar. All are then refined by AlignmentPatch, warped as a surface at that depth
+/// looks from the right: without it near points would be off by tenths of a pixel. The refinement
+/// is not bound to the curve, so that the distance from it is a test of the match.
 class StereoMatcher {
  public:
   StereoMatcher(const StereoRig& rig, const TrackerConfig& config);
@@ -56,12 +56,17 @@ class StereoMatcher {
   [[nodiscard]] const StereoStatistics& statistics() const { return statistics_; }
 
  private:
-  [[nodiscard]] std::optional<Eigen::Vector2f> start_of(const ImagePyramid& left,
-                                                        const ImagePyramid& right,
-                                                        const StereoQuery& query) const;
-  [[nodiscard]] std::optional<Eigen::Vector2f> search(const ImagePyramid& left,
-                                                      const ImagePyramid& right,
-                                                      const StereoQuery& query) const;
+  struct Start {
+    Eigen::Vector2f right_px;
+    double inverse_depth;
+  };
+  [[nodiscard]] std::optional<Start> start_of(const ImagePyramid& left, const ImagePyramid& right,
+                                              const StereoQuery& query) const;
+  [[nodiscard]] std::optional<Start> search(const ImagePyramid& left, const ImagePyramid& right,
+                                            const StereoQuery& query) const;
+  [[nodiscard]] std::optional<StereoMatch> match_one(const ImagePyramid& left,
+                                                     const ImagePyramid& right,
+                                                     const StereoQuery& query);
   [[nodiscard]] std::optional<StereoMatch> triangulate(const StereoQuery& query,
                                                        const Eigen::Vector2f& right_px) const;
 

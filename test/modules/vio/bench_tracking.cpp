@@ -30,8 +30,7 @@ void print_statistics(const TrackingRun& run) {
             << ", backward " << mean([&](std::size_t i) { return s[i].backward; }) << ", crowded "
             << mean([&](std::size_t i) { return s[i].crowded; }) << ", motion "
             << mean([&](std::size_t i) { return s[i].motion; }) << "\n  no right: start "
-            << mean([&](std::size_t i) { return s[i].stereo.no_start; }) << ", lost "
-            << mean([&](std::size_t i) { return s[i].stereo.lost; }) << ", dissimilar "
+            << mean([&](std::size_t i) { return s[i].stereo.no_start; }) << ", dissimilar "
             << mean([&](std::size_t i) { return s[i].stereo.dissimilar; }) << ", epipolar "
             << mean([&](std::size_t i) { return s[i].stereo.epipolar; }) << ", motion "
             << mean([&](std::size_t i) { return s[i].stereo_motion; }) << '\n';

@@ -2,7 +2,6 @@
 
 #include <catch2/catch.hpp>
 
-#include "modules/vio/patch.hpp"
 #include "textured_plane.hpp"
 
 namespace km {
@@ -72,33 +71,6 @@ TEST_CASE("No corners are asked for, none are possible", "[vio]") {
   CHECK(detector.detect(image, {}, -3).empty());
   const ImagePyramid small(squares(32, 16, 5), config, true);
   CHECK(detector.detect(small, {}, 10).empty());
-}
-
-TEST_CASE("Patch correlation is blind to gain and offset and nothing else", "[vio]") {
-  const StereoRig rig = test_rig();
-  const GrayImage picture = TexturedPlane{}.render(rig.cameras[0], SE3::Identity());
-  GrayImage dimmed = picture;
-  for (auto& level : dimmed.pixels) level = static_cast<std::uint8_t>(level / 2 + 30);
-  const TrackerConfig config;
-  const ImagePyramid a(picture, config, false);
-  const ImagePyramid b(dimmed, config, false);
-  const Eigen::Vector2f at(150.3F, 80.6F);
-  CHECK(patch_correlation(a.level(0), at, b.level(0), at) > 0.999);
-  CHECK(patch_correlation(a.level(0), at, b.level(0), {90.0F, 150.0F}) < 0.7);
-  CHECK(patch_correlation(a.level(0), at, b.level(0), {2.0F, 80.0F}) == 0.0);  // Over the rim.
-  const PatchTemplate patch(a.level(0), 150, 80);
-  CHECK(patch.correlation(b.level(0), 150, 80) > 0.999F);
-  CHECK(patch.correlation(b.level(0), 90, 150) < 0.7F);
-}
-
-TEST_CASE("A flat patch is like no other", "[vio]") {
-  const StereoRig rig = test_rig();
-  const TrackerConfig config;
-  const ImagePyramid flat(flat_image(rig.cameras[0], 100), config, false);
-  const ImagePyramid other(TexturedPlane{}.render(rig.cameras[0], SE3::Identity()), config, false);
-  CHECK(patch_correlation(flat.level(0), {90, 90}, other.level(0), {90, 90}) == 0.0);
-  CHECK_FALSE(PatchTemplate(flat.level(0), 90, 90).has_contrast());
-  CHECK(PatchTemplate(other.level(0), 90, 90).correlation(flat.level(0), 90, 90) == 0.0F);
 }
 
 }  // namespace

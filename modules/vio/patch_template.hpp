@@ -1,14 +1,8 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
 namespace km {
-
-/// Zero-mean normalised correlation of two 11 x 11 patches of 8-bit images around sub-pixel places,
-/// in [-1, 1]: blind to gain and offset. 0 where a patch leaves its image or has no contrast.
-[[nodiscard]] double patch_correlation(const cv::Mat& a, const Eigen::Vector2f& at_a,
-                                       const cv::Mat& b, const Eigen::Vector2f& at_b);
 
 /// A patch of 16 x 11 pixels of an 8-bit image, prepared to be compared with many others.
 class PatchTemplate {
