@@ -3,6 +3,6 @@ km_module(vio
           residuals/imu_cost.cpp residuals/pose_block.cpp residuals/prior_cost.cpp
           residuals/reprojection_cost.cpp stereo_odometry.cpp triangulation.cpp vio.cpp
           vio_keyframes.cpp window.cpp window_equations.cpp window_optimizer.cpp
-          window_sliding.cpp
+          window_optimizer_ceres.cpp           window_sliding.cpp
   LINK km_vio_frontend Ceres::ceres)
 km_node(vio SOURCES vio_node.cpp)

@@ -69,7 +69,9 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame) {
   decide_keyframe();
   locate_landmarks();
   SmootherUpdate update;
-  update.solution = optimize(window_, config_.iterations);
+  update.solution = config_.solver == SmootherSolver::kCeres
+                        ? optimize_by_ceres(window_, config_.iterations)
+                        : optimize(window_, config_.iterations);
   update.outliers = reject_outliers();
   update.state = newest.state;
   update.keyframe = newest.keyframe;

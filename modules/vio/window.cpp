@@ -13,6 +13,16 @@ std::size_t frame_index(const Window& window, std::uint64_t id) {
   return it != window.frames.end() && it->id == id ? index : window.frames.size();
 }
 
+std::vector<FirstEstimate> first_estimates(const Window& window) {
+  std::vector<FirstEstimate> result(window.frames.size());
+  for (std::size_t k = 0; k < window.prior.frames.size(); ++k) {
+    FirstEstimate& estimate = result[frame_index(window, window.prior.frames[k])];
+    estimate.pose = window.prior.linearization[k].T_odom_body;
+    if (k == 0) estimate.motion = window.prior.linearization[k];
+  }
+  return result;
+}
+
 void observe(Window& window, const TrackedFrame& tracked) {
   std::vector<WindowLandmark> added;
   auto at = window.landmarks.begin();

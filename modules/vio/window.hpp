@@ -49,6 +49,9 @@ struct Window {
 /// Index of the frame with `id`; frames.size() if there is none.
 [[nodiscard]] std::size_t frame_index(const Window& window, std::uint64_t id);
 
+/// For each frame what the prior holds of it.
+[[nodiscard]] std::vector<FirstEstimate> first_estimates(const Window& window);
+
 /// Enters what was seen in the window's last frame: known landmarks gain an observation, new ones
 /// are added, not located yet.
 void observe(Window& window, const TrackedFrame& tracked);

@@ -29,19 +29,15 @@ std::vector<const OdometryState*> prior_states(const Window& window) {
 }  // namespace
 
 WindowEquations::WindowEquations(const Window& window, double damping)
-    : window_(window), damping_(damping), first_estimates_(window.frames.size(), nullptr) {
-  for (std::size_t k = 0; k < window.prior.frames.size(); ++k)
-    first_estimates_[frame_index(window, window.prior.frames[k])] = &window.prior.linearization[k];
+    : window_(window), damping_(damping) {
+  const std::vector<FirstEstimate> held = first_estimates(window);
+  for (std::size_t k = 0; k < held.size(); ++k)
+    linearization_.push_back(held[k].applied_to(window.frames[k].state));
   const auto n = 15 * static_cast<Eigen::Index>(window.frames.size());
   H_.setZero(n, n);
   g_.setZero(n);
   couplings_.reserve(8 * window.landmarks.size());
   eliminated_.reserve(window.landmarks.size());
-}
-
-const OdometryState& WindowEquations::linearization(std::size_t frame) const {
-  return first_estimates_[frame] != nullptr ? *first_estimates_[frame]
-                                            : window_.frames[frame].state;
 }
 
 void WindowEquations::add_prior() {
@@ -71,15 +67,8 @@ void WindowEquations::add_prior() {
 void WindowEquations::add_imu(std::size_t frame) {
   const WindowFrame& i = window_.frames[frame - 1];
   const WindowFrame& j = window_.frames[frame];
-  // Of a state whose pose alone is in the prior, velocity and biases stay current.
-  const auto mixed = [&](std::size_t k) {
-    OdometryState state = window_.frames[k].state;
-    if (first_estimates_[k] == nullptr) return state;
-    if (window_.frames[k].id == window_.prior.frames.front()) return *first_estimates_[k];
-    state.T_odom_body = first_estimates_[k]->T_odom_body;
-    return state;
-  };
-  const ImuTerm term = j.imu->linearize(i.state, j.state, mixed(frame - 1), mixed(frame));
+  const ImuTerm term =
+      j.imu->linearize(i.state, j.state, linearization_[frame - 1], linearization_[frame]);
   const auto a = 15 * static_cast<Eigen::Index>(frame - 1);
   const auto b = a + 15;
   cost_ += 0.5 * term.r.squaredNorm();
@@ -103,7 +92,7 @@ void WindowEquations::add_landmark(const WindowLandmark& landmark, bool keyframe
   for (const WindowObservation& o : landmark.observations) {
     if (!counts(o)) continue;
     const SE3& T = window_.frames[o.frame].state.T_odom_body;
-    const SE3& T_linearization = linearization(o.frame).T_odom_body;
+    const SE3& T_linearization = linearization_[o.frame].T_odom_body;
     const auto at = 15 * static_cast<Eigen::Index>(o.frame);
     Coupling coupling{o.frame, Eigen::Matrix<double, 6, 3>::Zero(),
                       Eigen::Matrix<double, 6, 3>::Zero()};

@@ -52,11 +52,9 @@ class WindowEquations {
     Eigen::Matrix<double, 6, 3> Y;  // W V_inverse
   };
 
-  const OdometryState& linearization(std::size_t frame) const;
-
   const Window& window_;
   double damping_;
-  std::vector<const OdometryState*> first_estimates_;  // per frame; null if not in the prior
+  std::vector<OdometryState> linearization_;  // per frame, where derivatives are taken
   Eigen::MatrixXd H_;
   Eigen::VectorXd g_;
   double cost_ = 0.0;

@@ -9,6 +9,17 @@
 
 namespace km {
 
+OdometryState FirstEstimate::applied_to(const OdometryState& state) const {
+  OdometryState result = state;
+  if (pose) result.T_odom_body = *pose;
+  if (motion) {
+    result.v_odom = motion->v_odom;
+    result.gyro_bias = motion->gyro_bias;
+    result.accel_bias = motion->accel_bias;
+  }
+  return result;
+}
+
 ImuFactor::ImuFactor(const ImuPreintegration& imu, double gravity_mps2)
     : imu_(imu), gravity_odom_(0.0, 0.0, -gravity_mps2) {
   const Eigen::LLT<Matrix9> llt(imu.covariance());
@@ -92,7 +103,8 @@ bool ImuCost::Evaluate(double const* const* parameters, double* residuals,
     Eigen::Map<Vector15>{residuals} = factor_.error(i, j);
     return true;
   }
-  const ImuTerm term = factor_.linearize(i, j, i, j);
+  const ImuTerm term =
+      factor_.linearize(i, j, first_estimates_[0].applied_to(i), first_estimates_[1].applied_to(j));
   Eigen::Map<Vector15>{residuals} = term.r;
   const Matrix15* J[] = {&term.J_i, &term.J_i, &term.J_j, &term.J_j};
   for (int block = 0; block < 4; ++block) {

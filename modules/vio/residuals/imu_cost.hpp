@@ -2,6 +2,9 @@
 
 #include <ceres/sized_cost_function.h>
 
+#include <array>
+#include <optional>
+
 #include "modules/core/odometry.hpp"
 #include "modules/vio/preintegration.hpp"
 
@@ -17,6 +20,15 @@ struct ImuTerm {
   Vector15 r;
   Matrix15 J_i;
   Matrix15 J_j;
+};
+
+/// What of a state a prior holds, at the values it was first linearised at.
+struct FirstEstimate {
+  std::optional<SE3> pose;
+  std::optional<OdometryState> motion;  ///< Its velocity and biases.
+
+  /// `state` with these parts replaced.
+  [[nodiscard]] OdometryState applied_to(const OdometryState& state) const;
 };
 
 /// Preintegrated inertial factor between two states (Forster et al., TRO 2017, Sec. VI-E and
@@ -44,16 +56,20 @@ class ImuFactor {
   double accel_walk_weight_ = 0.0;
 };
 
-/// ImuFactor for Ceres. Blocks: pose i (7), motion i (9), pose j (7), motion j (9).
+/// ImuFactor for Ceres. Blocks: pose i (7), motion i (9), pose j (7), motion j (9). What is given
+/// of the first estimates replaces the current values where derivatives are taken.
 class ImuCost final : public ceres::SizedCostFunction<15, 7, 9, 7, 9> {
  public:
-  explicit ImuCost(const ImuFactor& factor) : factor_(factor) {}
+  explicit ImuCost(const ImuFactor& factor, const FirstEstimate& i = {},
+                   const FirstEstimate& j = {})
+      : factor_(factor), first_estimates_{i, j} {}
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
  private:
   ImuFactor factor_;
+  std::array<FirstEstimate, 2> first_estimates_;
 };
 
 }  // namespace km

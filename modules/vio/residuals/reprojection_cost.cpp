@@ -54,7 +54,8 @@ bool ReprojectionCost::Evaluate(double const* const* parameters, double* residua
   if (jacobians == nullptr) {
     if (!reprojection_error(view_, bearing_, T_odom_body, p_odom, term.r)) return false;
   } else {
-    if (!linearize_reprojection(view_, bearing_, T_odom_body, T_odom_body, p_odom, term))
+    if (!linearize_reprojection(view_, bearing_, T_odom_body, first_estimate_.value_or(T_odom_body),
+                                p_odom, term))
       return false;
     if (jacobians[0] != nullptr) {
       Eigen::Map<Eigen::Matrix<double, 2, 7, Eigen::RowMajor>> J(jacobians[0]);

@@ -2,6 +2,8 @@
 
 #include <ceres/sized_cost_function.h>
 
+#include <optional>
+
 #include "modules/core/camera.hpp"
 #include "modules/core/geometry.hpp"
 
@@ -40,11 +42,13 @@ inline constexpr double kMinDepth_m = 0.05;
                                           const SE3& T_odom_body, const SE3& T_linearization,
                                           const Eigen::Vector3d& p_odom, ReprojectionTerm& term);
 
-/// reprojection_error() for Ceres. Blocks: pose (7), point in odom (3).
+/// reprojection_error() for Ceres. Blocks: pose (7), point in odom (3). With a first estimate of
+/// the pose, derivatives are taken there.
 class ReprojectionCost final : public ceres::SizedCostFunction<2, 7, 3> {
  public:
-  ReprojectionCost(const ViewModel& view, const Eigen::Vector2d& bearing)
-      : view_(view), bearing_(bearing) {}
+  ReprojectionCost(const ViewModel& view, const Eigen::Vector2d& bearing,
+                   const std::optional<SE3>& first_estimate = std::nullopt)
+      : view_(view), bearing_(bearing), first_estimate_(first_estimate) {}
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
@@ -52,6 +56,7 @@ class ReprojectionCost final : public ceres::SizedCostFunction<2, 7, 3> {
  private:
   ViewModel view_;
   Eigen::Vector2d bearing_;
+  std::optional<SE3> first_estimate_;
 };
 
 }  // namespace km
