@@ -1,0 +1,47 @@
+#include "modules/core/json_writer.hpp"
+
+#include <catch2/catch.hpp>
+#include <cstdint>
+#include <limits>
+#include <sstream>
+
+namespace km {
+
+TEST_CASE("A document has its commas, indents and escapes in place", "[core]") {
+  std::ostringstream text;
+  JsonWriter json(text);
+  json.begin_object();
+  json.field("a", 1);
+  json.field("b \"q\"\n", "back\\slash");
+  json.key("list");
+  json.begin_array();
+  json.value(true);
+  json.begin_object();
+  json.end_object();
+  json.end_array();
+  json.end_object();
+  CHECK(text.str() ==
+        "{\n"
+        "  \"a\": 1,\n"
+        "  \"b \\\"q\\\"\\u000a\": \"back\\\\slash\",\n"
+        "  \"list\": [\n"
+        "    true,\n"
+        "    {}\n"
+        "  ]\n"
+        "}\n");
+}
+
+TEST_CASE("Numbers keep their value, what is no number becomes null", "[core]") {
+  std::ostringstream text;
+  JsonWriter json(text);
+  json.begin_array();
+  json.value(0.1);
+  json.value(1e-300);
+  json.value(std::numeric_limits<std::uint64_t>::max());
+  json.value(std::numeric_limits<double>::quiet_NaN());
+  json.value(-std::numeric_limits<double>::infinity());
+  json.end_array();
+  CHECK(text.str() == "[\n  0.1,\n  1e-300,\n  18446744073709551615,\n  null,\n  null\n]\n");
+}
+
+}  // namespace km
