@@ -1,0 +1,155 @@
+#include "modules/evaluation/trajectory_error.hpp"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <utility>
+
+namespace km {
+namespace {
+
+constexpr std::size_t kMinPairs = 3;
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+// Raw errors of one or several estimates, before they are summed up.
+struct Errors {
+  std::vector<double> position_m, rotation_deg, rpe_translation_m, rpe_rotation_deg;
+  std::size_t poses = 0;
+  double covered_s = 0.0;
+  double window_s = 0.0;
+
+  void append(const Errors& other) {
+    for (const auto list : {&Errors::position_m, &Errors::rotation_deg, &Errors::rpe_translation_m,
+                            &Errors::rpe_rotation_deg})
+      (this->*list).insert((this->*list).end(), (other.*list).begin(), (other.*list).end());
+    poses += other.poses;
+    covered_s += other.covered_s;
+    window_s += other.window_s;
+  }
+};
+
+TrajectoryError summary(const std::string& name, const Errors& errors) {
+  return {.name = name,
+          .poses = errors.poses,
+          .position_m = statistics_of(errors.position_m),
+          .rotation_deg = statistics_of(errors.rotation_deg),
+          .rpe_translation_m = statistics_of(errors.rpe_translation_m),
+          .rpe_rotation_deg = statistics_of(errors.rpe_rotation_deg),
+          .completeness = errors.window_s > 0.0 ? errors.covered_s / errors.window_s : 0.0};
+}
+
+TimeWindow window_of(const TrajectoryInput& input) {
+  return input.window.value_or(TimeWindow{input.truth.front().stamp, input.truth.back().stamp});
+}
+
+void add_absolute_errors(std::span<const PosePair> pairs, const Alignment& alignment,
+                         Errors& errors) {
+  for (const PosePair& pair : pairs) {
+    const SE3 T_truth_body = alignment.apply(pair.T_estimate_body);
+    errors.position_m.push_back(
+        (T_truth_body.translation() - pair.T_truth_body.translation()).norm());
+    errors.rotation_deg.push_back(
+        kDegrees * angle_of(pair.T_truth_body.linear().transpose() * T_truth_body.linear()));
+  }
+}
+
+void add_relative_errors(std::span<const PosePair> pairs, const Alignment& alignment,
+                         double delta_s, Errors& errors) {
+  const double tolerance_s = 0.1 * delta_s;
+  constexpr double kJitter = 0.01;  // of the delta, by which stamps may miss it at the end
+  std::size_t j = 0;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (seconds_between(pairs[i].stamp, pairs.back().stamp) < (1.0 - kJitter) * delta_s) break;
+    const auto off_s = [&](std::size_t k) {
+      return std::abs(seconds_between(pairs[i].stamp, pairs[k].stamp) - delta_s);
+    };
+    while (j + 1 < pairs.size() && off_s(j + 1) <= off_s(j)) ++j;
+    if (j <= i || off_s(j) > tolerance_s) continue;
+    const SE3 T_i_j = pairs[i].T_truth_body.inverse() * pairs[j].T_truth_body;
+    const SE3 T_i_j_estimate = alignment.apply(pairs[i].T_estimate_body).inverse() *
+                               alignment.apply(pairs[j].T_estimate_body);
+    const SE3 error = T_i_j.inverse() * T_i_j_estimate;
+    errors.rpe_translation_m.push_back(error.translation().norm());
+    errors.rpe_rotation_deg.push_back(kDegrees * angle_of(error.linear()));
+  }
+}
+
+void check(const TrajectoryErrorOptions& options) {
+  for (const double value :
+       {options.max_gap_s, options.max_difference_s, options.max_coverage_gap_s})
+    if (!(value >= 0.0) || !(value < 1e9))
+      throw std::invalid_argument("trajectory_error: a time limit is negative or not a number");
+  if (!(options.rpe_delta_s > 0.0))
+    throw std::invalid_argument("trajectory_error: rpe_delta_s is not positive");
+}
+
+std::vector<PosePair> associate(const TrajectoryInput& input,
+                                const TrajectoryErrorOptions& options) {
+  if (input.truth.empty()) throw std::invalid_argument(input.name + ": the truth holds no pose");
+  auto pairs = associate(input.truth, input.estimate, window_of(input), options.max_gap_s,
+                         options.max_difference_s);
+  if (pairs.size() < kMinPairs)
+    throw std::invalid_argument(input.name + ": only " + std::to_string(pairs.size()) + " of its " +
+                                std::to_string(input.estimate.size()) +
+                                " poses fall on the truth's time, at least " +
+                                std::to_string(kMinPairs) + " are needed");
+  return pairs;
+}
+
+}  // namespace
+
+SE3 Alignment::apply(const SE3& T_estimate_body) const {
+  SE3 scaled = T_estimate_body;
+  scaled.translation() *= scale;
+  return T_truth_estimate * scaled;
+}
+
+Alignment align(std::span<const PosePair> pairs, bool with_scale) {
+  const auto n = static_cast<Eigen::Index>(pairs.size());
+  Eigen::Matrix3Xd estimate(3, n);
+  Eigen::Matrix3Xd truth(3, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    estimate.col(i) = pairs[static_cast<std::size_t>(i)].T_estimate_body.translation();
+    truth.col(i) = pairs[static_cast<std::size_t>(i)].T_truth_body.translation();
+  }
+  const Eigen::Matrix4d S = Eigen::umeyama(estimate, truth, with_scale);
+  Alignment alignment;
+  if (with_scale) alignment.scale = S.col(0).head<3>().norm();
+  if (!S.allFinite() || !(alignment.scale > 0.0))
+    throw std::invalid_argument("align: the positions do not vary, their scale is arbitrary");
+  alignment.T_truth_estimate =
+      make_pose(S.topLeftCorner<3, 3>() / alignment.scale, S.topRightCorner<3, 1>());
+  return alignment;
+}
+
+TeamError trajectory_error(std::span<const TrajectoryInput> inputs,
+                           const TrajectoryErrorOptions& options) {
+  check(options);
+  if (inputs.empty()) throw std::invalid_argument("trajectory_error: no estimate");
+  std::vector<std::vector<PosePair>> pairs;
+  std::vector<PosePair> all;
+  for (const TrajectoryInput& input : inputs) {
+    pairs.push_back(associate(input, options));
+    all.insert(all.end(), pairs.back().begin(), pairs.back().end());
+  }
+
+  TeamError team;
+  team.alignment = align(all, options.with_scale);
+  Errors joint;
+  for (std::size_t r = 0; r < inputs.size(); ++r) {
+    Errors errors;
+    add_absolute_errors(pairs[r], team.alignment, errors);
+    add_relative_errors(pairs[r], team.alignment, options.rpe_delta_s, errors);
+    const TimeWindow window = window_of(inputs[r]);
+    errors.poses = inputs[r].estimate.size();
+    errors.covered_s = covered_seconds(inputs[r].estimate, window, options.max_coverage_gap_s);
+    errors.window_s = seconds_between(window.from, window.to);
+    team.robots.push_back(summary(inputs[r].name, errors));
+    joint.append(errors);
+  }
+  team.joint = summary("team", joint);
+  return team;
+}
+
+}  // namespace km

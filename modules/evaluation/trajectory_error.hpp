@@ -1,0 +1,75 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "modules/evaluation/association.hpp"
+#include "modules/evaluation/statistics.hpp"
+
+namespace km {
+
+/// p_truth = scale * T_truth_estimate.linear() * p_estimate + T_truth_estimate.translation().
+struct Alignment {
+  double scale = 1.0;
+  SE3 T_truth_estimate = SE3::Identity();
+
+  /// A pose of the estimate in the truth's world; its position is scaled.
+  [[nodiscard]] SE3 apply(const SE3& T_estimate_body) const;
+};
+
+/// The alignment with the least squared distance between the positions of the pairs, by Umeyama,
+/// "Least-Squares Estimation of Transformation Parameters Between Two Point Patterns", PAMI 1991,
+/// Eq. (40)-(43). With `with_scale` false the scale is 1. Precondition: at least one pair. Less
+/// than three positions, or positions on one line, leave part of the rotation arbitrary. Throws
+/// std::invalid_argument if a scale is asked for and either side does not move.
+[[nodiscard]] Alignment align(std::span<const PosePair> pairs, bool with_scale);
+
+/// How errors are measured.
+struct TrajectoryErrorOptions {
+  bool with_scale = false;          ///< Align by a similarity instead of a rigid transform.
+  double max_gap_s = 0.1;           ///< Poses further apart are not interpolated between.
+  double max_difference_s = 0.01;   ///< Without neighbours to interpolate: nearest pose, at most.
+  double rpe_delta_s = 1.0;         ///< Time over which relative errors are taken.
+  double max_coverage_gap_s = 2.0;  ///< Time between estimated poses that still counts as covered.
+};
+
+/// One estimate with its truth; both ascending and outliving the call.
+struct TrajectoryInput {
+  std::string name;
+  std::span<const StampedPose> truth;
+  std::span<const StampedPose> estimate;
+  std::optional<TimeWindow> window;  ///< Part of the truth that counts; by default all of it.
+};
+
+/// Errors of one estimate, or of all together.
+struct TrajectoryError {
+  std::string name;
+  std::size_t poses = 0;         ///< In the estimate.
+  Statistics position_m;         ///< Absolute trajectory error; count: pairs compared.
+  Statistics rotation_deg;       ///< Angle to the truth after the same alignment.
+  Statistics rpe_translation_m;  ///< Relative pose error over rpe_delta_s.
+  Statistics rpe_rotation_deg;
+  double completeness = 0.0;  ///< Share of the window covered, 0 to 1.
+};
+
+/// Errors of a team under ONE alignment.
+struct TeamError {
+  Alignment alignment;
+  TrajectoryError joint;                ///< All pairs together.
+  std::vector<TrajectoryError> robots;  ///< In the order of the inputs.
+};
+
+/// Aligns all estimates by one transform and compares each with its truth.
+///
+/// Absolute: distance between the aligned and the true position, at every pair of associate().
+/// Relative: for pairs i, j with j the nearest to rpe_delta_s after i, at most a tenth of it off,
+/// (T_truth_i^-1 T_truth_j)^-1 (T_estimate_i^-1 T_estimate_j), with the estimate's scale corrected.
+/// Completeness: covered time of the estimate over the window; of the team, sums of both.
+/// Throws std::invalid_argument, naming the estimate, if one shares fewer than three poses with its
+/// truth, and for no input or options out of range.
+[[nodiscard]] TeamError trajectory_error(std::span<const TrajectoryInput> inputs,
+                                         const TrajectoryErrorOptions& options = {});
+
+}  // namespace km

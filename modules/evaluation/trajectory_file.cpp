@@ -1,0 +1,105 @@
+#include "modules/evaluation/trajectory_file.hpp"
+
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <string>
+
+#include "modules/core/text_rows.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kFields = 8;
+constexpr double kMaxNormError = 0.01;
+
+// Seconds to nanoseconds without the rounding of a double, which is 240 ns today.
+std::optional<Stamp> parse_seconds(std::string_view field) {
+  long double seconds = 0.0L;
+  const char* const end = field.data() + field.size();
+  const auto [stopped, error] = std::from_chars(field.data(), end, seconds);
+  if (error != std::errc() || stopped != end || !(std::abs(seconds) < 9e9L)) return std::nullopt;
+  return static_cast<Stamp>(std::llround(seconds * 1e9L));
+}
+
+class RowParser {
+ public:
+  RowParser(const std::string& name, const TextRow& row) : name_(name), row_(row) {}
+
+  StampedPose parse(bool euroc) const {
+    if (row_.fields.size() < kFields)
+      fail(std::to_string(row_.fields.size()) + " fields, expected " + std::to_string(kFields) +
+           (euroc ? " or more (EuRoC: t[ns], p x y z, q w x y z)"
+                  : " (TUM: t[s], p x y z, q x y z w)"));
+    const std::string_view head = row_.fields.front();
+    const auto stamp = euroc ? parse_int64(head) : parse_seconds(head);
+    if (!stamp)
+      fail(std::string(head) + " is not a stamp in " + (euroc ? "nanoseconds" : "seconds"));
+
+    std::array<double, kFields> v{};
+    for (std::size_t i = 1; i < kFields; ++i) v[i] = number(row_.fields[i]);
+    Eigen::Quaterniond q = euroc ? Eigen::Quaterniond(v[4], v[5], v[6], v[7])
+                                 : Eigen::Quaterniond(v[7], v[4], v[5], v[6]);
+    if (std::abs(q.norm() - 1.0) > kMaxNormError)
+      fail("the quaternion's norm is " + std::to_string(q.norm()));
+    q.normalize();
+    return {*stamp, make_pose(q.toRotationMatrix(), {v[1], v[2], v[3]})};
+  }
+
+  [[noreturn]] void fail(const std::string& problem) const {
+    throw TrajectoryFileError(name_ + " line " + std::to_string(row_.line) + ": " + problem);
+  }
+
+ private:
+  double number(std::string_view field) const {
+    const auto value = parse_double(field);
+    if (!value || !std::isfinite(*value)) fail(std::string(field) + " is not a finite number");
+    return *value;
+  }
+
+  const std::string& name_;
+  const TextRow& row_;
+};
+
+bool is_header(const TextRow& row) {
+  return !row.fields.front().empty() &&
+         std::isalpha(static_cast<unsigned char>(row.fields.front().front())) != 0;
+}
+
+}  // namespace
+
+std::vector<StampedPose> parse_trajectory(std::string_view text, const std::string& name) {
+  std::vector<TextRow> rows = split_rows(text);
+  if (!rows.empty() && is_header(rows.front())) rows.erase(rows.begin());
+  if (rows.empty()) throw TrajectoryFileError(name + ": holds no pose");
+  const std::string_view first = rows.front().fields.front();
+  const auto after_first = static_cast<std::size_t>(first.data() + first.size() - text.data());
+  const std::size_t separator = text.find_first_not_of(" \t", after_first);
+  const bool euroc = separator != text.npos && text[separator] == ',';
+
+  std::vector<StampedPose> poses;
+  poses.reserve(rows.size());
+  for (const TextRow& row : rows) {
+    const RowParser parser(name, row);
+    const StampedPose pose = parser.parse(euroc);
+    if (!poses.empty() && pose.stamp < poses.back().stamp)
+      parser.fail("the stamp is before the last one");
+    if (!poses.empty() && pose.stamp == poses.back().stamp) continue;
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+std::vector<StampedPose> read_trajectory(const std::filesystem::path& file) {
+  if (!std::filesystem::is_regular_file(file))
+    throw TrajectoryFileError(file.string() + ": no such file");
+  std::ifstream stream(file, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  return parse_trajectory(text, file.string());
+}
+
+}  // namespace km

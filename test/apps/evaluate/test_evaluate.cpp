@@ -1,0 +1,86 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <string>
+
+#include "test/support/command.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+const std::string kTool = std::string(KM_BIN_DIR) + "/kimera_multi_evaluate ";
+
+// A curve at 10 Hz over `from` to `to` [s], `lift` too high.
+std::string tum(int from, int to, double lift) {
+  std::string text = "# t x y z qx qy qz qw\n";
+  for (int i = 10 * from; i <= 10 * to; ++i) {
+    const double t = 0.1 * i;
+    text += std::to_string(100.0 + t) + ' ' + std::to_string(std::sin(t)) + ' ' +
+            std::to_string(std::cos(0.8 * t)) + ' ' + std::to_string(lift) + " 0 0 0 1\n";
+  }
+  return text;
+}
+
+struct Files {
+  TemporaryFolder folder;
+  std::string truth = folder.write("truth.txt", tum(0, 20, 0.0)).string();
+  std::string a = folder.write("a/optimized.tum", tum(0, 10, 0.0)).string();
+  std::string b = folder.write("b/optimized.tum", tum(10, 20, 1.0)).string();
+};
+
+}  // namespace
+
+TEST_CASE("trajectory prints a table and writes JSON and a plot", "[evaluate]") {
+  const Files files;
+  const std::string json = (files.folder.path() / "out.json").string();
+  const std::string plot = (files.folder.path() / "out.svg").string();
+  const auto result = run_command(kTool + "trajectory --truth " + files.truth + " --estimate " +
+                                  files.a + ' ' + files.b + " --json " + json + " --plot " + plot);
+  CAPTURE(result.output);
+  REQUIRE(result.exit_code == 0);
+  CHECK_THAT(result.output, Catch::Contains("a/optimized") && Catch::Contains("b/optimized") &&
+                                Catch::Contains("\nteam"));
+  CHECK_THAT(files.folder.read("out.json"), Catch::Contains("\"joint\""));
+  CHECK_THAT(files.folder.read("out.svg"), Catch::StartsWith("<svg"));
+}
+
+TEST_CASE("trajectory judges a window, in seconds or stamps", "[evaluate]") {
+  const Files files;
+  const std::string command =
+      kTool + "trajectory --truth " + files.truth + " --estimate " + files.a;
+  CHECK_THAT(run_command(command).output, Catch::Contains(" 50.0%"));
+  CHECK_THAT(run_command(command + " --from 5 --to 15").output, Catch::Contains(" 50.0%"));
+  CHECK_THAT(run_command(command + " --to 10").output, Catch::Contains("100.0%"));
+  const auto backwards = run_command(command + " --from 10 --to 5");
+  CHECK(backwards.exit_code == 1);
+  CHECK_THAT(backwards.output, Catch::Contains("--from is not before --to"));
+}
+
+TEST_CASE("Several truths belong to the estimates one by one", "[evaluate]") {
+  const Files files;
+  const std::string two = kTool + "trajectory --truth " + files.a + " --truth " + files.b;
+  const auto result = run_command(two + " --estimate " + files.a + ' ' + files.b);
+  CHECK(result.exit_code == 0);
+  CHECK_THAT(result.output, Catch::Contains(" 0.0000"));
+  const auto mismatch = run_command(two + " --estimate " + files.a);
+  CHECK(mismatch.exit_code == 1);
+  CHECK_THAT(mismatch.output, Catch::Contains("give one --truth"));
+}
+
+TEST_CASE("Bad input ends with code 1 and one line that names it", "[evaluate]") {
+  const Files files;
+  const auto missing = run_command(kTool + "trajectory --truth /none --estimate " + files.a);
+  CHECK(missing.exit_code == 1);
+  CHECK(missing.output == "kimera_multi_evaluate: /none: no such file\n");
+  const auto bad = files.folder.write("bad.tum", "1.0 0 0 0 0 0 0 1\nhello\n").string();
+  const auto broken = run_command(kTool + "trajectory --truth " + bad + " --estimate " + files.a);
+  CHECK(broken.exit_code == 1);
+  CHECK_THAT(broken.output, Catch::Contains("bad.tum line 2: 1 fields, expected 8"));
+  CHECK(run_command(kTool).exit_code == 1);
+  CHECK(run_command(kTool + "trajectory --truth " + files.truth).exit_code == 1);
+  const auto help = run_command(kTool + "trajectory --help");
+  CHECK(help.exit_code == 0);
+  CHECK_THAT(help.output, Catch::Contains("Examples:"));
+}
+
+}  // namespace km

@@ -1,0 +1,52 @@
+#include "modules/evaluation/trajectory_report.hpp"
+
+#include <catch2/catch.hpp>
+#include <sstream>
+
+#include "modules/evaluation/trajectory_plot.hpp"
+#include "test/modules/evaluation/trajectories.hpp"
+
+namespace km {
+namespace {
+
+const std::vector<StampedPose> kTruth = sample(0.0, 20.0, 100, curve);
+const std::vector<TrajectoryInput> kInputs = {{"alpha", kTruth, kTruth, {}},
+                                              {"b<&>eta", kTruth, kTruth, {}}};
+
+std::size_t count(const std::string& text, const std::string& word) {
+  std::size_t n = 0;
+  for (auto at = text.find(word); at != text.npos; at = text.find(word, at + 1)) ++n;
+  return n;
+}
+
+}  // namespace
+
+TEST_CASE("The table has a line per estimate and one for a team", "[evaluation]") {
+  const std::string team = to_table(trajectory_error(kInputs));
+  CHECK(count(team, "\n") == 5);
+  CHECK_THAT(team, Catch::Contains("alpha") && Catch::Contains("\nteam"));
+  CHECK_THAT(team, Catch::Contains("100.0%"));
+  const std::string one = to_table(trajectory_error({kInputs.data(), 1}));
+  CHECK(count(one, "\n") == 3);
+  CHECK_THAT(one, !Catch::Contains("team"));
+}
+
+TEST_CASE("The JSON holds every robot and the team", "[evaluation]") {
+  std::ostringstream text;
+  JsonWriter json(text);
+  write_json(json, trajectory_error(kInputs));
+  CHECK(count(text.str(), "\"position_m\"") == 3);
+  CHECK_THAT(text.str(), Catch::Contains("\"name\": \"alpha\"") &&
+                             Catch::Contains("\"completeness\": 1") &&
+                             Catch::Contains("\"pairs\": 200"));
+}
+
+TEST_CASE("The plot draws a shared truth once and every estimate", "[evaluation]") {
+  const std::string svg = plot_from_above(kInputs, trajectory_error(kInputs));
+  CHECK_THAT(svg, Catch::StartsWith("<svg ") && Catch::EndsWith("</svg>\n"));
+  CHECK(count(svg, "<polyline") == 3);
+  CHECK_THAT(svg, Catch::Contains("alpha, position rmse") && Catch::Contains("b&lt;&amp;>eta"));
+  CHECK_THAT(svg, !Catch::Contains("nan") && !Catch::Contains("inf"));
+}
+
+}  // namespace km
