@@ -38,7 +38,10 @@ void SensorsNode::stop() noexcept {
 void SensorsNode::decode() {
   try {
     while (!stopped_) {
-      auto packet = reader_->next();
+      auto packet = [this] {
+        const auto scope = reading_.measure();
+        return reader_->next();
+      }();
       if (!packet) {
         worker_.post(EndOfData{reader_->report()});
         return;

@@ -12,6 +12,7 @@
 #include "modules/sensors/lag_filter.hpp"
 #include "modules/sensors/sensors_config.hpp"
 #include "runtime/clock.hpp"
+#include "runtime/metrics.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
 #include "runtime/worker.hpp"
@@ -42,6 +43,8 @@ class SensorsNode final : public Node {
   /// Ends at once: what is decoded but not yet due has not happened.
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
+  /// Reading and decoding a packet.
+  DurationHistogram timing() const override { return reading_.histogram(); }
 
   /// Packets published and pairs skipped so far. Thread-safe.
   std::size_t published() const { return published_; }
@@ -67,6 +70,7 @@ class SensorsNode final : public Node {
   std::atomic<std::size_t> published_ = 0;
   std::atomic<std::size_t> skipped_ = 0;
   std::atomic<bool> stopped_ = false;
+  Timing reading_;
   std::thread decoder_;
   Worker<Input> worker_;  // last member: stops first
 };

@@ -71,6 +71,7 @@ TEST_CASE("Every packet is published in order, then the end", "[sensors]") {
   CHECK(end.skipped == 0);
   CHECK(end.faults.count(ReaderFault::kMissingImage) == 1);
   CHECK(node.published() == 100);
+  CHECK(node.timing().count() == 101);  // the end is read too
   CHECK(node.error() == nullptr);
 }
 
