@@ -1,16 +1,16 @@
 #include "runtime/config_layers.hpp"
 
 #include <cerrno>
-#include <cstring>
 #include <fstream>
 #include <sstream>
+#include <system_error>
 
 namespace km {
 
 void ConfigLayers::add_file(const std::filesystem::path& file) {
   std::ifstream input(file);
   if (!input) {
-    problems_ += file.string() + ": cannot open: " + std::strerror(errno) + '\n';
+    problems_ += file.string() + ": cannot open: " + std::generic_category().message(errno) + '\n';
     return;
   }
   std::ostringstream text;

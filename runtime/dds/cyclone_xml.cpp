@@ -48,6 +48,28 @@ void write_general(std::ostream& xml, const DdsConfig& config, const NetworkInte
       << "B</FragmentSize></General>";
 }
 
+// Where the discovery of the robots 0, 1, ... of a host listens: the port mapping of RTPS with its
+// default parameters.
+int discovery_port(int domain, int index) {
+  return 7400 + 250 * domain + 10 + 2 * index;
+}
+
+// Robots on this host cost nothing on the network: the whole range is asked. Elsewhere each port
+// that is asked is a packet on the air.
+void write_peers(std::ostream& xml, const DdsConfig& config, const std::string& own_address) {
+  xml << "<Peers><Peer address='" << own_address << "'/>";
+  for (const std::string& peer : config.peers) {
+    if (peer == own_address) continue;
+    if (peer.find(':') != std::string::npos) {
+      xml << "<Peer address='" << escaped(peer) << "'/>";
+      continue;
+    }
+    for (int i = 0; i < config.robots_per_peer; ++i)
+      xml << "<Peer address='" << escaped(peer) << ':' << discovery_port(config.domain, i) << "'/>";
+  }
+  xml << "</Peers>";
+}
+
 void write_discovery(std::ostream& xml, const DdsConfig& config,
                      const NetworkInterface& interface) {
   const bool by_address = config.discovery == Discovery::kPeers || !config.peers.empty();
@@ -58,12 +80,7 @@ void write_discovery(std::ostream& xml, const DdsConfig& config,
       << "</MaxAutoParticipantIndex><LeaseDuration>" << milliseconds(config.lease_s)
       << "</LeaseDuration><SPDPInterval>" << milliseconds(config.spdp_interval_s)
       << "</SPDPInterval><Tag>" << escaped(config.team) << "</Tag>";
-  if (by_address) {
-    xml << "<Peers><Peer address='" << interface.address << "'/>";
-    for (const std::string& peer : config.peers)
-      if (peer != interface.address) xml << "<Peer address='" << escaped(peer) << "'/>";
-    xml << "</Peers>";
-  }
+  if (by_address) write_peers(xml, config, interface.address);
   xml << "</Discovery>";
 }
 

@@ -19,7 +19,8 @@ struct DdsConfig {
   std::string interface;              ///< Network interface; empty: see select_interface().
   Discovery discovery = Discovery::kMulticast;
   std::vector<std::string> peers;      ///< Addresses; this host's own need not be listed.
-  int max_participant_index = 39;      ///< Robots per host less one, when found by address.
+  int max_participant_index = 39;      ///< Robots on this host less one, if found by address.
+  int robots_per_peer = 12;            ///< Robots looked for at each address of `peers`.
   double lease_s = 60.0;               ///< Silence after which a robot is forgotten.
   double spdp_interval_s = 2.0;        ///< A robot announces itself this often.
   double liveliness_s = 2.0;           ///< Silence after which a robot counts as lost.
@@ -36,9 +37,12 @@ struct DdsConfig {
     visitor.field("interface", interface, "network interface; empty: chosen, see log");
     visitor.field("discovery", discovery,
                   {{"multicast", Discovery::kMulticast}, {"peers", Discovery::kPeers}});
-    visitor.field("peers", peers, "addresses of the other hosts; this host is always included");
+    visitor.field("peers", peers,
+                  "addresses (or address:port) of the other hosts; this one is always included");
     visitor.field("max_participant_index", max_participant_index, {0, 110},
-                  "robots per host less one, where they are found by address");
+                  "robots on this host less one, where they are found by address");
+    visitor.field("robots_per_peer", robots_per_peer, {1, 111},
+                  "robots looked for at each peer; each costs 0.25 kB per 2 s on the air");
     visitor.field("lease_s", lease_s, {3.0, 3600.0}, "[s] longer than ordinary outages");
     visitor.field("spdp_interval_s", spdp_interval_s, {0.1, 60.0}, "[s] between announcements");
     visitor.field("liveliness_s", liveliness_s, {0.2, 60.0}, "[s] of silence: lost");

@@ -54,10 +54,14 @@ TEST_CASE("Found by address a robot takes a fixed port, by multicast any", "[pro
                                               Contains("<AllowMulticast>spdp<") &&
                                               !Contains("<Peers>"));
   config.discovery = Discovery::kPeers;
-  config.peers = {"10.0.0.2", "10.0.0.1"};
-  CHECK_THAT(cyclone_xml(config, kCable),
-             Contains("<ParticipantIndex>auto<") && Contains("<AllowMulticast>false<") &&
-                 Contains("<Peers><Peer address='10.0.0.1'/><Peer address='10.0.0.2'/></Peers>"));
+  config.peers = {"10.0.0.2", "10.0.0.1", "10.0.0.3:9999"};
+  config.domain = 2;
+  config.robots_per_peer = 2;
+  CHECK_THAT(
+      cyclone_xml(config, kCable),
+      Contains("<ParticipantIndex>auto<") && Contains("<AllowMulticast>false<") &&
+          Contains("<Peers><Peer address='10.0.0.1'/><Peer address='10.0.0.2:7910'/>"
+                   "<Peer address='10.0.0.2:7912'/><Peer address='10.0.0.3:9999'/></Peers>"));
 }
 
 TEST_CASE("Loopback is told to carry multicast", "[profiles]") {
