@@ -48,7 +48,6 @@ TEST_CASE("Bag of words, k = 10, L = 5", "[place_recognition][!benchmark]") {
     };
   }
   BENCHMARK_ADVANCED("add, to 5000 images")(Catch::Benchmark::Chronometer meter) {
-    std::vector<BowDatabase> copies;
     BowDatabase half(vocabulary.size());
     for (std::size_t i = 0; i < 5000; ++i) half.add(vectors[i]);
     meter.measure(
