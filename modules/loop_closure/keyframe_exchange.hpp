@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdint>
+
+#include "modules/core/keyframe.hpp"
+
+namespace km {
+
+/// Asks the owner of `keyframe` for its odometry, points and descriptors.
+struct KeyframeRequest {
+  RobotId requester = 0;
+  std::uint32_t number = 0;  ///< Counts the requester's requests.
+  KeyframeId keyframe;
+};
+
+/// The answer. `found` is false where the owner has no such keyframe (yet): then only the
+/// keyframe's id is set.
+struct KeyframeReply {
+  std::uint32_t number = 0;  ///< Of the request.
+  bool found = false;
+  Keyframe keyframe;
+};
+
+}  // namespace km

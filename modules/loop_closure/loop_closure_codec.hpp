@@ -1,0 +1,65 @@
+#pragma once
+
+#include <loop_closure.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "modules/core/pose_graph.hpp"
+#include "modules/loop_closure/keyframe_exchange.hpp"
+#include "runtime/dds/codec.hpp"
+
+namespace km {
+
+/// No keyframe has more points; a message that claims more is refused.
+inline constexpr std::size_t kMaxKeypoints = 10000;
+
+/// Written by the robot that asks.
+template <>
+struct Codec<KeyframeRequest> {
+  using Wire = km_wire_KeyframeRequest;
+  static constexpr const char* kTopic = "keyframe_requests";
+  static constexpr std::uint16_t kVersion = 1;
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_KeyframeRequest_desc; }
+
+  struct Encoded {
+    Wire wire{};
+  };
+  static Encoded encode(const KeyframeRequest& request);
+  static Decoded<KeyframeRequest> decode(const Wire& wire);
+};
+
+/// Written by the owner of the keyframe. Bearings and inverse depths travel as 16-bit numbers in
+/// steps of the largest one: rounding is below 0.01 px, see idl/loop_closure.idl.
+template <>
+struct Codec<KeyframeReply> {
+  using Wire = km_wire_KeyframeReply;
+  static constexpr const char* kTopic = "keyframe_replies";
+  static constexpr std::uint16_t kVersion = 1;
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_KeyframeReply_desc; }
+
+  struct Encoded {
+    Wire wire{};
+    std::vector<km_wire_Keypoint> keypoints;
+  };
+  static Encoded encode(const KeyframeReply& reply);
+  static Decoded<KeyframeReply> decode(const Wire& wire);
+};
+
+/// Written by the robot that verified it, which owns the keyframe it starts from.
+template <>
+struct Codec<Closure> {
+  using Wire = km_wire_Closure;
+  static constexpr const char* kTopic = "closures";
+  static constexpr std::uint16_t kVersion = 1;
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_Closure_desc; }
+
+  struct Encoded {
+    Wire wire{};
+  };
+  static Encoded encode(const Closure& closure);
+  static Decoded<Closure> decode(const Wire& wire);
+};
+
+}  // namespace km
