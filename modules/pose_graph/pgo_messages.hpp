@@ -41,7 +41,7 @@ struct PgoStatus {
   PgoFrame frame;  ///< Of its present solution.
   std::uint32_t keyframes = 0;
   std::uint32_t revision = 0;  ///< Grows with its own keyframes and intra-robot closures.
-  std::vector<EdgeSetOffer> offers;
+  std::vector<EdgeSetOffer> offers = {};
   bool operator==(const PgoStatus&) const = default;
 };
 
@@ -90,8 +90,8 @@ struct PgoSession {
 /// Poses of one robot that its peers' edges end on, and keyframe 0, after one of its updates.
 struct PublicPoses {
   PgoPeer sender;
-  PgoSessionId session;
-  PgoFrame frame;
+  PgoSessionId session = {};
+  PgoFrame frame = {};
   std::uint32_t round = 0;                    ///< 0: before the first update.
   double cost = 0.0;                          ///< Share: own edges, and those to earlier members.
   double squared_gradient = 0.0;              ///< Of the block before this update.

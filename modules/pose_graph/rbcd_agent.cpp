@@ -48,13 +48,11 @@ bool RbcdAgent::add(const InlierSet& set) {
 
 void RbcdAgent::peer_alive(PgoPeer peer) {
   if (peer.robot == self_.robot) return;
-  const auto known = peers_.find(peer.robot);
-  if (known != peers_.end() && known->second.boot != peer.boot) {
+  Peer& entry = peers_.try_emplace(peer.robot, Peer{.boot = peer.boot}).first->second;
+  if (entry.boot != peer.boot) {
     graph_.forget(peer.robot);
-    peers_.erase(known);
+    entry = Peer{.boot = peer.boot};
   }
-  Peer& entry = peers_[peer.robot];
-  entry.boot = peer.boot;
   entry.alive = true;
   plan_outdated_ = true;
 }
@@ -72,22 +70,31 @@ const RbcdAgent::Peer* RbcdAgent::present(PgoPeer peer) const {
   return is ? &known->second : nullptr;
 }
 
+RbcdAgent::Peer* RbcdAgent::sender_of_message(PgoPeer peer) {
+  if (peer.robot == self_.robot) return nullptr;
+  Peer& entry = peers_.try_emplace(peer.robot, Peer{.boot = peer.boot}).first->second;
+  return entry.boot == peer.boot ? &entry : nullptr;
+}
+
 bool RbcdAgent::receive(const PgoStatus& status) {
-  if (present(status.sender) == nullptr) return false;
-  peers_.at(status.sender.robot).status = status;
+  Peer* sender = sender_of_message(status.sender);
+  if (sender == nullptr) return false;
+  sender->status = status;
   plan_outdated_ = true;
   return true;
 }
 
 bool RbcdAgent::receive(PublicPoses poses) {
-  if (present(poses.sender) == nullptr || !well_formed(poses, config_.rank)) return false;
-  auto& newest = peers_.at(poses.sender.robot).poses;
+  if (!well_formed(poses, config_.rank)) return false;
+  Peer* sender = sender_of_message(poses.sender);
+  if (sender == nullptr) return false;
+  const auto& newest = sender->poses;
   const bool stale = newest && newest->session.coordinator == poses.session.coordinator &&
                      std::pair(poses.session.number, poses.round) <
                          std::pair(newest->session.number, newest->round);
   if (stale) return true;
   poses.X = restore_stiefel(std::move(poses.X));
-  newest = std::move(poses);
+  sender->poses = std::move(poses);
   count_share(*newest);
   return true;
 }
@@ -154,9 +161,24 @@ OptimizerProgress RbcdAgent::make_progress() const {
   progress.cost = session.cost;
   progress.gradient_norm = session.gradient_norm;
   progress.seconds += running_->moved_s - running_->started_s;
-  const auto& self = session.plan.members[running_->position_of.at(self_.robot)];
-  progress.settled = session.finished && self.revision == graph_.revision();
+  progress.settled = session.finished && holds_all(session.plan);
   return progress;
+}
+
+bool RbcdAgent::holds_all(const SessionPlan& plan) const {
+  if (plan.members[running_->position_of.at(self_.robot)].revision != graph_.revision())
+    return false;
+  std::optional<RobotId> last;
+  for (const EdgeSetOffer& offer : graph_.offers()) {
+    const bool newest = offer.peer != last;
+    last = offer.peer;
+    const auto peer = peers_.find(offer.peer);
+    if (!newest || peer == peers_.end() || !peer->second.alive) continue;
+    const SessionPair pair{std::min(self_.robot, offer.peer), std::max(self_.robot, offer.peer),
+                           offer.id};
+    if (std::find(plan.pairs.begin(), plan.pairs.end(), pair) == plan.pairs.end()) return false;
+  }
+  return true;
 }
 
 }  // namespace km

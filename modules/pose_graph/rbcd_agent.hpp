@@ -55,8 +55,8 @@ class RbcdAgent {
   void peer_alive(PgoPeer peer);
   void peer_lost(RobotId robot);
 
-  /// Messages of peers, in any order, repeated or lost. False if one is refused: of a robot that
-  /// is not alive or of another boot, infeasible, or inconsistent in itself.
+  /// Messages of peers, in any order, repeated or lost; status and poses also before peer_alive().
+  /// False if one is refused: of another boot, infeasible, or inconsistent in itself.
   bool receive(const PgoStatus& status);
   bool receive(const PgoSession& session);
   bool receive(PublicPoses poses);
@@ -73,8 +73,8 @@ class RbcdAgent {
   struct Peer {
     std::uint64_t boot = 0;
     bool alive = false;
-    std::optional<PgoStatus> status;
-    std::optional<PublicPoses> poses;  // the newest
+    std::optional<PgoStatus> status = {};
+    std::optional<PublicPoses> poses = {};  // the newest
   };
   struct Running {
     PgoSession session;
@@ -88,10 +88,12 @@ class RbcdAgent {
 
   // rbcd_agent.cpp: peers, status, results.
   [[nodiscard]] const Peer* present(PgoPeer peer) const;
+  [[nodiscard]] Peer* sender_of_message(PgoPeer peer);
   [[nodiscard]] PgoStatus make_status() const;
   void send_status(PgoOutput& output);
   void publish(PgoOutput& output);
   [[nodiscard]] OptimizerProgress make_progress() const;
+  [[nodiscard]] bool holds_all(const SessionPlan& plan) const;
   [[nodiscard]] std::optional<Eigen::MatrixXd> pose_of_anchor(RobotId anchor) const;
 
   // rbcd_session.cpp: opening, joining and running sessions.

@@ -50,8 +50,12 @@ bool well_formed(const PgoSession& session, int rank) {
 
 SessionPlan RbcdAgent::make_plan() const {
   std::map<RobotId, PgoStatus> statuses{{self_.robot, make_status()}};
-  for (const auto& [robot, peer] : peers_)
-    if (peer.alive && peer.status) statuses.emplace(robot, *peer.status);
+  for (const auto& [robot, peer] : peers_) {
+    if (!peer.alive || !peer.status) continue;
+    PgoStatus& status = statuses.emplace(robot, *peer.status).first->second;
+    // A robot changes its frame in a session only, and its poses tell so before its status does.
+    if (peer.poses) status.frame = peer.poses->frame;
+  }
   return plan_session(statuses, self_.robot);
 }
 

@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <random>
+#include <set>
 #include <variant>
 #include <vector>
 
@@ -43,6 +44,28 @@ class PgoTeam {
       return entry.second.to == robot || entry.second.from == robot;
     });
     for (auto& [id, other] : robots_) other.agent->peer_lost(robot);
+  }
+
+  /// The robot goes out of reach; what is in flight to and from it is lost.
+  void disconnect(RobotId robot) {
+    unreachable_.insert(robot);
+    std::erase_if(in_flight_, [&](const auto& entry) {
+      return entry.second.to == robot || entry.second.from == robot;
+    });
+    for (auto& [id, other] : robots_) {
+      if (id == robot) continue;
+      other.agent->peer_lost(robot);
+      robots_.at(robot).agent->peer_lost(id);
+    }
+  }
+
+  void reconnect(RobotId robot) {
+    unreachable_.erase(robot);
+    for (auto& [id, other] : robots_) {
+      if (id == robot || unreachable_.contains(id)) continue;
+      other.agent->peer_alive(robots_.at(robot).peer);
+      robots_.at(robot).agent->peer_alive(other.peer);
+    }
   }
 
   RbcdAgent& agent(RobotId robot) { return *robots_.at(robot).agent; }
@@ -108,6 +131,7 @@ class PgoTeam {
     std::uniform_real_distribution<double> uniform(0.0, 1.0);
     for (const auto& [id, robot] : robots_) {
       if (id == from.peer.robot) continue;
+      if (unreachable_.contains(id) || unreachable_.contains(from.peer.robot)) continue;
       const bool lost = uniform(rng_) < network_.lost;
       const int copies = lost ? 0 : uniform(rng_) < network_.duplicated ? 2 : 1;
       for (int copy = 0; copy < copies; ++copy) {
@@ -128,6 +152,7 @@ class PgoTeam {
   NetworkConditions network_;
   std::mt19937 rng_;
   std::map<RobotId, Robot> robots_;
+  std::set<RobotId> unreachable_;
   std::multimap<double, Delivery> in_flight_;
   double now_s_ = 0.0;
   std::size_t bytes_ = 0;

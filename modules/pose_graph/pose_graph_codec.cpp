@@ -1,0 +1,179 @@
+#include "modules/pose_graph/pose_graph_codec.hpp"
+
+#include <cmath>
+#include <set>
+#include <span>
+#include <utility>
+
+namespace km {
+namespace {
+
+km_wire_PgoPeer to_wire(const PgoPeer& peer) {
+  return {.robot = peer.robot, .boot = peer.boot};
+}
+
+PgoPeer from_wire(const km_wire_PgoPeer& wire) {
+  return {wire.robot, wire.boot};
+}
+
+PgoPeer writer_of(const km_wire_Header& header) {
+  return {header.robot, header.boot};
+}
+
+// Points a generated sequence at elements it does not own.
+template <typename Sequence, typename T>
+void borrow(Sequence& sequence, std::vector<T>& elements) {
+  const auto size = static_cast<std::uint32_t>(elements.size());
+  sequence = {._maximum = size, ._length = size, ._buffer = elements.data(), ._release = false};
+}
+
+// nullopt if there are more than `max` elements or the buffer is missing.
+template <typename Sequence>
+auto elements_of(const Sequence& sequence, std::size_t max) {
+  using Span = std::span<const std::remove_pointer_t<decltype(sequence._buffer)>>;
+  const bool usable =
+      sequence._length <= max && (sequence._length == 0 || sequence._buffer != nullptr);
+  return usable ? std::optional(Span(sequence._buffer, sequence._length)) : std::nullopt;
+}
+
+bool is_rank(std::uint32_t rank) {
+  return 3 <= rank && rank <= kMaxRank;
+}
+
+}  // namespace
+
+Codec<PgoStatus>::Encoded Codec<PgoStatus>::encode(const PgoStatus& status) {
+  Encoded encoded;
+  for (const EdgeSetOffer& offer : status.offers)
+    encoded.offers.push_back({.peer = offer.peer,
+                              .edges = offer.edges,
+                              .set_version = offer.id.version,
+                              .hash = offer.id.hash});
+  encoded.wire.robot = status.sender.robot;
+  encoded.wire.frame = to_wire(status.frame);
+  encoded.wire.keyframes = status.keyframes;
+  encoded.wire.revision = status.revision;
+  borrow(encoded.wire.offers, encoded.offers);
+  return encoded;
+}
+
+Decoded<PgoStatus> Codec<PgoStatus>::decode(const Wire& wire) {
+  using Result = Decoded<PgoStatus>;
+  if (wire.robot != wire.header.robot) return Result::refuse("written by another robot");
+  const auto offers = elements_of(wire.offers, 8 * kMaxTeam);
+  if (!offers) return Result::refuse("offers are missing or too many");
+  PgoStatus status{.sender = writer_of(wire.header),
+                   .frame = from_wire(wire.frame),
+                   .keyframes = wire.keyframes,
+                   .revision = wire.revision,
+                   .offers = {}};
+  for (const km_wire_EdgeSetOffer& offer : *offers) {
+    if (offer.edges == 0 || offer.peer == wire.robot)
+      return Result::refuse("an offer without edges or to its own robot");
+    status.offers.push_back({offer.peer, offer.edges, {offer.set_version, offer.hash}});
+  }
+  return Result::accept(std::move(status));
+}
+
+Codec<PgoSession>::Encoded Codec<PgoSession>::encode(const PgoSession& session) {
+  Encoded encoded;
+  for (const SessionMember& member : session.plan.members)
+    encoded.members.push_back({.peer = to_wire(member.peer), .revision = member.revision});
+  for (const SessionPair& pair : session.plan.pairs)
+    encoded.pairs.push_back(
+        {.a = pair.a, .b = pair.b, .set_version = pair.edges.version, .hash = pair.edges.hash});
+  const auto anchor_pose = session.anchor_pose.reshaped();
+  encoded.anchor_pose.assign(anchor_pose.begin(), anchor_pose.end());
+  Wire& wire = encoded.wire;
+  wire.robot = session.id.coordinator.robot;
+  wire.session = session.id.number;
+  wire.frame = to_wire(session.plan.frame);
+  wire.rank = session.rank;
+  wire.max_rounds = session.max_rounds;
+  wire.anchor = session.anchor;
+  wire.round = session.round;
+  wire.cost = session.cost;
+  wire.gradient_norm = session.gradient_norm;
+  wire.finished = session.finished;
+  borrow(wire.members, encoded.members);
+  borrow(wire.pairs, encoded.pairs);
+  borrow(wire.anchor_pose, encoded.anchor_pose);
+  return encoded;
+}
+
+Decoded<PgoSession> Codec<PgoSession>::decode(const Wire& wire) {
+  using Result = Decoded<PgoSession>;
+  if (wire.robot != wire.header.robot) return Result::refuse("written by another robot");
+  if (!is_rank(wire.rank)) return Result::refuse("rank is out of range");
+  if (!std::isfinite(wire.cost) || !std::isfinite(wire.gradient_norm))
+    return Result::refuse("cost or gradient is not finite");
+  const auto members = elements_of(wire.members, kMaxTeam);
+  const auto pairs = elements_of(wire.pairs, kMaxTeam * kMaxTeam / 2);
+  const auto anchor_pose = elements_of(wire.anchor_pose, 4 * kMaxRank);
+  if (!members || !pairs || !anchor_pose) return Result::refuse("a list is missing or too long");
+  if (!anchor_pose->empty() && anchor_pose->size() != 4 * wire.rank)
+    return Result::refuse("the anchor's pose does not have the session's rank");
+
+  PgoSession session{.id = {writer_of(wire.header), wire.session}, .plan = {}};
+  session.plan.frame = from_wire(wire.frame);
+  for (const km_wire_SessionMember& member : *members)
+    session.plan.members.push_back({from_wire(member.peer), member.revision});
+  for (const km_wire_SessionPair& pair : *pairs)
+    session.plan.pairs.push_back({pair.a, pair.b, {pair.set_version, pair.hash}});
+  session.rank = wire.rank;
+  session.max_rounds = wire.max_rounds;
+  session.anchor = wire.anchor;
+  if (!anchor_pose->empty())
+    session.anchor_pose = Eigen::Map<const Eigen::MatrixXd>(anchor_pose->data(), wire.rank, 4);
+  session.round = wire.round;
+  session.cost = wire.cost;
+  session.gradient_norm = wire.gradient_norm;
+  session.finished = wire.finished;
+  return Result::accept(std::move(session));
+}
+
+Codec<PublicPoses>::Encoded Codec<PublicPoses>::encode(const PublicPoses& poses) {
+  Encoded encoded;
+  encoded.keyframes = poses.keyframes;
+  encoded.poses.reserve(static_cast<std::size_t>(poses.X.size()));
+  for (const double x : poses.X.reshaped()) encoded.poses.push_back(static_cast<float>(x));
+  Wire& wire = encoded.wire;
+  wire.robot = poses.sender.robot;
+  wire.coordinator = to_wire(poses.session.coordinator);
+  wire.session = poses.session.number;
+  wire.frame = to_wire(poses.frame);
+  wire.round = poses.round;
+  wire.cost = poses.cost;
+  wire.squared_gradient = poses.squared_gradient;
+  wire.rank = static_cast<std::uint32_t>(poses.X.rows());
+  borrow(wire.keyframes, encoded.keyframes);
+  borrow(wire.poses, encoded.poses);
+  return encoded;
+}
+
+Decoded<PublicPoses> Codec<PublicPoses>::decode(const Wire& wire) {
+  using Result = Decoded<PublicPoses>;
+  if (wire.robot != wire.header.robot) return Result::refuse("written by another robot");
+  if (!is_rank(wire.rank)) return Result::refuse("rank is out of range");
+  const auto keyframes = elements_of(wire.keyframes, kMaxPublicPoses);
+  const auto poses = elements_of(wire.poses, 4 * kMaxRank * kMaxPublicPoses);
+  if (!keyframes || !poses) return Result::refuse("a list is missing or too long");
+  if (poses->size() != 4 * wire.rank * keyframes->size())
+    return Result::refuse("poses and keyframes differ in number");
+
+  PublicPoses result{.sender = writer_of(wire.header),
+                     .session = {from_wire(wire.coordinator), wire.session},
+                     .frame = from_wire(wire.frame),
+                     .round = wire.round,
+                     .cost = wire.cost,
+                     .squared_gradient = wire.squared_gradient};
+  result.keyframes.assign(keyframes->begin(), keyframes->end());
+  result.X = Eigen::Map<const Eigen::MatrixXf>(poses->data(), wire.rank,
+                                               4 * static_cast<Eigen::Index>(keyframes->size()))
+                 .cast<double>();
+  if (!result.X.allFinite() || !std::isfinite(wire.cost) || !std::isfinite(wire.squared_gradient))
+    return Result::refuse("a number is not finite");
+  return Result::accept(std::move(result));
+}
+
+}  // namespace km

@@ -1,0 +1,115 @@
+#include "modules/pose_graph/pose_graph_node.hpp"
+
+#include <chrono>
+#include <string>
+#include <utility>
+
+#include "runtime/clock.hpp"
+#include "runtime/log.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kQueue = 1024;
+constexpr std::chrono::milliseconds kTick{50};
+
+template <typename... Handlers>
+struct Overloaded : Handlers... {
+  using Handlers::operator()...;
+};
+
+}  // namespace
+
+PoseGraphNode::PoseGraphNode(const PoseGraphConfig& config, PgoPeer self,
+                             const PoseGraphTopics& topics)
+    : topics_(topics),
+      agent_(config, self),
+      worker_(
+          kQueue, Overflow::kBlock, [this](const Input& input) { step(input, steady_now_s()); },
+          PoseGraphConfig::kSection),
+      ticks_(
+          kTick, [this] { worker_.post(Tick()); }, "pose_graph tick") {
+  const auto post = [this](const auto& message) { worker_.post(message); };
+  topics.odometry.subscribe(post);
+  topics.closures.subscribe(post);
+  topics.inlier_sets.subscribe(post);
+  topics.peer_inlier_sets.subscribe(post);
+  topics.peer_events.subscribe(post);
+  topics.peer_status.subscribe(post);
+  topics.peer_sessions.subscribe(post);
+  topics.peer_poses.subscribe(post);
+}
+
+void PoseGraphNode::start() {
+  worker_.start();
+  ticks_.start();
+}
+
+void PoseGraphNode::stop() noexcept {
+  worker_.stop();  // refuses further ticks, so that none waits for room
+  ticks_.stop();
+}
+
+std::exception_ptr PoseGraphNode::error() const {
+  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
+}
+
+void PoseGraphNode::step(const Input& input, double now_s) {
+  take(input);
+  const bool is_tick = std::holds_alternative<Tick>(input);
+  for (bool more = is_tick || worker_.load().size == 0; more;) {
+    PgoOutput output = agent_.step(now_s);
+    more = output.more && worker_.load().size == 0;
+    publish(std::move(output));
+  }
+}
+
+void PoseGraphNode::take(const Input& input) {
+  const auto take_in = Overloaded{
+      [](const Tick&) {},
+      [&](const Topic<KeyframeOdometry>::Message& m) { (void)agent_.add(*m); },
+      [&](const Topic<Closure>::Message& m) { (void)agent_.add(*m); },
+      [&](const Topic<InlierSet>::Message& m) { (void)agent_.add(*m); },
+      [&](const Topic<PeerEvent>::Message& m) { take_peer_event(*m); },
+      [&](const Topic<PgoStatus>::Message& m) {
+        if (!agent_.receive(*m)) refuse("status", m->sender.robot);
+      },
+      [&](const Topic<PgoSession>::Message& m) {
+        if (!agent_.receive(*m)) refuse("session", m->id.coordinator.robot);
+      },
+      [&](const Topic<PublicPoses>::Message& m) {
+        if (!agent_.receive(*m)) refuse("poses", m->sender.robot);
+      },
+  };
+  std::visit(take_in, input);
+}
+
+void PoseGraphNode::take_peer_event(const PeerEvent& event) {
+  switch (event.kind) {
+    case PeerEventKind::kJoined:
+    case PeerEventKind::kReturned:
+    case PeerEventKind::kRestarted:
+      return agent_.peer_alive({event.identity.robot, event.identity.boot});
+    case PeerEventKind::kLost:
+    case PeerEventKind::kLeft:
+      return agent_.peer_lost(event.identity.robot);
+    case PeerEventKind::kRefused:
+    case PeerEventKind::kConflict:
+      return;
+  }
+}
+
+void PoseGraphNode::refuse(const char* kind, RobotId from) const {
+  log::limited(log::Level::kWarn, name(), kind + std::to_string(from))
+      << kind << " of robot " << from << " refused: of a former process of it, or not usable";
+}
+
+void PoseGraphNode::publish(PgoOutput output) const {
+  if (output.session) topics_.sessions.publish(std::move(*output.session));
+  if (output.poses) topics_.poses.publish(std::move(*output.poses));
+  if (output.status) topics_.status.publish(std::move(*output.status));
+  if (output.trajectory) topics_.trajectory.publish(std::move(*output.trajectory));
+  if (output.progress) topics_.progress.publish(std::move(*output.progress));
+}
+
+}  // namespace km
