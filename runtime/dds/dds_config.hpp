@@ -43,7 +43,8 @@ struct DdsConfig {
                   "robots on this host less one, where they are found by address");
     visitor.field("robots_per_peer", robots_per_peer, {1, 111},
                   "robots looked for at each peer; each costs 0.25 kB per 2 s on the air");
-    visitor.field("lease_s", lease_s, {3.0, 3600.0}, "[s] longer than ordinary outages");
+    visitor.field("lease_s", lease_s, {3.0, 3600.0},
+                  "[s] longer than ordinary outages; requests live as long");
     visitor.field("spdp_interval_s", spdp_interval_s, {0.1, 60.0}, "[s] between announcements");
     visitor.field("liveliness_s", liveliness_s, {0.2, 60.0}, "[s] of silence: lost");
     visitor.field("max_message_bytes", max_message_bytes, {1200, 65500}, "[B] 1400 on radio");

@@ -4,6 +4,14 @@
 
 namespace km {
 
+namespace {
+
+dds_duration_t nanoseconds_of(double seconds) {
+  return static_cast<dds_duration_t>(std::llround(seconds * 1e9));
+}
+
+}  // namespace
+
 const char* to_string(TrafficCategory category) {
   switch (category) {
     case TrafficCategory::kPlaceRecognition:
@@ -28,20 +36,19 @@ DdsQos make_topic_qos(TopicKind kind, const DdsConfig& config) {
   if (kind == TopicKind::kStatus) {
     dds_qset_reliability(qos, DDS_RELIABILITY_BEST_EFFORT, 0);
     dds_qset_durability(qos, DDS_DURABILITY_VOLATILE);
-    dds_qset_liveliness(qos, DDS_LIVELINESS_AUTOMATIC,
-                        static_cast<dds_duration_t>(std::llround(config.liveliness_s * 1e9)));
+    dds_qset_liveliness(qos, DDS_LIVELINESS_AUTOMATIC, nanoseconds_of(config.liveliness_s));
     return owner;
   }
 
   dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
-  if (kind == TopicKind::kRequest) {
-    dds_qset_durability(qos, DDS_DURABILITY_VOLATILE);
-  } else {
-    dds_qset_durability(qos, DDS_DURABILITY_TRANSIENT_LOCAL);
-    // The history kept for robots that join later is this one, not the one above.
-    dds_qset_durability_service(qos, 0, DDS_HISTORY_KEEP_LAST, 1, DDS_LENGTH_UNLIMITED,
-                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
-  }
+  dds_qset_durability(qos, DDS_DURABILITY_TRANSIENT_LOCAL);
+  // The history kept for robots that join later is this one, not the one above.
+  dds_qset_durability_service(qos, 0, DDS_HISTORY_KEEP_LAST, 1, DDS_LENGTH_UNLIMITED,
+                              DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+  // A volatile request would be lost if it were the first to its addressee and overtook the
+  // discovery of its writer. A lifespan instead: DDS measures it from the arrival, so that the
+  // clocks of the robots need not agree.
+  if (kind == TopicKind::kRequest) dds_qset_lifespan(qos, nanoseconds_of(config.lease_s));
   return owner;
 }
 

@@ -8,7 +8,7 @@ namespace km {
 enum class TopicKind {
   kEvent,    ///< Every sample arrives, also at robots that join later. One key value per sample.
   kState,    ///< Reliable, newest sample of each key wins, also for robots that join later.
-  kRequest,  ///< Every sample reaches the robots present. One key value per sample.
+  kRequest,  ///< As kEvent, but forgotten after dds.lease_s. One key value per sample.
   kStatus,   ///< Newest wins, may be lost, and carries the liveliness of the robot.
 };
 

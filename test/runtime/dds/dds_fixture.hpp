@@ -103,6 +103,7 @@ class RawPingWriter {
 struct TestRobot {
   explicit TestRobot(std::shared_ptr<const DdsDomain> domain, RobotId id,
                      TopicKind ping_kind = TopicKind::kEvent,
+                     TopicKind addressed_kind = TopicKind::kRequest,
                      std::uint16_t protocol = kProtocolVersion)
       : participant(std::move(domain),
                     {id, "robot" + std::to_string(id), protocol, random_boot_id()}),
@@ -116,8 +117,8 @@ struct TestRobot {
     bridge.receive(status_in, TopicKind::kStatus, TrafficCategory::kOther);
     bridge.send(pings_out, ping_kind, TrafficCategory::kPlaceRecognition);
     bridge.receive(pings_in, ping_kind, TrafficCategory::kPlaceRecognition);
-    bridge.send(addressed_out, ping_kind, TrafficCategory::kGeometricVerification);
-    bridge.receive_addressed(addressed_in, ping_kind, TrafficCategory::kGeometricVerification);
+    bridge.send(addressed_out, addressed_kind, TrafficCategory::kGeometricVerification);
+    bridge.receive_addressed(addressed_in, addressed_kind, TrafficCategory::kGeometricVerification);
   }
   ~TestRobot() { stop(); }
 

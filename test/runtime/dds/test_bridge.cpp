@@ -55,7 +55,7 @@ TEST_CASE("The status of each robot reaches the others", "[dds]") {
   CHECK(status.phase == RobotPhase::kRunning);
 }
 
-TEST_CASE("A robot that joins late gets every event, the newest state, and no request", "[dds]") {
+TEST_CASE("A robot that joins late gets every event, request, and the newest state", "[dds]") {
   const auto kind = GENERATE(TopicKind::kEvent, TopicKind::kState, TopicKind::kRequest);
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, kind), witness(domain, 4, kind);
@@ -71,14 +71,25 @@ TEST_CASE("A robot that joins late gets every event, the newest state, and no re
   late.start();
   REQUIRE(a.hears(PeerEventKind::kJoined, 5));
   a.ping(2);
-  if (kind == TopicKind::kRequest) {
-    CHECK(indices(late.received.wait_for(1)) == std::vector<std::uint32_t>{2});
-  } else {
-    const auto pings = late.received.wait_for(3);
-    CHECK(indices(pings) == up_to(3));
-    for (const Ping& ping : pings)
-      if (ping.index < 2) CHECK(ping.payload == std::vector<std::uint8_t>{2});
-  }
+  const auto pings = late.received.wait_for(3);
+  CHECK(indices(pings) == up_to(3));
+  for (const Ping& ping : pings)
+    if (ping.index < 2) CHECK(ping.payload == std::vector<std::uint8_t>{2});
+}
+
+TEST_CASE("A request is forgotten once a robot that long silent would be", "[dds]") {
+  DdsConfig config = loopback_config();
+  config.lease_s = 3.0;  // the shortest accepted
+  const auto domain = std::make_shared<const DdsDomain>(config);
+  TestRobot a(domain, 3, TopicKind::kRequest);
+  a.start();
+  a.ping(0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(3100));  // the lifespan under test
+  TestRobot late(domain, 4, TopicKind::kRequest);
+  late.start();
+  REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+  a.ping(1);
+  CHECK(indices(late.received.wait_for(1)) == std::vector<std::uint32_t>{1});
 }
 
 TEST_CASE("What is sent again is dropped", "[dds]") {
@@ -118,7 +129,7 @@ TEST_CASE("Numbers that do not arrive are counted until they do", "[dds]") {
 TEST_CASE("An addressed message reaches its addressee, and nobody else gets a byte", "[dds]") {
   const auto kind = GENERATE(TopicKind::kRequest, TopicKind::kEvent);
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  TestRobot a(domain, 3, kind), b(domain, 4, kind), c(domain, 5, kind);
+  TestRobot a(domain, 3, kind, kind), b(domain, 4, kind, kind), c(domain, 5, kind, kind);
   for (TestRobot* robot : {&a, &b, &c}) robot->start();
   REQUIRE(a.hears(PeerEventKind::kJoined, 4));
   REQUIRE(a.hears(PeerEventKind::kJoined, 5));
@@ -221,7 +232,8 @@ TEST_CASE("Programs without an identity, or with a broken one, are not heard", "
 
 TEST_CASE("Robots of another protocol version are refused and not heard", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  TestRobot a(domain, 3), newer(domain, 4, TopicKind::kEvent, kProtocolVersion + 1);
+  TestRobot a(domain, 3),
+      newer(domain, 4, TopicKind::kEvent, TopicKind::kRequest, kProtocolVersion + 1);
   a.start();
   newer.start();
   CHECK(a.hears(PeerEventKind::kRefused, 4));
