@@ -1,5 +1,6 @@
 #include "modules/loop_closure/loop_closure_codec.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -15,6 +16,7 @@ constexpr float kMaxBearing = 100.0F;     // 89.4 degrees off the optical axis
 constexpr float kMaxInverseDepth = 1e4F;  // [1/m]: 0.1 mm before the lens
 constexpr double kMaxBaseline_m = 1e3;
 constexpr double kMaxFocal_px = 1e6;
+constexpr std::uint8_t kMaxOctave = 31;
 constexpr std::uint32_t kMaxInliers = 1U << 20U;
 constexpr float kMaxSimilarity = 1e6F;
 
@@ -73,6 +75,10 @@ const char* refusal(const km_wire_KeyframeReply& wire) {
     return "depths out of range";
   if (!in_range(wire.focal_px, kMaxFocal_px)) return "focal length out of range";
   if (!in_range(wire.baseline_m, kMaxBaseline_m)) return "baseline out of range";
+  if (wire.keypoints._length != 0 && !(wire.focal_px > 0.0F && wire.baseline_m > 0.0F))
+    return "keypoints without focal length or baseline";
+  for (std::uint32_t i = 0; i < wire.keypoints._length; ++i)
+    if (wire.keypoints._buffer[i].octave > kMaxOctave) return "octave out of range";
   return nullptr;
 }
 
@@ -182,6 +188,8 @@ Decoded<Closure> Codec<Closure>::decode(const Wire& wire) {
   const auto T_from_to = from_wire(wire.T_from_to);
   const auto covariance = from_wire(wire.covariance);
   if (!T_from_to || !covariance) return Result::refuse("it is not a pose with a covariance");
+  // Who weighs the closure inverts it.
+  if (covariance->llt().info() != Eigen::Success) return Result::refuse("a singular covariance");
   if (wire.inliers > kMaxInliers) return Result::refuse("too many inliers");
   if (!in_range(wire.similarity, kMaxSimilarity)) return Result::refuse("similarity out of range");
   return Result::accept({.from = *from,

@@ -1,0 +1,262 @@
+#include "modules/loop_closure/epipolar_matcher.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+#include <string>
+
+namespace km {
+namespace {
+
+// The patch of the search: 16 columns, one vector register of bytes, from -8 to +7.
+constexpr int kSearchLeft = 8;
+constexpr int kSearchColumns = 16;
+constexpr int kSearchHalfRows = 5;
+
+// The patch of the refinement: square, symmetric.
+constexpr int kHalf = 5;
+constexpr int kPatchSize = (2 * kHalf + 1) * (2 * kHalf + 1);
+
+// The best match must beat every other one that is not its neighbour by this factor.
+constexpr double kUniqueness = 1.15;
+constexpr int kNeighbour = 2;               // [px]
+constexpr int kMaxLeftRightDifference = 1;  // [px]
+constexpr double kMaxRefinement_px = 1.5;   // in disparity
+constexpr double kMaxRowOffset_px = 1.5;    // what calibration leaves of the epipolar constraint
+
+cv::Mat view(const GrayImage& image) {
+  // OpenCV has no read-only view; nothing here writes through it.
+  return {image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.pixels.data())};
+}
+
+// Axes of the rectified frame, in the left camera: x along the baseline, z midway between the
+// optical axes, as far as x leaves it free.
+Eigen::Matrix3d rectifying_rotation(const StereoRig& rig) {
+  const SE3 T_left_right = rig.T_left_right();
+  const Eigen::Vector3d x = T_left_right.translation().normalized();
+  const Eigen::Vector3d z_right = T_left_right.linear().col(2);
+  const Eigen::Vector3d z_mean = (Eigen::Vector3d::UnitZ() + z_right).normalized();
+  if (!(z_right.z() > 0.87) || !(x.x() > 0.87))
+    throw std::invalid_argument(
+        "EpipolarMatcher: the right camera must look the way of the left one and stand to its "
+        "right");
+  const Eigen::Vector3d y = z_mean.cross(x).normalized();
+  Eigen::Matrix3d R_rect_left;
+  R_rect_left << x.transpose(), y.transpose(), x.cross(y).transpose();
+  return R_rect_left;
+}
+
+// Local mean removed: what is left does not depend on exposure.
+cv::Mat flattened(const cv::Mat& image) {
+  cv::Mat mean, difference;
+  cv::blur(image, mean, {21, 21});
+  cv::subtract(image, mean, difference, cv::noArray(), CV_16S);
+  cv::Mat flat;
+  difference.convertTo(flat, CV_8U, 1.0, 128.0);
+  return flat;
+}
+
+unsigned patch_difference(const std::uint8_t* a, const std::uint8_t* b, std::size_t step) {
+  unsigned sum = 0;
+  for (int row = 0; row <= 2 * kSearchHalfRows; ++row, a += step, b += step)
+    for (int c = 0; c < kSearchColumns; ++c)
+      sum += static_cast<unsigned>(std::abs(int{a[c]} - int{b[c]}));
+  return sum;
+}
+
+// Minimum over shifts [first, last] of `target` against a fixed patch, if it is unique.
+struct Search {
+  int first, last, direction;  // column in target: column - direction * shift
+};
+
+std::optional<int> best_shift(const cv::Mat& reference, const cv::Mat& target, cv::Point at,
+                              const Search& search) {
+  constexpr int kMaxShifts = 1024;
+  std::array<unsigned, kMaxShifts> cost;
+  const int count = std::min(search.last - search.first + 1, kMaxShifts);
+  if (count <= 0) return std::nullopt;
+  const std::uint8_t* a = reference.ptr(at.y - kSearchHalfRows) + at.x - kSearchLeft;
+  const std::uint8_t* b = target.ptr(at.y - kSearchHalfRows) + at.x - kSearchLeft;
+  for (int i = 0; i < count; ++i)
+    cost[static_cast<std::size_t>(i)] =
+        patch_difference(a, b - search.direction * (search.first + i), reference.step);
+  const auto* best = std::min_element(cost.begin(), cost.begin() + count);
+  const int index = static_cast<int>(best - cost.begin());
+  for (int i = 0; i < count; ++i)
+    if (std::abs(i - index) > kNeighbour && cost[static_cast<std::size_t>(i)] < kUniqueness * *best)
+      return std::nullopt;
+  return search.first + index;
+}
+
+// A patch of zero mean and unit norm with its gradients.
+struct NormalisedPatch {
+  Eigen::Array<float, kPatchSize, 1> value, dx, dy;
+  bool textured = false;
+};
+
+NormalisedPatch sample(const cv::Mat& image, const Eigen::Vector2d& centre) {
+  NormalisedPatch patch;
+  const int x0 = static_cast<int>(std::floor(centre.x()));
+  const int y0 = static_cast<int>(std::floor(centre.y()));
+  const auto ax = static_cast<float>(centre.x() - x0);
+  const auto ay = static_cast<float>(centre.y() - y0);
+  const auto step = static_cast<std::ptrdiff_t>(image.step);
+  const auto mix = [&](const std::uint8_t* p) {
+    const float top = static_cast<float>(p[0]) * (1.0F - ax) + static_cast<float>(p[1]) * ax;
+    const float low =
+        static_cast<float>(p[step]) * (1.0F - ax) + static_cast<float>(p[step + 1]) * ax;
+    return top * (1.0F - ay) + low * ay;
+  };
+  Eigen::Index k = 0;
+  for (int r = -kHalf; r <= kHalf; ++r) {
+    const std::uint8_t* row = image.ptr(y0 + r) + x0;
+    for (int c = -kHalf; c <= kHalf; ++c, ++k) {
+      const std::uint8_t* p = row + c;
+      patch.value[k] = mix(p);
+      patch.dx[k] = 0.5F * (mix(p + 1) - mix(p - 1));
+      patch.dy[k] = 0.5F * (mix(p + step) - mix(p - step));
+    }
+  }
+  patch.value -= patch.value.mean();
+  const float norm = patch.value.matrix().norm();
+  constexpr float kLeastNorm = 2.0F * (2 * kHalf + 1);  // 2 grey levels per pixel
+  patch.textured = norm > kLeastNorm;
+  patch.value /= norm;
+  patch.dx = (patch.dx - patch.dx.mean()) / norm;
+  patch.dy = (patch.dy - patch.dy.mean()) / norm;
+  return patch;
+}
+
+bool inside(const cv::Mat& image, const Eigen::Vector2d& centre) {
+  constexpr double kMargin = kHalf + 2;
+  return centre.x() >= kMargin && centre.y() >= kMargin && centre.x() < image.cols - kMargin - 1 &&
+         centre.y() < image.rows - kMargin - 1;
+}
+
+struct Refined {
+  Eigen::Vector2d position;
+  double correlation = 0.0;
+};
+
+// Gauss-Newton on the normalised patches, in both directions of the image.
+std::optional<Refined> refine(const NormalisedPatch& reference, const cv::Mat& target,
+                              Eigen::Vector2d position) {
+  constexpr int kSteps = 6;
+  constexpr double kConverged_px = 0.01;
+  for (int i = 0;; ++i) {
+    if (!inside(target, position)) return std::nullopt;
+    const NormalisedPatch patch = sample(target, position);
+    if (!patch.textured) return std::nullopt;
+    const Eigen::Array<float, kPatchSize, 1> error = reference.value - patch.value;
+    Eigen::Matrix2f H;
+    H << patch.dx.square().sum(), (patch.dx * patch.dy).sum(), (patch.dx * patch.dy).sum(),
+        patch.dy.square().sum();
+    const Eigen::Vector2f g((patch.dx * error).sum(), (patch.dy * error).sum());
+    H.diagonal().array() += 1e-6F;  // an edge along the row: stay where the search put it
+    const Eigen::Vector2d delta = H.ldlt().solve(g).cast<double>();
+    if (delta.norm() < kConverged_px || i == kSteps)
+      return Refined{position, (reference.value * patch.value).sum()};
+    position += delta.cwiseMax(-1.0).cwiseMin(1.0);
+  }
+}
+
+}  // namespace
+
+EpipolarMatcher::EpipolarMatcher(const StereoRig& rig, const KeyframeFeaturesConfig& config)
+    : config_(checked(config)),
+      focal_px_(0.5 * (rig.cameras[0].fx + rig.cameras[0].fy)),
+      baseline_m_(rig.baseline_m()),
+      R_rect_left_(rectifying_rotation(rig)),
+      size_(rig.cameras[0].width, rig.cameras[0].height) {
+  const auto& [left, right] = rig.cameras;
+  if (left.width != right.width || left.height != right.height || size_.empty())
+    throw std::invalid_argument("EpipolarMatcher: the cameras must be of equal, positive size");
+  const Eigen::Vector3d axis = R_rect_left_ * Eigen::Vector3d::UnitZ();
+  centre_ = Eigen::Vector2d(left.cx, left.cy) - focal_px_ * axis.hnormalized();
+
+  const Eigen::Matrix3d R_left_right = rig.T_left_right().linear();
+  const Eigen::Matrix3d R_cam_rect[2] = {R_rect_left_.transpose(),
+                                         R_left_right.transpose() * R_rect_left_.transpose()};
+  for (std::size_t c = 0; c < 2; ++c) {
+    cv::Mat xy(size_, CV_32FC2);
+    for (int y = 0; y < size_.height; ++y)
+      for (int x = 0; x < size_.width; ++x) {
+        const Eigen::Vector2d rectified = (Eigen::Vector2d(x, y) - centre_) / focal_px_;
+        const Eigen::Vector3d ray = R_cam_rect[c] * rectified.homogeneous();
+        const Eigen::Vector2d raw = rig.cameras[c].project(ray.hnormalized());
+        xy.at<cv::Vec2f>(y, x) = {static_cast<float>(raw.x()), static_cast<float>(raw.y())};
+      }
+    cv::convertMaps(xy, cv::noArray(), map_[c], map_fraction_[c], CV_16SC2);
+  }
+}
+
+EpipolarMatcher::Rectified EpipolarMatcher::rectify(const StereoFrame& frame) const {
+  Rectified images;
+  const GrayImage* raw[2] = {&frame.left, &frame.right};
+  cv::Mat* rectified[2] = {&images.left, &images.right};
+  for (int c = 0; c < 2; ++c) {
+    const std::size_t pixels = static_cast<std::size_t>(size_.area());
+    if (raw[c]->width != size_.width || raw[c]->height != size_.height ||
+        raw[c]->pixels.size() != pixels)
+      throw std::invalid_argument("EpipolarMatcher: image of " + std::to_string(raw[c]->width) +
+                                  'x' + std::to_string(raw[c]->height) + ", expected " +
+                                  std::to_string(size_.width) + 'x' + std::to_string(size_.height));
+    cv::remap(view(*raw[c]), *rectified[c], map_[c], map_fraction_[c], cv::INTER_LINEAR);
+  }
+  images.left_flat = flattened(images.left);
+  images.right_flat = flattened(images.right);
+  return images;
+}
+
+float EpipolarMatcher::disparity(const Rectified& images, const Eigen::Vector2d& pixel) const {
+  const cv::Point at(static_cast<int>(std::lround(pixel.x())),
+                     static_cast<int>(std::lround(pixel.y())));
+  if (!inside(images.left, pixel) || at.x < kSearchLeft || at.x + kSearchColumns > size_.width)
+    return 0.0F;
+  const double fb = focal_px_ * baseline_m_;
+  const Search leftwards{
+      static_cast<int>(fb / config_.max_depth_m),
+      std::min(static_cast<int>(fb / config_.min_depth_m) + 1, at.x - kSearchLeft), 1};
+  const std::optional<int> shift = best_shift(images.left_flat, images.right_flat, at, leftwards);
+  if (!shift) return 0.0F;
+  const cv::Point in_right(at.x - *shift, at.y);
+  const Search rightwards{leftwards.first,
+                          std::min(static_cast<int>(fb / config_.min_depth_m) + 1,
+                                   size_.width - kSearchLeft - in_right.x),
+                          -1};
+  const std::optional<int> back =
+      best_shift(images.right_flat, images.left_flat, in_right, rightwards);
+  if (!back || std::abs(*back - *shift) > kMaxLeftRightDifference) return 0.0F;
+
+  const NormalisedPatch reference = sample(images.left, pixel);
+  if (!reference.textured) return 0.0F;
+  const Eigen::Vector2d start(pixel.x() - *shift, pixel.y());
+  const std::optional<Refined> refined = refine(reference, images.right, start);
+  if (!refined || refined->correlation < config_.min_stereo_correlation) return 0.0F;
+  const Eigen::Vector2d moved = refined->position - start;
+  if (std::abs(moved.x()) > kMaxRefinement_px || std::abs(moved.y()) > kMaxRowOffset_px)
+    return 0.0F;
+  return static_cast<float>(pixel.x() - refined->position.x());
+}
+
+std::vector<float> EpipolarMatcher::inverse_depths(
+    const StereoFrame& frame, std::span<const Eigen::Vector2f> bearings) const {
+  const Rectified images = rectify(frame);
+  const double fb = focal_px_ * baseline_m_;
+  std::vector<float> result(bearings.size(), 0.0F);
+  for (std::size_t i = 0; i < bearings.size(); ++i) {
+    const Eigen::Vector3d ray = R_rect_left_ * bearings[i].cast<double>().homogeneous();
+    const float d = disparity(images, focal_px_ * ray.hnormalized() + centre_);
+    // Depth along the rectified axis is f * baseline / d; the ray scales it to the left camera's.
+    const double inverse_depth = d * ray.z() / fb;
+    if (inverse_depth >= 1.0 / config_.max_depth_m && inverse_depth <= 1.0 / config_.min_depth_m)
+      result[i] = static_cast<float>(inverse_depth);
+  }
+  return result;
+}
+
+}  // namespace km

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <span>
+#include <vector>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/frame.hpp"
+#include "modules/loop_closure/keyframe_features_config.hpp"
+
+namespace km {
+
+/// Depth of single points of the left image, from the right one.
+///
+/// Both images are resampled so that epipolar lines become rows and equal focal lengths make the
+/// disparity f * baseline / z. A patch is searched along its row by the sum of absolute
+/// differences, the minimum checked from right to left and against the second best, and refined to
+/// a fraction of a pixel by Lucas-Kanade steps in disparity, row, gain and offset. Const members
+/// are safe to call from several threads.
+class EpipolarMatcher {
+ public:
+  /// Throws ConfigError if `config` is out of bounds, std::invalid_argument if the cameras are not
+  /// of equal size, or look too far apart (more than 30 degrees) or along the baseline to be
+  /// rectified.
+  EpipolarMatcher(const StereoRig& rig, const KeyframeFeaturesConfig& config);
+
+  /// Inverse depth [1/m] along the optical axis of the left camera for each bearing of the left
+  /// camera (undistorted, z = 1); 0 where there is none. Throws std::invalid_argument if an image
+  /// is not of the camera's size.
+  [[nodiscard]] std::vector<float> inverse_depths(const StereoFrame& frame,
+                                                  std::span<const Eigen::Vector2f> bearings) const;
+
+  /// Focal length of the rectified images [px]: that of the left camera.
+  [[nodiscard]] double focal_px() const { return focal_px_; }
+
+ private:
+  struct Rectified {
+    cv::Mat left, right;            // resampled
+    cv::Mat left_flat, right_flat;  // without their local mean: brightness drops out
+  };
+
+  [[nodiscard]] Rectified rectify(const StereoFrame& frame) const;
+  [[nodiscard]] float disparity(const Rectified& images, const Eigen::Vector2d& pixel) const;
+
+  KeyframeFeaturesConfig config_;
+  double focal_px_ = 0.0, baseline_m_ = 0.0;
+  Eigen::Vector2d centre_;       // principal point of both rectified images
+  Eigen::Matrix3d R_rect_left_;  // left camera to rectified
+  cv::Size size_;
+  cv::Mat map_[2], map_fraction_[2];  // rectified pixel to raw pixel, fixed point
+};
+
+}  // namespace km

@@ -1,0 +1,127 @@
+#include "modules/loop_closure/keyframe_features.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <opencv2/features2d.hpp>
+#include <optional>
+#include <stdexcept>
+
+namespace km {
+namespace {
+
+constexpr float kScale = 1.2F;
+constexpr int kLevels = 8;
+constexpr int kEdge = 31;
+
+// Corners to choose from, per corner kept: more give a more even cover and cost time.
+constexpr int kCandidatesPerKeypoint = 4;
+
+cv::Mat view(const GrayImage& image) {
+  // OpenCV has no read-only view; nothing here writes through it.
+  return {image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.pixels.data())};
+}
+
+// Strongest first; ties by position, so that the order does not depend on the detector's.
+void sort_by_response(std::vector<cv::KeyPoint>& corners) {
+  std::sort(corners.begin(), corners.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
+    if (a.response != b.response) return a.response > b.response;
+    if (a.pt.y != b.pt.y) return a.pt.y < b.pt.y;
+    return a.pt.x < b.pt.x;
+  });
+}
+
+// Of corners sorted by response, those with no stronger one of the same octave closer than
+// `radius` (grown with the octave); cells of half the radius make the test cheap.
+std::vector<cv::KeyPoint> suppressed(const std::vector<cv::KeyPoint>& corners, double radius,
+                                     cv::Size size) {
+  std::vector<cv::KeyPoint> kept;
+  std::vector<std::vector<std::uint8_t>> covered(kLevels);
+  for (const cv::KeyPoint& corner : corners) {
+    const double cell = 0.5 * radius * std::pow(kScale, corner.octave);
+    const int columns = static_cast<int>(size.width / cell) + 1;
+    const int rows = static_cast<int>(size.height / cell) + 1;
+    auto& cells = covered[static_cast<std::size_t>(corner.octave)];
+    cells.resize(static_cast<std::size_t>(columns * rows), 0);
+    const int cx = static_cast<int>(corner.pt.x / cell);
+    const int cy = static_cast<int>(corner.pt.y / cell);
+    if (cells[static_cast<std::size_t>(cy * columns + cx)] != 0) continue;
+    kept.push_back(corner);
+    for (int y = std::max(cy - 2, 0); y <= std::min(cy + 2, rows - 1); ++y)
+      for (int x = std::max(cx - 2, 0); x <= std::min(cx + 2, columns - 1); ++x)
+        cells[static_cast<std::size_t>(y * columns + x)] = 1;
+  }
+  return kept;
+}
+
+// At most `count` corners, as evenly spread as their number allows: the smallest radius that
+// leaves no more than `count` (Bailo et al., "Efficient adaptive non-maximal suppression
+// algorithms for homogeneous spatial keypoint distribution", 2018, with a bisection).
+std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> corners, std::size_t count,
+                                 cv::Size size) {
+  sort_by_response(corners);
+  if (corners.size() <= count) return corners;
+  double low = 1.0;
+  double high = 0.25 * std::hypot(size.width, size.height);
+  std::vector<cv::KeyPoint> best = suppressed(corners, high, size);
+  for (int i = 0; i < 10; ++i) {
+    const double radius = 0.5 * (low + high);
+    std::vector<cv::KeyPoint> kept = suppressed(corners, radius, size);
+    if (kept.size() > count) {
+      low = radius;
+    } else {
+      high = radius;
+      best = std::move(kept);
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+KeyframeFeatureExtractor::KeyframeFeatureExtractor(const StereoRig& rig,
+                                                   const KeyframeFeaturesConfig& config)
+    : config_(checked(config)), rig_(rig), stereo_(rig, config) {}
+
+KeyframeFeatures KeyframeFeatureExtractor::without_images() const {
+  KeyframeFeatures features;
+  features.T_body_cam = rig_.cameras[0].T_body_cam;
+  features.focal_px = stereo_.focal_px();
+  features.baseline_m = rig_.baseline_m();
+  return features;
+}
+
+KeyframeFeatures KeyframeFeatureExtractor::extract(const StereoFrame& frame) const {
+  const PinholeCamera& camera = rig_.cameras[0];
+  if (frame.left.width != camera.width || frame.left.height != camera.height)
+    throw std::invalid_argument("KeyframeFeatureExtractor: left image of another size");
+  const cv::Mat image = view(frame.left);
+  const auto orb = cv::ORB::create(kCandidatesPerKeypoint * config_.max_keypoints, kScale, kLevels,
+                                   kEdge, 0, 2, cv::ORB::HARRIS_SCORE, 31, config_.min_contrast);
+  std::vector<cv::KeyPoint> corners;
+  orb->detect(image, corners);
+  corners =
+      spread(std::move(corners), static_cast<std::size_t>(config_.max_keypoints), image.size());
+  cv::Mat descriptors;
+  orb->compute(image, corners, descriptors);  // drops what is too near the border
+
+  KeyframeFeatures features = without_images();
+  std::vector<Eigen::Vector2f> bearings;
+  for (int i = 0; i < descriptors.rows; ++i) {
+    const cv::KeyPoint& corner = corners[static_cast<std::size_t>(i)];
+    const std::optional<Eigen::Vector2d> bearing = camera.unproject({corner.pt.x, corner.pt.y});
+    if (!bearing) continue;
+    bearings.push_back(bearing->cast<float>());
+    features.keypoints.push_back({.bearing = bearings.back(),
+                                  .inverse_depth = 0.0F,
+                                  .octave = static_cast<std::uint8_t>(corner.octave)});
+    std::memcpy(features.descriptors.emplace_back().data(), descriptors.ptr(i),
+                sizeof(OrbDescriptor));
+  }
+  const std::vector<float> inverse_depths = stereo_.inverse_depths(frame, bearings);
+  for (std::size_t i = 0; i < inverse_depths.size(); ++i)
+    features.keypoints[i].inverse_depth = inverse_depths[i];
+  return features;
+}
+
+}  // namespace km

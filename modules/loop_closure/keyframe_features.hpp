@@ -1,0 +1,33 @@
+#pragma once
+
+#include "modules/core/camera.hpp"
+#include "modules/core/frame.hpp"
+#include "modules/core/keyframe.hpp"
+#include "modules/loop_closure/epipolar_matcher.hpp"
+#include "modules/loop_closure/keyframe_features_config.hpp"
+
+namespace km {
+
+/// Makes of a stereo pair what place recognition and verification work on: ORB keypoints of the
+/// left image, evenly spread, with depth where stereo gives one (Rublee et al., "ORB: an efficient
+/// alternative to SIFT or SURF", ICCV 2011). Const members are safe to call from several threads.
+class KeyframeFeatureExtractor {
+ public:
+  /// Throws ConfigError if `config` is out of bounds, std::invalid_argument if the rig cannot be
+  /// rectified.
+  KeyframeFeatureExtractor(const StereoRig& rig, const KeyframeFeaturesConfig& config);
+
+  /// Features of `frame`, at most max_keypoints. An image without corners gives none. Throws
+  /// std::invalid_argument if an image is not of its camera's size.
+  [[nodiscard]] KeyframeFeatures extract(const StereoFrame& frame) const;
+
+  /// The rig's numbers without any keypoint: for a keyframe that has no images.
+  [[nodiscard]] KeyframeFeatures without_images() const;
+
+ private:
+  KeyframeFeaturesConfig config_;
+  StereoRig rig_;
+  EpipolarMatcher stereo_;
+};
+
+}  // namespace km

@@ -1,0 +1,195 @@
+#include "modules/loop_closure/loop_closure_node.hpp"
+
+#include <chrono>
+#include <stdexcept>
+#include <utility>
+
+#include "runtime/clock.hpp"
+#include "runtime/log.hpp"
+
+namespace km {
+namespace {
+
+// Robots that meet again after a while produce candidates in bursts.
+constexpr std::size_t kQueueCapacity = 16384;
+constexpr std::chrono::milliseconds kTickPeriod(100);
+
+}  // namespace
+
+LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
+                                 const LoopClosureTopics& topics)
+    : self_(self),
+      topics_(topics),
+      verifier_(config),
+      peers_(static_cast<std::size_t>(config.cached_keyframes)),
+      requests_(config.request_timeout_s, config.max_outstanding_requests),
+      worker_(
+          kQueueCapacity, Overflow::kBlock,
+          [this](const Input& input) {
+            std::visit([this](const auto& message) { step(message); }, input);
+          },
+          "loop_closure"),
+      periodic_(kTickPeriod, [this] { worker_.post(LoopClosureTick{steady_now_s()}); }) {
+  const auto queue = [this](const auto& message) { worker_.post(message); };
+  topics_.keyframes.subscribe(queue);
+  topics_.candidates.subscribe(queue);
+  topics_.measured_closures.subscribe(queue);
+  topics_.peer_requests.subscribe(queue);
+  topics_.peer_replies.subscribe(queue);
+  topics_.peer_events.subscribe(queue);
+}
+
+void LoopClosureNode::start() {
+  worker_.start();
+  periodic_.start();
+}
+
+void LoopClosureNode::stop() noexcept {
+  periodic_.stop();
+  worker_.stop();
+}
+
+std::exception_ptr LoopClosureNode::error() const {
+  const std::exception_ptr failure = worker_.error();
+  return failure ? failure : periodic_.error();
+}
+
+void LoopClosureNode::step(const std::shared_ptr<const Keyframe>& own_keyframe) {
+  own_[own_keyframe->odometry.id] = own_keyframe;
+  arrived(own_keyframe);
+}
+
+void LoopClosureNode::step(const std::shared_ptr<const LoopCandidate>& candidate) {
+  accept({{candidate->match, candidate->query}, candidate->similarity, std::nullopt, false});
+}
+
+void LoopClosureNode::step(const std::shared_ptr<const RelativePose>& measured_closure) {
+  accept({{measured_closure->from, measured_closure->to}, 0.0, *measured_closure, false});
+}
+
+void LoopClosureNode::step(const std::shared_ptr<const KeyframeRequest>& request) {
+  if (request->requester == self_ || request->keyframe.robot != self_) {
+    log::limited(log::Level::kWarn, name(), "misdirected " + std::to_string(request->requester))
+        << "robot " << request->requester << " asks here for keyframe "
+        << to_string(request->keyframe);
+    return;
+  }
+  KeyframeReply reply{.number = request->number, .found = false, .keyframe = {}};
+  reply.keyframe.odometry.id = request->keyframe;
+  if (const auto own = own_.find(request->keyframe); own != own_.end()) {
+    reply.found = true;
+    reply.keyframe = *own->second;
+  }
+  topics_.own_replies.publish(Addressed<KeyframeReply>{
+      request->requester, std::make_shared<const KeyframeReply>(std::move(reply))});
+}
+
+void LoopClosureNode::step(const std::shared_ptr<const KeyframeReply>& reply) {
+  const KeyframeId& id = reply->keyframe.odometry.id;
+  if (!reply->found) return requests_.absent(id, now_s_);
+  // Also the answer to a repeated request, or one nobody asked for.
+  if (!requests_.arrived(id)) return;
+  const KeyframePtr keyframe(reply, &reply->keyframe);
+  peers_.put(keyframe);
+  arrived(keyframe);
+  send_due_requests();
+}
+
+void LoopClosureNode::step(const std::shared_ptr<const PeerEvent>& event) {
+  if (event->kind != PeerEventKind::kReturned && event->kind != PeerEventKind::kJoined &&
+      event->kind != PeerEventKind::kRestarted)
+    return;
+  requests_.returned(event->identity.robot);
+  send_due_requests();
+}
+
+void LoopClosureNode::step(const LoopClosureTick& tick) {
+  now_s_ = tick.now_s;
+  send_due_requests();
+}
+
+void LoopClosureNode::accept(Work work) {
+  const auto& [from, to] = work.id;
+  if (from == to || from.robot != self_) {
+    log::limited(log::Level::kWarn, name(), "foreign closure")
+        << "no closure from a keyframe of this robot: " << to_string(from) << " - "
+        << to_string(to);
+    return;
+  }
+  // Of two own keyframes place recognition may see either first.
+  if (!work.measured && known_.contains({to, from})) return;
+  if (!known_.insert(work.id).second) return;
+  report(work, ClosureStage::kCandidate);
+  advance(work);
+  send_due_requests();
+}
+
+LoopClosureNode::KeyframePtr LoopClosureNode::find(const KeyframeId& id) {
+  if (id.robot != self_) return peers_.get(id);
+  const auto own = own_.find(id);
+  return own == own_.end() ? nullptr : own->second;
+}
+
+// Goes on with what is there; waits for what is not, a peer's keyframe by asking for it.
+void LoopClosureNode::advance(const Work& work) {
+  const KeyframePtr from = find(work.id.from);
+  const KeyframePtr to = find(work.id.to);
+  if (from && to) return complete(work, *from, *to);
+  // The own one first: without it the other would only fill the cache.
+  const KeyframeId& missing = from ? work.id.to : work.id.from;
+  waiting_[missing].push_back(work);
+  if (missing.robot != self_) requests_.want(missing);
+}
+
+void LoopClosureNode::arrived(const KeyframePtr& keyframe) {
+  const auto found = waiting_.find(keyframe->odometry.id);
+  if (found == waiting_.end()) return;
+  const std::vector<Work> works = std::move(found->second);
+  waiting_.erase(found);
+  for (const Work& work : works) advance(work);
+}
+
+void LoopClosureNode::complete(const Work& work, const Keyframe& from, const Keyframe& to) {
+  Closure closure{.from = from.odometry,
+                  .to = to.odometry,
+                  .T_from_to = SE3::Identity(),
+                  .covariance = Matrix6::Identity(),
+                  .inliers = 0,
+                  .similarity = work.similarity};
+  Verification numbers;
+  if (work.measured) {
+    closure.T_from_to = work.measured->T_from_to;
+    closure.covariance = work.measured->covariance;
+  } else {
+    numbers = verifier_.verify(from.features, to.features);
+    if (numbers.status != VerificationStatus::kAccepted)
+      return report(work, ClosureStage::kReceived, to_string(numbers.status), numbers);
+    closure.T_from_to = numbers.T_from_to;
+    closure.covariance = numbers.covariance;
+    closure.inliers = numbers.inliers;
+  }
+  report(work, ClosureStage::kVerified, {}, numbers);
+  topics_.own_closures.publish(std::move(closure));
+}
+
+void LoopClosureNode::report(const Work& work, ClosureStage stage, std::string reason,
+                             const Verification& numbers) const {
+  topics_.outcomes.publish(ClosureOutcome{.id = work.id,
+                                          .similarity = work.similarity,
+                                          .stage = stage,
+                                          .reason = std::move(reason),
+                                          .matches = numbers.matches,
+                                          .inliers = numbers.inliers});
+}
+
+void LoopClosureNode::send_due_requests() {
+  for (const KeyframeId& keyframe : requests_.due(now_s_)) {
+    auto request = std::make_shared<const KeyframeRequest>(
+        KeyframeRequest{.requester = self_, .number = next_request_++, .keyframe = keyframe});
+    topics_.own_requests.publish(Addressed<KeyframeRequest>{keyframe.robot, std::move(request)});
+    for (Work& work : waiting_.at(keyframe))
+      if (!std::exchange(work.requested, true)) report(work, ClosureStage::kRequested);
+  }
+}
+
+}  // namespace km

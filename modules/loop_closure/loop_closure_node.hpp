@@ -1,0 +1,113 @@
+#pragma once
+
+#include <cstdint>
+#include <exception>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "modules/core/keyframe.hpp"
+#include "modules/core/pose_graph.hpp"
+#include "modules/loop_closure/keyframe_cache.hpp"
+#include "modules/loop_closure/keyframe_exchange.hpp"
+#include "modules/loop_closure/keyframe_requests.hpp"
+#include "modules/loop_closure/verifier.hpp"
+#include "runtime/dds/bridge.hpp"
+#include "runtime/node.hpp"
+#include "runtime/periodic.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+
+/// Channels of the loop closure node; they must outlive it.
+struct LoopClosureTopics {
+  Topic<Keyframe>& keyframes;              ///< In: own.
+  Topic<LoopCandidate>& candidates;        ///< In: pairs that look like the same place.
+  Topic<RelativePose>& measured_closures;  ///< In: known ones, from own keyframes.
+  Topic<KeyframeRequest>& peer_requests;   ///< In: for own keyframes.
+  Topic<KeyframeReply>& peer_replies;      ///< In: to this robot's requests.
+  Topic<PeerEvent>& peer_events;           ///< In: who comes and goes.
+  const Topic<Addressed<KeyframeRequest>>& own_requests;
+  const Topic<Addressed<KeyframeReply>>& own_replies;
+  const Topic<Closure>& own_closures;     ///< Out: verified.
+  const Topic<ClosureOutcome>& outcomes;  ///< Out: whenever a candidate gets further or stops.
+};
+
+/// Time passes: requests that are due are sent.
+struct LoopClosureTick {
+  double now_s = 0.0;  ///< From any origin, not decreasing.
+};
+
+/// Turns candidates into verified closures (Tian et al., "Kimera-Multi", Sec. III-A): gets the
+/// keyframes of peers from their owners, verifies, and publishes. A candidate is never given up for
+/// want of an answer. Measured closures go the same way, but need only the odometry of the other
+/// end. Serves the peers' requests for own keyframes.
+///
+/// A closure starts at an own keyframe: `from` is the candidate's match, `to` its query. Each pair
+/// is verified once here; its other robot may find and verify it as well, with the ends exchanged.
+class LoopClosureNode final : public Node {
+ public:
+  /// Throws ConfigError if `config` is out of bounds.
+  LoopClosureNode(const LoopClosureConfig& config, RobotId self, const LoopClosureTopics& topics);
+
+  std::string_view name() const override { return "loop_closure"; }
+  void start() override;
+  void stop() noexcept override;
+  std::exception_ptr error() const override;
+  DurationHistogram timing() const override { return worker_.timing(); }
+
+  /// Handle one input synchronously. The thread calls only these; so can tests and replay.
+  void step(const std::shared_ptr<const Keyframe>& own_keyframe);
+  void step(const std::shared_ptr<const LoopCandidate>& candidate);
+  void step(const std::shared_ptr<const RelativePose>& measured_closure);
+  void step(const std::shared_ptr<const KeyframeRequest>& request);
+  void step(const std::shared_ptr<const KeyframeReply>& reply);
+  void step(const std::shared_ptr<const PeerEvent>& event);
+  void step(const LoopClosureTick& tick);
+
+ private:
+  using Input =
+      std::variant<std::shared_ptr<const Keyframe>, std::shared_ptr<const LoopCandidate>,
+                   std::shared_ptr<const RelativePose>, std::shared_ptr<const KeyframeRequest>,
+                   std::shared_ptr<const KeyframeReply>, std::shared_ptr<const PeerEvent>,
+                   LoopClosureTick>;
+  using KeyframePtr = std::shared_ptr<const Keyframe>;
+
+  /// A candidate, or a measured closure, on its way.
+  struct Work {
+    ClosureId id;
+    double similarity = 0.0;
+    std::optional<RelativePose> measured;  ///< Empty: to be verified.
+    bool requested = false;                ///< The other end has been asked for.
+  };
+
+  void accept(Work work);
+  void advance(const Work& work);
+  void arrived(const KeyframePtr& keyframe);
+  KeyframePtr find(const KeyframeId& id);
+  void complete(const Work& work, const Keyframe& from, const Keyframe& to);
+  void report(const Work& work, ClosureStage stage, std::string reason = {},
+              const Verification& numbers = {}) const;
+  void send_due_requests();
+
+  const RobotId self_;
+  const LoopClosureTopics topics_;
+  const Verifier verifier_;
+  std::map<KeyframeId, KeyframePtr> own_;
+  KeyframeCache peers_;
+  KeyframeRequests requests_;
+  std::map<KeyframeId, std::vector<Work>> waiting_;  // for this keyframe
+  std::set<ClosureId> known_;                        // candidates and measured closures seen
+  double now_s_ = 0.0;
+  std::uint32_t next_request_ = 0;
+  Worker<Input> worker_;
+  Periodic periodic_;  // last member: stops first, it posts into the worker
+};
+
+}  // namespace km

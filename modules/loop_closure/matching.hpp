@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "modules/core/keyframe.hpp"
+
+namespace km {
+
+/// Keypoint `a` of one keyframe and `b` of another that look alike.
+struct Match {
+  std::uint32_t a = 0;
+  std::uint32_t b = 0;
+  int distance = 0;  ///< Hamming distance of the descriptors, 0 to 256.
+
+  auto operator<=>(const Match&) const = default;
+};
+
+/// What a pair of descriptors must satisfy to be a match.
+struct MatchRules {
+  double max_ratio = 0.85;  ///< Best distance over second best, as seen from a.
+  int max_distance = 64;    ///< [bit]
+};
+
+/// Pairs that are each other's nearest descriptor and pass `rules`, in ascending order of `a`. Of
+/// equally near descriptors the first counts. Without a second descriptor in `b` there is no ratio
+/// and so no match. O(|a| |b|): see the benchmark.
+[[nodiscard]] std::vector<Match> match_descriptors(std::span<const OrbDescriptor> a,
+                                                   std::span<const OrbDescriptor> b,
+                                                   const MatchRules& rules);
+
+}  // namespace km

@@ -1,0 +1,226 @@
+#include "modules/loop_closure/relative_pose.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+#include <string>
+
+#include "modules/core/lie.hpp"
+
+namespace km {
+namespace {
+
+// Least ratio of the second to the first singular value of Arun's H, a ratio of variances: below
+// it the points lie on a line for all that can be told.
+constexpr double kLeastSpread = 1e-4;
+
+// 99 % quantiles of the chi-squared distribution with 2 and 3 degrees of freedom.
+constexpr double kQuantile2 = 9.210;
+constexpr double kQuantile3 = 11.345;
+
+// Steps on a minimal sample and on the inliers of a new best model: enough to get near.
+constexpr int kSampleSteps = 2;
+constexpr int kPolishSteps = 3;
+
+TransferError error_of(const SE3& T_a_b, const SE3& T_b_a, const ImagePair& pair) {
+  return pair.a.has_depth ? transfer_error(T_b_a, pair.a, pair.b)
+                          : transfer_error(T_a_b, pair.b, pair.a);
+}
+
+double quantile(int dim) {
+  return dim == 3 ? kQuantile3 : kQuantile2;
+}
+
+// Variance of a point along its ray: that of the inverse depth times (d|p| / d rho)^2.
+double range_variance(const ImagePoint& point) {
+  const double z = 1.0 / point.m.z();
+  return z * z * z * z * point.variance.z() * (1.0 + point.m.head<2>().squaredNorm());
+}
+
+// Sums of Gauss-Newton with Cauchy weights.
+struct NormalEquations {
+  Matrix6 H = Matrix6::Zero();
+  Vector6 g = Vector6::Zero();
+  double chi2 = 0.0;
+  double freedom = 0.0;
+};
+
+NormalEquations linearise(const SE3& T_a_b, std::span<const ImagePair> pairs,
+                          std::span<const std::size_t> indices) {
+  NormalEquations sum;
+  const SE3 T_b_a = T_a_b.inverse();
+  const Matrix6 Ad = adjoint(T_a_b);
+  for (const std::size_t i : indices) {
+    const ImagePair& pair = pairs[i];
+    const TransferError error = error_of(T_a_b, T_b_a, pair);
+    if (!error.in_front) continue;
+    // Carried from b to a instead, the same xi acts on T_b_a as -Ad(T_a_b) xi.
+    Eigen::Matrix<double, 3, 6> J;
+    if (pair.a.has_depth) {
+      J = transfer_jacobian(T_b_a, pair.a);
+    } else {
+      J = -transfer_jacobian(T_a_b, pair.b) * Ad;
+    }
+    const double weight = 1.0 / (1.0 + error.chi2 / quantile(error.dim));
+    const Eigen::Matrix<double, 6, 3> JtW = weight * J.transpose() * error.information;
+    sum.H += JtW * J;
+    sum.g += JtW * error.r;
+    sum.chi2 += weight * error.chi2;
+    sum.freedom += weight * error.dim;
+  }
+  return sum;
+}
+
+// Three pairs with depth on both sides; their triangles must agree before more is computed.
+class ThreePointProblem {
+ public:
+  static constexpr std::size_t kSampleSize = 3;
+
+  explicit ThreePointProblem(std::span<const ImagePair> pairs) : pairs_(pairs) {
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const auto& [a, b] = pairs[i];
+      if (a.has_depth && b.has_depth)
+        solid_.push_back({a.point(), b.point(), range_variance(a) + range_variance(b), i});
+    }
+  }
+
+  std::size_t size() const { return pairs_.size(); }
+  std::size_t drawable() const { return solid_.size(); }
+
+  std::optional<SE3> solve(std::span<const std::size_t> sample) const {
+    std::array<Eigen::Vector3d, 3> a, b;
+    std::array<std::size_t, 3> indices;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Solid& s = solid_[sample[k]];
+      for (std::size_t l = 0; l < k; ++l)
+        if (!same_length(s, solid_[sample[l]])) return std::nullopt;
+      a[k] = s.a;
+      b[k] = s.b;
+      indices[k] = s.pair;
+    }
+    const std::optional<SE3> T_a_b = align_points(a, b);
+    if (!T_a_b) return std::nullopt;
+    const std::optional<PoseFit> fit = refine_pose(*T_a_b, pairs_, indices, kSampleSteps);
+    return fit ? fit->T_a_b : *T_a_b;
+  }
+
+  double error(const SE3& T_a_b, std::size_t i) const {
+    return pair_error(T_a_b, pairs_[i]).relative();
+  }
+
+  std::optional<SE3> polish(const SE3& T_a_b, std::span<const std::size_t> inliers) const {
+    const std::optional<PoseFit> fit = refine_pose(T_a_b, pairs_, inliers, kPolishSteps);
+    return fit ? std::optional(fit->T_a_b) : std::nullopt;
+  }
+
+ private:
+  struct Solid {
+    Eigen::Vector3d a, b;
+    double range_variance;  // of both together
+    std::size_t pair;
+  };
+
+  static bool same_length(const Solid& s, const Solid& t) {
+    const double difference = (s.a - t.a).norm() - (s.b - t.b).norm();
+    constexpr double kSigmas = 3.0;
+    return difference * difference <= kSigmas * kSigmas * (s.range_variance + t.range_variance);
+  }
+
+  std::span<const ImagePair> pairs_;
+  std::vector<Solid> solid_;
+};
+
+}  // namespace
+
+std::optional<SE3> align_points(std::span<const Eigen::Vector3d> points_a,
+                                std::span<const Eigen::Vector3d> points_b) {
+  if (points_a.size() != points_b.size())
+    throw std::invalid_argument("align_points: " + std::to_string(points_a.size()) +
+                                " points and " + std::to_string(points_b.size()));
+  if (points_a.size() < 3) return std::nullopt;
+  const auto n = static_cast<double>(points_a.size());
+  Eigen::Vector3d mean_a = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_b = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < points_a.size(); ++i) {
+    mean_a += points_a[i] / n;
+    mean_b += points_b[i] / n;
+  }
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < points_a.size(); ++i)
+    H += (points_b[i] - mean_b) * (points_a[i] - mean_a).transpose();
+
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Vector3d& s = svd.singularValues();
+  if (!(s(1) > kLeastSpread * s(0))) return std::nullopt;
+  Eigen::Matrix3d V = svd.matrixV();
+  if ((V * svd.matrixU().transpose()).determinant() < 0.0) V.col(2) *= -1.0;
+  const Eigen::Matrix3d R_a_b = V * svd.matrixU().transpose();
+  return make_pose(R_a_b, mean_a - R_a_b * mean_b);
+}
+
+double PairError::relative() const {
+  constexpr double kBehind = 1e9;
+  return dim == 0 ? kBehind : chi2 / quantile(dim);
+}
+
+PairError pair_error(const SE3& T_a_b, const ImagePair& pair) {
+  const TransferError error = error_of(T_a_b, T_a_b.inverse(), pair);
+  return {error.chi2, error.in_front ? error.dim : 0};
+}
+
+std::optional<PoseFit> refine_pose(const SE3& T_a_b, std::span<const ImagePair> pairs,
+                                   std::span<const std::size_t> indices, int max_iterations) {
+  constexpr double kConverged = 1e-7;  // [rad], [m]
+  PoseFit fit;
+  fit.T_a_b = T_a_b;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    const NormalEquations equations = linearise(fit.T_a_b, pairs, indices);
+    const Eigen::LDLT<Matrix6> ldlt(equations.H);
+    constexpr double kLeastPivotRatio = 1e-12;
+    const auto pivots = ldlt.vectorD();
+    if (ldlt.info() != Eigen::Success ||
+        !(pivots.minCoeff() > kLeastPivotRatio * pivots.maxCoeff()))
+      return std::nullopt;
+    const Vector6 xi = -ldlt.solve(equations.g);
+    if (!xi.allFinite()) return std::nullopt;
+    fit.T_a_b = fit.T_a_b * se3_exp(xi);
+    if (xi.norm() < kConverged) break;
+  }
+  fit.T_a_b.linear() = nearest_rotation(fit.T_a_b.linear());
+  const NormalEquations equations = linearise(fit.T_a_b, pairs, indices);
+  fit.information = equations.H;
+  fit.chi2 = equations.chi2;
+  fit.freedom = equations.freedom;
+  return fit;
+}
+
+Matrix6 information_without_strongest(const PoseFit& fit, std::span<const ImagePair> pairs,
+                                      std::span<const std::size_t> indices, double share) {
+  const Eigen::LDLT<Matrix6> whole(fit.information);
+  struct Part {
+    double strength;
+    Matrix6 H;
+  };
+  std::vector<Part> parts;
+  parts.reserve(indices.size());
+  for (const std::size_t& i : indices) {
+    const Matrix6 H = linearise(fit.T_a_b, pairs, {&i, 1}).H;
+    parts.push_back({whole.solve(H).trace(), H});
+  }
+  const auto wanted = static_cast<std::size_t>(share * static_cast<double>(parts.size()));
+  const std::size_t taken = std::min(std::max<std::size_t>(wanted, 2), parts.size());
+  std::partial_sort(parts.begin(), parts.begin() + static_cast<std::ptrdiff_t>(taken), parts.end(),
+                    [](const Part& l, const Part& r) { return l.strength > r.strength; });
+  Matrix6 left = Matrix6::Zero();
+  for (std::size_t i = taken; i < parts.size(); ++i) left += parts[i].H;
+  return left;
+}
+
+RansacResult<SE3> ransac_pose(std::span<const ImagePair> pairs, const RansacOptions& options,
+                              std::mt19937& rng) {
+  return ransac<SE3>(ThreePointProblem(pairs), options, rng);
+}
+
+}  // namespace km

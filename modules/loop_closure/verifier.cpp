@@ -1,0 +1,163 @@
+#include "modules/loop_closure/verifier.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "modules/core/lie.hpp"
+#include "modules/loop_closure/guided_matching.hpp"
+#include "modules/loop_closure/matching.hpp"
+#include "modules/loop_closure/relative_pose.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kRansacConfidence = 0.999;
+constexpr int kRefineIterations = 5;
+
+// Radii of the guided matching [px], one after the other: the pose gets better as they shrink.
+constexpr double kGuidedRadii_px[] = {8.0, 5.6, 3.9};
+constexpr double kGuidedRatio = 0.9;
+
+// Share of the inliers that the pose must do without.
+constexpr double kStrongestShare = 0.15;
+
+// Variance of the pose over what independent errors of the points would give: corners of one
+// object move together when seen from elsewhere. Measured on EuRoC V1_01 and MH_01.
+constexpr double kCommonErrors = 4.0;
+
+std::vector<ImagePair> pairs_of(const std::vector<Match>& matches, const KeyframeFeatures& from,
+                                const KeyframeFeatures& to, const ImageNoise& noise) {
+  std::vector<ImagePair> pairs;
+  pairs.reserve(matches.size());
+  for (const Match& match : matches) {
+    const ImagePair pair{image_point(from, match.a, noise), image_point(to, match.b, noise)};
+    if (pair.a.has_depth || pair.b.has_depth) pairs.push_back(pair);
+  }
+  return pairs;
+}
+
+std::vector<std::size_t> inliers_of(const SE3& T_a_b, const std::vector<ImagePair>& pairs) {
+  std::vector<std::size_t> inliers;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    if (pair_error(T_a_b, pairs[i]).relative() <= 1.0) inliers.push_back(i);
+  return inliers;
+}
+
+// A pose of the cameras and all correspondences that support it.
+struct Support {
+  PoseFit fit;
+  std::vector<ImagePair> pairs;
+  std::vector<std::size_t> inliers;
+};
+
+std::optional<Support> gather_support(const PoseFit& start, const KeyframeFeatures& from,
+                                      const KeyframeFeatures& to, const ImageNoise& noise,
+                                      int max_distance) {
+  Support support{start, {}, {}};
+  const auto refine = [&] {
+    support.inliers = inliers_of(support.fit.T_a_b, support.pairs);
+    const std::optional<PoseFit> fit =
+        refine_pose(support.fit.T_a_b, support.pairs, support.inliers, kRefineIterations);
+    if (fit) support.fit = *fit;
+    return fit.has_value();
+  };
+  for (const double radius_px : kGuidedRadii_px) {
+    const GuidedMatchRules rules{radius_px, kGuidedRatio, max_distance};
+    support.pairs = pairs_of(match_guided(support.fit.T_a_b, from, to, rules), from, to, noise);
+    if (!refine()) return std::nullopt;
+  }
+  if (!refine()) return std::nullopt;
+  return support;
+}
+
+// Covariance of the bodies' relative pose from information in the cameras'.
+// T_body_a body_b exp(Ad(T_body_cam_b) xi) = T_body_cam_a T_a_b exp(xi) T_body_cam_b^-1.
+Matrix6 body_covariance(const Matrix6& information, const SE3& T_body_cam) {
+  const Matrix6 Ad = adjoint(T_body_cam);
+  return Ad * information.ldlt().solve(Matrix6::Identity()) * Ad.transpose();
+}
+
+bool holds(const Matrix6& information) {
+  constexpr double kLeastPivotRatio = 1e-12;
+  const Eigen::LDLT<Matrix6> ldlt(information);
+  const auto pivots = ldlt.vectorD();
+  return ldlt.info() == Eigen::Success && pivots.minCoeff() > kLeastPivotRatio * pivots.maxCoeff();
+}
+
+}  // namespace
+
+const char* to_string(VerificationStatus status) {
+  switch (status) {
+    case VerificationStatus::kAccepted:
+      return "accepted";
+    case VerificationStatus::kTooFewMatches:
+      return "too few matches";
+    case VerificationStatus::kNoConsensus:
+      return "matches do not agree on a pose";
+    case VerificationStatus::kDegenerate:
+      return "matches leave the pose undetermined";
+    case VerificationStatus::kTooFewInliers:
+      return "too few inliers";
+    case VerificationStatus::kPoorlyHeld:
+      return "pose hangs on a few inliers";
+  }
+  return "";
+}
+
+Verifier::Verifier(const LoopClosureConfig& config) : config_(checked(config)) {}
+
+Verification Verifier::verify(const KeyframeFeatures& from, const KeyframeFeatures& to) const {
+  Verification result;
+  const auto refused = [&](VerificationStatus status) {
+    result.status = status;
+    return result;
+  };
+  const ImageNoise noise{config_.keypoint_noise_px, config_.disparity_noise_px};
+  const MatchRules rules{config_.max_match_ratio, config_.max_match_distance};
+  const std::vector<ImagePair> pairs =
+      pairs_of(match_descriptors(from.descriptors, to.descriptors, rules), from, to, noise);
+  result.matches = static_cast<int>(pairs.size());
+  if (result.matches < config_.min_consensus) return refused(VerificationStatus::kTooFewMatches);
+
+  std::mt19937 rng(config_.seed);
+  const RansacResult<SE3> consensus =
+      ransac_pose(pairs, {kRansacConfidence, config_.max_ransac_iterations}, rng);
+  result.consensus = static_cast<int>(consensus.inliers.size());
+  result.iterations = consensus.iterations;
+  if (!consensus.model || result.consensus < config_.min_consensus)
+    return refused(VerificationStatus::kNoConsensus);
+
+  const std::optional<PoseFit> start =
+      refine_pose(*consensus.model, pairs, consensus.inliers, kRefineIterations);
+  if (!start) return refused(VerificationStatus::kDegenerate);
+  const std::optional<Support> support =
+      gather_support(*start, from, to, noise, config_.max_match_distance);
+  if (!support) return refused(VerificationStatus::kDegenerate);
+  result.inliers = static_cast<int>(support->inliers.size());
+  if (result.inliers < config_.min_inliers) return refused(VerificationStatus::kTooFewInliers);
+
+  const PoseFit& fit = support->fit;
+  const double scale = std::max(1.0, fit.chi2 / std::max(1.0, fit.freedom - 6.0));
+  const Matrix6 weakened =
+      information_without_strongest(fit, support->pairs, support->inliers, kStrongestShare);
+  if (!holds(weakened)) return refused(VerificationStatus::kPoorlyHeld);
+  const Matrix6 weak = scale * body_covariance(weakened, to.T_body_cam);
+  result.rotation_sigma_rad = std::sqrt(weak.topLeftCorner<3, 3>().trace());
+  result.position_sigma_m = std::sqrt(weak.bottomRightCorner<3, 3>().trace());
+  if (!(result.rotation_sigma_rad <= config_.max_rotation_sigma_rad &&
+        result.position_sigma_m <= config_.max_position_sigma_m))
+    return refused(VerificationStatus::kPoorlyHeld);
+
+  result.T_from_to = from.T_body_cam * fit.T_a_b * to.T_body_cam.inverse();
+  result.covariance = kCommonErrors * scale * body_covariance(fit.information, to.T_body_cam);
+  result.covariance.diagonal().head<3>().array() += std::pow(config_.systematic_rotation_rad, 2);
+  result.covariance.diagonal().tail<3>().array() += std::pow(config_.systematic_translation_m, 2);
+  result.covariance = 0.5 * (result.covariance + result.covariance.transpose()).eval();
+  return refused(VerificationStatus::kAccepted);
+}
+
+}  // namespace km

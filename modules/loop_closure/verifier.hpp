@@ -1,0 +1,61 @@
+#pragma once
+
+#include "modules/core/geometry.hpp"
+#include "modules/core/keyframe.hpp"
+#include "modules/loop_closure/loop_closure_config.hpp"
+
+namespace km {
+
+/// Result of a verification: accepted, or the first test that failed.
+enum class VerificationStatus {
+  kAccepted,
+  kTooFewMatches,  ///< The images do not look alike.
+  kNoConsensus,    ///< No pose that enough of the matches agree with.
+  kDegenerate,     ///< The matches leave the pose undetermined (few points, on a line).
+  kTooFewInliers,  ///< Too few correspondences support the refined pose.
+  kPoorlyHeld,     ///< Without its strongest inliers the pose would be too uncertain.
+};
+
+/// "accepted", "too few matches", ...
+const char* to_string(VerificationStatus status);
+
+/// A verified closure, or why there is none, with the numbers behind it. Numbers of steps that were
+/// not reached are zero.
+struct Verification {
+  VerificationStatus status = VerificationStatus::kTooFewMatches;
+  SE3 T_from_to = SE3::Identity();           ///< Of the bodies. Set if accepted, like covariance.
+  Matrix6 covariance = Matrix6::Identity();  ///< At T_from_to, see modules/core/covariance.hpp.
+  int matches = 0;                ///< Alike descriptors, at least one of them with depth.
+  int consensus = 0;              ///< Matches that agree with the best sampled pose.
+  int iterations = 0;             ///< Samples drawn.
+  int inliers = 0;                ///< Correspondences, found with the pose known, that support it.
+  double position_sigma_m = 0.0;  ///< Without the strongest inliers; all three axes together.
+  double rotation_sigma_rad = 0.0;  ///< Likewise.
+};
+
+/// Geometric verification of loop closures: two keyframes to the relative pose of their bodies
+/// with its covariance, or why not.
+///
+///  1. Matches by descriptor alone (match_descriptors()).
+///  2. A pose that many of them agree with (ransac_pose(); Tian et al., "Kimera-Multi", Sec.
+///  III-A).
+///  3. Matching again where the pose says, in narrowing circles, and refinement on the inliers:
+///     most correspondences are found only now, since similar corners elsewhere no longer compete.
+///  4. Tests, each against a way of being wrong that was seen on recorded images.
+///
+/// The covariance is that of the refinement (both images' noise, scaled up if the residuals are
+/// larger) times a factor for what neighbouring points err in common, plus systematic errors.
+///
+/// Pure: the same features give the same result. verify() is safe to call from several threads.
+class Verifier {
+ public:
+  /// Throws ConfigError if `config` is out of bounds.
+  explicit Verifier(const LoopClosureConfig& config);
+
+  [[nodiscard]] Verification verify(const KeyframeFeatures& from, const KeyframeFeatures& to) const;
+
+ private:
+  LoopClosureConfig config_;
+};
+
+}  // namespace km

@@ -1,0 +1,184 @@
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <limits>
+
+#include "modules/loop_closure/loop_closure_codec.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+constexpr RobotId kOwner = 40000;
+
+KeyframeReply random_reply(std::mt19937& rng, int points) {
+  KeyframeReply reply{.number = 12, .found = true, .keyframe = {}};
+  reply.keyframe.odometry = {{kOwner, 7}, random_pose(rng), random_covariance(rng, 0.1)};
+  reply.keyframe.stamp = 1403636584763555584;
+  KeyframeFeatures& features = reply.keyframe.features;
+  features.T_body_cam = random_pose(rng, 0.1);
+  features.focal_px = 458.654;
+  features.baseline_m = 0.11;
+  std::uniform_real_distribution<float> bearing(-0.9F, 0.9F);
+  std::uniform_real_distribution<float> depth(0.4F, 60.0F);
+  for (int i = 0; i < points; ++i) {
+    Keypoint point;
+    point.bearing.x() = bearing(rng);
+    point.bearing.y() = bearing(rng);
+    point.inverse_depth = i % 4 == 0 ? 0.0F : 1.0F / depth(rng);
+    point.octave = static_cast<std::uint8_t>(i % 8);
+    features.keypoints.push_back(point);
+    OrbDescriptor descriptor;
+    for (auto& byte : descriptor) byte = static_cast<std::uint8_t>(rng());
+    features.descriptors.push_back(descriptor);
+  }
+  return reply;
+}
+
+template <typename T>
+typename Codec<T>::Encoded encoded_by(RobotId writer, const T& message) {
+  auto encoded = Codec<T>::encode(message);
+  encoded.wire.header.robot = writer;
+  return encoded;
+}
+
+TEST_CASE("A keyframe survives the wire to a hundredth of a pixel", "[codec]") {
+  std::mt19937 rng(GENERATE(1U, 2U, 3U));
+  const KeyframeReply sent = random_reply(rng, 1000);
+  const auto encoded = encoded_by(kOwner, sent);
+  const auto decoded = Codec<KeyframeReply>::decode(encoded.wire);
+  REQUIRE(decoded.value.has_value());
+  const KeyframeFeatures& a = sent.keyframe.features;
+  const KeyframeFeatures& b = decoded.value->keyframe.features;
+  REQUIRE(b.keypoints.size() == a.keypoints.size());
+  CHECK(b.descriptors == a.descriptors);
+  const double max_px = 0.01;
+  for (std::size_t i = 0; i < a.keypoints.size(); ++i) {
+    const Keypoint& p = a.keypoints[i];
+    const Keypoint& q = b.keypoints[i];
+    CHECK(q.octave == p.octave);
+    CHECK(q.has_depth() == p.has_depth());
+    CHECK(a.focal_px * static_cast<double>((q.bearing - p.bearing).norm()) < max_px);
+    const auto disparity_error = static_cast<double>(std::abs(q.inverse_depth - p.inverse_depth));
+    CHECK(a.focal_px * a.baseline_m * disparity_error < max_px);
+  }
+  CHECK(decoded.value->number == 12);
+  CHECK(decoded.value->keyframe.stamp == sent.keyframe.stamp);
+  CHECK((decoded.value->keyframe.odometry.T_odom_kf.matrix() -
+         sent.keyframe.odometry.T_odom_kf.matrix())
+            .norm() < 1e-12);
+  CHECK(decoded.value->keyframe.odometry.covariance == sent.keyframe.odometry.covariance);
+}
+
+TEST_CASE("The smallest known depth does not become unknown on the wire", "[codec]") {
+  std::mt19937 rng(5);
+  KeyframeReply reply = random_reply(rng, 2);
+  reply.keyframe.features.keypoints[0].inverse_depth = 1e-9F;
+  reply.keyframe.features.keypoints[1].inverse_depth = 5.0F;
+  const auto encoded = encoded_by(kOwner, reply);
+  const auto decoded = Codec<KeyframeReply>::decode(encoded.wire);
+  REQUIRE(decoded.value.has_value());
+  CHECK(decoded.value->keyframe.features.keypoints[0].has_depth());
+}
+
+TEST_CASE("A keyframe without points, or not found, survives the wire", "[codec]") {
+  std::mt19937 rng(6);
+  const auto empty = encoded_by(kOwner, random_reply(rng, 0));
+  CHECK(Codec<KeyframeReply>::decode(empty.wire).value.has_value());
+  KeyframeReply absent{.number = 3, .found = false, .keyframe = {}};
+  absent.keyframe.odometry.id = {kOwner, 99};
+  const auto encoded = encoded_by(kOwner, absent);
+  const auto decoded = Codec<KeyframeReply>::decode(encoded.wire);
+  REQUIRE(decoded.value.has_value());
+  CHECK_FALSE(decoded.value->found);
+  CHECK(decoded.value->keyframe.odometry.id == KeyframeId{kOwner, 99});
+}
+
+TEST_CASE("Hostile replies are refused with a reason", "[codec]") {
+  std::mt19937 rng(7);
+  auto encoded = encoded_by(kOwner, random_reply(rng, 20));
+  km_wire_KeyframeReply& wire = encoded.wire;
+  SECTION("another robot's keyframe") {
+    wire.header.robot = 3;
+  }
+  SECTION("odometry of another keyframe") {
+    wire.odometry.keyframe.index = 8;
+  }
+  SECTION("a quaternion that is none") {
+    wire.odometry.T_odom_kf.q[0] = 4.0;
+  }
+  SECTION("a position that is not a number") {
+    wire.T_body_cam.t[1] = std::nan("");
+  }
+  SECTION("a covariance with a negative variance") {
+    wire.odometry.covariance.upper[0] = -1.0;
+  }
+  SECTION("an infinite step") {
+    wire.bearing_step = std::numeric_limits<float>::infinity();
+  }
+  SECTION("a negative step") {
+    wire.inverse_depth_step = -1e-3F;
+  }
+  SECTION("a focal length that is not a number") {
+    wire.focal_px = std::nanf("");
+  }
+  SECTION("more points than any image has") {
+    wire.keypoints._length = 1U << 30U;
+  }
+  SECTION("points without a buffer") {
+    wire.keypoints._buffer = nullptr;
+  }
+  const auto decoded = Codec<KeyframeReply>::decode(wire);
+  CHECK_FALSE(decoded.value.has_value());
+  CHECK(decoded.refusal != nullptr);
+}
+
+TEST_CASE("A closure survives the wire exactly", "[codec]") {
+  std::mt19937 rng(8);
+  const Closure sent{.from = {{kOwner, 1}, random_pose(rng), random_covariance(rng, 0.1)},
+                     .to = {{9, 5}, random_pose(rng), random_covariance(rng, 0.2)},
+                     .T_from_to = random_pose(rng),
+                     .covariance = random_covariance(rng, 0.01),
+                     .inliers = 77,
+                     .similarity = 0.75};
+  const auto encoded = encoded_by(kOwner, sent);
+  const auto decoded = Codec<Closure>::decode(encoded.wire);
+  REQUIRE(decoded.value.has_value());
+  CHECK(decoded.value->id() == sent.id());
+  CHECK(decoded.value->covariance == sent.covariance);
+  CHECK((decoded.value->T_from_to.matrix() - sent.T_from_to.matrix()).norm() < 1e-12);
+  CHECK(decoded.value->inliers == 77);
+  CHECK(decoded.value->similarity == 0.75);
+}
+
+TEST_CASE("Hostile closures and requests are refused with a reason", "[codec]") {
+  std::mt19937 rng(9);
+  const Closure closure{.from = {{kOwner, 1}, random_pose(rng), Matrix6::Identity()},
+                        .to = {{9, 5}, random_pose(rng), Matrix6::Identity()}};
+  auto encoded = encoded_by(kOwner, closure);
+  SECTION("written by another robot") {
+    encoded.wire.header.robot = 9;
+  }
+  SECTION("from a keyframe to itself") {
+    encoded.wire.to = encoded.wire.from;
+    encoded.wire.to_odometry = encoded.wire.from_odometry;
+  }
+  SECTION("odometry of another keyframe") {
+    encoded.wire.to.index = 6;
+  }
+  SECTION("a similarity that is not a number") {
+    encoded.wire.similarity = std::nanf("");
+  }
+  SECTION("absurdly many inliers") {
+    encoded.wire.inliers = ~0U;
+  }
+  CHECK(Codec<Closure>::decode(encoded.wire).refusal != nullptr);
+
+  auto request = encoded_by<KeyframeRequest>(kOwner, {kOwner, 1, {9, 5}});
+  CHECK(Codec<KeyframeRequest>::decode(request.wire).value.has_value());
+  request.wire.header.robot = 5;
+  CHECK(Codec<KeyframeRequest>::decode(request.wire).refusal != nullptr);
+}
+
+}  // namespace
+}  // namespace km
