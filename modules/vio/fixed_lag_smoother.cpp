@@ -48,7 +48,7 @@ std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
   hold_first();
   for (int pass = 0; pass < 2; ++pass) {
     locate_landmarks();
-    if (!optimize_by_ceres(window_, kStartIterations).usable) return std::nullopt;
+    if (!solve(kStartIterations).usable) return std::nullopt;
     reject_outliers();
   }
   // The prior stays at the guess of the biases; heading and position have not moved.
@@ -69,15 +69,18 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame) {
   decide_keyframe();
   locate_landmarks();
   SmootherUpdate update;
-  update.solution = config_.solver == SmootherSolver::kCeres
-                        ? optimize_by_ceres(window_, config_.iterations)
-                        : optimize(window_, config_.iterations);
+  update.solution = solve(config_.iterations);
   update.outliers = reject_outliers();
   update.state = newest.state;
   update.keyframe = newest.keyframe;
   update.landmarks = static_cast<int>(std::count_if(
       window_.landmarks.begin(), window_.landmarks.end(), [](const auto& l) { return l.located; }));
   return update;
+}
+
+WindowSolution FixedLagSmoother::solve(int iterations) {
+  return config_.solver == SmootherSolver::kCeres ? optimize_by_ceres(window_, iterations)
+                                                  : optimize(window_, iterations);
 }
 
 void FixedLagSmoother::append(const InertialFrame& frame, const OdometryState& state) {
@@ -178,30 +181,28 @@ bool FixedLagSmoother::leaving(Stamp stamp) const {
          (too_many && stamp == window_.frames.front().state.stamp);
 }
 
+const WindowFrame* FixedLagSmoother::frame_at(Stamp stamp) const {
+  const auto it = std::find_if(window_.frames.begin(), window_.frames.end(),
+                               [&](const WindowFrame& f) { return f.state.stamp == stamp; });
+  return it == window_.frames.end() ? nullptr : &*it;
+}
+
 std::optional<UncertainPose> FixedLagSmoother::relative_pose(Stamp from, Stamp to) const {
-  const auto index = [&](Stamp stamp) {
-    return static_cast<Eigen::Index>(
-        std::find_if(window_.frames.begin(), window_.frames.end(),
-                     [&](const WindowFrame& f) { return f.state.stamp == stamp; }) -
-        window_.frames.begin());
-  };
-  const auto count = static_cast<Eigen::Index>(window_.frames.size());
-  const Eigen::Index i = index(from), j = index(to);
-  if (i == count || j == count) return std::nullopt;
+  const WindowFrame* a = frame_at(from);
+  const WindowFrame* b = frame_at(to);
+  if (a == nullptr || b == nullptr) return std::nullopt;
   WindowEquations equations(window_, 0.0);
   equations.add_all();
   Eigen::MatrixXd H = equations.H();
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(H);
   if (llt.info() != Eigen::Success) return std::nullopt;
 
-  const SE3& T_from = window_.frames[static_cast<std::size_t>(i)].state.T_odom_body;
-  const SE3& T_to = window_.frames[static_cast<std::size_t>(j)].state.T_odom_body;
   UncertainPose result;
-  result.T = T_from.inverse() * T_to;
+  result.T = a->state.T_odom_body.inverse() * b->state.T_odom_body;
   // xi = -Ad(T_to_from) xi_from + xi_to; Sigma = D H^-1 D^T = |L^-1 D^T|^2.
-  Eigen::MatrixXd D_T = Eigen::MatrixXd::Zero(15 * count, 6);
-  D_T.middleRows<6>(15 * i) = -adjoint(result.T.inverse()).transpose();
-  D_T.middleRows<6>(15 * j) += Matrix6::Identity();
+  Eigen::MatrixXd D_T = Eigen::MatrixXd::Zero(H.rows(), 6);
+  D_T.middleRows<6>(15 * (a - window_.frames.data())) = -adjoint(result.T.inverse()).transpose();
+  D_T.middleRows<6>(15 * (b - window_.frames.data())) += Matrix6::Identity();
   llt.matrixL().solveInPlace(D_T);
   result.Sigma = D_T.transpose() * D_T;
   return result;

@@ -57,6 +57,9 @@ class FixedLagSmoother {
   /// States now in the window, in order of time.
   [[nodiscard]] const Window& window() const { return window_; }
 
+  /// The current estimate at an image in the window; null if it is not there.
+  [[nodiscard]] const WindowFrame* frame_at(Stamp stamp) const;
+
   /// The current estimate of the relative pose of two images in the window with its marginal
   /// covariance; nullopt if one has left or the information is singular.
   [[nodiscard]] std::optional<UncertainPose> relative_pose(Stamp from, Stamp to) const;
@@ -65,6 +68,7 @@ class FixedLagSmoother {
   [[nodiscard]] bool leaving(Stamp stamp) const;
 
  private:
+  WindowSolution solve(int iterations);
   void append(const InertialFrame& frame, const OdometryState& state);
   void decide_keyframe();
   int reject_outliers();

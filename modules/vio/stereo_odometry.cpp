@@ -4,14 +4,12 @@
 
 #include "modules/vio/residuals/pose_block.hpp"
 #include "modules/vio/triangulation.hpp"
-#include "modules/vio/window_optimizer.hpp"
 
 namespace km {
 namespace {
 
 constexpr int kMinLandmarks = 12;
 constexpr int kPoseIterations = 15;
-constexpr int kBundleIterations = 20;
 
 Window empty_window(const SensorRig& rig, const VioConfig& config) {
   Window window;
@@ -20,15 +18,6 @@ Window empty_window(const SensorRig& rig, const VioConfig& config) {
   window.gravity_mps2 = config.gravity_mps2;
   window.loss_scale = config.loss_scale;
   return window;
-}
-
-// Holds the first state: nothing else fixes the frame without inertial factors.
-void hold_first(Window& window) {
-  constexpr double kWeight = 1e4;
-  window.prior.frames = {window.frames.front().id};
-  window.prior.linearization = {window.frames.front().state};
-  window.prior.J = kWeight * Eigen::MatrixXd::Identity(15, 15);
-  window.prior.r = Eigen::VectorXd::Zero(15);
 }
 
 // Pose of the last frame on the landmarks located so far; false if there are too few.
@@ -87,8 +76,6 @@ std::optional<std::vector<SE3>> stereo_odometry(std::span<const InertialFrame> f
     for (WindowLandmark& landmark : window.landmarks)
       if (!landmark.located && tracked_now(window, landmark)) locate(window, max_error, landmark);
   }
-  hold_first(window);
-  if (!optimize_by_ceres(window, kBundleIterations).usable) return std::nullopt;
   std::vector<SE3> poses;
   const SE3 T_first = window.frames.front().state.T_odom_body.inverse();
   for (const WindowFrame& frame : window.frames) poses.push_back(T_first * frame.state.T_odom_body);

@@ -9,6 +9,7 @@
 namespace km {
 namespace {
 
+constexpr double kMaxAhead_s = 1.0;  // of a sample before its image: a broken stamp would block all
 constexpr double kMaxCostPerObservation = 100.0;  // a fit has less than 1
 
 }  // namespace
@@ -22,7 +23,7 @@ Vio::Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, cons
 
 VioResult Vio::process(const SensorPacket& packet) {
   VioResult result;
-  const int refused = take_samples(packet.imu);
+  const int refused = take_samples(packet);
   if (refused > 0) result.problem = VioProblem::kBadSamples;
   statistics_.refused_samples += refused;
   const auto fits = [](const GrayImage& image, const PinholeCamera& camera) {
@@ -61,12 +62,14 @@ VioResult Vio::process(const SensorPacket& packet) {
   return result;
 }
 
-int Vio::take_samples(std::span<const ImuSample> samples) {
+int Vio::take_samples(const SensorPacket& packet) {
   int refused = 0;
-  for (const ImuSample& sample : samples) {
+  for (const ImuSample& sample : packet.imu) {
     const bool repeated = !samples_.empty() && sample.stamp == samples_.back().stamp;
     if (repeated) continue;  // the border sample of two packets
-    if (!sample.gyro.allFinite() || !sample.accel.allFinite() ||
+    const bool future =
+        packet.frame != nullptr && seconds_between(packet.frame->stamp, sample.stamp) > kMaxAhead_s;
+    if (future || !sample.gyro.allFinite() || !sample.accel.allFinite() ||
         (!samples_.empty() && sample.stamp < samples_.back().stamp))
       ++refused;
     else
@@ -114,12 +117,10 @@ void Vio::try_start(VioResult& result) {
       ++statistics_.starts;
       result.states = *states;
       running_ = true;
-      for (std::size_t k = 0; k < held_.size(); ++k) {
-        if (k == 0)
-          hand_on_first((*states)[k], held_[k].frame, result);
-        else if (due((*states)[k]))
+      hand_on_first(states->front(), held_.front().frame, result);
+      for (std::size_t k = 1; k < held_.size(); ++k)
+        if (smoother_.window().frames[k].keyframe && due((*states)[k]))
           hand_on((*states)[k], held_[k].frame, result);
-      }
       held_.clear();
       return;
     }
@@ -173,6 +174,7 @@ bool Vio::plausible(const SmootherUpdate& update) const {
 }
 
 void Vio::restart(Held held) {
+  statistics_.images_without_pose += static_cast<int>(held_.size());
   running_ = false;
   held_.clear();
   held_.push_back(std::move(held));

@@ -34,7 +34,7 @@ struct VioStatistics {
   int divergences = 0;
   int starts = 0;
   int start_attempts = 0;
-  int images_without_pose = 0;  ///< Given up after a timeout of the start.
+  int images_without_pose = 0;  ///< Given up: no start was possible with them.
 };
 
 /// What came out of one packet.
@@ -68,7 +68,7 @@ class Vio {
     Frame frame;
   };
 
-  int take_samples(std::span<const ImuSample> samples);
+  int take_samples(const SensorPacket& packet);
   [[nodiscard]] std::optional<std::vector<ImuSample>> samples_since(Stamp last, Stamp now) const;
   [[nodiscard]] Eigen::Matrix3d turn(const std::vector<ImuSample>& samples, Stamp from,
                                      Stamp to) const;

@@ -23,9 +23,11 @@ bool Vio::due(const OdometryState& state) const {
   const double dt = seconds_between(last_keyframe_->stamp, state.stamp);
   if (dt < config_.output_interval_s - 1e-3) return false;
   if (dt >= config_.output_rest_interval_s) return true;
-  const auto previous = smoother_.relative_pose(last_keyframe_->stamp, state.stamp);
-  return !previous || previous->T.translation().norm() >= config_.output_distance_m ||
-         angle_of(previous->T.linear()) >= config_.output_rotation_rad;
+  const WindowFrame* previous = smoother_.frame_at(last_keyframe_->stamp);
+  if (previous == nullptr) return true;
+  const SE3 T = previous->state.T_odom_body.inverse() * state.T_odom_body;
+  return T.translation().norm() >= config_.output_distance_m ||
+         angle_of(T.linear()) >= config_.output_rotation_rad;
 }
 
 void Vio::hand_on_first(const OdometryState& state, const Frame& frame, VioResult& result) {
