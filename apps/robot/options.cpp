@@ -1,0 +1,106 @@
+#include "apps/robot/options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <iostream>
+#include <limits>
+
+#include "apps/robot/robot_config.hpp"
+
+namespace km {
+namespace {
+
+constexpr const char* kFooter = R"(
+Examples
+  One robot on a whole recording, in real time:
+    kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --dataset MH_01_easy --output results/a
+  Two robots on two hosts of one network (any ids, they find each other):
+    hostA$ kimera_multi_robot --config config/datasets/euroc.yaml --robot 7  --name alice --dataset A --output results/a
+    hostB$ kimera_multi_robot --config config/datasets/euroc.yaml --robot 12 --name bob   --dataset B --output results/b
+  Where multicast is not allowed:   --peers 10.0.0.2,10.0.0.3 --interface wlan0 --link wifi
+  The back-end alone, on a recorded pose graph:
+    kimera_multi_robot --config config/datasets/tunnels.yaml --robot 3 --graph robot3.csv --rate max --output results/3
+
+Files written to --output: odometry.tum, optimized.tum, pose_graph.g2o, loop_closures.csv, traffic.csv,
+timing.csv, config.yaml, summary.json.
+Ctrl-C ends the run in order with everything written; a second Ctrl-C ends it at once.
+Exit codes: 0 done, 1 bad input or configuration, 2 bad command line, 3 a module failed while running.)";
+
+double parse_rate(const std::string& text) {
+  if (text == "max") return std::numeric_limits<double>::infinity();
+  char* end = nullptr;
+  const double rate = std::strtod(text.c_str(), &end);
+  if (end == text.c_str() || *end != '\0' || !(rate > 0.0))
+    throw CLI::ValidationError("--rate", text + " is neither a positive number nor max");
+  return rate;
+}
+
+void print_config(const RobotOptions& options) {
+  try {
+    std::cout << load_robot_config(options).effective;
+  } catch (const ConfigError& error) {
+    throw CLI::ValidationError("--print-config", error.what());
+  }
+  throw CLI::Success();
+}
+
+void add_input(CLI::App& app, RobotOptions& options) {
+  auto* group = app.add_option_group("Input", "What the robot perceives");
+  group->add_option("--dataset", options.dataset, "EuRoC/ASL folder: cam0, cam1, imu0, or mav0/")
+      ->check(CLI::ExistingDirectory);
+  group->add_option("--graph", options.graph, "Recorded pose graph of one robot (.g2o or .csv)")
+      ->check(CLI::ExistingFile);
+  group->require_option(1);
+  app.add_option("--from", options.from_s, "Start of the part to play [s since the first image]");
+  app.add_option("--to", options.to_s, "End of the part to play [s since the first image]");
+  app.add_option_function<std::string>(
+         "--rate", [&options](const std::string& text) { options.rate = parse_rate(text); },
+         "Speed of playing: 1.0 real time, 2 twice as fast, max as fast as it can")
+      ->default_str("1.0");
+}
+
+void add_network(CLI::App& app, RobotOptions& options) {
+  app.add_option("--domain", options.domain, "DDS domain: robots of one team use the same")
+      ->check(CLI::Range(0, 230));
+  app.add_option("--link", options.link, "Link profile: wired, wifi, intermittent, or a file");
+  app.add_option("--peers", options.peers, "Addresses of the other hosts, where multicast is off")
+      ->delimiter(',');
+  app.add_option("--interface", options.interface_name, "Network interface, e.g. wlan0");
+}
+
+}  // namespace
+
+RobotOptions parse_options(int argc, char** argv) {
+  RobotOptions options;
+  CLI::App app{"One robot of the team: odometry, place recognition, and the team's pose graph."};
+  app.footer(kFooter);
+  app.add_option("--config", options.configs, "Configuration files; later ones override earlier")
+      ->check(CLI::ExistingFile);
+  app.add_option("--set", options.settings, "One setting over all files: section.key=value");
+  app.add_option("--robot", options.robot,
+                 "Id of this robot, any number 0..65535, unique in the team")
+      ->required();
+  app.add_option("--name", options.name, "Name shown to people (default robot<id>)");
+  add_input(app, options);
+  add_network(app, options);
+  app.add_option("--output", options.output, "Folder of the results, made if absent")->required();
+  app.add_option("--serve-limit", options.serve_limit_s,
+                 "Longest time [s] to serve peers after the own input has ended")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  app.add_flag_callback(
+      "--print-config", [&options] { print_config(options); },
+      "Print the configuration that the options before this one make, with bounds, and exit");
+  app.add_option("--log", options.log_level, "error, warn, info or debug")
+      ->check(CLI::IsMember({"error", "warn", "info", "debug"}))
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    std::exit(app.exit(error) == 0 ? 0 : 2);
+  }
+  if (options.name.empty()) options.name = "robot" + std::to_string(options.robot);
+  return options;
+}
+
+}  // namespace km

@@ -1,0 +1,143 @@
+#include "apps/robot/results.hpp"
+
+#include <cinttypes>
+#include <cstdio>
+#include <fstream>
+#include <stdexcept>
+
+#include "modules/core/json_writer.hpp"
+#include "modules/pose_graph/g2o_io.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::ofstream open(const fs::path& file) {
+  std::ofstream stream(file);
+  if (!stream) throw std::runtime_error(file.string() + ": cannot be written");
+  return stream;
+}
+
+void close(std::ofstream& stream, const fs::path& file) {
+  stream.close();
+  if (!stream) throw std::runtime_error(file.string() + ": writing failed, is the disk full?");
+}
+
+const char* to_string(ClosureStage stage) {
+  switch (stage) {
+    case ClosureStage::kCandidate:
+      return "candidate";
+    case ClosureStage::kRequested:
+      return "requested";
+    case ClosureStage::kReceived:
+      return "received";
+    case ClosureStage::kVerified:
+      return "verified";
+    case ClosureStage::kInlier:
+      return "inlier";
+  }
+  return "";
+}
+
+void write_closures(const fs::path& file, const RunRecord& record) {
+  std::ofstream out = open(file);
+  out << "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,inliers,reason\n";
+  for (const ClosureOutcome& row : record.outcomes())
+    out << row.id.from.robot << ',' << row.id.from.index << ',' << row.id.to.robot << ','
+        << row.id.to.index << ',' << row.similarity << ',' << to_string(row.stage) << ','
+        << row.matches << ',' << row.inliers << ",\"" << row.reason << "\"\n";
+  close(out, file);
+}
+
+// The robot's own poses with every edge that touches them: odometry, and the inlier closures of
+// either finder. Poses of other robots stay in their files.
+G2oGraph graph_of(const RunRecord& record) {
+  G2oGraph graph;
+  const auto& keyframes = record.keyframes();
+  const auto& trajectory = record.trajectory();
+  for (std::size_t i = 0; i < keyframes.size(); ++i) {
+    const bool solved = trajectory && i < trajectory->T_world_kf.size();
+    const SE3& T = solved ? trajectory->T_world_kf[i] : keyframes[i].T_odom_kf;
+    graph.vertices.push_back({keyframes[i].id, T});
+    if (i > 0)
+      graph.edges.push_back({keyframes[i - 1].id, keyframes[i].id, keyframes[i].T_previous_kf,
+                             keyframes[i].covariance});
+  }
+  for (const Closure& closure : record.inlier_closures())
+    graph.edges.push_back(closure.relative_pose());
+  return graph;
+}
+
+void write_summary(const fs::path& file, const RunRecord& record, const RunSummary& summary) {
+  RunRecord::StageCounts total;
+  for (const auto& [peer, counts] : record.stages_per_peer()) {
+    total.candidates += counts.candidates;
+    total.verified += counts.verified;
+    total.inliers += counts.inliers;
+  }
+  const OptimizerProgress& progress = record.progress();
+  std::ofstream out = open(file);
+  JsonWriter json(out);
+  json.begin_object();
+  json.field("robot", record.robot());
+  json.field("name", summary.name);
+  json.field("keyframes", record.keyframes().size());
+  json.field("frames", summary.frames);
+  json.field("frames_skipped", summary.frames_skipped);
+  json.key("closures");
+  json.begin_object();
+  json.field("candidates", total.candidates);
+  json.field("verified", total.verified);
+  json.field("inliers", total.inliers);
+  json.end_object();
+  json.key("pgo");
+  json.begin_object();
+  json.field("rounds", progress.round);
+  json.field("seconds", progress.seconds);
+  json.field("cost", progress.cost);
+  json.field("gradient_norm", progress.gradient_norm);
+  json.field("anchor", progress.anchor);
+  json.field("settled", progress.settled);
+  json.key("members");
+  json.begin_array();
+  for (const RobotId member : progress.members) json.value(member);
+  json.end_array();
+  json.end_object();
+  json.key("traffic");
+  json.begin_object();
+  for (const auto& [category, bytes] : summary.traffic_bytes) json.field(category, bytes);
+  json.end_object();
+  json.field("seconds", summary.seconds);
+  json.field("exit_reason", summary.exit_reason);
+  json.end_object();
+  close(out, file);
+}
+
+}  // namespace
+
+void write_tum(const fs::path& file, std::span<const StampedPose> poses) {
+  std::ofstream out = open(file);
+  for (const StampedPose& pose : poses) {
+    const Eigen::Vector3d& t = pose.T.translation();
+    const Eigen::Quaterniond q(pose.T.linear());
+    char line[256];
+    // Whole and fractional seconds apart: a double holds epoch nanoseconds to 0.2 us only.
+    std::snprintf(line, sizeof line,
+                  "%" PRId64 ".%09" PRId64 " %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n",
+                  pose.stamp / 1'000'000'000, pose.stamp % 1'000'000'000, t.x(), t.y(), t.z(),
+                  q.x(), q.y(), q.z(), q.w());
+    out << line;
+  }
+  close(out, file);
+}
+
+void write_results(const fs::path& folder, const RunRecord& record, const RunSummary& summary) {
+  write_tum(folder / "odometry.tum", record.odometry());
+  write_tum(folder / "optimized.tum", record.optimized());
+  write_g2o(folder / "pose_graph.g2o", graph_of(record));
+  write_closures(folder / "loop_closures.csv", record);
+  write_summary(folder / "summary.json", record, summary);
+}
+
+}  // namespace km

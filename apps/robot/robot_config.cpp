@@ -1,0 +1,88 @@
+#include "apps/robot/robot_config.hpp"
+
+#include <unistd.h>
+
+#include <array>
+#include <climits>
+
+#include "runtime/config_layers.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path program_folder() {
+  std::array<char, PATH_MAX> buffer{};
+  const ssize_t length = readlink("/proc/self/exe", buffer.data(), buffer.size() - 1);
+  return length > 0
+             ? fs::path(std::string(buffer.data(), static_cast<std::size_t>(length))).parent_path()
+             : fs::current_path();
+}
+
+// Which link profile the files or the command line choose: it must be read before all of them.
+std::string chosen_link(const RobotOptions& options) {
+  if (!options.link.empty()) return options.link;
+  ConfigLayers layers;
+  for (const fs::path& file : options.configs) layers.add_file(file);
+  for (const std::string& setting : options.settings) layers.add_override(setting);
+  return layers.load<RunConfig>().link;
+}
+
+fs::path link_profile(const std::string& link) {
+  const bool is_name = link.find('/') == std::string::npos && !link.ends_with(".yaml");
+  return find_shipped_file(is_name ? "qos/" + link + ".yaml" : link);
+}
+
+void apply_options(const RobotOptions& options, ConfigLayers& layers) {
+  layers.add_override("run.link=" + chosen_link(options));
+  if (options.domain) layers.add_override("dds.domain=" + std::to_string(*options.domain));
+  if (!options.interface_name.empty())
+    layers.add_override("dds.interface=" + options.interface_name);
+  if (options.peers.empty()) return;
+  std::string list;
+  for (const std::string& peer : options.peers) list += (list.empty() ? "" : ", ") + peer;
+  layers.add_override("dds.peers=[" + list + "]");
+  layers.add_override("dds.discovery=peers");
+}
+
+}  // namespace
+
+fs::path find_shipped_file(const std::string& name) {
+  const fs::path program = program_folder();
+  const std::array<fs::path, 4> places = {fs::path(name), fs::path("config") / name,
+                                          program / "../../config" / name,
+                                          program / "../share/kimera_multi" / name};
+  std::string tried;
+  for (const fs::path& place : places) {
+    if (fs::is_regular_file(place)) return place;
+    tried += "\n  " + place.lexically_normal().string();
+  }
+  throw ConfigError("no file " + name + "; looked for" + tried);
+}
+
+RobotConfig load_robot_config(const RobotOptions& options) {
+  ConfigLayers layers;
+  layers.add_file(link_profile(chosen_link(options)));
+  for (const fs::path& file : options.configs) layers.add_file(file);
+  for (const std::string& setting : options.settings) layers.add_override(setting);
+  apply_options(options, layers);
+
+  RobotConfig config;
+  config.run = layers.load<RunConfig>();
+  config.dds = layers.load<DdsConfig>();
+  config.sensors = layers.load<SensorsConfig>();
+  config.tracker = layers.load<TrackerConfig>();
+  config.vio = layers.load<VioConfig>();
+  config.keyframe_features = layers.load<KeyframeFeaturesConfig>();
+  config.place_recognition = layers.load<PlaceRecognitionConfig>();
+  config.loop_closure = layers.load<LoopClosureConfig>();
+  config.pcm = layers.load<PcmConfig>();
+  config.pose_graph = layers.load<PoseGraphConfig>();
+  config.graph_playback = layers.load<GraphPlaybackConfig>();
+  layers.finish();
+  config.effective = layers.effective();
+  return config;
+}
+
+}  // namespace km

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "apps/robot/options.hpp"
+#include "apps/robot/run_config.hpp"
+#include "modules/loop_closure/keyframe_features_config.hpp"
+#include "modules/loop_closure/loop_closure_config.hpp"
+#include "modules/outlier_rejection/pcm_config.hpp"
+#include "modules/place_recognition/place_recognition_config.hpp"
+#include "modules/pose_graph/graph_playback_config.hpp"
+#include "modules/pose_graph/pose_graph_config.hpp"
+#include "modules/sensors/sensors_config.hpp"
+#include "modules/vio/tracker_config.hpp"
+#include "modules/vio/vio_config.hpp"
+#include "runtime/dds/dds_config.hpp"
+
+namespace km {
+
+/// The configuration of every module of a robot.
+struct RobotConfig {
+  RunConfig run;
+  DdsConfig dds;
+  SensorsConfig sensors;
+  TrackerConfig tracker;
+  VioConfig vio;
+  KeyframeFeaturesConfig keyframe_features;
+  PlaceRecognitionConfig place_recognition;
+  LoopClosureConfig loop_closure;
+  PcmConfig pcm;
+  PoseGraphConfig pose_graph;
+  GraphPlaybackConfig graph_playback;
+
+  std::string effective;  ///< As YAML: a file that gives this configuration again.
+};
+
+/// Link profile, then --config files, then --set, then the options of the command line: what comes
+/// later wins. Throws ConfigError with every problem, by file and line.
+[[nodiscard]] RobotConfig load_robot_config(const RobotOptions& options);
+
+/// A file that comes with the program, such as "vocabulary/indoor.kmvoc" or "qos/wifi.yaml": `name`
+/// as it is, else below config/ of the source tree or of the installation this program runs from.
+/// Throws ConfigError that names every place looked at.
+[[nodiscard]] std::filesystem::path find_shipped_file(const std::string& name);
+
+}  // namespace km

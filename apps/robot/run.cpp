@@ -1,0 +1,177 @@
+#include "apps/robot/run.hpp"
+
+#include <fstream>
+#include <optional>
+#include <stdexcept>
+
+#include "apps/robot/departure.hpp"
+#include "apps/robot/results.hpp"
+#include "apps/robot/status_text.hpp"
+#include "apps/robot/wiring.hpp"
+#include "modules/sensors/euroc_reader.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/log.hpp"
+#include "runtime/metrics.hpp"
+#include "runtime/status_line.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr int kModuleFailed = 3;
+
+RobotInput open_input(const RobotOptions& options, const RobotConfig& config) {
+  if (!options.dataset.empty())
+    return std::make_unique<EurocReader>(
+        options.dataset,
+        EurocOptions{.from_s = options.from_s.value_or(0.0),
+                     .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
+                     .stereo_tolerance_s = config.sensors.stereo_tolerance_s});
+  RecordedGraph graph = read_recorded_graph(options.graph);
+  if (graph.robot != options.robot)
+    throw std::invalid_argument(options.graph.string() + " holds robot " +
+                                std::to_string(graph.robot) + ": start it with --robot " +
+                                std::to_string(graph.robot));
+  return graph;
+}
+
+void make_output_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw std::runtime_error(folder.string() + ": " + error.message());
+}
+
+std::ofstream open_result(const fs::path& file) {
+  std::ofstream stream(file);
+  if (!stream) throw std::runtime_error(file.string() + ": cannot be written");
+  return stream;
+}
+
+// What happens beside the modules while they run: phase, status line, traffic over time.
+class Watch {
+ public:
+  Watch(const RobotOptions& options, const RobotConfig& config, Robot& robot)
+      : robot_(robot),
+        departure_(config.run.settle_s, options.serve_limit_s),
+        start_s_(steady_now_s()),
+        traffic_file_(open_result(options.output / "traffic.csv")),
+        traffic_csv_(traffic_file_) {}
+
+  /// True when the robot may leave. Called ten times a second.
+  bool poll() {
+    const double now_s = steady_now_s() - start_s_;
+    const TrafficSnapshot traffic = robot_.bridge().traffic();
+    const bool ended = robot_.input_ended();
+    robot_.recorder().with_record([&](const RunRecord& record) {
+      status_line_.update(
+          status_text(robot_.dataset_time_s(), record, robot_.bridge().peers().list(), traffic));
+      const std::vector<RobotPhase> peers = present_peers();
+      robot_.set_phase(departure_.update(now_s, {.input_ended = ended,
+                                                 .graph_settled = record.settled(),
+                                                 .activity = record.activity(),
+                                                 .present_peers = peers}));
+    });
+    if (now_s - traffic_written_s_ >= kTrafficInterval_s) write_traffic(now_s, traffic);
+    if (departure_.reason() != nullptr) robot_.set_phase(RobotPhase::kLeaving);
+    return departure_.reason() != nullptr;
+  }
+
+  void finish() { write_traffic(seconds(), robot_.bridge().traffic()); }
+  [[nodiscard]] double seconds() const { return steady_now_s() - start_s_; }
+  [[nodiscard]] const char* reason() const { return departure_.reason(); }
+
+ private:
+  static constexpr double kTrafficInterval_s = 1.0;
+
+  // A peer that is there but has not said how far it is counts as running.
+  std::vector<RobotPhase> present_peers() const {
+    std::map<RobotId, RobotPhase> told;
+    for (const RobotStatus& status : robot_.status_node().peers())
+      told[status.robot] = status.phase;
+    std::vector<RobotPhase> phases;
+    for (const Peer& peer : robot_.bridge().peers().list())
+      if (peer.state == PeerState::kAlive) phases.push_back(told[peer.identity.robot]);
+    return phases;
+  }
+
+  void write_traffic(double now_s, const TrafficSnapshot& traffic) {
+    traffic_csv_.append(now_s, traffic);
+    traffic_file_.flush();  // what is recorded survives a crash
+    traffic_written_s_ = now_s;
+  }
+
+  Robot& robot_;
+  Departure departure_;
+  double start_s_;
+  std::ofstream traffic_file_;
+  TrafficCsv traffic_csv_;
+  double traffic_written_s_ = 0.0;
+  StatusLine status_line_;
+};
+
+void write_timings(const fs::path& file, const Robot& robot) {
+  std::ofstream out = open_result(file);
+  out << "module,calls,median_ms,p95_ms,max_ms,total_s\n";
+  for (const Node* node : robot.nodes()) {
+    const DurationHistogram timing = node->timing();
+    if (timing.count() == 0) continue;
+    out << node->name() << ',' << timing.count() << ',' << 1e3 * timing.quantile_s(0.5) << ','
+        << 1e3 * timing.quantile_s(0.95) << ',' << 1e3 * timing.max_s() << ',' << timing.total_s()
+        << '\n';
+  }
+}
+
+std::string exit_reason(const RunResult& result, const Watch& watch) {
+  if (result.failure) return result.failure->node + ": " + result.failure->message;
+  if (result.interrupted) return "interrupted";
+  return watch.reason() != nullptr ? watch.reason() : "unknown";
+}
+
+RunSummary summarize(const RobotOptions& options, Robot& robot, double seconds,
+                     const std::string& reason) {
+  RunSummary summary;
+  summary.name = options.name;
+  summary.seconds = seconds;
+  summary.exit_reason = reason;
+  if (robot.sensors() != nullptr) {
+    summary.frames = robot.sensors()->published();
+    summary.frames_skipped = robot.sensors()->skipped();
+  }
+  const TrafficSnapshot traffic = robot.bridge().traffic();
+  for (const auto category :
+       {TrafficCategory::kPlaceRecognition, TrafficCategory::kGeometricVerification,
+        TrafficCategory::kPoseGraphOptimization, TrafficCategory::kOther})
+    summary.traffic_bytes[to_string(category)] = traffic.bytes(Direction::kOut, category);
+  return summary;
+}
+
+}  // namespace
+
+int run_robot(const RobotOptions& options, SignalWatch& signals) {
+  const RobotConfig config = load_robot_config(options);
+  RobotInput input = open_input(options, config);
+  make_output_folder(options.output);
+  open_result(options.output / "config.yaml") << config.effective;
+
+  Robot robot(options, config, std::move(input), signals);
+  std::optional<Watch> watch;
+  watch.emplace(options, config, robot);
+  const RunResult result = robot.run([&watch] { return watch->poll(); });
+  watch->finish();
+  const std::string reason = exit_reason(result, *watch);
+  const double seconds = watch->seconds();
+  watch.reset();  // the status line ends before the last log lines
+
+  robot.recorder().with_record([&](const RunRecord& record) {
+    write_results(options.output, record, summarize(options, robot, seconds, reason));
+  });
+  write_timings(options.output / "timing.csv", robot);
+  if (result.failure) {
+    log::error(result.failure->node) << result.failure->message;
+    return kModuleFailed;
+  }
+  log::info("robot") << "done (" << reason << "), results in " << options.output.string();
+  return 0;
+}
+
+}  // namespace km

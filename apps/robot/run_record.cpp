@@ -1,0 +1,90 @@
+#include "apps/robot/run_record.hpp"
+
+#include <algorithm>
+
+#include "modules/core/odometry_correction.hpp"
+
+namespace km {
+
+void RunRecord::add(const KeyframeOdometry& keyframe) {
+  ++activity_;
+  keyframes_.push_back(keyframe);
+  keyframes_.back().frame = nullptr;  // a run of an hour would keep every keyframe's images
+}
+
+void RunRecord::add(const Closure& closure) {
+  ++activity_;
+  if (closure.from.id.robot == robot_ || closure.to.id.robot == robot_)
+    closures_.insert_or_assign(closure.id(), closure);
+}
+
+void RunRecord::add(const InlierSet& set) {
+  ++activity_;
+  if (set.a != robot_ && set.b != robot_) return;
+  InlierSet& newest = inlier_sets_[{set.a, set.b}];
+  if (set.version >= newest.version) newest = set;
+}
+
+void RunRecord::add(const ClosureOutcome& outcome) {
+  ++activity_;
+  outcomes_[outcome.id] = outcome;
+}
+
+void RunRecord::add(const OptimizerProgress& progress) {
+  if (progress.round != progress_.round) ++activity_;
+  progress_ = progress;
+}
+
+void RunRecord::add(const Trajectory& trajectory) {
+  if (trajectory.robot == robot_) trajectory_ = trajectory;
+}
+
+bool RunRecord::is_inlier(const ClosureId& id) const {
+  const auto set = inlier_sets_.find(std::minmax(id.from.robot, id.to.robot));
+  return set != inlier_sets_.end() &&
+         std::binary_search(set->second.closures.begin(), set->second.closures.end(), id);
+}
+
+std::vector<Closure> RunRecord::inlier_closures() const {
+  std::vector<Closure> result;
+  for (const auto& [id, closure] : closures_)
+    if (is_inlier(id)) result.push_back(closure);
+  return result;
+}
+
+std::vector<ClosureOutcome> RunRecord::outcomes() const {
+  std::vector<ClosureOutcome> result;
+  for (auto [id, outcome] : outcomes_) {
+    if (outcome.stage == ClosureStage::kVerified) {
+      if (is_inlier(id))
+        outcome.stage = ClosureStage::kInlier;
+      else if (outcome.reason.empty())
+        outcome.reason = "inconsistent with the other closures of the robot pair";
+    } else if (outcome.reason.empty()) {
+      outcome.reason = "the run ended first";
+    }
+    result.push_back(outcome);
+  }
+  return result;
+}
+
+std::vector<StampedPose> RunRecord::optimized() const {
+  std::vector<StampedPose> keyframes;
+  const std::size_t solved = trajectory_ ? trajectory_->T_world_kf.size() : 0;
+  for (std::size_t i = 0; i < std::min(solved, keyframes_.size()); ++i)
+    keyframes.push_back({keyframes_[i].stamp, trajectory_->T_world_kf[i]});
+  return odometry_.empty() ? keyframes : correct_odometry(odometry_, keyframes);
+}
+
+std::map<RobotId, RunRecord::StageCounts> RunRecord::stages_per_peer() const {
+  std::map<RobotId, StageCounts> result;
+  for (const auto& [id, outcome] : outcomes_) {
+    StageCounts& counts = result[id.from.robot == robot_ ? id.to.robot : id.from.robot];
+    ++counts.candidates;
+    counts.verified += outcome.stage >= ClosureStage::kVerified ? 1 : 0;
+    counts.inliers += is_inlier(id) ? 1 : 0;
+  }
+  return result;
+}
+
+}  // namespace km

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "modules/core/odometry.hpp"
+#include "modules/core/pose_graph.hpp"
+#include "modules/core/stamped_pose.hpp"
+
+namespace km {
+
+/// Everything one run leaves behind, as plain data: filled by the recorder's thread, written to
+/// files by write_results(). Not thread-safe.
+class RunRecord {
+ public:
+  explicit RunRecord(RobotId robot) : robot_(robot) {}
+
+  void add(const OdometryState& state) { odometry_.push_back({state.stamp, state.T_odom_body}); }
+  void add(const KeyframeOdometry& keyframe);
+  void add(const Closure& closure);
+  void add(const InlierSet& set);  ///< Kept if newer than the pair's last.
+  void add(const ClosureOutcome& outcome);
+  void add(const Trajectory& trajectory);  ///< Of this robot.
+  void add(const OptimizerProgress& progress);
+
+  [[nodiscard]] RobotId robot() const { return robot_; }
+
+  /// True if the optimiser has nothing left to do (or never had).
+  [[nodiscard]] bool settled() const { return keyframes_.size() < 2 || progress_.settled; }
+
+  /// Changes with every keyframe, closure, outcome and round.
+  [[nodiscard]] std::uint64_t activity() const { return activity_; }
+
+  [[nodiscard]] const std::vector<StampedPose>& odometry() const { return odometry_; }
+  [[nodiscard]] const std::vector<KeyframeOdometry>& keyframes() const { return keyframes_; }
+  [[nodiscard]] const std::optional<Trajectory>& trajectory() const { return trajectory_; }
+  [[nodiscard]] const OptimizerProgress& progress() const { return progress_; }
+
+  /// Closures of this robot that are inliers, with its own and its peers' measurements.
+  [[nodiscard]] std::vector<Closure> inlier_closures() const;
+
+  /// Every candidate of this robot in the order of ids, the stage raised to kInlier, or the reason
+  /// filled in, by the newest inlier sets.
+  [[nodiscard]] std::vector<ClosureOutcome> outcomes() const;
+
+  /// Poses in the team's frame: of every image, or of every keyframe where there are no images.
+  [[nodiscard]] std::vector<StampedPose> optimized() const;
+
+  struct StageCounts {
+    int candidates = 0;
+    int verified = 0;
+    int inliers = 0;
+  };
+  /// Closures with each other robot (or inside this one) that this robot found.
+  [[nodiscard]] std::map<RobotId, StageCounts> stages_per_peer() const;
+
+ private:
+  [[nodiscard]] bool is_inlier(const ClosureId& id) const;
+
+  RobotId robot_;
+  std::vector<StampedPose> odometry_;
+  std::vector<KeyframeOdometry> keyframes_;  // without their images
+  std::map<ClosureId, Closure> closures_;
+  std::map<std::pair<RobotId, RobotId>, InlierSet> inlier_sets_;
+  std::map<ClosureId, ClosureOutcome> outcomes_;
+  std::optional<Trajectory> trajectory_;
+  OptimizerProgress progress_;
+  std::uint64_t activity_ = 0;
+};
+
+}  // namespace km

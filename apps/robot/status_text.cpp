@@ -1,0 +1,77 @@
+#include "apps/robot/status_text.hpp"
+
+#include <cstdio>
+#include <map>
+
+namespace km {
+namespace {
+
+std::string format(const char* pattern, double value) {
+  char text[48];
+  std::snprintf(text, sizeof text, pattern, value);
+  return text;
+}
+
+std::string bytes_text(std::uint64_t bytes) {
+  const auto value = static_cast<double>(bytes);
+  return value < 1e6 ? format("%.0f kB", value * 1e-3) : format("%.2f MB", value * 1e-6);
+}
+
+const char* to_word(PeerState state) {
+  switch (state) {
+    case PeerState::kAlive:
+      return "alive";
+    case PeerState::kLost:
+      return "lost";
+    case PeerState::kLeft:
+      return "left";
+  }
+  return "";
+}
+
+std::string peers_text(const std::vector<Peer>& peers) {
+  if (peers.empty()) return "peers: none yet";
+  std::string text = "peers:";
+  for (const Peer& peer : peers) text += ' ' + peer.identity.name + ' ' + to_word(peer.state) + ',';
+  text.pop_back();
+  return text;
+}
+
+std::string closures_text(const RunRecord& record, const std::vector<Peer>& peers) {
+  std::map<RobotId, std::string> names;
+  for (const Peer& peer : peers) names[peer.identity.robot] = peer.identity.name;
+  names[record.robot()] = "own";
+  std::string text = "closures:";
+  for (const auto& [robot, counts] : record.stages_per_peer()) {
+    const std::string& name = names[robot];
+    text += ' ' + (name.empty() ? std::to_string(robot) : name) + ' ' +
+            std::to_string(counts.candidates) + '>' + std::to_string(counts.verified) + '>' +
+            std::to_string(counts.inliers) + ',';
+  }
+  if (text.back() == ',') text.pop_back();
+  return text.back() == ':' ? text + " none yet" : text;
+}
+
+std::string optimizer_text(const OptimizerProgress& progress) {
+  return "pgo: cost " + format("%.4g", progress.cost) + ", round " +
+         std::to_string(progress.round) + ", with " +
+         std::to_string(progress.members.empty() ? 0 : progress.members.size() - 1);
+}
+
+}  // namespace
+
+std::string status_text(double dataset_time_s, const RunRecord& record,
+                        const std::vector<Peer>& peers, const TrafficSnapshot& traffic) {
+  const auto sent = [&traffic](TrafficCategory category) {
+    return bytes_text(traffic.bytes(Direction::kOut, category));
+  };
+  return format("%.1f s, ", dataset_time_s) + std::to_string(record.odometry().size()) +
+         " images, " + std::to_string(record.keyframes().size()) + " keyframes | " +
+         peers_text(peers) + " | " + closures_text(record, peers) + " | " +
+         optimizer_text(record.progress()) + " | out: place " +
+         sent(TrafficCategory::kPlaceRecognition) + ", verify " +
+         sent(TrafficCategory::kGeometricVerification) + ", pgo " +
+         sent(TrafficCategory::kPoseGraphOptimization) + ", other " + sent(TrafficCategory::kOther);
+}
+
+}  // namespace km

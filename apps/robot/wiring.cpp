@@ -1,0 +1,147 @@
+#include "apps/robot/wiring.hpp"
+
+#include <utility>
+
+#include "modules/loop_closure/keyframe_features_node.hpp"
+#include "modules/loop_closure/loop_closure_codec.hpp"
+#include "modules/loop_closure/loop_closure_node.hpp"
+#include "modules/outlier_rejection/outlier_rejection_codec.hpp"
+#include "modules/outlier_rejection/pcm_node.hpp"
+#include "modules/place_recognition/place_recognition_codec.hpp"
+#include "modules/place_recognition/place_recognition_node.hpp"
+#include "modules/place_recognition/vocabulary_file.hpp"
+#include "modules/pose_graph/pose_graph_codec.hpp"
+#include "modules/pose_graph/pose_graph_node.hpp"
+#include "modules/vio/vio_node.hpp"
+#include "runtime/dds/robot_status_codec.hpp"
+
+namespace km {
+
+template <typename NodeType, typename... Arguments>
+NodeType& Robot::add(bool feeds, Arguments&&... arguments) {
+  NodeType& node = supervisor_.emplace<NodeType>(std::forward<Arguments>(arguments)...);
+  if (feeds) feeding_.push_back(&node);
+  nodes_.push_back(&node);
+  return node;
+}
+
+Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput input,
+             SignalWatch& signals)
+    : identity_{.robot = options.robot, .name = options.name, .boot = random_boot_id()},
+      participant_(config.dds, identity_),
+      supervisor_(signals) {
+  auto bridge = std::make_unique<DdsBridge>(participant_);
+  bridge_ = bridge.get();
+  if (auto* reader = std::get_if<std::unique_ptr<DatasetReader>>(&input))
+    add_sensing(config, options.rate, std::move(*reader));
+  else
+    add_playback(config, options.rate, std::get<RecordedGraph>(std::move(input)));
+  add_back_end(config);
+  add_network();
+  add_records();
+  nodes_.push_back(bridge_);
+  supervisor_.add(std::move(bridge));
+}
+
+void Robot::add_sensing(const RobotConfig& config, double rate,
+                        std::unique_ptr<DatasetReader> reader) {
+  const SensorRig rig = reader->rig();
+  sensors_ = &add<SensorsNode>(true, config.sensors, rate, std::move(reader), topics_.packets,
+                               topics_.sensors_end);
+  add<VioNode>(true, identity_.robot, rig, config.tracker, config.vio,
+               VioTopics{topics_.packets, topics_.odometry, topics_.keyframe_odometry});
+  add<KeyframeFeaturesNode>(true, config.keyframe_features, rig.stereo, topics_.keyframe_odometry,
+                            topics_.keyframes);
+  add<PlaceRecognitionNode>(
+      false, config.place_recognition, identity_.robot,
+      std::make_shared<const Vocabulary>(load_vocabulary(find_shipped_file(config.run.vocabulary))),
+      PlaceRecognitionTopics{topics_.keyframes, topics_.peer_bows, topics_.own_bows,
+                             topics_.candidates, topics_.place_queries});
+  topics_.sensors_end.subscribe([this](const auto&) { source_ended_ = true; });
+}
+
+void Robot::add_playback(const RobotConfig& config, double rate, RecordedGraph graph) {
+  add<GraphPlaybackNode>(true, config.graph_playback, rate, std::move(graph),
+                         GraphPlaybackTopics{topics_.keyframe_odometry, topics_.keyframes,
+                                             topics_.measured_closures, topics_.playback_end});
+  topics_.playback_end.subscribe([this](const auto&) { source_ended_ = true; });
+}
+
+void Robot::add_back_end(const RobotConfig& config) {
+  add<LoopClosureNode>(
+      false, config.loop_closure, identity_.robot,
+      LoopClosureTopics{topics_.keyframes, topics_.candidates, topics_.measured_closures,
+                        topics_.peer_requests, topics_.peer_replies, bridge_->peers().events(),
+                        topics_.own_requests, topics_.own_replies, topics_.own_closures,
+                        topics_.outcomes});
+  topics_.own_closures.subscribe(
+      [this](const auto& closure) { topics_.closures.publish(closure); });
+  add<PcmNode>(false, config.pcm, identity_.robot, topics_.closures, topics_.own_inlier_sets);
+  add<PoseGraphNode>(
+      false, config.pose_graph, PgoPeer{identity_.robot, identity_.boot},
+      PoseGraphTopics{topics_.keyframe_odometry, topics_.closures, topics_.own_inlier_sets,
+                      topics_.peer_inlier_sets, bridge_->peers().events(), topics_.peer_pgo_status,
+                      topics_.peer_pgo_sessions, topics_.peer_poses, topics_.own_pgo_status,
+                      topics_.own_pgo_sessions, topics_.own_poses, topics_.trajectory,
+                      topics_.progress});
+}
+
+// What crosses between robots, and how: the kinds of topic are those of runtime/dds/topic_kind.hpp.
+void Robot::add_network() {
+  using enum TopicKind;
+  using enum TrafficCategory;
+  DdsBridge& dds = *bridge_;
+  Topics& t = topics_;
+  dds.send(t.own_bows, kEvent, kPlaceRecognition);
+  dds.receive(t.peer_bows, kEvent, kPlaceRecognition);
+  dds.send(t.own_requests, kRequest, kGeometricVerification);
+  dds.receive_addressed(t.peer_requests, kRequest, kGeometricVerification);
+  dds.send(t.own_replies, kRequest, kGeometricVerification);
+  dds.receive_addressed(t.peer_replies, kRequest, kGeometricVerification);
+  dds.send(t.own_closures, kEvent, kGeometricVerification);
+  dds.receive(t.closures, kEvent, kGeometricVerification);
+  dds.send(t.own_inlier_sets, kState, kPoseGraphOptimization);
+  dds.receive(t.peer_inlier_sets, kState, kPoseGraphOptimization);
+  dds.send(t.own_pgo_status, kState, kPoseGraphOptimization);
+  dds.receive(t.peer_pgo_status, kState, kPoseGraphOptimization);
+  dds.send(t.own_pgo_sessions, kState, kPoseGraphOptimization);
+  dds.receive(t.peer_pgo_sessions, kState, kPoseGraphOptimization);
+  dds.send(t.own_poses, kState, kPoseGraphOptimization);
+  dds.receive(t.peer_poses, kState, kPoseGraphOptimization);
+  dds.send(t.own_status, kStatus, kOther);
+  dds.receive(t.peer_status, kStatus, kOther);
+}
+
+void Robot::add_records() {
+  recorder_ = &add<RecorderNode>(false, identity_.robot);
+  recorder_->record(topics_.odometry);
+  recorder_->record(topics_.keyframe_odometry);
+  recorder_->record(topics_.closures);
+  recorder_->record(topics_.outcomes);
+  recorder_->record(topics_.own_inlier_sets);
+  recorder_->record(topics_.peer_inlier_sets);
+  recorder_->record(topics_.trajectory);
+  recorder_->record(topics_.progress);
+  // The first stamp is the origin of the dataset's time shown to people.
+  topics_.keyframe_odometry.subscribe(
+      [this, first = std::optional<Stamp>()](const auto& keyframe) mutable {
+        if (!first) first = keyframe->stamp;
+        dataset_time_s_ = seconds_between(*first, keyframe->stamp);
+        ++keyframes_;
+      });
+  status_ = &add<RobotStatusNode>(
+      false, [this] { return own_status(); }, topics_.own_status, topics_.peer_status);
+}
+
+RobotStatus Robot::own_status() const {
+  return {identity_.robot, identity_.name, phase_, dataset_time_s_, keyframes_};
+}
+
+bool Robot::input_ended() {
+  if (!source_ended_) return false;
+  if (!std::exchange(drained_, true))
+    for (Node* node : feeding_) node->stop();
+  return true;
+}
+
+}  // namespace km

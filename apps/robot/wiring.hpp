@@ -1,0 +1,110 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <variant>
+#include <vector>
+
+#include "apps/robot/recorder_node.hpp"
+#include "apps/robot/robot_config.hpp"
+#include "modules/core/frame.hpp"
+#include "modules/loop_closure/keyframe_exchange.hpp"
+#include "modules/place_recognition/keyframe_bow.hpp"
+#include "modules/place_recognition/place_query.hpp"
+#include "modules/pose_graph/graph_playback_node.hpp"
+#include "modules/pose_graph/pgo_messages.hpp"
+#include "modules/pose_graph/recorded_graph.hpp"
+#include "modules/sensors/dataset_reader.hpp"
+#include "modules/sensors/sensors_node.hpp"
+#include "runtime/dds/bridge.hpp"
+#include "runtime/dds/robot_status_node.hpp"
+#include "runtime/supervisor.hpp"
+
+namespace km {
+
+/// Every channel of a robot. `own_*` goes to the other robots, `peer_*` comes from them; the rest
+/// stays inside.
+struct Topics {
+  Topic<SensorPacket> packets;
+  Topic<SensorsEnd> sensors_end;
+  Topic<GraphPlaybackEnd> playback_end;
+  Topic<OdometryState> odometry;
+  Topic<KeyframeOdometry> keyframe_odometry;
+  Topic<Keyframe> keyframes;
+  Topic<RelativePose> measured_closures;
+  Topic<KeyframeBow> own_bows, peer_bows;
+  Topic<PlaceQuery> place_queries;
+  Topic<LoopCandidate> candidates;
+  Topic<Addressed<KeyframeRequest>> own_requests;
+  Topic<Addressed<KeyframeReply>> own_replies;
+  Topic<KeyframeRequest> peer_requests;
+  Topic<KeyframeReply> peer_replies;
+  Topic<ClosureOutcome> outcomes;
+  Topic<Closure> own_closures, closures;  // the latter: own and received
+  Topic<InlierSet> own_inlier_sets, peer_inlier_sets;
+  Topic<PgoStatus> own_pgo_status, peer_pgo_status;
+  Topic<PgoSession> own_pgo_sessions, peer_pgo_sessions;
+  Topic<PublicPoses> own_poses, peer_poses;
+  Topic<Trajectory> trajectory;
+  Topic<OptimizerProgress> progress;
+  Topic<RobotStatus> own_status, peer_status;
+};
+
+/// What the robot perceives: a recording of sensors, or a recorded pose graph.
+using RobotInput = std::variant<std::unique_ptr<DatasetReader>, RecordedGraph>;
+
+/// All nodes of one robot and how they are joined: the system on one page (wiring.cpp).
+class Robot {
+ public:
+  /// Builds and joins everything; nothing runs yet. Throws ConfigError and DdsError.
+  Robot(const RobotOptions& options, const RobotConfig& config, RobotInput input,
+        SignalWatch& signals);
+
+  /// Runs until the robot may leave its team, a node fails, or a signal.
+  [[nodiscard]] RunResult run(const Supervisor::Finished& finished) {
+    return supervisor_.run(finished);
+  }
+
+  /// True once the input is over; then, the first time, what was in flight before the recorder is
+  /// waited for: after it no more keyframes come.
+  bool input_ended();
+
+  [[nodiscard]] const RecorderNode& recorder() const { return *recorder_; }
+  [[nodiscard]] DdsBridge& bridge() { return *bridge_; }
+  [[nodiscard]] const RobotStatusNode& status_node() const { return *status_; }
+  [[nodiscard]] const SensorsNode* sensors() const { return sensors_; }  ///< Null without sensors.
+  void set_phase(RobotPhase phase) { phase_ = phase; }
+  [[nodiscard]] double dataset_time_s() const { return dataset_time_s_; }
+  [[nodiscard]] const std::vector<const Node*>& nodes() const { return nodes_; }
+
+ private:
+  void add_sensing(const RobotConfig& config, double rate, std::unique_ptr<DatasetReader> reader);
+  void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
+  void add_back_end(const RobotConfig& config);
+  void add_network();
+  void add_records();
+  [[nodiscard]] RobotStatus own_status() const;
+
+  /// Adds a node to the supervisor; `feeds` marks those that the end of the input drains.
+  template <typename NodeType, typename... Arguments>
+  NodeType& add(bool feeds, Arguments&&... arguments);
+
+  const RobotIdentity identity_;
+  DdsParticipant participant_;
+  Topics topics_;
+  std::atomic<bool> source_ended_ = false;
+  std::atomic<double> dataset_time_s_ = 0.0;
+  std::atomic<std::uint32_t> keyframes_ = 0;
+  std::atomic<RobotPhase> phase_ = RobotPhase::kRunning;
+  bool drained_ = false;
+  std::vector<Node*> feeding_;  // from the source to the last that makes keyframes
+  std::vector<const Node*> nodes_;
+  SensorsNode* sensors_ = nullptr;
+  RecorderNode* recorder_ = nullptr;
+  RobotStatusNode* status_ = nullptr;
+  DdsBridge* bridge_ = nullptr;
+  Supervisor supervisor_;  // last member: stops the nodes before what they use
+};
+
+}  // namespace km

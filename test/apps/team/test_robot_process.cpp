@@ -1,0 +1,117 @@
+#include "apps/team/robot_process.hpp"
+
+#include <poll.h>
+
+#include <catch2/catch.hpp>
+
+#include "apps/team/team_display.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+// A shell script as a process; `lines` collects its standard output up to its end.
+struct Script {
+  TemporaryFolder folder;
+  RobotProcess process;
+  std::vector<std::string> lines;
+
+  explicit Script(const std::string& text)
+      : process({"/bin/sh", "-c", text}, no_signals(), folder.path() / "log") {}
+
+  static sigset_t no_signals() {
+    sigset_t set;
+    sigemptyset(&set);
+    return set;
+  }
+  void read_once() {
+    std::vector<pollfd> fds;
+    for (const int fd : process.descriptors()) fds.push_back({fd, POLLIN, 0});
+    poll(fds.data(), fds.size(), 50);
+    for (std::string& line : process.read()) lines.push_back(std::move(line));
+  }
+  void wait() {
+    while (!process.exit()) read_once();
+  }
+};
+
+}  // namespace
+
+TEST_CASE("A process gives its lines, its end and its last words", "[team]") {
+  Script script("echo one; echo bad >&2; printf 'two\\nthree'; exit 3");
+  script.wait();
+  CHECK(script.lines == std::vector<std::string>{"one", "two", "three"});
+  CHECK(script.process.exit()->code == 3);
+  CHECK(to_string(*script.process.exit()) == "exit code 3");
+  REQUIRE(script.process.last_words().size() == 1);
+  CHECK(script.process.last_words().back() == "bad");
+  CHECK_THAT(script.folder.read("log"), Catch::Contains("one\n") && Catch::Contains("bad\n"));
+}
+
+TEST_CASE("Only the last words are kept", "[team]") {
+  Script script("for i in $(seq 1 1000); do echo $i >&2; done");
+  script.wait();
+  CHECK(script.process.exit()->ok());
+  CHECK(script.process.last_words().size() == 12);
+  CHECK(script.process.last_words().back() == "1000");
+}
+
+TEST_CASE("Its standard input is empty and its process group its own", "[team]") {
+  Script script("read x || echo empty; [ $(ps -o pgid= -p $$) = $$ ] && echo leader");
+  script.wait();
+  CHECK(script.lines == std::vector<std::string>{"empty", "leader"});
+}
+
+TEST_CASE("A signal reaches the process", "[team]") {
+  Script script("trap 'echo told; exit 0' INT; echo ready; while :; do sleep 0.02; done");
+  while (script.lines.empty()) script.read_once();
+  script.process.send(SIGINT);
+  script.wait();
+  CHECK(script.lines == std::vector<std::string>{"ready", "told"});
+  CHECK(script.process.exit()->ok());
+}
+
+TEST_CASE("A process that a signal ended says which", "[team]") {
+  Script script("kill -9 $$");
+  script.wait();
+  CHECK_FALSE(script.process.exit()->ok());
+  CHECK_THAT(to_string(*script.process.exit()), Catch::Contains("signal 9"));
+}
+
+TEST_CASE("A program that cannot be started fails with a reason", "[team]") {
+  const TemporaryFolder folder;
+  RobotProcess process({folder.path() / "missing"}, Script::no_signals(), folder.path() / "log");
+  while (!process.exit()) process.read();
+  CHECK(process.exit()->code == 127);
+  REQUIRE(process.last_words().size() == 1);
+  CHECK_THAT(process.last_words().back(), Catch::StartsWith("cannot be started: No such file"));
+}
+
+TEST_CASE("A process does not outlive its owner", "[team]") {
+  pid_t child = 0;
+  {
+    Script script("echo $$; sleep 60");
+    while (script.lines.empty()) script.read_once();
+    child = std::stoi(script.lines.front());
+    CHECK(kill(child, 0) == 0);
+  }
+  CHECK(kill(child, 0) != 0);
+}
+
+TEST_CASE("The display redraws a terminal and prefixes lines elsewhere", "[team]") {
+  std::ostringstream plain;
+  TeamDisplay log({"a", "long"}, plain, false, 0);
+  log.update(0, "hello");
+  log.update(1, "you");
+  CHECK(plain.str() == "a    | hello\nlong | you\n");
+
+  std::ostringstream screen;
+  TeamDisplay tty({"a", "b"}, screen, true, 20);
+  tty.update(0, "x");
+  CHECK(screen.str() == "\r\x1b[Ka | x\n\r\x1b[Kb | \n");
+  screen.str("");
+  tty.update(1, std::string(100, 'y'));
+  CHECK(screen.str() == "\x1b[2A\r\x1b[Ka | x\n\r\x1b[Kb | " + std::string(15, 'y') + "\n");
+}
+
+}  // namespace km

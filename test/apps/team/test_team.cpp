@@ -1,0 +1,115 @@
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <string>
+
+#include "test/support/command.hpp"
+#include "test/support/temporary_folder.hpp"
+
+// kimera_multi_team as a program, with a shell script in the robots' place.
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Finds its name and output folder on its command line, prints a status line and leaves a summary;
+// `end` is what it does then.
+std::string robot_script(const std::string& end) {
+  return "#!/bin/sh\n"
+         "all=\"$*\"\n"
+         "while [ $# -gt 0 ]; do\n"
+         "  case $1 in --name) name=$2; shift ;; --output) out=$2; shift ;; esac\n"
+         "  shift\n"
+         "done\n"
+         "echo \"status of $name: $all\"\n"
+         "echo '{\"keyframes\": 5, \"frames\": 77, \"exit_reason\": \"finished\"}' > "
+         "\"$out/summary.json\"\n" +
+         end + '\n';
+}
+
+struct Team {
+  TemporaryFolder folder;
+  std::string command;
+
+  explicit Team(const std::string& end) {
+    const fs::path script = folder.write("robot", robot_script(end));
+    fs::permissions(script, fs::perms::owner_all);
+    folder.write("g.csv", "");
+    const fs::path file = folder.write("team.yaml",
+                                       "robots:\n"
+                                       "  - {id: 1, name: alice, graph: g.csv}\n"
+                                       "  - {id: 2, name: bob, graph: g.csv}\n");
+    command = std::string(KM_BIN_DIR) + "/kimera_multi_team --config " + file.string() +
+              " --robot-binary " + script.string() + " --output " +
+              (folder.path() / "out").string();
+  }
+};
+
+}  // namespace
+
+TEST_CASE("A team runs its robots, shows their lines and prints the table", "[team]") {
+  const Team team("exit 0");
+  const std::string json = (team.folder.path() / "team.json").string();
+  const auto result =
+      run_command(team.command + " --rate max --domain 5 --json " + json + " -- --set a.b=1");
+  CAPTURE(result.output);
+  CHECK(result.exit_code == 0);
+  CHECK_THAT(result.output, Catch::Contains("alice | status of alice: --robot 1 --name alice"));
+  CHECK_THAT(result.output, Catch::Contains("--rate max --domain 5"));
+  CHECK_THAT(result.output, Catch::Contains("--set a.b=1"));
+  CHECK_THAT(result.output, Catch::Contains("bob   | status of bob"));
+  CHECK_THAT(result.output, Catch::Contains("77") && Catch::Contains("finished"));
+  CHECK_THAT(team.folder.read("team.json"), Catch::Contains("\"frames\": 77"));
+  CHECK_THAT(team.folder.read("out/bob/robot.log"), Catch::Contains("status of bob"));
+}
+
+TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
+  const Team team("[ $name = bob ] && { echo 'out of luck' >&2; exit 9; }; exit 0");
+  const auto result = run_command(team.command);
+  CAPTURE(result.output);
+  CHECK(result.exit_code == 3);
+  CHECK_THAT(result.output, Catch::Contains("bob failed, exit code 9; its last words:") &&
+                                Catch::Contains("  out of luck"));
+}
+
+TEST_CASE("The domain is drawn once for the whole team", "[team]") {
+  const Team team("exit 0");
+  const std::string output = run_command(team.command).output;
+  CAPTURE(output);
+  const auto domain_after = [&](std::size_t at) {
+    const std::string key = "--domain ";
+    const std::size_t begin = output.find(key, at) + key.size();
+    return output.substr(begin, output.find(' ', begin) - begin);
+  };
+  CHECK(domain_after(output.find("status of alice")) == domain_after(output.find("status of bob")));
+}
+
+TEST_CASE("An interrupt is passed on once and the table still printed", "[team]") {
+  const Team team(
+      "trap 'echo \"$name told\"; exit 0' INT\n"
+      "[ $name = alice ] && kill -INT $PPID\n"
+      "while :; do sleep 0.05; done");
+  const auto result = run_command("exec " + team.command);
+  CAPTURE(result.output);
+  CHECK(result.exit_code == 0);
+  CHECK_THAT(result.output, Catch::Contains("alice told") && Catch::Contains("bob   | bob told"));
+  CHECK_THAT(result.output, Catch::Contains("team, one frame"));
+}
+
+TEST_CASE("A time limit asks the robots to end", "[team]") {
+  const Team team("trap 'exit 0' INT; while :; do sleep 0.05; done");
+  CHECK(run_command(team.command + " --time-limit 0.2").exit_code == 0);
+}
+
+TEST_CASE("What cannot be run is refused with code 1", "[team]") {
+  const Team team("exit 0");
+  CHECK(run_command(team.command + " --robot-binary /nowhere/robot").exit_code == 1);
+  const std::string tool = std::string(KM_BIN_DIR) + "/kimera_multi_team";
+  CHECK(run_command(tool).exit_code == 1);
+  const auto missing = run_command(tool + " --config /nowhere.yaml");
+  CHECK(missing.exit_code == 1);
+  CHECK(missing.output == "kimera_multi_team: /nowhere.yaml: no such file\n");
+  CHECK(run_command(tool + " --help").exit_code == 0);
+}
+
+}  // namespace km

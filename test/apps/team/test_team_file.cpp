@@ -1,0 +1,136 @@
+#include "apps/team/team_file.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "apps/team/run_team.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A folder with what team files refer to.
+struct Inputs {
+  TemporaryFolder folder;
+  fs::path dataset = folder.path() / "recording";
+  Inputs() {
+    fs::create_directories(dataset);
+    folder.write("common.yaml", "");
+    folder.write("truth.csv", "");
+    folder.write("recording/g.csv", "");
+  }
+  fs::path team(const std::string& text) const { return folder.write("team.yaml", text); }
+};
+
+std::string problems_of(const fs::path& file, const fs::path& dataset) {
+  try {
+    static_cast<void>(read_team_file(file, dataset));
+  } catch (const TeamFileError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+}  // namespace
+
+TEST_CASE("A team file gives the robots their inputs", "[team]") {
+  const Inputs inputs;
+  const fs::path file = inputs.team(
+      "config: common.yaml\n"
+      "truth: truth.csv\n"
+      "rate: max\n"
+      "domain: 7\n"
+      "output: out/here\n"
+      "time_limit_s: 12.5\n"
+      "arguments: [--link, wifi]\n"
+      "robots:\n"
+      "  - {id: 3, name: a, dataset: \"${DATASET}\", from: 0, to: 7.5}\n"
+      "  - {id: 300, graph: \"${DATASET}/g.csv\", arguments: --verbose, truth: recording/g.csv}\n");
+  const TeamPlan plan = read_team_file(file, inputs.dataset);
+  CHECK(plan.configs == std::vector{inputs.folder.path() / "common.yaml"});
+  CHECK(plan.rate == "max");
+  CHECK(plan.domain == 7U);
+  CHECK(plan.output == "out/here");
+  CHECK(plan.time_limit_s == 12.5);
+  REQUIRE(plan.robots.size() == 2);
+  const RobotPlan& a = plan.robots[0];
+  CHECK(a.id == 3);
+  CHECK(a.name == "a");
+  CHECK(a.dataset == inputs.dataset);
+  CHECK(a.graph.empty());
+  CHECK(a.from_s == 0.0);
+  CHECK(a.to_s == 7.5);
+  CHECK(a.truth == inputs.folder.path() / "truth.csv");
+  const RobotPlan& b = plan.robots[1];
+  CHECK(b.id == 300);
+  CHECK(b.name == "robot300");
+  CHECK(b.graph == inputs.dataset / "g.csv");
+  CHECK_FALSE(b.from_s);
+  CHECK(b.truth == inputs.dataset / "g.csv");
+  CHECK(b.arguments == std::vector<std::string>{"--link", "wifi", "--verbose"});
+}
+
+TEST_CASE("The command line of a robot says what its plan says", "[team]") {
+  TeamPlan plan;
+  plan.configs = {"/c.yaml", "/d.yaml"};
+  plan.domain = 9;
+  plan.output = "out";
+  RobotPlan robot;
+  robot.id = 4;
+  robot.name = "x";
+  robot.dataset = "/data";
+  robot.from_s = 7.5;
+  robot.arguments = {"--set", "a.b=1"};
+  CHECK(robot_command("/bin/robot", plan, robot) ==
+        std::vector<std::string>{
+            "/bin/robot", "--config", "/c.yaml",   "--config", "/d.yaml", "--robot", "4",
+            "--name",     "x",        "--dataset", "/data",    "--from",  "7.5",     "--rate",
+            "1.0",        "--domain", "9",         "--output", "out/x",   "--set",   "a.b=1"});
+}
+
+TEST_CASE("Every problem of a team file is told with its line", "[team]") {
+  const Inputs inputs;
+  const std::string problems = problems_of(inputs.team("config: none.yaml\n"
+                                                       "speed: 3\n"
+                                                       "domain: 500\n"
+                                                       "robots:\n"
+                                                       "  - {id: 1, name: a, dataset: recording}\n"
+                                                       "  - {id: 1, name: a/b, graph: recording}\n"
+                                                       "  - {id: 70000, name: c}\n"
+                                                       "  - {id: 2, dataset: x, from: soon}\n"),
+                                           {});
+  for (const char* expected :
+       {"line 1: no such file or folder: ", "line 2: unknown key speed",
+        "line 3: domain is not a number from 0 to 230", "line 6: name 'a/b' is not made of",
+        "line 6: id 1 is used twice", "line 7: a robot needs an id from 0 to 65535",
+        "line 7: robot c needs either dataset or graph",
+        "line 8: no such file or folder: ", "line 8: from is not a number of seconds"}) {
+    CAPTURE(expected);
+    CHECK_THAT(problems, Catch::Contains(expected));
+  }
+}
+
+TEST_CASE("A team file without robots or dataset is refused", "[team]") {
+  const Inputs inputs;
+  CHECK_THAT(problems_of(inputs.team("rate: 1\n"), {}),
+             Catch::Contains("a team needs a list of robots"));
+  CHECK_THAT(problems_of(inputs.team("robots:\n  - {id: 1, dataset: \"${DATASET}\"}\n"), {}),
+             Catch::Contains("line 2: ${DATASET} needs --dataset"));
+  CHECK_THAT(problems_of(inputs.team("robots: [\n"), {}), Catch::Contains("team.yaml line "));
+  CHECK_THAT(problems_of("/no/team.yaml", {}), Catch::Contains("no such file"));
+  CHECK_THAT(problems_of(inputs.team("just text\n"), {}),
+             Catch::Contains("expected keys and values"));
+}
+
+TEST_CASE("The team files that are shipped can be read", "[team]") {
+  const auto [file, data, robots] = GENERATE(table<const char*, const char*, std::size_t>(
+      {{"euroc_two_robots.yaml", "euroc/MH_01_easy", 2},
+       {"tunnels.yaml", "multi_robot/tunnels_8robots", 8}}));
+  const auto dataset = shared_data(data);
+  if (!dataset) return;
+  CHECK(read_team_file(fs::path("config/teams") / file, *dataset).robots.size() == robots);
+}
+
+}  // namespace km

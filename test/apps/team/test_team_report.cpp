@@ -1,0 +1,119 @@
+#include "apps/team/team_report.hpp"
+
+#include <catch2/catch.hpp>
+#include <sstream>
+
+#include "apps/team/text_table.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+constexpr const char* kSummary = R"({
+  "robot": 4, "name": "a", "keyframes": 12, "frames": 150, "frames_skipped": 1,
+  "closures": {"candidates": 9, "verified": 5, "inliers": 4},
+  "pgo": {"rounds": 33, "seconds": 0.5, "cost": 1.25, "gradient_norm": 0.1, "anchor": 4,
+          "settled": true, "members": [4, 7]},
+  "traffic": {"place_recognition": 2000, "geometric_verification": 3000000, "pgo": 400, "other": 5},
+  "exit_reason": "done"
+})";
+
+std::string straight_line(double lift_m) {
+  std::string text;
+  for (int i = 0; i < 50; ++i)
+    text += std::to_string(1 + i) + " " + std::to_string(i * i % 7) + " " + std::to_string(i) +
+            " " + std::to_string(lift_m) + " 0 0 0 1\n";
+  return text;
+}
+
+// Two robots; `a` with all its files, `b` with none.
+TeamResult example(const TemporaryFolder& folder) {
+  TeamPlan plan;
+  plan.output = folder.path();
+  for (const char* name : {"a", "b"}) {
+    RobotPlan robot;
+    robot.name = name;
+    robot.id = 4;
+    robot.graph = "g.csv";
+    robot.truth = folder.write("truth.tum", straight_line(0.0));
+    plan.robots.push_back(robot);
+  }
+  folder.write("a/summary.json", kSummary);
+  folder.write("a/odometry.tum", straight_line(0.5));
+  folder.write("a/optimized.tum", straight_line(0.0));
+  return collect_results(plan, {{{0, 0}, {}}, {{3, 0}, {"error: no luck"}}});
+}
+
+}  // namespace
+
+TEST_CASE("A summary is read with its parts", "[team]") {
+  const TemporaryFolder folder;
+  const RobotSummary summary = read_summary(folder.write("summary.json", kSummary));
+  CHECK(summary.keyframes == 12);
+  CHECK(summary.frames == 150);
+  CHECK(summary.frames_skipped == 1);
+  CHECK(summary.closure_candidates == 9);
+  CHECK(summary.closures_verified == 5);
+  CHECK(summary.closures_inlier == 4);
+  CHECK(summary.pgo_rounds == 33);
+  CHECK(summary.pgo_seconds == 0.5);
+  CHECK(summary.pgo_cost == 1.25);
+  CHECK(summary.pgo_anchor == RobotId{4});
+  CHECK(summary.pgo_members == std::vector<RobotId>{4, 7});
+  CHECK(summary.traffic_bytes.at("geometric_verification") == 3000000);
+  CHECK(summary.exit_reason == "done");
+}
+
+TEST_CASE("A summary that is missing or broken is named", "[team]") {
+  const TemporaryFolder folder;
+  CHECK_THROWS_WITH(read_summary(folder.path() / "x.json"), Catch::EndsWith("no such file"));
+  CHECK_THROWS_WITH(read_summary(folder.write("y.json", "[1, 2")), Catch::Contains("y.json"));
+  CHECK_THROWS_WITH(read_summary(folder.write("z.json", "7")),
+                    Catch::Contains("not a JSON object"));
+  CHECK(read_summary(folder.write("empty.json", "{}")).keyframes == 0);
+}
+
+TEST_CASE("A robot without results leaves a note, the others are judged", "[team]") {
+  const TemporaryFolder folder;
+  const TeamResult team = example(folder);
+  REQUIRE(team.robots.size() == 2);
+  CHECK(team.robots[0].notes.empty());
+  REQUIRE(team.robots[0].odometry);
+  CHECK(team.robots[0].odometry->position_m.rmse < 1e-9);
+  REQUIRE(team.optimized);
+  CHECK(team.optimized->robots.size() == 1);
+  CHECK(team.robots[1].notes.size() == 3);
+  CHECK_FALSE(team.robots[1].odometry);
+}
+
+TEST_CASE("The tables show results, failures and last words", "[team]") {
+  const TemporaryFolder folder;
+  const std::string text = to_table(example(folder));
+  for (const char* expected : {"team, one frame", "100.0%", "FAILED, exit code 3",
+                               "b failed, exit code 3; its last words:\n  error: no luck", "2.0 kB",
+                               "3.0 MB", "400 B", "2 robots", "note: b: "}) {
+    CAPTURE(text, expected);
+    CHECK_THAT(text, Catch::Contains(expected));
+  }
+}
+
+TEST_CASE("The JSON of a run holds every robot", "[team]") {
+  const TemporaryFolder folder;
+  std::ostringstream text;
+  JsonWriter json(text);
+  write_json(json, example(folder));
+  for (const char* expected : {"\"exit_code\": 3", "\"rounds\": 33", "\"pgo\": 400",
+                               "\"optimized\": {", "\"members\": [\n"}) {
+    CAPTURE(text.str(), expected);
+    CHECK_THAT(text.str(), Catch::Contains(expected));
+  }
+}
+
+TEST_CASE("Columns are aligned", "[team]") {
+  CHECK(align_columns({{"a", "bb"}, {"ccc", "d"}}) == "a    bb\nccc   d\n");
+  CHECK(bytes_text(999) == "999 B");
+  CHECK(bytes_text(1500) == "1.5 kB");
+  CHECK(fixed(1.0 / 0.0, 2) == "-");
+}
+
+}  // namespace km
