@@ -7,13 +7,10 @@
 
 #include "modules/vio/klt.hpp"
 #include "modules/vio/local_warp.hpp"
-#include "modules/vio/stereo_motion.hpp"
-#include "modules/vio/two_point_ransac.hpp"
 
 namespace km {
 namespace {
 
-constexpr float kMinSpacing = 0.4F;  // Of min_distance_px: tracks may come nearer than corners.
 constexpr float kMinCorrelation = 0.85F;   // Of a track with the patch it began with.
 constexpr float kMaxCorrectionPx = 2.0F;   // By which the patch may correct KLT.
 constexpr int kSearchEvery = 4;            // Images, for features that stereo has not found.
@@ -42,6 +39,12 @@ void check_image(const GrayImage& image, const PinholeCamera& camera, const char
                               std::to_string(camera.height));
 }
 
+std::unique_ptr<const AlignmentPatch> cut_patch(const ImagePyramid& image,
+                                                const Eigen::Vector2f& px) {
+  const auto patch = AlignmentPatch::cut(image.level(0), px);
+  return patch ? std::make_unique<const AlignmentPatch>(*patch) : nullptr;
+}
+
 }  // namespace
 
 FeatureTracker::FeatureTracker(const StereoRig& rig, const TrackerConfig& config)
@@ -58,6 +61,9 @@ TrackedFrame FeatureTracker::track(const StereoFrame& frame,
                                    const Eigen::Matrix3d& R_previous_current_body) {
   check_image(frame.left, rig_.cameras[0], "left");
   check_image(frame.right, rig_.cameras[1], "right");
+  if (!R_previous_current_body.allFinite()) {
+    throw std::invalid_argument("FeatureTracker::track: the rotation is not finite");
+  }
   ImagePyramid left(frame.left, config_, true);
   const ImagePyramid right(frame.right, config_, false);
 
@@ -74,7 +80,7 @@ TrackedFrame FeatureTracker::track(const StereoFrame& frame,
   }
 
   tracks_.clear();
-  for (const Step& step : steps) tracks_.push_back(step.now);
+  for (Step& step : steps) tracks_.push_back(std::move(step.now));
   statistics_.tracked = static_cast<int>(tracks_.size());
   statistics_.motion_known = motion.has_value();
   add_corners(left);
@@ -90,155 +96,83 @@ SE3 FeatureTracker::predicted_motion(Stamp stamp, const Eigen::Matrix3d& R_body)
   return make_pose(R_body_cam.transpose() * R_body * R_body_cam, velocity_ * dt_s);
 }
 
-std::vector<Eigen::Vector2f> FeatureTracker::predicted_px(const SE3& T_previous_current) const {
-  std::vector<Eigen::Vector2f> result;
-  result.reserve(tracks_.size());
-  for (const Track& track : tracks_) {
-    const std::optional<double> depth =
-        track.inverse_depth ? track.inverse_depth : depth_nearby(track.px);
-    const Eigen::Vector3d X =
-        transfer({track.left, depth.value_or(0.0), track.left}, T_previous_current);
-    // Behind the camera there is no prediction: the old place is as good as any.
-    const bool in_front = X.z() > 0.1;
-    result.push_back(in_front
-                         ? Eigen::Vector2f(rig_.cameras[0].project(X.hnormalized()).cast<float>())
-                         : track.px);
-  }
-  return result;
-}
-
-std::optional<double> FeatureTracker::depth_nearby(const Eigen::Vector2f& px) const {
+double FeatureTracker::depth_guess(const Track& track) const {
+  if (track.inverse_depth) return *track.inverse_depth;
   constexpr float kReachPx = 80.0F;
   float nearest = kReachPx * kReachPx;
-  std::optional<double> depth;
-  for (const Track& track : tracks_) {
-    const float distance = (track.px - px).squaredNorm();
-    if (!track.inverse_depth || distance >= nearest) continue;
+  double guess = 0.0;
+  for (const Track& other : tracks_) {
+    const float distance = (other.px - track.px).squaredNorm();
+    if (!other.inverse_depth || distance >= nearest) continue;
     nearest = distance;
-    depth = track.inverse_depth;
+    guess = *other.inverse_depth;
   }
-  return depth;
+  return guess;
+}
+
+Eigen::Vector2f FeatureTracker::predicted_px(const Track& track, double inverse_depth,
+                                             const SE3& T_previous_current) const {
+  const Eigen::Vector3d X = transfer({track.left, inverse_depth, track.left}, T_previous_current);
+  constexpr double kMinDepthRatio = 0.1;  // Nearly behind the camera: no prediction.
+  if (X.z() < kMinDepthRatio) return track.px;
+  return rig_.cameras[0].project(X.hnormalized()).cast<float>();
 }
 
 std::vector<FeatureTracker::Step> FeatureTracker::follow(const ImagePyramid& left,
                                                          const SE3& guess) {
   std::vector<Step> steps;
   if (tracks_.empty()) return steps;
+  std::vector<double> depths;
   std::vector<Eigen::Vector2f> from;
-  for (const Track& track : tracks_) from.push_back(track.px);
-  const KltResult there = track_klt(previous_left_, left, from, predicted_px(guess),
-                                    config_.window_px, config_.pyramid_levels);
+  std::vector<Eigen::Vector2f> starts;
+  for (const Track& track : tracks_) {
+    depths.push_back(depth_guess(track));
+    from.push_back(track.px);
+    starts.push_back(predicted_px(track, depths.back(), guess));
+  }
+  const KltResult there =
+      track_klt(previous_left_, left, from, starts, config_.window_px, config_.pyramid_levels);
+  const double tolerance = config_.max_forward_backward_px;
   KltResult back;
-  if (config_.max_forward_backward_px > 0.0) {
+  if (tolerance > 0.0) {
     back = track_klt(left, previous_left_, there.px, from, config_.window_px, 0);
   }
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    const std::optional<Eigen::Vector2d> bearing =
+    const auto bearing =
         there.found[i] ? rig_.cameras[0].unproject(there.px[i].cast<double>()) : std::nullopt;
     if (!bearing) {
       ++statistics_.lost;
-    } else if (!back.px.empty() &&
-               (!back.found[i] || (back.px[i] - from[i]).norm() >
-                                      static_cast<float>(config_.max_forward_backward_px))) {
-      ++statistics_.backward;
-    } else {
-      Track now;
-      now.id = tracks_[i].id;
-      now.length = tracks_[i].length + 1;
-      now.px = there.px[i];
-      now.left = *bearing;
-      steps.push_back({tracks_[i], now});
-    }
-  }
-  return steps;
-}
-
-void FeatureTracker::drop_crowded(std::vector<Step>& steps) {
-  const float spacing = kMinSpacing * static_cast<float>(config_.min_distance_px);
-  std::vector<Step> kept;
-  for (const Step& step : steps) {  // The older of two comes first.
-    const bool crowded = std::any_of(kept.begin(), kept.end(), [&](const Step& other) {
-      return (other.now.px - step.now.px).squaredNorm() < spacing * spacing;
-    });
-    if (crowded) {
-      ++statistics_.crowded;
-    } else {
-      kept.push_back(step);
-    }
-  }
-  steps = std::move(kept);
-}
-
-std::optional<SE3> FeatureTracker::drop_outliers(std::vector<Step>& steps, const SE3& guess) {
-  std::vector<DepthPair> pairs;
-  for (const Step& step : steps) {
-    if (!step.before.inverse_depth) continue;
-    pairs.push_back({step.before.left, *step.before.inverse_depth, step.now.left});
-  }
-  constexpr double kNoisePx = 1.0;
-  const std::optional<SE3> motion = estimate_motion(pairs, guess, kNoisePx / focal_px_, rng_);
-  if (motion) {
-    drop_by_motion(steps, *motion);
-  } else {
-    drop_by_two_points(steps, guess);
-  }
-  return motion;
-}
-
-void FeatureTracker::drop_by_motion(std::vector<Step>& steps, const SE3& T_previous_current) {
-  const double threshold = config_.max_reprojection_px / focal_px_;
-  std::vector<Step> kept;
-  for (Step& step : steps) {
-    if (step.before.inverse_depth) {
-      const DepthPair pair{step.before.left, *step.before.inverse_depth, step.now.left};
-      if (reprojection_distance(pair, T_previous_current) < threshold) {
-        step.now.inverse_depth = pair.inverse_depth / transfer(pair, T_previous_current).z();
-        kept.push_back(step);
-        continue;
-      }
-    }
-    // Without a depth, or with a wrong one, the landmark still lies on its epipolar line.
-    if (epipolar_distance({step.before.left, step.now.left}, T_previous_current.linear(),
-                          T_previous_current.translation()) < threshold) {
-      kept.push_back(step);
-    } else {
-      ++statistics_.motion;
-    }
-  }
-  steps = std::move(kept);
-}
-
-void FeatureTracker::drop_by_two_points(std::vector<Step>& steps, const SE3& guess) {
-  std::vector<BearingPair> pairs;
-  for (const Step& step : steps) pairs.push_back({step.before.left, step.now.left});
-  const TwoPointResult result =
-      two_point_ransac(pairs, guess.linear(), config_.max_reprojection_px / focal_px_, rng_);
-  std::vector<Step> kept;
-  for (std::size_t i = 0; i < steps.size(); ++i) {
-    if (!result.inlier[i]) {
-      ++statistics_.motion;
       continue;
     }
-    steps[i].now.inverse_depth = steps[i].before.inverse_depth;
-    kept.push_back(steps[i]);
+    if (tolerance > 0.0 && !(back.found[i] && (back.px[i] - from[i]).norm() < tolerance)) {
+      ++statistics_.backward;
+      continue;
+    }
+    Step step{std::move(tracks_[i]), {}, {}, depths[i]};
+    step.left_before = step.now.left;
+    step.depth_before = step.now.inverse_depth;
+    ++step.now.length;
+    step.now.px = there.px[i];
+    step.now.left = *bearing;
+    step.now.right.reset();
+    step.now.inverse_depth.reset();
+    steps.push_back(std::move(step));
   }
-  steps = std::move(kept);
+  return steps;
 }
 
 void FeatureTracker::align(std::vector<Step>& steps, const ImagePyramid& left,
                            const SE3& T_previous_current) const {
   const SE3 T_current_previous = T_previous_current.inverse();
   for (Step& step : steps) {
-    const auto depth =
-        step.before.inverse_depth ? step.before.inverse_depth : depth_nearby(step.before.px);
-    step.now.A = local_warp(rig_.cameras[0], rig_.cameras[0], step.before.left, depth.value_or(0.0),
-                            T_current_previous) *
-                 step.before.A;
-    step.now.patch = step.before.patch;
-    if (step.now.patch && place_on_patch(step.now, left)) continue;
+    Track& track = step.now;
+    track.A = local_warp(rig_.cameras[0], rig_.cameras[0], step.left_before, step.depth_guess,
+                         T_current_previous) *
+              track.A;
+    if (track.patch && place_on_patch(track, left)) continue;
     // It looks too different by now, or half of it is hidden: what KLT found starts anew.
-    step.now.patch = AlignmentPatch::cut(left.level(0), step.now.px);
-    step.now.A.setIdentity();
+    track.patch = cut_patch(left, track.px);
+    track.A.setIdentity();
   }
 }
 
@@ -266,8 +200,8 @@ void FeatureTracker::add_corners(const ImagePyramid& left) {
     track.id = next_id_++;
     track.px = px;
     track.left = *bearing;
-    track.patch = AlignmentPatch::cut(left.level(0), px);
-    tracks_.push_back(track);
+    track.patch = cut_patch(left, px);
+    tracks_.push_back(std::move(track));
     ++statistics_.detected;
   }
 }

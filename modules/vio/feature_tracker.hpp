@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <random>
 #include <span>
@@ -12,6 +13,7 @@
 #include "modules/vio/image_pyramid.hpp"
 #include "modules/vio/patch_alignment.hpp"
 #include "modules/vio/stereo_matcher.hpp"
+#include "modules/vio/stereo_motion.hpp"
 #include "modules/vio/tracked_frame.hpp"
 #include "modules/vio/tracker_config.hpp"
 
@@ -47,7 +49,8 @@ class FeatureTracker {
 
   /// The features of `frame`, possibly none. `R_previous_current_body` is the rotation of the body
   /// since the frame before, p_previous = R * p_current; identity if it is not known.
-  /// Throws std::invalid_argument if an image does not have the size of its camera.
+  /// Throws std::invalid_argument if an image does not have the size of its camera or the
+  /// rotation is not finite; the tracker is then unchanged.
   [[nodiscard]] TrackedFrame track(const StereoFrame& frame,
                                    const Eigen::Matrix3d& R_previous_current_body);
 
@@ -62,18 +65,25 @@ class FeatureTracker {
     Eigen::Vector2d left = Eigen::Vector2d::Zero();  // Bearings.
     std::optional<Eigen::Vector2d> right;
     std::optional<double> inverse_depth;  // Measured here, or carried on by the motion [1/m].
-    std::optional<AlignmentPatch> patch;  // From the image where the track began.
+    std::unique_ptr<const AlignmentPatch> patch;  // From where the track began; null at the rim.
     Eigen::Matrix2f A = Eigen::Matrix2f::Identity();  // Patch to this image.
   };
-  // A track and where it is in the new image.
+  // A track in the new image, and what was known of it in the image before.
   struct Step {
-    Track before;
     Track now;
+    Eigen::Vector2d left_before = Eigen::Vector2d::Zero();
+    std::optional<double> depth_before;  // Inverse, its own.
+    double depth_guess = 0.0;            // Inverse, its own or a neighbour's.
+
+    [[nodiscard]] DepthPair depth_pair() const {
+      return {left_before, depth_before.value_or(0.0), now.left};
+    }
   };
 
   [[nodiscard]] SE3 predicted_motion(Stamp stamp, const Eigen::Matrix3d& R_body) const;
-  [[nodiscard]] std::vector<Eigen::Vector2f> predicted_px(const SE3& T_previous_current) const;
-  [[nodiscard]] std::optional<double> depth_nearby(const Eigen::Vector2f& px) const;
+  [[nodiscard]] double depth_guess(const Track& track) const;
+  [[nodiscard]] Eigen::Vector2f predicted_px(const Track& track, double inverse_depth,
+                                             const SE3& T_previous_current) const;
   [[nodiscard]] std::vector<Step> follow(const ImagePyramid& left, const SE3& guess);
   void drop_crowded(std::vector<Step>& steps);
   [[nodiscard]] std::optional<SE3> drop_outliers(std::vector<Step>& steps, const SE3& guess);

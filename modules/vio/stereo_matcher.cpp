@@ -48,6 +48,9 @@ std::optional<StereoMatcher::Start> StereoMatcher::search(const ImagePyramid& le
     const double inverse_depth = nearest * static_cast<double>(i) / steps;
     const Eigen::Vector2d px =
         0.5 * rig_.cameras[1].project(right_bearing(query.left, inverse_depth));
+    const bool inside =
+        px.x() >= 0.0 && px.y() >= 0.0 && px.x() < image.cols && px.y() < image.rows;
+    if (!inside) continue;
     places[i] = px.array().round().cast<int>();
     if (!PatchTemplate::covered_by(image, places[i].x(), places[i].y())) continue;
     scores[i] = patch.correlation(image, places[i].x(), places[i].y());

@@ -32,7 +32,7 @@ struct TrackerConfig {
   double max_epipolar_px = 1.5;
 
   /// Largest distance of a feature from where the motion common to all features puts it [px].
-  double max_reprojection_px = 2.5;
+  double max_reprojection_px = 1.5;
 
   /// Nearest depth searched in stereo [m].
   double min_depth_m = 0.3;

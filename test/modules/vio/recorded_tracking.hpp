@@ -25,7 +25,7 @@ enum class RotationHint { kNone, kRawGyro, kCalibratedGyro };
 struct TrackingRun {
   std::vector<TrackedFrame> frames;
   std::vector<TrackerStatistics> statistics;
-  std::vector<double> milliseconds;  ///< Of each track().
+  std::vector<double> milliseconds;  ///< Processor time of each track().
 };
 
 TrackingRun run_tracker(const Recording& recording, const TrackerConfig& config, RotationHint hint);

@@ -203,7 +203,7 @@ TEST_CASE("One dark eye leaves features without a right point", "[vio]") {
   }
 }
 
-TEST_CASE("An image of the wrong size is refused and changes nothing", "[vio]") {
+TEST_CASE("An image of the wrong size or no rotation is refused and changes nothing", "[vio]") {
   const StereoRig rig = test_rig();
   const TexturedPlane plane;
   const Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
@@ -222,6 +222,8 @@ TEST_CASE("An image of the wrong size is refused and changes nothing", "[vio]") 
   cut.left.pixels.pop_back();
   CHECK_THROWS_AS(tracker.track(cut, R), std::invalid_argument);
   CHECK_THROWS_AS(tracker.track(StereoFrame{}, R), std::invalid_argument);
+  const Eigen::Matrix3d no_rotation = Eigen::Matrix3d::Constant(std::nan(""));
+  CHECK_THROWS_AS(tracker.track(second, no_rotation), std::invalid_argument);
 
   const TrackedFrame a = tracker.track(second, R);
   const TrackedFrame b = untouched.track(second, R);
