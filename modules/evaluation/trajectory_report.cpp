@@ -35,19 +35,6 @@ void write_statistics(JsonWriter& json, const char* name, const Statistics& stat
   json.end_object();
 }
 
-void write_error(JsonWriter& json, const TrajectoryError& error) {
-  json.begin_object();
-  json.field("name", error.name);
-  json.field("poses", error.poses);
-  json.field("pairs", error.position_m.count);
-  json.field("completeness", error.completeness);
-  write_statistics(json, "position_m", error.position_m);
-  write_statistics(json, "rotation_deg", error.rotation_deg);
-  write_statistics(json, "rpe_translation_m", error.rpe_translation_m);
-  write_statistics(json, "rpe_rotation_deg", error.rpe_rotation_deg);
-  json.end_object();
-}
-
 void write_alignment(JsonWriter& json, const Alignment& alignment) {
   const Eigen::Quaterniond q(alignment.T_truth_estimate.linear());
   json.begin_object();
@@ -79,16 +66,29 @@ std::string to_table(const TeamError& team) {
   return out.str();
 }
 
+void write_json(JsonWriter& json, const TrajectoryError& error) {
+  json.begin_object();
+  json.field("name", error.name);
+  json.field("poses", error.poses);
+  json.field("pairs", error.position_m.count);
+  json.field("completeness", error.completeness);
+  write_statistics(json, "position_m", error.position_m);
+  write_statistics(json, "rotation_deg", error.rotation_deg);
+  write_statistics(json, "rpe_translation_m", error.rpe_translation_m);
+  write_statistics(json, "rpe_rotation_deg", error.rpe_rotation_deg);
+  json.end_object();
+}
+
 void write_json(JsonWriter& json, const TeamError& team) {
   json.begin_object();
   json.key("alignment");
   write_alignment(json, team.alignment);
   json.key("robots");
   json.begin_array();
-  for (const TrajectoryError& robot : team.robots) write_error(json, robot);
+  for (const TrajectoryError& robot : team.robots) write_json(json, robot);
   json.end_array();
   json.key("joint");
-  write_error(json, team.joint);
+  write_json(json, team.joint);
   json.end_object();
 }
 

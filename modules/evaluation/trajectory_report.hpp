@@ -15,4 +15,7 @@ namespace km {
 /// robots: [{name, poses, pairs, position_m: {rmse, ...}, ...}], joint: {...}}.
 void write_json(JsonWriter& json, const TeamError& team);
 
+/// The entry of one estimate alone.
+void write_json(JsonWriter& json, const TrajectoryError& error);
+
 }  // namespace km

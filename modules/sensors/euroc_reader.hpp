@@ -39,6 +39,10 @@ class EurocReader final : public DatasetReader {
   /// First stereo pair of the whole recording: the origin of the window's times.
   [[nodiscard]] Stamp recording_start() const { return recording_start_; }
 
+  /// First and last stereo pair of the window.
+  [[nodiscard]] Stamp first_stamp() const { return pairs_.front().stamp; }
+  [[nodiscard]] Stamp last_stamp() const { return pairs_.back().stamp; }
+
  private:
   void select(const EurocOptions& options);
   [[nodiscard]] bool has_imu(const StereoPairFile& pair);

@@ -87,6 +87,8 @@ TEST_CASE("The domain is drawn once for the whole team", "[team]") {
 TEST_CASE("An interrupt is passed on once and the table still printed", "[team]") {
   const Team team(
       "trap 'echo \"$name told\"; exit 0' INT\n"
+      "touch \"$out/ready\"\n"
+      "while [ $name = alice ] && [ ! -e \"$out/../bob/ready\" ]; do :; done\n"
       "[ $name = alice ] && kill -INT $PPID\n"
       "while :; do sleep 0.05; done");
   const auto result = run_command("exec " + team.command);

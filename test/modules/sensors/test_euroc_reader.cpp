@@ -80,6 +80,8 @@ TEST_CASE("A window is half open and counts from the recording's first image", "
   CHECK(a.back().frame->stamp == EurocFolder::image_stamp(3));
   CHECK(b.front().frame->stamp == EurocFolder::image_stamp(4));
   CHECK(second.recording_start() == EurocFolder::kFirstImage);
+  CHECK(second.first_stamp() == EurocFolder::image_stamp(4));
+  CHECK(second.last_stamp() == EurocFolder::image_stamp(7));
   CHECK_THROWS_AS(EurocReader(folder.root(), {.from_s = 1.0, .to_s = 1.0}), std::invalid_argument);
   CHECK_THROWS_AS(EurocReader(folder.root(), {.from_s = std::nan("")}), std::invalid_argument);
   CHECK_THROWS_WITH(EurocReader(folder.root(), {.from_s = 1.0}),

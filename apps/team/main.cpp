@@ -1,0 +1,124 @@
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <exception>
+#include <fstream>
+#include <iostream>
+#include <random>
+
+#include "apps/team/run_team.hpp"
+#include "apps/team/team_report.hpp"
+#include "apps/team/team_results.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kAbout =
+    "Runs a team of robots on this host, one process each, and compares what they estimated.\n\n"
+    "A team file lists the robots and their inputs (see config/teams/):\n"
+    "  config: ../datasets/euroc.yaml       # as for kimera_multi_robot; one or a list\n"
+    "  truth: truth.csv                     # optional; a robot may have its own\n"
+    "  robots:\n"
+    "    - {id: 0, name: a, dataset: \"${DATASET}\", from: 0.0, to: 7.5}\n"
+    "    - {id: 1, name: b, graph: b.g2o, arguments: [--set, section.key=1]}\n"
+    "Optional keys: rate, domain, output, time_limit_s, arguments. Paths are relative to the "
+    "file.\n\n"
+    "Exit code: 0 if every robot ended well, 1 for input that cannot be used, 3 if a robot "
+    "failed.\n"
+    "Ctrl-C asks the robots to end in order and prints what there is; a second one ends them.\n\n"
+    "Examples:\n"
+    "  kimera_multi_team --config config/teams/euroc_two_robots.yaml --dataset MH_01_easy\n"
+    "  kimera_multi_team --config config/teams/tunnels.yaml --dataset tunnels_8robots --rate max";
+
+struct TeamOptions {
+  fs::path config, dataset, output, truth, json, robot_binary;
+  std::string rate;
+  std::optional<std::uint32_t> domain;
+  std::optional<double> time_limit_s;
+  std::vector<std::string> arguments;
+};
+
+fs::path program_folder() {
+  return fs::read_symlink("/proc/self/exe").parent_path();
+}
+
+void define(CLI::App& app, TeamOptions& options) {
+  options.robot_binary = program_folder() / "kimera_multi_robot";
+  app.add_option("--config", options.config, "Team file")->required();
+  app.add_option("--dataset", options.dataset, "What ${DATASET} stands for in the team file");
+  app.add_option("--rate", options.rate, "Times real time, or max (default: the file's, 1.0)");
+  app.add_option("--domain", options.domain, "DDS domain (default: the file's, or random)")
+      ->check(CLI::Range(0, 230));
+  app.add_option("--output", options.output, "Results, one folder per robot (default: the file's)");
+  app.add_option("--truth", options.truth, "True poses of all robots, instead of the file's");
+  app.add_option("--time-limit", options.time_limit_s, "Ask the robots to end after this [s]")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--json", options.json, "Also write the results to this file, as JSON");
+  app.add_option("--robot-binary", options.robot_binary, "Program of a robot")
+      ->capture_default_str();
+  app.add_option("arguments", options.arguments, "After --: more arguments of every robot");
+}
+
+// The command line has the last word over the team file.
+km::TeamPlan make_plan(const TeamOptions& options) {
+  km::TeamPlan plan = km::read_team_file(options.config, options.dataset);
+  if (!options.rate.empty()) plan.rate = options.rate;
+  if (!options.output.empty()) plan.output = options.output;
+  if (options.domain) plan.domain = options.domain;
+  if (options.time_limit_s) plan.time_limit_s = options.time_limit_s;
+  if (!plan.domain) {
+    std::random_device device;  // teams of one host must not meet
+    plan.domain = std::uniform_int_distribution<std::uint32_t>(1, 230)(device);
+  }
+  for (km::RobotPlan& robot : plan.robots) {
+    if (!options.truth.empty()) robot.truth = options.truth;
+    robot.arguments.insert(robot.arguments.end(), options.arguments.begin(),
+                           options.arguments.end());
+  }
+  return plan;
+}
+
+int run(const TeamOptions& options) {
+  const km::TeamPlan plan = make_plan(options);
+  if (access(options.robot_binary.c_str(), X_OK) != 0)
+    throw std::runtime_error(options.robot_binary.string() + ": no such program; build it, or " +
+                             "give --robot-binary");
+  km::SignalWatch signals;
+  std::vector<std::string> names;
+  for (const km::RobotPlan& robot : plan.robots) names.push_back(robot.name);
+  std::cout << names.size() << " robots in DDS domain " << *plan.domain << ", results in "
+            << plan.output.string() << std::endl;
+  km::TeamDisplay display(names);
+  const km::TeamResult team =
+      km::collect_results(plan, km::run_team(options.robot_binary, plan, signals, display));
+
+  std::cout << '\n' << to_table(team);
+  if (!options.json.empty()) {
+    std::ofstream file(options.json);
+    km::JsonWriter json(file);
+    write_json(json, team);
+    if (!file.flush()) throw std::runtime_error(options.json.string() + ": cannot be written");
+  }
+  const bool ok = std::all_of(team.robots.begin(), team.robots.end(),
+                              [](const km::RobotResult& robot) { return robot.run.exit.ok(); });
+  return ok ? 0 : 3;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(kAbout);
+  TeamOptions options;
+  try {
+    define(app, options);
+    app.parse(argc, argv);
+    return run(options);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 1;
+  } catch (const std::exception& error) {
+    std::cerr << "kimera_multi_team: " << error.what() << '\n';
+    return 1;
+  }
+}

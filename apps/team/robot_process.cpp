@@ -1,0 +1,128 @@
+#include "apps/team/robot_process.hpp"
+
+#include <fcntl.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+namespace km {
+namespace {
+
+constexpr std::size_t kLastWords = 12;
+
+std::runtime_error system_error(const std::string& what) {
+  return std::runtime_error(what + ": " + std::strerror(errno));
+}
+
+// Read end without blocking, both ends closed on exec.
+std::array<int, 2> make_pipe() {
+  std::array<int, 2> ends{};
+  if (pipe2(ends.data(), O_CLOEXEC) != 0) throw system_error("pipe");
+  fcntl(ends[0], F_SETFL, O_NONBLOCK);
+  return ends;
+}
+
+// In the child between fork and exec: async-signal-safe calls only.
+[[noreturn]] void become(char* const* arguments, int out, int err, const sigset_t& blocked,
+                         pid_t parent) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != parent) _exit(127);  // it died before the line above
+  setpgid(0, 0);
+  sigprocmask(SIG_SETMASK, &blocked, nullptr);
+  const int nothing = open("/dev/null", O_RDONLY);
+  if (nothing >= 0) dup2(nothing, STDIN_FILENO);
+  dup2(out, STDOUT_FILENO);
+  dup2(err, STDERR_FILENO);
+  execv(arguments[0], arguments);
+  const char* const reason = strerrordesc_np(errno);
+  [[maybe_unused]] ssize_t written = write(STDERR_FILENO, "cannot be started: ", 19);
+  written = write(STDERR_FILENO, reason, std::strlen(reason));
+  _exit(127);
+}
+
+}  // namespace
+
+std::string to_string(const ProcessExit& exit) {
+  if (exit.signal != 0)
+    return "ended by signal " + std::to_string(exit.signal) + " (" + strsignal(exit.signal) + ')';
+  return "exit code " + std::to_string(exit.code);
+}
+
+RobotProcess::RobotProcess(const std::vector<std::string>& command, const sigset_t& blocked,
+                           const std::filesystem::path& log)
+    : log_(log) {
+  if (!log_) throw std::runtime_error(log.string() + ": cannot be written");
+  std::vector<char*> arguments;
+  std::vector<std::string> texts = command;  // execv wants them mutable
+  for (std::string& text : texts) arguments.push_back(text.data());
+  arguments.push_back(nullptr);
+
+  const auto out = make_pipe();
+  const auto err = make_pipe();
+  const pid_t parent = getpid();
+  pid_ = fork();
+  if (pid_ == 0) become(arguments.data(), out[1], err[1], blocked, parent);
+  close(out[1]);
+  close(err[1]);
+  out_.fd = out[0];
+  err_.fd = err[0];
+  if (pid_ < 0) throw system_error("fork");
+}
+
+RobotProcess::~RobotProcess() {
+  if (!exit_ && pid_ > 0) {
+    kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+  }
+  for (const int fd : descriptors())
+    if (fd >= 0) close(fd);
+}
+
+std::vector<std::string> RobotProcess::drain(Pipe& pipe) {
+  std::vector<std::string> lines;
+  std::array<char, 4096> buffer{};
+  while (pipe.fd >= 0) {
+    const ssize_t n = ::read(pipe.fd, buffer.data(), buffer.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) break;
+    if (n <= 0) {
+      close(std::exchange(pipe.fd, -1));
+      if (!pipe.partial.empty()) lines.push_back(std::exchange(pipe.partial, {}));
+      break;
+    }
+    pipe.partial.append(buffer.data(), static_cast<std::size_t>(n));
+    for (auto end = pipe.partial.find('\n'); end != std::string::npos;
+         end = pipe.partial.find('\n')) {
+      lines.push_back(pipe.partial.substr(0, end));
+      pipe.partial.erase(0, end + 1);
+    }
+  }
+  for (const std::string& line : lines) log_ << line << std::endl;
+  return lines;
+}
+
+std::vector<std::string> RobotProcess::read() {
+  int status = 0;
+  // Asked before the pipes are read: after an end they hold all there is.
+  const bool ended = !exit_ && waitpid(pid_, &status, WNOHANG) == pid_;
+  std::vector<std::string> lines = drain(out_);
+  for (std::string& line : drain(err_)) {
+    last_words_.push_back(std::move(line));
+    if (last_words_.size() > kLastWords) last_words_.pop_front();
+  }
+  if (ended)
+    exit_ = WIFSIGNALED(status) ? ProcessExit{0, WTERMSIG(status)}
+                                : ProcessExit{WEXITSTATUS(status), 0};
+  return lines;
+}
+
+void RobotProcess::send(int signal) {
+  if (!exit_) kill(pid_, signal);
+}
+
+}  // namespace km

@@ -1,0 +1,126 @@
+#include "apps/team/run_team.hpp"
+
+#include <poll.h>
+
+#include <algorithm>
+#include <csignal>
+#include <memory>
+#include <sstream>
+
+#include "runtime/clock.hpp"
+
+namespace km {
+namespace {
+
+constexpr int kPoll_ms = 100;
+constexpr double kGrace_s = 30.0;
+
+std::string number(double value) {
+  std::ostringstream text;
+  text.precision(12);
+  text << value;
+  return text.str();
+}
+
+// The processes of a team, and what has been asked of them.
+class RunningTeam {
+ public:
+  RunningTeam(const std::filesystem::path& binary, const TeamPlan& plan, SignalWatch& signals,
+              TeamDisplay& display)
+      : plan_(plan), signals_(signals), display_(display) {
+    for (const RobotPlan& robot : plan.robots) {
+      const auto folder = plan.output / robot.name;
+      std::filesystem::create_directories(folder);
+      robots_.push_back(std::make_unique<RobotProcess>(robot_command(binary, plan, robot),
+                                                       signals.previous(), folder / "robot.log"));
+      display_.update(robots_.size() - 1, "started");
+    }
+  }
+
+  void wait() {
+    const double start_s = steady_now_s();
+    while (is_running()) {
+      poll_output();
+      for (std::size_t i = 0; i < robots_.size(); ++i) read(i);
+      if (const auto signal = signals_.wait(0.0)) send_to_all(*signal);
+      if (plan_.time_limit_s) enforce_limit(steady_now_s() - start_s);
+    }
+  }
+
+  std::vector<RobotRun> results() const {
+    std::vector<RobotRun> runs;
+    for (const auto& robot : robots_) runs.push_back({robot->exit().value(), robot->last_words()});
+    return runs;
+  }
+
+ private:
+  bool is_running() const {
+    return std::any_of(robots_.begin(), robots_.end(),
+                       [](const auto& robot) { return !robot->exit(); });
+  }
+
+  // Waits for output of any robot, at most kPoll_ms.
+  void poll_output() const {
+    std::vector<pollfd> polled;
+    for (const auto& robot : robots_)
+      for (const int fd : robot->descriptors()) polled.push_back({fd, POLLIN, 0});
+    poll(polled.data(), polled.size(), kPoll_ms);
+  }
+
+  void read(std::size_t i) {
+    if (robots_[i]->exit()) return;
+    for (const std::string& line : robots_[i]->read()) display_.update(i, line);
+    if (robots_[i]->exit() && !robots_[i]->exit()->ok())
+      display_.update(i, "FAILED: " + to_string(*robots_[i]->exit()));
+  }
+
+  void send_to_all(int signal) {
+    for (const auto& robot : robots_) robot->send(signal);
+  }
+
+  void enforce_limit(double elapsed_s) {
+    if (!asked_to_end_ && elapsed_s > *plan_.time_limit_s) {
+      asked_to_end_ = true;
+      send_to_all(SIGINT);
+    }
+    if (elapsed_s > *plan_.time_limit_s + kGrace_s) send_to_all(SIGKILL);
+  }
+
+  const TeamPlan& plan_;
+  SignalWatch& signals_;
+  TeamDisplay& display_;
+  std::vector<std::unique_ptr<RobotProcess>> robots_;
+  bool asked_to_end_ = false;
+};
+
+}  // namespace
+
+std::vector<std::string> robot_command(const std::filesystem::path& binary, const TeamPlan& plan,
+                                       const RobotPlan& robot) {
+  std::vector<std::string> command = {binary.string()};
+  const auto option = [&command](const char* name, const std::string& value) {
+    command.emplace_back(name);
+    command.push_back(value);
+  };
+  for (const auto& config : plan.configs) option("--config", config.string());
+  option("--robot", std::to_string(robot.id));
+  option("--name", robot.name);
+  if (!robot.dataset.empty()) option("--dataset", robot.dataset.string());
+  if (!robot.graph.empty()) option("--graph", robot.graph.string());
+  if (robot.from_s) option("--from", number(*robot.from_s));
+  if (robot.to_s) option("--to", number(*robot.to_s));
+  option("--rate", plan.rate);
+  option("--domain", std::to_string(plan.domain.value_or(0)));
+  option("--output", (plan.output / robot.name).string());
+  command.insert(command.end(), robot.arguments.begin(), robot.arguments.end());
+  return command;
+}
+
+std::vector<RobotRun> run_team(const std::filesystem::path& binary, const TeamPlan& plan,
+                               SignalWatch& signals, TeamDisplay& display) {
+  RunningTeam team(binary, plan, signals, display);
+  team.wait();
+  return team.results();
+}
+
+}  // namespace km

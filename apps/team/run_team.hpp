@@ -1,0 +1,33 @@
+#pragma once
+
+#include <deque>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "apps/team/robot_process.hpp"
+#include "apps/team/team_display.hpp"
+#include "apps/team/team_file.hpp"
+#include "runtime/supervisor.hpp"
+
+namespace km {
+
+/// How one robot's process ended.
+struct RobotRun {
+  ProcessExit exit;
+  std::deque<std::string> last_words;
+};
+
+/// The robot's command line.
+[[nodiscard]] std::vector<std::string> robot_command(const std::filesystem::path& binary,
+                                                     const TeamPlan& plan, const RobotPlan& robot);
+
+/// Starts a process per robot and waits for all of them; in the order of the plan, whose domain is
+/// set. Signals are passed on to the robots: the first asks them to end in order, as does the time
+/// limit, the second ends them at once. 30 s after the time limit they are killed. Output folders
+/// are made. Throws std::runtime_error if a process cannot be started; none is left then.
+[[nodiscard]] std::vector<RobotRun> run_team(const std::filesystem::path& binary,
+                                             const TeamPlan& plan, SignalWatch& signals,
+                                             TeamDisplay& display);
+
+}  // namespace km

@@ -1,0 +1,182 @@
+#include "apps/team/team_report.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "apps/team/text_table.hpp"
+#include "modules/evaluation/trajectory_report.hpp"
+
+namespace km {
+namespace {
+
+using Rows = std::vector<std::vector<std::string>>;
+
+constexpr std::array kTraffic = {"place_recognition", "geometric_verification", "pgo", "other"};
+
+std::string ate(const TrajectoryError* error) {
+  return error != nullptr ? fixed(error->position_m.rmse, 4) : "-";
+}
+
+std::string covered(const TrajectoryError* error) {
+  return error != nullptr ? fixed(100.0 * error->completeness, 1) + '%' : "-";
+}
+
+const TrajectoryError* find(const std::optional<TeamError>& team, const std::string& name) {
+  if (!team) return nullptr;
+  const auto found = std::find_if(team->robots.begin(), team->robots.end(),
+                                  [&](const TrajectoryError& e) { return e.name == name; });
+  return found != team->robots.end() ? &*found : nullptr;
+}
+
+std::string end_of(const RobotResult& robot) {
+  if (!robot.run.exit.ok()) return "FAILED, " + to_string(robot.run.exit);
+  return robot.summary && !robot.summary->exit_reason.empty() ? robot.summary->exit_reason : "ok";
+}
+
+std::string count_text(std::uint64_t count) {
+  return std::to_string(count);
+}
+
+std::string trajectory_table(const TeamResult& team) {
+  Rows rows = {{"robot", "frames", "skipped", "keyframes", "odometry ATE [m]", "covered",
+                "optimized ATE [m]", "covered", "end"}};
+  for (const RobotResult& robot : team.robots) {
+    const RobotSummary summary = robot.summary.value_or(RobotSummary{});
+    const TrajectoryError* const odometry = robot.odometry ? &*robot.odometry : nullptr;
+    const TrajectoryError* const optimized = find(team.optimized, robot.plan.name);
+    rows.push_back({robot.plan.name, count_text(summary.frames), count_text(summary.frames_skipped),
+                    count_text(summary.keyframes), ate(odometry), covered(odometry), ate(optimized),
+                    covered(optimized), end_of(robot)});
+  }
+  const TrajectoryError* const joint = team.optimized ? &team.optimized->joint : nullptr;
+  rows.push_back({"team, one frame", "", "", "", "", "", ate(joint), covered(joint), ""});
+  return align_columns(rows);
+}
+
+std::string closure_table(const TeamResult& team) {
+  Rows rows = {{"robot", "candidates", "verified", "inliers", "PGO rounds", "PGO time [s]",
+                "PGO cost", "anchor", "solves with"}};
+  RobotSummary sum;
+  for (const RobotResult& robot : team.robots) {
+    const RobotSummary s = robot.summary.value_or(RobotSummary{});
+    rows.push_back({robot.plan.name, count_text(s.closure_candidates),
+                    count_text(s.closures_verified), count_text(s.closures_inlier),
+                    count_text(s.pgo_rounds), fixed(s.pgo_seconds, 2), fixed(s.pgo_cost, 3),
+                    s.pgo_anchor ? count_text(*s.pgo_anchor) : "-",
+                    count_text(s.pgo_members.size()) + " robots"});
+    sum.closure_candidates += s.closure_candidates;
+    sum.closures_verified += s.closures_verified;
+    sum.closures_inlier += s.closures_inlier;
+    sum.pgo_rounds = std::max(sum.pgo_rounds, s.pgo_rounds);
+    sum.pgo_seconds = std::max(sum.pgo_seconds, s.pgo_seconds);
+  }
+  rows.push_back({"team", count_text(sum.closure_candidates), count_text(sum.closures_verified),
+                  count_text(sum.closures_inlier), count_text(sum.pgo_rounds),
+                  fixed(sum.pgo_seconds, 2)});
+  return align_columns(rows);
+}
+
+std::string traffic_table(const TeamResult& team) {
+  Rows rows = {{"sent", "place recognition", "geometric verification", "distributed PGO", "other"}};
+  std::array<double, kTraffic.size()> sums{};
+  for (const RobotResult& robot : team.robots) {
+    std::vector<std::string> row = {robot.plan.name};
+    for (std::size_t c = 0; c < kTraffic.size(); ++c) {
+      double bytes = 0.0;
+      if (robot.summary) {
+        const auto& traffic = robot.summary->traffic_bytes;
+        const auto entry = traffic.find(kTraffic[c]);
+        if (entry != traffic.end()) bytes = static_cast<double>(entry->second);
+      }
+      sums[c] += bytes;
+      row.push_back(bytes_text(bytes));
+    }
+    rows.push_back(std::move(row));
+  }
+  rows.push_back({"team"});
+  for (const double sum : sums) rows.back().push_back(bytes_text(sum));
+  return align_columns(rows);
+}
+
+std::string failures(const TeamResult& team) {
+  std::string text;
+  for (const RobotResult& robot : team.robots) {
+    for (const std::string& note : robot.notes)
+      text.append("note: ").append(robot.plan.name).append(": ").append(note).append("\n");
+    if (robot.run.exit.ok()) continue;
+    text += robot.plan.name + " failed, " + to_string(robot.run.exit) + "; its last words:\n";
+    for (const std::string& line : robot.run.last_words)
+      text.append("  ").append(line).append("\n");
+  }
+  return text;
+}
+
+void write_summary(JsonWriter& json, const RobotSummary& summary) {
+  json.field("keyframes", summary.keyframes);
+  json.field("frames", summary.frames);
+  json.field("frames_skipped", summary.frames_skipped);
+  json.key("closures");
+  json.begin_object();
+  json.field("candidates", summary.closure_candidates);
+  json.field("verified", summary.closures_verified);
+  json.field("inliers", summary.closures_inlier);
+  json.end_object();
+  json.key("pgo");
+  json.begin_object();
+  json.field("rounds", summary.pgo_rounds);
+  json.field("seconds", summary.pgo_seconds);
+  json.field("cost", summary.pgo_cost);
+  if (summary.pgo_anchor) json.field("anchor", *summary.pgo_anchor);
+  json.key("members");
+  json.begin_array();
+  for (const RobotId member : summary.pgo_members) json.value(member);
+  json.end_array();
+  json.end_object();
+  json.key("traffic");
+  json.begin_object();
+  for (const auto& [category, bytes] : summary.traffic_bytes) json.field(category, bytes);
+  json.end_object();
+  json.field("exit_reason", summary.exit_reason);
+}
+
+void write_robot(JsonWriter& json, const RobotResult& robot) {
+  json.begin_object();
+  json.field("robot", robot.plan.id);
+  json.field("name", robot.plan.name);
+  json.field("exit_code", robot.run.exit.code);
+  json.field("exit_signal", robot.run.exit.signal);
+  if (robot.summary) write_summary(json, *robot.summary);
+  if (robot.odometry) {
+    json.key("odometry");
+    write_json(json, *robot.odometry);
+  }
+  json.key("notes");
+  json.begin_array();
+  for (const std::string& note : robot.notes) json.value(note);
+  json.end_array();
+  json.end_object();
+}
+
+}  // namespace
+
+std::string to_table(const TeamResult& team) {
+  std::string text =
+      trajectory_table(team) + '\n' + closure_table(team) + '\n' + traffic_table(team);
+  const std::string remarks = failures(team);
+  return remarks.empty() ? text : text + '\n' + remarks;
+}
+
+void write_json(JsonWriter& json, const TeamResult& team) {
+  json.begin_object();
+  json.key("robots");
+  json.begin_array();
+  for (const RobotResult& robot : team.robots) write_robot(json, robot);
+  json.end_array();
+  if (team.optimized) {
+    json.key("optimized");
+    write_json(json, *team.optimized);
+  }
+  json.end_object();
+}
+
+}  // namespace km

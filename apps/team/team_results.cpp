@@ -1,0 +1,115 @@
+#include "apps/team/team_results.hpp"
+
+#include <yaml-cpp/yaml.h>
+
+#include <exception>
+#include <stdexcept>
+#include <utility>
+
+#include "modules/evaluation/trajectory_file.hpp"
+#include "modules/sensors/euroc_reader.hpp"
+
+namespace km {
+namespace {
+
+// JSON is YAML; absent keys keep the default.
+template <typename T>
+void read(const YAML::Node& map, const char* key, T& value) {
+  if (map && map.IsMap() && map[key]) value = map[key].as<T>(value);
+}
+
+// The part of the recording the robot was given; nullopt for pose graphs.
+std::optional<TimeWindow> window_of(const RobotPlan& plan) {
+  if (plan.dataset.empty()) return std::nullopt;
+  EurocOptions options;
+  options.from_s = plan.from_s.value_or(options.from_s);
+  options.to_s = plan.to_s.value_or(options.to_s);
+  const EurocReader reader(plan.dataset, options);
+  return TimeWindow{reader.first_stamp(), reader.last_stamp()};
+}
+
+// Trajectories of the robots, read once: the inputs of the evaluation refer to them.
+class Trajectories {
+ public:
+  explicit Trajectories(const TeamPlan& plan) : plan_(plan) {}
+
+  // The robot's `file` with its truth, if it can be judged; else why not, and nullopt. The result
+  // stays valid.
+  std::optional<TrajectoryInput> input(const RobotPlan& robot, const char* file,
+                                       std::vector<std::string>& notes) try {
+    if (robot.truth.empty()) return std::nullopt;
+    const auto& truth = read(robot.truth);
+    const auto& estimate = read(plan_.output / robot.name / file);
+    TrajectoryInput input{robot.name, truth, estimate, window_of(robot)};
+    static_cast<void>(trajectory_error({&input, 1}));  // throws if it cannot be compared
+    return input;
+  } catch (const std::exception& error) {
+    notes.emplace_back(error.what());
+    return std::nullopt;
+  }
+
+ private:
+  const std::vector<StampedPose>& read(const std::filesystem::path& file) {
+    const auto known = read_.find(file);
+    return known != read_.end() ? known->second
+                                : read_.emplace(file, read_trajectory(file)).first->second;
+  }
+
+  const TeamPlan& plan_;
+  std::map<std::filesystem::path, std::vector<StampedPose>> read_;
+};
+
+}  // namespace
+
+RobotSummary read_summary(const std::filesystem::path& file) {
+  if (!std::filesystem::is_regular_file(file))
+    throw std::runtime_error(file.string() + ": no such file");
+  RobotSummary summary;
+  try {
+    const YAML::Node root = YAML::LoadFile(file.string());
+    if (!root.IsMap()) throw std::runtime_error(file.string() + ": not a JSON object");
+    read(root, "keyframes", summary.keyframes);
+    read(root, "frames", summary.frames);
+    read(root, "frames_skipped", summary.frames_skipped);
+    const YAML::Node closures = root["closures"];
+    read(closures, "candidates", summary.closure_candidates);
+    read(closures, "verified", summary.closures_verified);
+    read(closures, "inliers", summary.closures_inlier);
+    const YAML::Node pgo = root["pgo"];
+    read(pgo, "rounds", summary.pgo_rounds);
+    read(pgo, "seconds", summary.pgo_seconds);
+    read(pgo, "cost", summary.pgo_cost);
+    if (pgo && pgo.IsMap() && pgo["anchor"]) summary.pgo_anchor = pgo["anchor"].as<RobotId>();
+    read(pgo, "members", summary.pgo_members);
+    read(root, "traffic", summary.traffic_bytes);
+    read(root, "exit_reason", summary.exit_reason);
+  } catch (const YAML::Exception& error) {
+    throw std::runtime_error(file.string() + ": " + error.what());
+  }
+  return summary;
+}
+
+TeamResult collect_results(const TeamPlan& plan, std::vector<RobotRun> runs) {
+  TeamResult result;
+  Trajectories trajectories(plan);
+  std::vector<TrajectoryInput> optimized;
+  for (std::size_t i = 0; i < plan.robots.size(); ++i) {
+    RobotResult robot;
+    robot.plan = plan.robots[i];
+    robot.run = std::move(runs[i]);
+    try {
+      robot.summary = read_summary(plan.output / robot.plan.name / "summary.json");
+    } catch (const std::exception& error) {
+      robot.notes.emplace_back(error.what());
+    }
+    if (const auto input = trajectories.input(robot.plan, "odometry.tum", robot.notes))
+      robot.odometry = trajectory_error({&*input, 1}).joint;
+    if (const auto input = trajectories.input(robot.plan, "optimized.tum", robot.notes))
+      optimized.push_back(*input);
+    result.robots.push_back(std::move(robot));
+  }
+  if (!optimized.empty()) result.optimized = trajectory_error(optimized);
+  return result;
+}
+
+}  // namespace km
