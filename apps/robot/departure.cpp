@@ -17,7 +17,9 @@ RobotPhase Departure::update(double now_s, const Inputs& inputs) {
                              [](RobotPhase phase) { return phase >= RobotPhase::kSettled; });
   if (!all_settled) all_settled_s_.reset();
   if (all_settled && !all_settled_s_) all_settled_s_ = now_s;
-  if (all_settled && now_s - *all_settled_s_ >= settle_s_)
+  const bool told = std::find(inputs.present_peers.begin(), inputs.present_peers.end(),
+                              RobotPhase::kLeaving) != inputs.present_peers.end();
+  if (all_settled && (told || now_s - *all_settled_s_ >= settle_s_))
     reason_ = "all present robots have settled";
   else if (now_s - *ended_s_ >= serve_limit_s_)
     reason_ = "time limit for serving peers";

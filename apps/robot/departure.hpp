@@ -22,7 +22,7 @@ class Departure {
     bool input_ended = false;    ///< And what was in flight has been processed.
     bool graph_settled = false;  ///< The optimiser has nothing left to do.
     std::uint64_t activity = 0;  ///< Changes whenever a module has done something new.
-    std::span<const RobotPhase> present_peers;
+    std::span<const RobotPhase> present_peers = {};
   };
 
   /// Takes the state at `now_s`; the phase to tell the others.

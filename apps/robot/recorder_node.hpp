@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <exception>
 #include <functional>
 #include <memory>
@@ -23,9 +24,14 @@ class RecorderNode final : public Node {
   template <typename T>
   void record(Topic<T>& topic) {
     topic.subscribe([this](const std::shared_ptr<const T>& message) {
-      worker_.post([this, message] { record_.add(*message); });
+      worker_.post([this, message] {
+        if (!frozen_) record_.add(*message);
+      });
     });
   }
+
+  /// What comes from now on is not recorded: the robot leaves with what it has. Thread-safe.
+  void freeze() { frozen_ = true; }
 
   /// Calls `read` with the record, which no other thread changes meanwhile. Thread-safe.
   template <typename Reader>
@@ -45,6 +51,7 @@ class RecorderNode final : public Node {
 
   mutable std::mutex mutex_;  // guards record_
   RunRecord record_;
+  std::atomic<bool> frozen_ = false;
   Worker<Input> worker_;  // last member: stops first
 };
 

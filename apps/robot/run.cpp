@@ -65,6 +65,7 @@ class Watch {
     robot_.recorder().with_record([&](const RunRecord& record) {
       status_line_.update(
           status_text(robot_.dataset_time_s(), record, robot_.bridge().peers().list(), traffic));
+      if (leaving_since_s_) return;
       const std::vector<RobotPhase> peers = present_peers();
       robot_.set_phase(departure_.update(now_s, {.input_ended = ended,
                                                  .graph_settled = record.settled(),
@@ -72,8 +73,7 @@ class Watch {
                                                  .present_peers = peers}));
     });
     if (now_s - traffic_written_s_ >= kTrafficInterval_s) write_traffic(now_s, traffic);
-    if (departure_.reason() != nullptr) robot_.set_phase(RobotPhase::kLeaving);
-    return departure_.reason() != nullptr;
+    return departure_.reason() != nullptr && said_goodbye(now_s);
   }
 
   void finish() { write_traffic(seconds(), robot_.bridge().traffic()); }
@@ -82,6 +82,17 @@ class Watch {
 
  private:
   static constexpr double kTrafficInterval_s = 1.0;
+  static constexpr double kGoodbye_s = 1.5;  // three times the period of the status
+
+  // Tells the others before going, so that they go with the same solution.
+  bool said_goodbye(double now_s) {
+    if (!leaving_since_s_) {
+      leaving_since_s_ = now_s;
+      robot_.freeze_record();
+      robot_.set_phase(RobotPhase::kLeaving);
+    }
+    return robot_.bridge().peers().list().empty() || now_s - *leaving_since_s_ >= kGoodbye_s;
+  }
 
   // A peer that is there but has not said how far it is counts as running.
   std::vector<RobotPhase> present_peers() const {
@@ -106,6 +117,7 @@ class Watch {
   std::ofstream traffic_file_;
   TrafficCsv traffic_csv_;
   double traffic_written_s_ = 0.0;
+  std::optional<double> leaving_since_s_;
   StatusLine status_line_;
 };
 

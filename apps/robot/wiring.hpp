@@ -75,6 +75,8 @@ class Robot {
   [[nodiscard]] const RobotStatusNode& status_node() const { return *status_; }
   [[nodiscard]] const SensorsNode* sensors() const { return sensors_; }  ///< Null without sensors.
   void set_phase(RobotPhase phase) { phase_ = phase; }
+  /// Nothing is recorded from now on.
+  void freeze_record() { recorder_->freeze(); }
   [[nodiscard]] double dataset_time_s() const { return dataset_time_s_; }
   [[nodiscard]] const std::vector<const Node*>& nodes() const { return nodes_; }
 

@@ -48,6 +48,22 @@ TEST_CASE("New work after all had settled starts the wait again", "[departure]")
   CHECK(departure.reason() != nullptr);
 }
 
+TEST_CASE("A settled robot goes as soon as a peer says that it leaves", "[departure]") {
+  Departure departure(kSettle_s, kLimit_s);
+  std::vector<RobotPhase> peers = {RobotPhase::kSettled, RobotPhase::kSettled};
+  Departure::Inputs inputs{
+      .input_ended = true, .graph_settled = true, .activity = 0, .present_peers = peers};
+  departure.update(9.0, inputs);
+  CHECK(departure.reason() == nullptr);
+  peers[1] = RobotPhase::kLeaving;
+  inputs.graph_settled = false;  // not while there is work
+  departure.update(9.1, inputs);
+  CHECK(departure.reason() == nullptr);
+  inputs.graph_settled = true;
+  departure.update(9.2, inputs);
+  CHECK(departure.reason() != nullptr);
+}
+
 TEST_CASE("A robot whose graph never settles leaves at the limit", "[departure]") {
   Departure departure(kSettle_s, kLimit_s);
   const Departure::Inputs busy{.input_ended = true, .graph_settled = false};
