@@ -1,0 +1,283 @@
+#include <catch2/catch.hpp>
+#include <deque>
+#include <memory>
+
+#include "modules/loop_closure/loop_closure_node.hpp"
+#include "test/modules/loop_closure/synthetic_keyframes.hpp"
+
+namespace km {
+namespace {
+
+constexpr RobotId kSelf = 3;
+constexpr RobotId kPeer = 9;
+
+// A robot's node with its channels; what it sends is kept.
+struct Robot {
+  explicit Robot(RobotId self, const LoopClosureConfig& config = {})
+      : node(config, self,
+             {keyframes, candidates, measured, peer_requests, peer_replies, peer_events,
+              own_requests, own_replies, own_closures, outcomes}) {
+    own_requests.subscribe([this](const auto& m) { requests.push_back(*m); });
+    own_replies.subscribe([this](const auto& m) { replies.push_back(*m); });
+    own_closures.subscribe([this](const auto& m) { closures.push_back(*m); });
+    outcomes.subscribe([this](const auto& m) { reports.push_back(*m); });
+  }
+
+  template <typename T>
+  void give(T message) {
+    node.step(std::make_shared<const T>(std::move(message)));
+  }
+  void tick(double now_s) { node.step(LoopClosureTick{now_s}); }
+
+  Topic<Keyframe> keyframes;
+  Topic<LoopCandidate> candidates;
+  Topic<RelativePose> measured;
+  Topic<KeyframeRequest> peer_requests;
+  Topic<KeyframeReply> peer_replies;
+  Topic<PeerEvent> peer_events;
+  Topic<Addressed<KeyframeRequest>> own_requests;
+  Topic<Addressed<KeyframeReply>> own_replies;
+  Topic<Closure> own_closures;
+  Topic<ClosureOutcome> outcomes;
+  std::deque<Addressed<KeyframeRequest>> requests;
+  std::deque<Addressed<KeyframeReply>> replies;
+  std::vector<Closure> closures;
+  std::vector<ClosureOutcome> reports;
+  LoopClosureNode node;
+};
+
+// Delivers what both have sent; a reply may produce further requests.
+void deliver(Robot& a, Robot& b) {
+  while (!a.requests.empty() || !b.requests.empty() || !a.replies.empty() || !b.replies.empty())
+    for (auto [from, to] : {std::pair(&a, &b), std::pair(&b, &a)}) {
+      const auto requests = std::exchange(from->requests, {});
+      for (const auto& request : requests) to->node.step(request.message);
+      const auto replies = std::exchange(from->replies, {});
+      for (const auto& reply : replies) to->node.step(reply.message);
+    }
+}
+
+// Keyframe 0 of the robot and 5 of its peer see the same place.
+struct Scene {
+  explicit Scene(unsigned seed) {
+    std::mt19937 rng(seed);
+    const KeyframePair pair = make_keyframe_pair(rng, 150, {0.7, 0.3}, 1.0);
+    T_own_peer = pair.T_from_to;
+    own.odometry = {{kSelf, 0}, random_pose(rng), random_covariance(rng, 0.1)};
+    own.features = pair.from;
+    peer.odometry = {{kPeer, 5}, random_pose(rng), random_covariance(rng, 0.1)};
+    peer.features = pair.to;
+  }
+  LoopCandidate candidate() const { return {peer.odometry.id, own.odometry.id, 0.75}; }
+
+  SE3 T_own_peer;
+  Keyframe own, peer;
+};
+
+std::vector<ClosureStage> stages_of(const std::vector<ClosureOutcome>& reports) {
+  std::vector<ClosureStage> stages;
+  for (const ClosureOutcome& report : reports) stages.push_back(report.stage);
+  return stages;
+}
+
+using enum ClosureStage;
+using Stages = std::vector<ClosureStage>;
+
+TEST_CASE("a candidate becomes a closure by one request and one reply", "[loop_closure_node]") {
+  const Scene scene(1);
+  Robot robot(kSelf), peer(kPeer);
+  robot.give(scene.own);
+  peer.give(scene.peer);
+  robot.give(scene.candidate());
+  REQUIRE(robot.requests.size() == 1);
+  CHECK(robot.requests[0].to == kPeer);
+  CHECK(robot.requests[0].message->keyframe == scene.peer.odometry.id);
+  deliver(robot, peer);
+
+  REQUIRE(robot.closures.size() == 1);
+  const Closure& closure = robot.closures[0];
+  CHECK(closure.id() == ClosureId{scene.own.odometry.id, scene.peer.odometry.id});
+  CHECK(closure.similarity == 0.75);
+  CHECK(closure.inliers > 100);
+  CHECK(closure.to.T_odom_kf.isApprox(scene.peer.odometry.T_odom_kf));
+  CHECK(closure.from.covariance == scene.own.odometry.covariance);
+  CHECK(se3_log(closure.T_from_to.inverse() * scene.T_own_peer).norm() < 0.03);  // [m], [rad]
+  CHECK(stages_of(robot.reports) == Stages{kCandidate, kRequested, kVerified});
+  CHECK(robot.reports.back().inliers == closure.inliers);
+}
+
+TEST_CASE("a candidate seen twice is verified once, and a keyframe fetched once",
+          "[loop_closure_node]") {
+  const Scene scene(2);
+  Robot robot(kSelf), peer(kPeer);
+  robot.give(scene.own);
+  peer.give(scene.peer);
+  robot.give(scene.candidate());
+  robot.give(scene.candidate());
+  deliver(robot, peer);
+  robot.give(scene.candidate());
+  CHECK(robot.closures.size() == 1);
+
+  Keyframe second = scene.own;  // another own keyframe against the same one of the peer
+  second.odometry.id.index = 1;
+  robot.give(second);
+  robot.give(LoopCandidate{scene.peer.odometry.id, second.odometry.id, 0.6});
+  CHECK(robot.requests.empty());
+  CHECK(robot.closures.size() == 2);
+}
+
+TEST_CASE("a lost request or reply is made up for after the time-out", "[loop_closure_node]") {
+  const bool lose_reply = GENERATE(false, true);
+  CAPTURE(lose_reply);
+  const Scene scene(3);
+  Robot robot(kSelf), peer(kPeer);
+  robot.give(scene.own);
+  peer.give(scene.peer);
+  robot.tick(100.0);
+  robot.give(scene.candidate());
+  REQUIRE(robot.requests.size() == 1);
+  if (lose_reply) peer.node.step(robot.requests[0].message);
+  robot.requests.clear();
+  peer.replies.clear();
+  robot.tick(101.9);
+  CHECK(robot.requests.empty());
+  robot.tick(102.0);
+  REQUIRE(robot.requests.size() == 1);
+  deliver(robot, peer);
+  CHECK(robot.closures.size() == 1);
+  CHECK(stages_of(robot.reports) == Stages{kCandidate, kRequested, kVerified});
+}
+
+TEST_CASE("both answers of a repeated request give one closure", "[loop_closure_node]") {
+  const Scene scene(4);
+  Robot robot(kSelf), peer(kPeer);
+  robot.give(scene.own);
+  peer.give(scene.peer);
+  robot.give(scene.candidate());
+  robot.tick(50.0);
+  REQUIRE(robot.requests.size() == 2);
+  CHECK(robot.requests[0].message->number != robot.requests[1].message->number);
+  deliver(robot, peer);
+  CHECK(robot.closures.size() == 1);
+}
+
+TEST_CASE("a peer that returns is asked at once for what it owes", "[loop_closure_node]") {
+  const Scene scene(5);
+  Robot robot(kSelf), peer(kPeer);
+  robot.give(scene.own);
+  peer.give(scene.peer);
+  robot.give(scene.candidate());
+  for (int t = 0; t < 60; ++t) robot.tick(t);  // nobody there
+  robot.requests.clear();
+  PeerEvent event{PeerEventKind::kLost, {}, {}};
+  event.identity.robot = kPeer;
+  robot.give(event);
+  CHECK(robot.requests.empty());
+  event.kind = PeerEventKind::kReturned;
+  robot.give(event);
+  REQUIRE(robot.requests.size() == 1);
+  deliver(robot, peer);
+  CHECK(robot.closures.size() == 1);
+}
+
+TEST_CASE("a keyframe its owner does not have yet is asked for again", "[loop_closure_node]") {
+  const Scene scene(6);
+  Robot robot(kSelf), peer(kPeer);
+  robot.give(scene.own);
+  robot.give(scene.candidate());
+  deliver(robot, peer);
+  CHECK(robot.closures.empty());
+  peer.give(scene.peer);
+  robot.tick(1.0);
+  CHECK(robot.requests.empty());
+  robot.tick(2.0);
+  deliver(robot, peer);
+  CHECK(robot.closures.size() == 1);
+}
+
+TEST_CASE("a candidate that fails verification says why", "[loop_closure_node]") {
+  Scene scene(7);
+  for (OrbDescriptor& descriptor : scene.peer.features.descriptors) descriptor = {};
+  Robot robot(kSelf), peer(kPeer);
+  robot.give(scene.own);
+  peer.give(scene.peer);
+  robot.give(scene.candidate());
+  deliver(robot, peer);
+  CHECK(robot.closures.empty());
+  REQUIRE(stages_of(robot.reports) == Stages{kCandidate, kRequested, kReceived});
+  CHECK(robot.reports.back().reason == "too few matches");
+}
+
+TEST_CASE("candidates inside one robot need no request, in whatever order things arrive",
+          "[loop_closure_node]") {
+  Scene scene(8);
+  scene.peer.odometry.id = {kSelf, 50};
+  Robot robot(kSelf);
+  const bool candidate_first = GENERATE(false, true);
+  CAPTURE(candidate_first);
+  if (candidate_first) robot.give(scene.candidate());
+  robot.give(scene.own);
+  robot.give(scene.peer);
+  if (!candidate_first) robot.give(scene.candidate());
+  CHECK(robot.requests.empty());
+  REQUIRE(robot.closures.size() == 1);
+  CHECK(robot.closures[0].id() == ClosureId{{kSelf, 0}, {kSelf, 50}});
+  robot.give(LoopCandidate{scene.own.odometry.id, scene.peer.odometry.id, 0.7});
+  CHECK(robot.closures.size() == 1);  // the same pair from the other side
+}
+
+TEST_CASE("a measured closure needs only the odometry of the other end", "[loop_closure_node]") {
+  Scene scene(9);
+  scene.own.features = scene.peer.features = {};
+  Robot robot(kSelf), peer(kPeer);
+  robot.give(scene.own);
+  peer.give(scene.peer);
+  std::mt19937 rng(1);
+  const RelativePose measured{scene.own.odometry.id, scene.peer.odometry.id, random_pose(rng),
+                              random_covariance(rng, 0.1)};
+  robot.give(measured);
+  deliver(robot, peer);
+  REQUIRE(robot.closures.size() == 1);
+  CHECK(robot.closures[0].T_from_to.matrix() == measured.T_from_to.matrix());
+  CHECK(robot.closures[0].covariance == measured.covariance);
+  CHECK(robot.closures[0].to.T_odom_kf.isApprox(scene.peer.odometry.T_odom_kf));
+}
+
+TEST_CASE("closures that start at another robot and misdirected requests are ignored",
+          "[loop_closure_node]") {
+  const Scene scene(10);
+  Robot robot(kSelf);
+  robot.give(scene.own);
+  robot.give(LoopCandidate{{kSelf, 0}, {kPeer, 5}, 0.9});
+  robot.give(RelativePose{{kPeer, 5}, {kSelf, 0}, SE3::Identity(), Matrix6::Identity()});
+  robot.give(KeyframeRequest{kPeer, 1, {77, 0}});
+  CHECK(robot.requests.empty());
+  CHECK(robot.replies.empty());
+  CHECK(robot.reports.empty());
+}
+
+TEST_CASE("a reply nobody asked for changes nothing", "[loop_closure_node]") {
+  const Scene scene(11);
+  Robot robot(kSelf);
+  robot.give(scene.own);
+  robot.give(KeyframeReply{0, true, scene.peer});
+  robot.give(scene.candidate());
+  CHECK(robot.requests.size() == 1);  // it was not kept
+  CHECK(robot.closures.empty());
+}
+
+TEST_CASE("the node works through its thread", "[loop_closure_node]") {
+  const Scene scene(12);
+  Robot robot(kSelf);
+  robot.node.start();
+  robot.keyframes.publish(scene.own);
+  robot.candidates.publish(scene.candidate());
+  robot.node.stop();  // finishes what is queued
+  CHECK_FALSE(robot.node.error());
+  CHECK(robot.requests.size() >= 1);
+  REQUIRE_FALSE(robot.reports.empty());
+  CHECK(robot.reports.front().stage == kCandidate);
+}
+
+}  // namespace
+}  // namespace km

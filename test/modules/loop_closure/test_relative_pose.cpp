@@ -1,0 +1,208 @@
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <numbers>
+#include <numeric>
+
+#include "modules/loop_closure/relative_pose.hpp"
+#include "test/modules/loop_closure/synthetic_keyframes.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kExact = 1e-9;  // [m], [rad]: rounding of a closed form on points of a few metres
+
+std::vector<Eigen::Vector3d> random_points(std::mt19937& rng, int count) {
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < count; ++i) points.push_back(3.0 * random_vector<3>(rng));
+  return points;
+}
+
+std::vector<Eigen::Vector3d> moved(const SE3& T, const std::vector<Eigen::Vector3d>& points) {
+  std::vector<Eigen::Vector3d> result;
+  for (const Eigen::Vector3d& p : points) result.push_back(T * p);
+  return result;
+}
+
+std::vector<ImagePair> image_pairs(const KeyframePair& keyframes, const ImageNoise& noise) {
+  std::vector<ImagePair> pairs;
+  for (std::size_t i = 0; i < keyframes.from.keypoints.size(); ++i)
+    pairs.push_back({image_point(keyframes.from, i, noise), image_point(keyframes.to, i, noise)});
+  return pairs;
+}
+
+std::vector<std::size_t> all_of(const std::vector<ImagePair>& pairs) {
+  std::vector<std::size_t> indices(pairs.size());
+  std::iota(indices.begin(), indices.end(), std::size_t{0});
+  return indices;
+}
+
+SE3 camera_pose(const KeyframePair& keyframes) {
+  return keyframes.from.T_body_cam.inverse() * keyframes.T_from_to * keyframes.to.T_body_cam;
+}
+
+TEST_CASE("aligning points recovers a quarter turn and a shift exactly", "[relative_pose]") {
+  std::mt19937 rng(1);
+  const Eigen::Matrix3d R =
+      Eigen::AngleAxisd(-std::numbers::pi / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const SE3 T_a_b = make_pose(R, {1.0, 2.0, 3.0});
+  const auto points_b = random_points(rng, 40);
+  const std::optional<SE3> found = align_points(moved(T_a_b, points_b), points_b);
+  REQUIRE(found);
+  CHECK(found->isApprox(T_a_b, kExact));
+}
+
+TEST_CASE("aligning points recovers any pose from three points", "[relative_pose]") {
+  const auto seed = GENERATE(range(1U, 21U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const SE3 T_a_b = random_pose(rng);
+  const auto points_b = random_points(rng, 3);  // a plane: the reflection must be resolved
+  const std::optional<SE3> found = align_points(moved(T_a_b, points_b), points_b);
+  REQUIRE(found);
+  CHECK((found->matrix() - T_a_b.matrix()).norm() < 1e-7);  // three points may be near a line
+}
+
+TEST_CASE("points on a line, in one place, or too few have no alignment", "[relative_pose]") {
+  std::vector<Eigen::Vector3d> points;
+  SECTION("a line") {
+    for (int i = 0; i < 10; ++i) points.emplace_back(0.1 * i + 0.1, 0.1 * i + 0.2, 0.1 * i + 0.3);
+  }
+  SECTION("one place") {
+    points.assign(5, Eigen::Vector3d(1, 2, 3));
+  }
+  SECTION("two points") {
+    points = {{0, 0, 1}, {1, 0, 1}};
+  }
+  CHECK_FALSE(align_points(points, points));
+}
+
+TEST_CASE("aligning lists of unequal length is misuse", "[relative_pose]") {
+  const std::vector<Eigen::Vector3d> three(3, Eigen::Vector3d::Ones());
+  const std::vector<Eigen::Vector3d> four(4, Eigen::Vector3d::Ones());
+  CHECK_THROWS_AS(align_points(three, four), std::invalid_argument);
+}
+
+TEST_CASE("the transfer Jacobian is the derivative of the error", "[relative_pose]") {
+  const auto seed = GENERATE(range(1U, 6U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const KeyframePair keyframes = make_keyframe_pair(rng, 1, {}, 0.0);
+  const ImagePair pair = image_pairs(keyframes, {}).front();
+  const SE3 T_a_b = camera_pose(keyframes);
+  const auto J = transfer_jacobian(T_a_b.inverse(), pair.a);
+  constexpr double kStep = 1e-6;
+  for (int c = 0; c < 6; ++c) {
+    const Vector6 xi = kStep * Vector6::Unit(c);
+    const SE3 plus = T_a_b * se3_exp(xi);
+    const SE3 minus = T_a_b * se3_exp(-xi);
+    const Eigen::Vector3d numeric = (transfer_error(plus.inverse(), pair.a, pair.b).r -
+                                     transfer_error(minus.inverse(), pair.a, pair.b).r) /
+                                    (2.0 * kStep);
+    CHECK((J.col(c) - numeric).norm() < 1e-7);  // central differences: step squared
+  }
+}
+
+TEST_CASE("refinement reaches the truth of points without noise", "[relative_pose]") {
+  const auto seed = GENERATE(range(1U, 6U));
+  const bool one_sided = GENERATE(false, true);
+  CAPTURE(seed, one_sided);
+  std::mt19937 rng(seed);
+  const KeyframePair keyframes = make_keyframe_pair(rng, 30, {}, 0.0);
+  std::vector<ImagePair> pairs = image_pairs(keyframes, {});
+  if (one_sided)  // half the pairs have depth only in a, half only in b
+    for (std::size_t i = 0; i < pairs.size(); ++i)
+      (i % 2 == 0 ? pairs[i].a : pairs[i].b).has_depth = false;
+  const SE3 T_a_b = camera_pose(keyframes);
+  const SE3 start = T_a_b * se3_exp(0.03 * Vector6::Ones());
+  const auto fit = refine_pose(start, pairs, all_of(pairs), 20);
+  REQUIRE(fit);
+  CHECK(se3_log(T_a_b.inverse() * fit->T_a_b).norm() < 1e-6);  // keypoints are floats
+}
+
+TEST_CASE("two pairs do not determine a pose", "[relative_pose]") {
+  std::mt19937 rng(1);
+  const KeyframePair keyframes = make_keyframe_pair(rng, 2, {}, 0.0);
+  const std::vector<ImagePair> pairs = image_pairs(keyframes, {});
+  const std::vector<std::size_t> one = {0};
+  CHECK_FALSE(refine_pose(camera_pose(keyframes), pairs, one, 5));
+}
+
+TEST_CASE("RANSAC finds the pose and the inliers among 70 % outliers", "[relative_pose]") {
+  const auto seed = GENERATE(range(1U, 6U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const ImageNoise noise{0.7, 0.3};
+  const KeyframePair keyframes = make_keyframe_pair(rng, 100, noise, 1.0);
+  std::vector<ImagePair> pairs = image_pairs(keyframes, noise);
+  constexpr std::size_t kInliers = 30;
+  for (std::size_t i = kInliers; i < pairs.size(); ++i)  // partners changed in a circle
+    pairs[i].b = image_point(keyframes.to, i + 1 < pairs.size() ? i + 1 : kInliers, noise);
+
+  std::mt19937 draws(7);
+  const RansacResult<SE3> result = ransac_pose(pairs, {0.999, 5000}, draws);
+  REQUIRE(result.model);
+  const Vector6 error = se3_log(camera_pose(keyframes).inverse() * *result.model);
+  CHECK(error.head<3>().norm() < 0.03);  // 0.7 px over 458 px, 30 points: 3 sigma is below 0.01
+  CHECK(error.tail<3>().norm() < 0.08);
+  const auto true_inliers = std::count_if(result.inliers.begin(), result.inliers.end(),
+                                          [](std::size_t i) { return i < kInliers; });
+  CHECK(true_inliers >= 27);  // the test keeps 99 % of them
+  CHECK(static_cast<std::size_t>(true_inliers) + 3 >= result.inliers.size());
+}
+
+TEST_CASE("RANSAC with the same seed gives the same result", "[relative_pose]") {
+  std::mt19937 rng(3);
+  const KeyframePair keyframes = make_keyframe_pair(rng, 60, {0.7, 0.3}, 1.0);
+  const std::vector<ImagePair> pairs = image_pairs(keyframes, {0.7, 0.3});
+  std::mt19937 first(5), second(5);
+  const auto a = ransac_pose(pairs, {}, first);
+  const auto b = ransac_pose(pairs, {}, second);
+  REQUIRE(a.model);
+  CHECK(a.model->matrix() == b.model->matrix());
+  CHECK(a.inliers == b.inliers);
+}
+
+// 400 trials: 95 % of a chi-squared variable lie below its quantile, with a standard deviation of
+// 1.1 %. Cauchy weights make the information a little too small: a few more are inside.
+TEST_CASE("errors of the refined pose have the covariance it claims", "[relative_pose]") {
+  const ImageNoise noise{0.7, 0.3};
+  constexpr int kTrials = 400;
+  constexpr double kQuantile95 = 12.592;  // 6 degrees of freedom
+  int inside = 0;
+  double sum = 0.0;
+  std::mt19937 rng(11);
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const KeyframePair keyframes = make_keyframe_pair(rng, 60, noise, 1.0);
+    const std::vector<ImagePair> pairs = image_pairs(keyframes, noise);
+    const SE3 T_a_b = camera_pose(keyframes);
+    const auto fit = refine_pose(T_a_b, pairs, all_of(pairs), 10);
+    REQUIRE(fit);
+    const Vector6 xi = se3_log(fit->T_a_b.inverse() * T_a_b);
+    const double chi2 = xi.dot(fit->information * xi);
+    inside += chi2 < kQuantile95 ? 1 : 0;
+    sum += chi2 / kTrials;
+  }
+  CHECK(inside >= 0.92 * kTrials);
+  CHECK(sum > 3.5);  // expected 6 with plain weights; Cauchy takes a quarter of the information
+  CHECK(sum < 6.6);
+}
+
+TEST_CASE("a pose held by two points loses its information with them", "[relative_pose]") {
+  std::mt19937 rng(2);
+  const ImageNoise noise{0.7, 0.3};
+  const KeyframePair keyframes = make_keyframe_pair(rng, 40, noise, 0.0);
+  std::vector<ImagePair> pairs = image_pairs(keyframes, noise);
+  const SE3 T_a_b = camera_pose(keyframes);
+  // All but the first two are the same point, seen from nearly one direction.
+  for (std::size_t i = 3; i < pairs.size(); ++i) pairs[i] = pairs[2];
+  const auto fit = refine_pose(T_a_b, pairs, all_of(pairs), 0);
+  REQUIRE(fit);
+  const Matrix6 left = information_without_strongest(*fit, pairs, all_of(pairs), 0.01);
+  const Eigen::SelfAdjointEigenSolver<Matrix6> whole(fit->information);
+  const Eigen::SelfAdjointEigenSolver<Matrix6> rest(left);
+  CHECK(rest.eigenvalues()(0) < 1e-6 * whole.eigenvalues()(0));
+}
+
+}  // namespace
+}  // namespace km

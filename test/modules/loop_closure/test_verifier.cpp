@@ -1,0 +1,106 @@
+#include <Eigen/LU>
+#include <catch2/catch.hpp>
+
+#include "modules/core/covariance.hpp"
+#include "modules/loop_closure/verifier.hpp"
+#include "test/modules/loop_closure/synthetic_keyframes.hpp"
+
+namespace km {
+namespace {
+
+const ImageNoise kNoise{0.7, 0.3};
+
+TEST_CASE("the verifier recovers the pose of the bodies", "[verifier]") {
+  const auto seed = GENERATE(range(1U, 11U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const KeyframePair pair = make_keyframe_pair(rng, 200, kNoise, 1.0);
+  const Verification result = Verifier({}).verify(pair.from, pair.to);
+  REQUIRE(result.status == VerificationStatus::kAccepted);
+  CHECK(result.matches == 200);
+  CHECK(result.inliers >= 170);  // 1 % of the inliers fail their test, a few leave the circle
+  CHECK(is_covariance(result.covariance));
+  const Vector6 xi = se3_log(result.T_from_to.inverse() * pair.T_from_to);
+  CHECK(xi.dot(result.covariance.inverse() * xi) < 16.8);  // 99 % quantile, and that is cautious
+  CHECK(xi.head<3>().norm() < 0.01);
+  CHECK(xi.tail<3>().norm() < 0.03);
+}
+
+TEST_CASE("a keyframe verifies against itself with the identity", "[verifier]") {
+  std::mt19937 rng(1);
+  const KeyframePair pair = make_keyframe_pair(rng, 100, kNoise, 0.0);
+  const Verification result = Verifier({}).verify(pair.from, pair.from);
+  REQUIRE(result.status == VerificationStatus::kAccepted);
+  CHECK(result.inliers == 100);
+  CHECK(se3_log(result.T_from_to).norm() < 1e-6);
+}
+
+TEST_CASE("the same keyframes give the same result", "[verifier]") {
+  std::mt19937 rng(2);
+  const KeyframePair pair = make_keyframe_pair(rng, 150, kNoise, 1.0);
+  const Verifier verifier({});
+  const Verification first = verifier.verify(pair.from, pair.to);
+  const Verification second = verifier.verify(pair.from, pair.to);
+  CHECK(first.T_from_to.matrix() == second.T_from_to.matrix());
+  CHECK(first.covariance == second.covariance);
+}
+
+TEST_CASE("keyframes of different places are refused", "[verifier]") {
+  std::mt19937 rng(3);
+  const KeyframePair here = make_keyframe_pair(rng, 300, kNoise, 1.0);
+  const KeyframePair there = make_keyframe_pair(rng, 300, kNoise, 1.0);
+  CHECK(Verifier({}).verify(here.from, there.to).status == VerificationStatus::kTooFewMatches);
+}
+
+TEST_CASE("alike images of different shape have no consensus", "[verifier]") {
+  std::mt19937 rng(4);
+  KeyframePair pair = make_keyframe_pair(rng, 100, kNoise, 1.0);
+  std::shuffle(pair.to.keypoints.begin(), pair.to.keypoints.end(), rng);  // descriptors stay
+  const Verification result = Verifier({}).verify(pair.from, pair.to);
+  CHECK(result.status == VerificationStatus::kNoConsensus);
+  CHECK(result.matches == 100);
+  CHECK(result.consensus < LoopClosureConfig{}.min_consensus);
+}
+
+TEST_CASE("a closure that hangs on a small far patch is refused", "[verifier]") {
+  std::mt19937 rng(5);
+  KeyframePair pair = make_keyframe_pair(rng, 60, kNoise, 0.0);
+  for (KeyframeFeatures* features : {&pair.from, &pair.to})
+    for (Keypoint& keypoint : features->keypoints) {
+      keypoint.bearing *= 0.1F;
+      keypoint.inverse_depth = 0.08F;  // 12.5 m away, all of it
+    }
+  pair.to.keypoints = pair.from.keypoints;
+  CHECK(Verifier({}).verify(pair.from, pair.to).status == VerificationStatus::kPoorlyHeld);
+}
+
+TEST_CASE("too few inliers are refused by number", "[verifier]") {
+  std::mt19937 rng(6);
+  const KeyframePair pair = make_keyframe_pair(rng, 14, kNoise, 0.3);
+  LoopClosureConfig config;
+  config.min_consensus = 6;
+  CHECK(Verifier(config).verify(pair.from, pair.to).status == VerificationStatus::kTooFewInliers);
+  config.min_inliers = 6;
+  CHECK(Verifier(config).verify(pair.from, pair.to).status != VerificationStatus::kTooFewInliers);
+}
+
+TEST_CASE("keyframes without features or without depth are refused", "[verifier]") {
+  std::mt19937 rng(7);
+  KeyframePair pair = make_keyframe_pair(rng, 50, kNoise, 0.0);
+  CHECK(Verifier({}).verify({}, {}).status == VerificationStatus::kTooFewMatches);
+  CHECK(Verifier({}).verify({}, pair.to).status == VerificationStatus::kTooFewMatches);
+  for (KeyframeFeatures* features : {&pair.from, &pair.to})
+    for (Keypoint& keypoint : features->keypoints) keypoint.inverse_depth = 0.0F;
+  const Verification result = Verifier({}).verify(pair.from, pair.to);
+  CHECK(result.status == VerificationStatus::kTooFewMatches);
+  CHECK(result.matches == 0);
+}
+
+TEST_CASE("a verifier out of bounds is refused", "[verifier]") {
+  LoopClosureConfig config;
+  config.min_inliers = 0;
+  CHECK_THROWS_AS(Verifier(config), ConfigError);
+}
+
+}  // namespace
+}  // namespace km
