@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <compare>
 #include <cstdint>
 #include <vector>
@@ -38,7 +39,8 @@ struct EdgeSetOffer {
 /// What one robot brings to distributed optimisation; sent when it changes and now and then.
 struct PgoStatus {
   PgoPeer sender;
-  PgoFrame frame;  ///< Of its present solution.
+  PgoFrame frame;                   ///< Of its present solution.
+  std::uint32_t frame_version = 0;  ///< Counts its changes of frame.
   std::uint32_t keyframes = 0;
   std::uint32_t revision = 0;  ///< Grows with its own keyframes and intra-robot closures.
   std::vector<EdgeSetOffer> offers = {};
@@ -70,6 +72,10 @@ struct SessionPlan {
   PgoFrame frame;                      ///< Members in other frames are aligned to it first.
   std::vector<SessionMember> members;  ///< In order of alignment and of the sweep.
   std::vector<SessionPair> pairs;      ///< Ascending.
+  [[nodiscard]] bool has_member(RobotId robot) const {
+    return std::any_of(members.begin(), members.end(),
+                       [&](const SessionMember& member) { return member.peer.robot == robot; });
+  }
   bool operator==(const SessionPlan&) const = default;
 };
 
@@ -92,9 +98,10 @@ struct PublicPoses {
   PgoPeer sender;
   PgoSessionId session = {};
   PgoFrame frame = {};
-  std::uint32_t round = 0;                    ///< 0: before the first update.
-  double cost = 0.0;                          ///< Share: own edges, and those to earlier members.
-  double squared_gradient = 0.0;              ///< Of the block before this update.
+  std::uint32_t frame_version = 0;  ///< As in PgoStatus: whichever message has more is newer.
+  std::uint32_t round = 0;          ///< 0: before the first update.
+  double cost = 0.0;                ///< Share: own edges, and those to earlier members.
+  double squared_gradient = 0.0;    ///< Of the block before this update.
   std::vector<std::uint32_t> keyframes = {};  ///< Ascending, 0 first.
   LiftedPoses X = {};                         ///< r x 4 per keyframe, single precision.
 };

@@ -51,6 +51,7 @@ Codec<PgoStatus>::Encoded Codec<PgoStatus>::encode(const PgoStatus& status) {
                               .hash = offer.id.hash});
   encoded.wire.robot = status.sender.robot;
   encoded.wire.frame = to_wire(status.frame);
+  encoded.wire.frame_version = status.frame_version;
   encoded.wire.keyframes = status.keyframes;
   encoded.wire.revision = status.revision;
   borrow(encoded.wire.offers, encoded.offers);
@@ -64,6 +65,7 @@ Decoded<PgoStatus> Codec<PgoStatus>::decode(const Wire& wire) {
   if (!offers) return Result::refuse("offers are missing or too many");
   PgoStatus status{.sender = writer_of(wire.header),
                    .frame = from_wire(wire.frame),
+                   .frame_version = wire.frame_version,
                    .keyframes = wire.keyframes,
                    .revision = wire.revision,
                    .offers = {}};
@@ -142,6 +144,7 @@ Codec<PublicPoses>::Encoded Codec<PublicPoses>::encode(const PublicPoses& poses)
   wire.coordinator = to_wire(poses.session.coordinator);
   wire.session = poses.session.number;
   wire.frame = to_wire(poses.frame);
+  wire.frame_version = poses.frame_version;
   wire.round = poses.round;
   wire.cost = poses.cost;
   wire.squared_gradient = poses.squared_gradient;
@@ -164,6 +167,7 @@ Decoded<PublicPoses> Codec<PublicPoses>::decode(const Wire& wire) {
   PublicPoses result{.sender = writer_of(wire.header),
                      .session = {from_wire(wire.coordinator), wire.session},
                      .frame = from_wire(wire.frame),
+                     .frame_version = wire.frame_version,
                      .round = wire.round,
                      .cost = wire.cost,
                      .squared_gradient = wire.squared_gradient};

@@ -19,7 +19,7 @@ struct PoseGraphConfig {
   int max_rounds = 0;
 
   /// A session has converged when a round lowers the team's cost by less than this part of it.
-  double min_relative_decrease = 1e-6;
+  double min_relative_decrease = 1e-7;
 
   /// Rounds that a session is given before new keyframes or closures replace it by the next.
   int min_rounds_per_session = 10;
@@ -27,6 +27,10 @@ struct PoseGraphConfig {
   /// Newton steps of one block update, and products with the Hessian in each.
   int max_newton_steps = 3;
   int max_cg_iterations = 50;
+
+  /// How far a block update may go at most, the minimum of the block being 1, see
+  /// SessionBlock::update(): it grows from 1.5 towards this over the rounds of a session.
+  double max_over_relaxation = 1.95;
 
   /// Closures count as agreeing on where a new robot's frame lies up to this rotation [rad] and
   /// this distance [m]: the drift of the odometry between them.
@@ -49,6 +53,8 @@ struct PoseGraphConfig {
                   "before new measurements open the next session");
     visitor.field("max_newton_steps", max_newton_steps, {1, 100}, "per block update");
     visitor.field("max_cg_iterations", max_cg_iterations, {1, 10000}, "per Newton step");
+    visitor.field("max_over_relaxation", max_over_relaxation, {1.0, 1.99},
+                  "1: to the block's minimum");
     visitor.field("alignment_rotation_rad", alignment_rotation_rad, {1e-3, std::numbers::pi},
                   "[rad] agreement of closures on a new robot's frame");
     visitor.field("alignment_translation_m", alignment_translation_m, {1e-3, 1e4}, "[m] the same");

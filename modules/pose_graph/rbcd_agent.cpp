@@ -111,7 +111,7 @@ PgoOutput RbcdAgent::step(double now_s) {
 }
 
 PgoStatus RbcdAgent::make_status() const {
-  return {self_, frame_, graph_.keyframes(), graph_.revision(), graph_.offers()};
+  return {self_, frame_, frame_version_, graph_.keyframes(), graph_.revision(), graph_.offers()};
 }
 
 void RbcdAgent::send_status(PgoOutput& output) {

@@ -34,7 +34,8 @@ struct [[nodiscard]] PgoOutput {
 /// Within a session members update in turn without a central clock: a member updates its block in
 /// round t once it has the poses of round t of all its neighbours before it in the session's order
 /// and of round t - 1 of those after it. This is a Gauss-Seidel sweep: two neighbours never move
-/// at once, so no update can raise the team's cost, whatever the delays; robots without common
+/// at once, so no update can raise the team's cost, whatever the delays (over-relaxed, see
+/// SessionBlock::update(), and still never above the cost before); robots without common
 /// edges move at the same time. Members that are not in the session's frame yet are aligned
 /// before round 1 in the same order. Public poses are rounded to single precision by their sender,
 /// who goes on from the rounded ones: all compute with the same numbers.
@@ -82,7 +83,8 @@ class RbcdAgent {
     std::optional<std::uint32_t> round = {};  // own; nullopt until the block is in the frame
     std::set<RobotId> counted = {};           // members before this one, and absent neighbours
     double started_s = 0.0;
-    double moved_s = 0.0;  // last update or repetition
+    double moved_s = 0.0;  // last update
+    double sent_s = 0.0;   // last update or repetition of its poses
   };
   using EdgesTo = std::map<RobotId, std::vector<InterEdge>>;
 
@@ -96,21 +98,26 @@ class RbcdAgent {
   [[nodiscard]] bool holds_all(const SessionPlan& plan) const;
   [[nodiscard]] std::optional<Eigen::MatrixXd> pose_of_anchor(RobotId anchor) const;
 
-  // rbcd_session.cpp: opening, joining and running sessions.
+  // rbcd_session.cpp: who optimises what, and who says so.
   void coordinate(PgoOutput& output);
   [[nodiscard]] SessionPlan make_plan() const;
   [[nodiscard]] bool should_open() const;
   void open_session();
   [[nodiscard]] bool accepts(const PgoSession& session) const;
-  bool join(const PgoSession& session);
+  void join_or_wait(const PgoSession& session);
   void follow(const PgoSession& session);
+
+  // rbcd_sweep.cpp: the block of this robot in the running session.
+  bool join(const PgoSession& session);
   [[nodiscard]] std::optional<EdgesTo> edges_in(const SessionPlan& plan) const;
   [[nodiscard]] EdgesTo edges_to_absent(const SessionPlan& plan) const;
   [[nodiscard]] LiftedPoses extended_poses() const;
   void start_block(const SessionPlan& plan, EdgesTo edges, const EdgesTo& absent);
   void advance(PgoOutput& output);
+  void enter_frame(PgoOutput& output);
   [[nodiscard]] const PublicPoses* poses_in_session(RobotId robot, std::uint32_t round) const;
   [[nodiscard]] bool hear_neighbours();
+  [[nodiscard]] double relaxation_of(std::uint32_t round, std::size_t members) const;
   void finish_update(double squared_gradient, PgoOutput& output);
   void count_share(const PublicPoses& poses);
 
@@ -119,8 +126,10 @@ class RbcdAgent {
   LocalGraph graph_;
   std::map<RobotId, Peer> peers_;
   PgoFrame frame_;
+  std::uint32_t frame_version_ = 0;
   std::optional<SessionBlock> block_;
   std::optional<Running> running_;
+  std::optional<PgoSession> waiting_;  // to be joined when more is known
   std::optional<RoundLedger> ledger_;  // if this robot coordinates the running session
   SessionPlan plan_;                   // of what is known
   bool plan_outdated_ = true;

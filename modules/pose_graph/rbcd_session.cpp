@@ -1,19 +1,13 @@
 #include <algorithm>
+#include <utility>
 
-#include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/rbcd_agent.hpp"
 
 namespace km {
 namespace {
 
-// A session that has not moved for so many status periods sends its last messages again.
-constexpr double kStalledPeriods = 3.0;
-constexpr int kAlignmentSteps = 10;  // Newton steps of the first solution beside aligned peers
-
-bool is_member(const SessionPlan& plan, RobotId robot) {
-  return std::any_of(plan.members.begin(), plan.members.end(),
-                     [&](const SessionMember& member) { return member.peer.robot == robot; });
-}
+// A session that has not moved for so many status periods is replaced.
+constexpr double kHopelessPeriods = 10.0;
 
 // The same work, in whatever order and frame.
 bool same_graph(const SessionPlan& x, const SessionPlan& y) {
@@ -41,8 +35,8 @@ bool well_formed(const PgoSession& session, int rank) {
       anchor.size() == 0 || (anchor.rows() == rank && anchor.cols() == 4 && anchor.allFinite() &&
                              stiefel_error(anchor) <= 1e-3);
   return session.rank == static_cast<std::uint32_t>(rank) &&
-         robots.size() == session.plan.members.size() &&
-         robots.contains(session.id.coordinator.robot) &&
+         robots.size() == session.plan.members.size() && !robots.empty() &&
+         *robots.begin() == session.id.coordinator.robot &&
          std::all_of(pairs.begin(), pairs.end(), known_pair) && anchor_fits;
 }
 
@@ -53,15 +47,18 @@ SessionPlan RbcdAgent::make_plan() const {
   for (const auto& [robot, peer] : peers_) {
     if (!peer.alive || !peer.status) continue;
     PgoStatus& status = statuses.emplace(robot, *peer.status).first->second;
-    // A robot changes its frame in a session only, and its poses tell so before its status does.
-    if (peer.poses) status.frame = peer.poses->frame;
+    // Poses are sent at once, status now and then.
+    if (peer.poses && peer.poses->frame_version > status.frame_version)
+      status.frame = peer.poses->frame;
   }
   return plan_session(statuses, self_.robot);
 }
 
 void RbcdAgent::coordinate(PgoOutput& output) {
-  if (plan_outdated_) plan_ = make_plan();
-  plan_outdated_ = false;
+  if (std::exchange(plan_outdated_, false)) {
+    plan_ = make_plan();
+    if (const auto session = std::exchange(waiting_, std::nullopt)) join_or_wait(*session);
+  }
   if (coordinator_of(plan_) != self_.robot) return;
   if (should_open()) open_session();
   const bool due = now_s_ - session_sent_s_ >= config_.status_period_s;
@@ -74,8 +71,9 @@ void RbcdAgent::coordinate(PgoOutput& output) {
 bool RbcdAgent::should_open() const {
   if (!running_) return true;
   const PgoSession& session = running_->session;
-  if (same_graph(session.plan, plan_)) return false;
-  const bool stalled = now_s_ - running_->moved_s > kStalledPeriods * config_.status_period_s;
+  const double still_s = now_s_ - running_->moved_s;
+  const bool stalled = still_s > kHopelessPeriods * config_.status_period_s;
+  if (same_graph(session.plan, plan_)) return stalled && !session.finished;
   return session.finished || stalled || session.id.coordinator != self_ ||
          has_lost_member(session.plan, plan_) ||
          session.round >= static_cast<std::uint32_t>(config_.min_rounds_per_session);
@@ -112,11 +110,18 @@ bool RbcdAgent::receive(const PgoSession& session) {
   if (running_ && session.id == running_->session.id)
     follow(session);
   else if (self != members.end() && accepts(session))
-    join(session);
+    join_or_wait(session);
   else if (running_ && session.id.coordinator == running_->session.id.coordinator &&
            running_->session.id.number < session.id.number)
     running_.reset();  // the others go on without this robot
   return true;
+}
+
+void RbcdAgent::join_or_wait(const PgoSession& session) {
+  if (!accepts(session)) return;
+  // Its coordinator must be known to be connected to this robot, and its edges be at hand.
+  const bool connected = plan_.has_member(session.id.coordinator.robot);
+  if (!connected || !join(session)) waiting_ = session;
 }
 
 void RbcdAgent::follow(const PgoSession& session) {
@@ -126,173 +131,6 @@ void RbcdAgent::follow(const PgoSession& session) {
   running.cost = session.cost;
   running.gradient_norm = session.gradient_norm;
   running.finished |= session.finished;
-}
-
-std::optional<RbcdAgent::EdgesTo> RbcdAgent::edges_in(const SessionPlan& plan) const {
-  EdgesTo edges;
-  for (const SessionPair& pair : plan.pairs) {
-    if (pair.a != self_.robot && pair.b != self_.robot) continue;
-    const RobotId peer = pair.a == self_.robot ? pair.b : pair.a;
-    const auto* of_peer = graph_.edges(peer, pair.edges);
-    if (of_peer == nullptr) return std::nullopt;
-    edges.emplace(peer, *of_peer);
-  }
-  return edges;
-}
-
-RbcdAgent::EdgesTo RbcdAgent::edges_to_absent(const SessionPlan& plan) const {
-  EdgesTo edges;
-  for (const auto& [robot, peer] : peers_) {
-    const auto* of_peer = graph_.newest_edges(robot);
-    if (is_member(plan, robot) || of_peer == nullptr || !peer.poses ||
-        peer.poses->frame != plan.frame)
-      continue;
-    const auto& keyframes = peer.poses->keyframes;
-    for (const InterEdge& e : *of_peer)
-      if (std::binary_search(keyframes.begin(), keyframes.end(), e.other))
-        edges[robot].push_back(e);
-  }
-  return edges;
-}
-
-LiftedPoses RbcdAgent::extended_poses() const {
-  const Eigen::Index known = block_ ? pose_count(block_->X()) : 0;
-  LiftedPoses X(config_.rank, 4 * Eigen::Index{graph_.keyframes()});
-  X.leftCols(4 * known) = block_ ? block_->X() : LiftedPoses(config_.rank, 0);
-  for (Eigen::Index i = known; i < pose_count(X); ++i)
-    X.middleCols<4>(4 * i) =
-        i == 0 ? lifted_identity(config_.rank)
-               : lift(X.middleCols<4>(4 * (i - 1)), graph_.step_to(static_cast<std::uint32_t>(i)));
-  return X;
-}
-
-void RbcdAgent::start_block(const SessionPlan& plan, EdgesTo edges, const EdgesTo& absent) {
-  edges.insert(absent.begin(), absent.end());
-  const std::vector<BlockEdge> own_edges = graph_.own_edges();
-  block_.emplace(extended_poses(), own_edges, edges);
-  for (const auto& [robot, to_absent] : absent) {
-    const PublicPoses& poses = *peers_.at(robot).poses;
-    (void)block_->set_neighbour(robot, poses.keyframes, poses.X);
-  }
-  // Alone, nothing ties the block to its present place: closures may call for a better start.
-  const std::size_t intra_closures = own_edges.size() + 1 - graph_.keyframes();
-  if (plan.members.size() == 1 && edges.empty() && intra_closures != intra_closures_tried_) {
-    const auto poses = chordal_initialisation(Eigen::Index{graph_.keyframes()}, own_edges);
-    block_->offer(lift(poses, config_.rank));
-    intra_closures_tried_ = intra_closures;
-  }
-}
-
-bool RbcdAgent::join(const PgoSession& session) {
-  const SessionPlan& plan = session.plan;
-  auto edges = edges_in(plan);
-  if (!edges) return false;  // it is sent again
-  const EdgesTo absent = edges_to_absent(plan);
-  start_block(plan, std::move(*edges), absent);
-  if (running_) optimising_s_ += running_->moved_s - running_->started_s;
-  Running& running = running_.emplace(Running{.session = session});
-  running.started_s = running.moved_s = now_s_;
-  for (std::size_t k = 0; k < plan.members.size(); ++k)
-    running.position_of[plan.members[k].peer.robot] = k;
-  const std::size_t position = running.position_of.at(self_.robot);
-  for (const auto& [robot, at] : running.position_of)
-    if (at < position) running.counted.insert(robot);
-  for (const auto& [robot, to_absent] : absent) running.counted.insert(robot);
-  ledger_.reset();
-  if (session.id.coordinator == self_) {
-    std::set<RobotId> members;
-    for (const SessionMember& member : plan.members) members.insert(member.peer.robot);
-    ledger_.emplace(members);
-  }
-  sent_poses_.reset();
-  return true;
-}
-
-const PublicPoses* RbcdAgent::poses_in_session(RobotId robot, std::uint32_t round) const {
-  const auto peer = peers_.find(robot);
-  const bool found = peer != peers_.end() && peer->second.poses &&
-                     peer->second.poses->session == running_->session.id &&
-                     peer->second.poses->round >= round;
-  return found ? &*peer->second.poses : nullptr;
-}
-
-bool RbcdAgent::hear_neighbours() {
-  const std::size_t position = running_->position_of.at(self_.robot);
-  for (const RobotId robot : block_->neighbours()) {
-    const auto member = running_->position_of.find(robot);
-    if (member == running_->position_of.end()) continue;  // absent, set once
-    const bool before = member->second < position;
-    if (!running_->round && !before) continue;  // aligned later than this robot
-    const std::uint32_t round = running_->round ? *running_->round + (before ? 1 : 0) : 0;
-    const PublicPoses* poses = poses_in_session(robot, round);
-    if (poses == nullptr || !block_->set_neighbour(robot, poses->keyframes, poses->X)) return false;
-  }
-  return true;
-}
-
-void RbcdAgent::advance(PgoOutput& output) {
-  if (!running_ || running_->session.finished) return;
-  const PgoSession& session = running_->session;
-  const bool in_frame = frame_ == session.plan.frame || running_->position_of.at(self_.robot) == 0;
-  if (!running_->round && in_frame) {
-    frame_ = session.plan.frame;
-    running_->round = 0;
-    return finish_update(0.0, output);
-  }
-  const bool stopped =
-      running_->round && session.max_rounds > 0 && *running_->round >= session.max_rounds;
-  if (stopped || !hear_neighbours()) {
-    const double silent_s = now_s_ - running_->moved_s;
-    if (sent_poses_ && silent_s > kStalledPeriods * config_.status_period_s) {
-      output.poses = sent_poses_;
-      running_->moved_s = now_s_;
-    }
-    return;
-  }
-  TruncatedNewtonOptions options{.max_iterations = config_.max_newton_steps,
-                                 .max_cg_iterations = config_.max_cg_iterations};
-  if (running_->round) {
-    const auto result = block_->update(options);
-    ++*running_->round;
-    ++total_rounds_;
-    return finish_update(result.initial_gradient_norm * result.initial_gradient_norm, output);
-  }
-  options.max_iterations = kAlignmentSteps;
-  block_->align({config_.alignment_rotation_rad, config_.alignment_translation_m}, options);
-  frame_ = session.plan.frame;
-  running_->round = 0;
-  plan_outdated_ = true;
-  finish_update(0.0, output);
-}
-
-void RbcdAgent::finish_update(double squared_gradient, PgoOutput& output) {
-  PublicPoses poses{.sender = self_, .session = running_->session.id, .frame = frame_};
-  poses.round = *running_->round;
-  poses.squared_gradient = squared_gradient;
-  poses.keyframes = block_->public_keyframes();
-  poses.X = block_->round_public_poses();
-  // In round 0 members after this one may not be in the frame yet; the share counts none of them.
-  poses.cost = running_->round == 0U ? 0.0 : block_->share_of_cost(running_->counted);
-  running_->moved_s = now_s_;
-  count_share(poses);
-  publish_due_ = true;
-  output.more = true;
-  if (running_->session.plan.members.size() == 1) return;
-  sent_poses_ = poses;
-  output.poses = std::move(poses);
-}
-
-void RbcdAgent::count_share(const PublicPoses& poses) {
-  if (!ledger_ || poses.session != running_->session.id || poses.round == 0) return;
-  if (!ledger_->record(poses.sender.robot, poses.round, poses.cost, poses.squared_gradient)) return;
-  PgoSession& session = running_->session;
-  session.round = ledger_->last()->round;
-  session.cost = ledger_->last()->cost;
-  session.gradient_norm = ledger_->last()->gradient_norm;
-  const auto decrease = ledger_->relative_decrease();
-  session.finished = (session.max_rounds > 0 && session.round >= session.max_rounds) ||
-                     (decrease && *decrease < config_.min_relative_decrease);
-  announce_session_ |= session.finished;
 }
 
 }  // namespace km

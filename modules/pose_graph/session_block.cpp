@@ -84,10 +84,22 @@ void SessionBlock::align(const AlignmentTolerance& tolerance,
   X_ = minimise(problem, std::move(X_), options).X;
 }
 
-TruncatedNewtonResult SessionBlock::update(const TruncatedNewtonOptions& options) {
+TruncatedNewtonResult SessionBlock::update(const TruncatedNewtonOptions& options,
+                                           double relaxation) {
   if (fixed_changed_) problem_.set_fixed(fixed_);
   fixed_changed_ = false;
   TruncatedNewtonResult result = minimise(problem_, X_, options);
+  if (relaxation <= 1.0) {
+    X_ = result.X;
+    return result;
+  }
+  const LiftedPoses step = project_tangent(result.X, result.X - X_);
+  LiftedPoses beyond = retract(result.X, (relaxation - 1.0) * step);
+  const double cost = problem_.cost(beyond);
+  if (cost < result.initial_cost) {
+    result.X = std::move(beyond);
+    result.cost = cost;
+  }
   X_ = result.X;
   return result;
 }

@@ -31,9 +31,13 @@ class SessionBlock {
   /// rigid transform fits. Precondition: at least one neighbour was set.
   void align(const AlignmentTolerance& tolerance, const TruncatedNewtonOptions& options);
 
-  /// Lowers the cost of the block, all neighbours fixed.
+  /// Lowers the cost of the block, all neighbours fixed: towards its minimum, and beyond by
+  /// `relaxation` - 1 times the way if the cost there is still below that at the start. For an
+  /// exact minimum of a quadratic it is for every relaxation in (0, 2): successive over-relaxation,
+  /// by which a sweep gets over its slow modes in a fraction of the rounds (Ostrowski; Young,
+  /// "Iterative Solution of Large Linear Systems", 1971, Ch. 4).
   /// Precondition: all neighbours were set.
-  TruncatedNewtonResult update(const TruncatedNewtonOptions& options);
+  TruncatedNewtonResult update(const TruncatedNewtonOptions& options, double relaxation);
 
   /// Rounds the public poses to single precision, makes them feasible again, and returns them as
   /// rounded: what peers rebuild from them by restore_stiefel() is what stays here.

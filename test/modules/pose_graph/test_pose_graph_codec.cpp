@@ -22,6 +22,7 @@ typename Codec<T>::Encoded written(const T& message, const PgoPeer& writer) {
 PgoStatus some_status() {
   return {.sender = {700, 0xfedcba9876543210U},
           .frame = {3, 77},
+          .frame_version = 21,
           .keyframes = 12,
           .revision = 34,
           .offers = {{3, 5, {2, 99}}, {65535, 1, {1, 1}}}};
@@ -46,6 +47,7 @@ PgoSession some_session(bool with_anchor) {
 PublicPoses some_poses(Eigen::Index rank) {
   std::mt19937 rng(2);
   PublicPoses poses{.sender = {700, 8}, .session = {{3, 9}, 4}, .frame = {3, 77}};
+  poses.frame_version = 22;
   poses.round = 6;
   poses.cost = 1.5;
   poses.squared_gradient = 2.5;
@@ -87,6 +89,7 @@ TEST_CASE("public poses of single precision come back exactly", "[pose_graph][co
   CHECK(decoded.value->sender == poses.sender);
   CHECK(decoded.value->session == poses.session);
   CHECK(decoded.value->frame == poses.frame);
+  CHECK(decoded.value->frame_version == 22);
   CHECK(decoded.value->round == 6);
   CHECK(decoded.value->cost == 1.5);
   CHECK(decoded.value->squared_gradient == 2.5);

@@ -1,0 +1,196 @@
+#include <algorithm>
+
+#include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/rbcd_agent.hpp"
+
+namespace km {
+namespace {
+
+// After so many status periods without an update a member sends its last poses again.
+constexpr double kStalledPeriods = 3.0;
+constexpr int kAlignmentSteps = 10;  // Newton steps of the first solution beside aligned peers
+
+}  // namespace
+
+std::optional<RbcdAgent::EdgesTo> RbcdAgent::edges_in(const SessionPlan& plan) const {
+  EdgesTo edges;
+  for (const SessionPair& pair : plan.pairs) {
+    if (pair.a != self_.robot && pair.b != self_.robot) continue;
+    const RobotId peer = pair.a == self_.robot ? pair.b : pair.a;
+    const auto* of_peer = graph_.edges(peer, pair.edges);
+    if (of_peer == nullptr) return std::nullopt;
+    edges.emplace(peer, *of_peer);
+  }
+  return edges;
+}
+
+RbcdAgent::EdgesTo RbcdAgent::edges_to_absent(const SessionPlan& plan) const {
+  EdgesTo edges;
+  for (const auto& [robot, peer] : peers_) {
+    const auto* of_peer = graph_.newest_edges(robot);
+    if (plan.has_member(robot) || of_peer == nullptr || !peer.poses ||
+        peer.poses->frame != plan.frame)
+      continue;
+    const auto& keyframes = peer.poses->keyframes;
+    for (const InterEdge& e : *of_peer)
+      if (std::binary_search(keyframes.begin(), keyframes.end(), e.other))
+        edges[robot].push_back(e);
+  }
+  return edges;
+}
+
+LiftedPoses RbcdAgent::extended_poses() const {
+  const Eigen::Index known = block_ ? pose_count(block_->X()) : 0;
+  LiftedPoses X(config_.rank, 4 * Eigen::Index{graph_.keyframes()});
+  X.leftCols(4 * known) = block_ ? block_->X() : LiftedPoses(config_.rank, 0);
+  for (Eigen::Index i = known; i < pose_count(X); ++i)
+    X.middleCols<4>(4 * i) =
+        i == 0 ? lifted_identity(config_.rank)
+               : lift(X.middleCols<4>(4 * (i - 1)), graph_.step_to(static_cast<std::uint32_t>(i)));
+  return X;
+}
+
+void RbcdAgent::start_block(const SessionPlan& plan, EdgesTo edges, const EdgesTo& absent) {
+  edges.insert(absent.begin(), absent.end());
+  const std::vector<BlockEdge> own_edges = graph_.own_edges();
+  block_.emplace(extended_poses(), own_edges, edges);
+  for (const auto& [robot, to_absent] : absent) {
+    const PublicPoses& poses = *peers_.at(robot).poses;
+    (void)block_->set_neighbour(robot, poses.keyframes, poses.X);
+  }
+  // Alone, nothing ties the block to its present place: closures may call for a better start.
+  const std::size_t intra_closures = own_edges.size() + 1 - graph_.keyframes();
+  if (plan.members.size() == 1 && edges.empty() && intra_closures != intra_closures_tried_) {
+    const auto poses = chordal_initialisation(Eigen::Index{graph_.keyframes()}, own_edges);
+    block_->offer(lift(poses, config_.rank));
+    intra_closures_tried_ = intra_closures;
+  }
+}
+
+bool RbcdAgent::join(const PgoSession& session) {
+  const SessionPlan& plan = session.plan;
+  auto edges = edges_in(plan);
+  if (!edges) return false;
+  const EdgesTo absent = edges_to_absent(plan);
+  start_block(plan, std::move(*edges), absent);
+  if (running_) optimising_s_ += running_->moved_s - running_->started_s;
+  Running& running = running_.emplace(Running{.session = session});
+  running.started_s = running.moved_s = running.sent_s = now_s_;
+  for (std::size_t k = 0; k < plan.members.size(); ++k)
+    running.position_of[plan.members[k].peer.robot] = k;
+  const std::size_t position = running.position_of.at(self_.robot);
+  for (const auto& [robot, at] : running.position_of)
+    if (at < position) running.counted.insert(robot);
+  for (const auto& [robot, to_absent] : absent) running.counted.insert(robot);
+  ledger_.reset();
+  if (session.id.coordinator == self_) {
+    std::set<RobotId> members;
+    for (const SessionMember& member : plan.members) members.insert(member.peer.robot);
+    ledger_.emplace(members);
+  }
+  sent_poses_.reset();
+  return true;
+}
+
+const PublicPoses* RbcdAgent::poses_in_session(RobotId robot, std::uint32_t round) const {
+  const auto peer = peers_.find(robot);
+  const bool found = peer != peers_.end() && peer->second.poses &&
+                     peer->second.poses->session == running_->session.id &&
+                     peer->second.poses->round >= round;
+  return found ? &*peer->second.poses : nullptr;
+}
+
+bool RbcdAgent::hear_neighbours() {
+  const std::size_t position = running_->position_of.at(self_.robot);
+  bool any = false;
+  for (const RobotId robot : block_->neighbours()) {
+    const auto member = running_->position_of.find(robot);
+    const bool absent = member == running_->position_of.end();  // set once, when joining
+    const bool before = !absent && member->second < position;
+    any |= absent || before;
+    if (absent || (!running_->round && !before)) continue;  // the latter are aligned later
+    const std::uint32_t round = running_->round ? *running_->round + (before ? 1 : 0) : 0;
+    const PublicPoses* poses = poses_in_session(robot, round);
+    if (poses == nullptr || !block_->set_neighbour(robot, poses->keyframes, poses->X)) return false;
+  }
+  return any || running_->round;
+}
+
+void RbcdAgent::advance(PgoOutput& output) {
+  if (!running_ || running_->session.finished) return;
+  const PgoSession& session = running_->session;
+  const bool in_frame = frame_ == session.plan.frame || running_->position_of.at(self_.robot) == 0;
+  if (!running_->round && in_frame) {
+    return enter_frame(output);
+  }
+  const bool stopped =
+      running_->round && session.max_rounds > 0 && *running_->round >= session.max_rounds;
+  if (stopped || !hear_neighbours()) {
+    const double silent_s = now_s_ - running_->sent_s;
+    if (sent_poses_ && silent_s > kStalledPeriods * config_.status_period_s) {
+      output.poses = sent_poses_;
+      running_->sent_s = now_s_;
+    }
+    return;
+  }
+  TruncatedNewtonOptions options{.max_iterations = config_.max_newton_steps,
+                                 .max_cg_iterations = config_.max_cg_iterations};
+  if (running_->round) {
+    const double relaxation = relaxation_of(*running_->round, session.plan.members.size());
+    const auto result = block_->update(options, relaxation);
+    ++*running_->round;
+    ++total_rounds_;
+    return finish_update(result.initial_gradient_norm * result.initial_gradient_norm, output);
+  }
+  options.max_iterations = kAlignmentSteps;
+  block_->align({config_.alignment_rotation_rad, config_.alignment_translation_m}, options);
+  enter_frame(output);
+}
+
+void RbcdAgent::enter_frame(PgoOutput& output) {
+  const PgoFrame& frame = running_->session.plan.frame;
+  if (frame_ != frame) ++frame_version_;
+  frame_ = frame;
+  running_->round = 0;
+  plan_outdated_ = true;
+  finish_update(0.0, output);
+}
+
+// Grows with the rounds of a session: first the fast modes are damped, then the slow ones sped up.
+double RbcdAgent::relaxation_of(std::uint32_t round, std::size_t members) const {
+  if (members == 1) return 1.0;
+  return std::min(config_.max_over_relaxation, 2.0 - 4.0 / (8.0 + round));
+}
+
+void RbcdAgent::finish_update(double squared_gradient, PgoOutput& output) {
+  PublicPoses poses{.sender = self_, .session = running_->session.id, .frame = frame_};
+  poses.frame_version = frame_version_;
+  poses.round = *running_->round;
+  poses.squared_gradient = squared_gradient;
+  poses.keyframes = block_->public_keyframes();
+  poses.X = block_->round_public_poses();
+  // In round 0 members after this one may not be in the frame yet; the share counts none of them.
+  poses.cost = running_->round == 0U ? 0.0 : block_->share_of_cost(running_->counted);
+  running_->moved_s = running_->sent_s = now_s_;
+  count_share(poses);
+  publish_due_ = true;
+  output.more = true;
+  if (running_->session.plan.members.size() == 1) return;
+  sent_poses_ = poses;
+  output.poses = std::move(poses);
+}
+
+void RbcdAgent::count_share(const PublicPoses& poses) {
+  if (!ledger_ || poses.session != running_->session.id || poses.round == 0) return;
+  if (!ledger_->record(poses.sender.robot, poses.round, poses.cost, poses.squared_gradient)) return;
+  PgoSession& session = running_->session;
+  session.round = ledger_->last()->round;
+  session.cost = ledger_->last()->cost;
+  session.gradient_norm = ledger_->last()->gradient_norm;
+  const auto decrease = ledger_->relative_decrease();
+  session.finished = (session.max_rounds > 0 && session.round >= session.max_rounds) ||
+                     (decrease && *decrease < config_.min_relative_decrease);
+  announce_session_ |= session.finished;
+}
+
+}  // namespace km
