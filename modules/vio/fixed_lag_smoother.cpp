@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "modules/core/lie.hpp"
-#include "modules/vio/residuals/pose_block.hpp"
 #include "modules/vio/triangulation.hpp"
 #include "modules/vio/window_equations.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "modules/vio/residuals/pose_block.hpp"
+#include "modules/vio/residuals/retraction.hpp"
 
 namespace km {
 namespace {

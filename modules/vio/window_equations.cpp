@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "modules/vio/residuals/pose_block.hpp"
+#include "modules/vio/residuals/retraction.hpp"
 
 namespace km {
 namespace {

@@ -3,8 +3,10 @@
 #include <memory>
 #include <vector>
 
+#include "modules/vio/residuals/imu_cost.hpp"
 #include "modules/vio/residuals/pose_block.hpp"
 #include "modules/vio/residuals/prior_cost.hpp"
+#include "modules/vio/residuals/reprojection_cost.hpp"
 #include "modules/vio/window_optimizer.hpp"
 
 namespace km {
@@ -15,8 +17,13 @@ struct WindowProblem {
   explicit WindowProblem(const Window& window);
   void write_to(Window& window) const;
 
-  std::vector<PoseBlock> poses;
-  std::vector<MotionBlock> motions;
+  struct StateBlocks {
+    PoseBlock pose;
+    MotionBlock motion;
+  };
+  // Ceres orders the blocks of an elimination group by address: in one vector that is by frame,
+  // and repeatable.
+  std::vector<StateBlocks> states;
   std::vector<Eigen::Vector3d> points;
   ceres::CauchyLoss loss;
   PoseManifold manifold;
@@ -40,10 +47,8 @@ ceres::Problem::Options shared_objects() {
 
 WindowProblem::WindowProblem(const Window& window)
     : loss(window.loss_scale), problem(shared_objects()) {
-  for (const WindowFrame& frame : window.frames) {
-    poses.push_back(pose_block(frame.state.T_odom_body));
-    motions.push_back(motion_block(frame.state));
-  }
+  for (const WindowFrame& frame : window.frames)
+    states.push_back({pose_block(frame.state.T_odom_body), motion_block(frame.state)});
   for (const WindowLandmark& landmark : window.landmarks) points.push_back(landmark.p_odom);
   const std::vector<FirstEstimate> held = first_estimates(window);
   add_frames(window, held);
@@ -53,14 +58,14 @@ WindowProblem::WindowProblem(const Window& window)
 
 void WindowProblem::add_frames(const Window& window, const std::vector<FirstEstimate>& held) {
   for (std::size_t k = 0; k < window.frames.size(); ++k) {
-    problem.AddParameterBlock(poses[k].data(), 7, &manifold);
-    problem.AddParameterBlock(motions[k].data(), 9);
-    ordering->AddElementToGroup(poses[k].data(), 1);
-    ordering->AddElementToGroup(motions[k].data(), 1);
+    problem.AddParameterBlock(states[k].pose.data(), 7, &manifold);
+    problem.AddParameterBlock(states[k].motion.data(), 9);
+    ordering->AddElementToGroup(states[k].pose.data(), 1);
+    ordering->AddElementToGroup(states[k].motion.data(), 1);
     if (k > 0 && window.frames[k].imu)
       problem.AddResidualBlock(new ImuCost(*window.frames[k].imu, held[k - 1], held[k]), nullptr,
-                               poses[k - 1].data(), motions[k - 1].data(), poses[k].data(),
-                               motions[k].data());
+                               states[k - 1].pose.data(), states[k - 1].motion.data(),
+                               states[k].pose.data(), states[k].motion.data());
   }
 }
 
@@ -74,7 +79,7 @@ void WindowProblem::add_landmarks(const Window& window, const std::vector<FirstE
         if (o.bearings[c])
           problem.AddResidualBlock(
               new ReprojectionCost(window.views[c], *o.bearings[c], held[o.frame].pose), &loss,
-              poses[o.frame].data(), points[l].data());
+              states[o.frame].pose.data(), points[l].data());
   }
 }
 
@@ -83,16 +88,16 @@ void WindowProblem::add_prior(const Window& window) {
   std::vector<double*> parameters;
   for (const std::uint64_t id : window.prior.frames) {
     const std::size_t k = frame_index(window, id);
-    parameters.push_back(poses[k].data());
-    if (parameters.size() == 1) parameters.push_back(motions[k].data());
+    parameters.push_back(states[k].pose.data());
+    if (parameters.size() == 1) parameters.push_back(states[k].motion.data());
   }
   problem.AddResidualBlock(new PriorCost(window.prior), nullptr, parameters);
 }
 
 void WindowProblem::write_to(Window& window) const {
-  for (std::size_t k = 0; k < poses.size(); ++k) {
+  for (std::size_t k = 0; k < states.size(); ++k) {
     const Stamp stamp = window.frames[k].state.stamp;
-    window.frames[k].state = state_of(poses[k].data(), motions[k].data());
+    window.frames[k].state = state_of(states[k].pose.data(), states[k].motion.data());
     window.frames[k].state.stamp = stamp;
   }
   for (std::size_t l = 0; l < points.size(); ++l) window.landmarks[l].p_odom = points[l];

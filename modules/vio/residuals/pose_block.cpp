@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "modules/core/lie.hpp"
-
 namespace km {
 
 PoseBlock pose_block(const SE3& T_odom_body) {
@@ -32,19 +30,6 @@ OdometryState state_of(const double* pose_block, const double* motion_block) {
   state.gyro_bias = Eigen::Map<const Eigen::Vector3d>(motion_block + 3);
   state.accel_bias = Eigen::Map<const Eigen::Vector3d>(motion_block + 6);
   return state;
-}
-
-SE3 retract(const SE3& T, const Eigen::Ref<const Vector6>& delta) {
-  const Eigen::Quaterniond q(T.linear() * so3_exp(delta.head<3>()));
-  return make_pose(q.normalized().toRotationMatrix(),
-                   T.translation() + T.linear() * delta.tail<3>());
-}
-
-Vector6 local_coordinates(const SE3& from, const SE3& to) {
-  Vector6 delta;
-  delta.head<3>() = so3_log(from.linear().transpose() * to.linear());
-  delta.tail<3>() = from.linear().transpose() * (to.translation() - from.translation());
-  return delta;
 }
 
 bool PoseManifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {

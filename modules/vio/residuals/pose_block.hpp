@@ -5,6 +5,7 @@
 #include <array>
 
 #include "modules/core/odometry.hpp"
+#include "modules/vio/residuals/retraction.hpp"
 
 namespace km {
 
@@ -19,14 +20,6 @@ using MotionBlock = std::array<double, 9>;
 
 /// The state of two blocks, without a stamp.
 [[nodiscard]] OdometryState state_of(const double* pose_block, const double* motion_block);
-
-/// Retraction of every estimator here: R' = R exp(rotation), t' = t + R translation, of
-/// delta = [rotation; translation]. It equals T * exp(delta) to first order (Forster et al., TRO
-/// 2017, Sec. III-C).
-[[nodiscard]] SE3 retract(const SE3& T, const Eigen::Ref<const Vector6>& delta);
-
-/// Inverse of retract(): the delta from `from` to `to`.
-[[nodiscard]] Vector6 local_coordinates(const SE3& from, const SE3& to);
 
 /// retract() on a pose block. The cost functions deliver their derivatives by the six tangent
 /// coordinates in the first six of the seven columns; PlusJacobian passes these on.

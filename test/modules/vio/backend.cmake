@@ -1,2 +1,8 @@
+km_test(vio
+  SOURCES test_preintegration.cpp test_residuals.cpp test_marginalization.cpp
+          test_fixed_lag_smoother.cpp test_initialization.cpp
+  LINK km_vio Ceres::ceres)
+
+# Odometry on recorded data as in the table of results; run by hand.
 add_executable(bench_vio bench_vio.cpp odometry_errors.cpp odometry_run.cpp recorded_tracking.cpp)
 target_link_libraries(bench_vio PRIVATE km_options km_vio km_sensors)
