@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 namespace km {
@@ -16,7 +17,7 @@ namespace {
 constexpr std::size_t kLastWords = 12;
 
 std::runtime_error system_error(const std::string& what) {
-  return std::runtime_error(what + ": " + std::strerror(errno));
+  return std::runtime_error(what + ": " + std::generic_category().message(errno));
 }
 
 // Read end without blocking, both ends closed on exec.
@@ -48,8 +49,11 @@ std::array<int, 2> make_pipe() {
 }  // namespace
 
 std::string to_string(const ProcessExit& exit) {
-  if (exit.signal != 0)
-    return "ended by signal " + std::to_string(exit.signal) + " (" + strsignal(exit.signal) + ')';
+  if (exit.signal != 0) {
+    const char* const name = sigdescr_np(exit.signal);
+    return "ended by signal " + std::to_string(exit.signal) +
+           (name != nullptr ? " (" + std::string(name) + ')' : std::string());
+  }
   return "exit code " + std::to_string(exit.code);
 }
 
@@ -59,6 +63,7 @@ RobotProcess::RobotProcess(const std::vector<std::string>& command, const sigset
   if (!log_) throw std::runtime_error(log.string() + ": cannot be written");
   std::vector<char*> arguments;
   std::vector<std::string> texts = command;  // execv wants them mutable
+  arguments.reserve(texts.size() + 1);
   for (std::string& text : texts) arguments.push_back(text.data());
   arguments.push_back(nullptr);
 

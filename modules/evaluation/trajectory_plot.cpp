@@ -92,6 +92,12 @@ double scale_bar_m(double px_per_m) {
   return decade;
 }
 
+std::string metres_text(double metres) {
+  std::ostringstream text;
+  text << std::setprecision(3) << metres << " m";
+  return text.str();
+}
+
 void draw_legend(std::ostream& svg, double top_px, const TeamError& team) {
   double y = top_px;
   const auto entry = [&](const char* colour, const std::string& text) {
@@ -101,10 +107,8 @@ void draw_legend(std::ostream& svg, double top_px, const TeamError& team) {
   };
   entry("#888888", "truth");
   for (std::size_t r = 0; r < team.robots.size(); ++r) {
-    std::ostringstream text;
-    text << team.robots[r].name << ", position rmse " << std::setprecision(3)
-         << team.robots[r].position_m.rmse << " m";
-    entry(kColours[r % kColours.size()], text.str());
+    entry(kColours[r % kColours.size()],
+          team.robots[r].name + ", position rmse " + metres_text(team.robots[r].position_m.rmse));
   }
 }
 
@@ -140,7 +144,7 @@ std::string plot_from_above(std::span<const TrajectoryInput> inputs, const TeamE
     canvas.draw(svg, estimates[r], kColours[r % kColours.size()], 1.2);
   svg << "<path d=\"M" << kMargin_px << ',' << bar_y << " h" << bar_m * canvas.px_per_m()
       << "\" stroke=\"black\" stroke-width=\"2\"/>\n<text x=\"" << kMargin_px << "\" y=\""
-      << bar_y - 5.0 << "\">" << std::defaultfloat << bar_m << " m</text>\n";
+      << bar_y - 5.0 << "\">" << metres_text(bar_m) << "</text>\n";
   draw_legend(svg, legend_y, team);
   svg << "</svg>\n";
   return svg.str();

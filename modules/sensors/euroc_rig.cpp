@@ -79,7 +79,7 @@ class SensorYaml {
   YAML::Node root_;
 };
 
-SE3 read_T_BS(const SensorYaml& yaml) {
+SE3 read_extrinsics(const SensorYaml& yaml) {
   const YAML::Node data = yaml.child(yaml.at("T_BS"), "data");
   const std::vector<double> values = yaml.numbers(data, "T_BS", 16, "4x4, row by row");
   const Eigen::Matrix4d T =
@@ -124,7 +124,7 @@ PinholeCamera read_camera(const std::filesystem::path& file) {
   const auto distortion = yaml.numbers(yaml.at("distortion_coefficients"),
                                        "distortion_coefficients", 4, "k1, k2, p1, p2");
   std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
-  camera.T_body_cam = read_T_BS(yaml);
+  camera.T_body_cam = read_extrinsics(yaml);
   return camera;
 }
 
@@ -142,7 +142,7 @@ SensorRig read_euroc_rig(const std::filesystem::path& mav0) {
   SensorRig rig;
   const SensorYaml imu(mav0 / "imu0" / "sensor.yaml");
   rig.imu = read_imu_noise(imu);
-  const SE3 T_imu_body = read_T_BS(imu).inverse();  // `body` here: the one the files refer to
+  const SE3 T_imu_body = read_extrinsics(imu).inverse();  // `body` here: the one the files refer to
   const std::filesystem::path files[] = {mav0 / "cam0" / "sensor.yaml",
                                          mav0 / "cam1" / "sensor.yaml"};
   for (std::size_t i = 0; i < 2; ++i) {

@@ -1,7 +1,11 @@
 #include <catch2/catch.hpp>
+#include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <string>
+#include <thread>
 
+#include "apps/team/robot_process.hpp"
 #include "test/support/command.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -96,6 +100,30 @@ TEST_CASE("An interrupt is passed on once and the table still printed", "[team]"
   CHECK(result.exit_code == 0);
   CHECK_THAT(result.output, Catch::Contains("alice told") && Catch::Contains("bob   | bob told"));
   CHECK_THAT(result.output, Catch::Contains("team, one frame"));
+}
+
+TEST_CASE("Robots die with a team program that is killed", "[team]") {
+  const Team team(
+      "echo $$ > \"$out/pid.new\"; mv \"$out/pid.new\" \"$out/pid\"\n"
+      "while :; do sleep 0.05; done");
+  sigset_t none;
+  sigemptyset(&none);
+  RobotProcess program({"/bin/sh", "-c", "exec " + team.command}, none, team.folder.path() / "log");
+  const fs::path pid_file = team.folder.path() / "out/bob/pid";
+  while (!fs::exists(pid_file) && !program.exit()) program.read();
+  REQUIRE_FALSE(program.exit());
+  program.send(SIGKILL);
+  while (!program.exit()) program.read();
+
+  std::string pid = team.folder.read("out/bob/pid");
+  pid.pop_back();                 // end of line
+  const auto is_alive = [&pid] {  // where nobody collects orphans, they stay as zombies: (name) Z
+    std::string stat;
+    std::getline(std::ifstream("/proc/" + pid + "/stat"), stat);
+    return !stat.empty() && stat.find(") Z ") == stat.npos;
+  };
+  while (is_alive()) std::this_thread::yield();  // fails by the time limit of the test
+  SUCCEED("robot ended");
 }
 
 TEST_CASE("A time limit asks the robots to end", "[team]") {
