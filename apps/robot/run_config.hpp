@@ -19,14 +19,11 @@ struct RunConfig {
   /// The robot leaves when it and all present peers have had nothing to do for this long [s].
   double settle_s = 3.0;
 
-  /// The status line, where it is not a terminal, is printed this often [s].
-  double status_interval_s = 2.0;
 
   void visit_fields(auto& visitor) {
     visitor.field("vocabulary", vocabulary, "file, or one that comes with the program");
     visitor.field("link", link, "wired, wifi, intermittent, or a file");
     visitor.field("settle_s", settle_s, {0.1, 600.0}, "[s] of quiet before the robot leaves");
-    visitor.field("status_interval_s", status_interval_s, {0.1, 600.0}, "[s] where not a terminal");
   }
 };
 

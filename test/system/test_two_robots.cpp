@@ -1,0 +1,118 @@
+#include <catch2/catch.hpp>
+
+#include <csignal>
+#include <random>
+
+#include "test/support/process.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/system/team_run.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST_CASE("Two robots on the halves of a recording localise together", "[system]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const TeamRun run = run_team("euroc_two_robots.yaml", *dataset, folder);
+  CAPTURE(run.result.output);
+  REQUIRE(run.result.exit_code == 0);
+
+  // Bounds of the recording's requirements; what is reached is two to three times better.
+  const double max_odometry_ate_m = 0.010;
+  const double max_team_ate_m = 0.015;
+  const int min_inter_robot_inliers = 10;
+  int inliers = 0;
+  for (const auto& robot : run.json["robots"]) {
+    CHECK(robot["odometry"]["completeness"].as<double>() > 0.999);
+    CHECK(robot["odometry"]["position_m"]["rmse"].as<double>() < max_odometry_ate_m);
+    CHECK(robot["pgo"]["members"].size() == 2);
+    inliers += robot["closures"]["inliers"].as<int>();
+  }
+  CHECK(inliers >= min_inter_robot_inliers);
+  CHECK(run.json["optimized"]["joint"]["position_m"]["rmse"].as<double>() < max_team_ate_m);
+  for (const char* file : {"odometry.tum", "optimized.tum", "pose_graph.g2o", "loop_closures.csv",
+                           "traffic.csv", "timing.csv", "config.yaml", "summary.json"})
+    CHECK(fs::file_size(folder.path() / "a" / file) > 0);
+}
+
+std::vector<std::string> robot_command(const std::string& id, const fs::path& dataset,
+                                       const fs::path& output, int domain) {
+  return {std::string(KM_BIN_DIR) + "/kimera_multi_robot",
+          "--config",
+          "config/datasets/euroc.yaml",
+          "--robot",
+          id,
+          "--name",
+          "r" + id,
+          "--dataset",
+          dataset.string(),
+          "--output",
+          output.string(),
+          "--domain",
+          std::to_string(domain)};
+}
+
+int random_domain() {
+  std::random_device device;
+  return std::uniform_int_distribution<int>(1, 230)(device);
+}
+
+TEST_CASE("An interrupted robot ends in order with everything written", "[system]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  Process robot(robot_command("5", *dataset, folder.path(), random_domain()));
+  // A status line with the first images, long before the end of the recording.
+  REQUIRE(robot.wait_for_prefix("4.").has_value());
+  robot.kill(SIGINT);
+  CHECK(robot.wait() == 0);
+  CHECK(fs::file_size(folder.path() / "odometry.tum") > 0);
+  CHECK(folder.read("summary.json").find("interrupted") != std::string::npos);
+}
+
+TEST_CASE("A robot whose peer is killed goes on and finishes", "[system]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const int domain = random_domain();
+  auto command = robot_command("1", *dataset, folder.path() / "a", domain);
+  command.insert(command.end(), {"--to", "7.5"});
+  Process survivor(command);
+  {
+    Process victim(robot_command("60000", *dataset, folder.path() / "b", domain));
+    REQUIRE(victim.wait_for_prefix("4.").has_value());
+    victim.kill(SIGKILL);
+  }
+  CHECK(survivor.wait() == 0);
+  CHECK(folder.read("a/summary.json").find("settled\": true") != std::string::npos);
+}
+
+TEST_CASE("Bad input and configuration end a robot with one clear message", "[system]") {
+  const TemporaryFolder folder;
+  const std::string robot = std::string(KM_BIN_DIR) + "/kimera_multi_robot --robot 1 --output " +
+                            (folder.path() / "out").string();
+  const auto fails_with = [&](const std::string& arguments, int code, const std::string& text) {
+    const CommandResult result = run_command(robot + ' ' + arguments);
+    CAPTURE(arguments, result.output);
+    CHECK(result.exit_code == code);
+    CHECK(result.output.find(text) != std::string::npos);
+  };
+  const std::string empty = folder.path().string();
+  fails_with("--dataset " + empty, 1, "cam0");
+  fails_with("--dataset /nonexistent", 2, "/nonexistent");
+  fails_with("--dataset " + empty + " --rate fast", 2, "neither a positive number nor max");
+  fails_with("", 2, "--dataset");
+  fails_with("--dataset " + empty + " --set pcm.confidence=2", 1, "pcm.confidence");
+  fails_with("--dataset " + empty + " --link carrier_pigeon", 1, "carrier_pigeon");
+  const auto typo = folder.write("typo.yaml", "vio:\n  iteratons: 3\n");
+  fails_with("--dataset " + empty + " --config " + typo.string(), 1, "typo.yaml:2");
+  const auto graph = folder.write("bad.g2o", "EDGE_SE3:QUAT 0 1 nan\n");
+  fails_with("--graph " + graph.string(), 1, "bad.g2o:1");
+  CHECK_FALSE(fs::exists(folder.path() / "out" / "odometry.tum"));
+}
+
+}  // namespace
+}  // namespace km
