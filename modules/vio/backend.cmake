@@ -1,5 +1,5 @@
 km_module(vio
-  SOURCES fixed_lag_smoother.cpp initialization.cpp marginalization.cpp preintegration.cpp
+  SOURCES fixed_lag_sliding.cpp fixed_lag_smoother.cpp initialization.cpp marginalization.cpp preintegration.cpp
           residuals/imu_cost.cpp residuals/imu_factor.cpp residuals/pose_block.cpp
           residuals/prior_cost.cpp residuals/reprojection.cpp residuals/reprojection_cost.cpp
           residuals/retraction.cpp stereo_odometry.cpp triangulation.cpp vio.cpp vio_keyframes.cpp

