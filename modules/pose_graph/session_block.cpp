@@ -4,6 +4,14 @@
 #include "modules/pose_graph/rounding.hpp"
 
 namespace km {
+namespace {
+
+// Of a block when it enters a frame, see perturb_rotations(): small beside any measurement, large
+// beside rounding. One block out of its subspace draws its neighbours out of theirs.
+constexpr double kPerturbation = 1e-3;
+constexpr unsigned kPerturbationSeed = 1;
+
+}  // namespace
 
 SessionBlock::SessionBlock(LiftedPoses X, std::vector<BlockEdge> own_edges,
                            const std::map<RobotId, std::vector<InterEdge>>& edges_to)
@@ -79,6 +87,8 @@ void SessionBlock::align(const AlignmentTolerance& tolerance,
   const Eigen::MatrixXd L = align_rigidly(heard, poses, tolerance);
   for (std::size_t i = 0; i < poses.size(); ++i)
     X_.middleCols<4>(4 * static_cast<Eigen::Index>(i)) = lift(L, poses[i]);
+  std::mt19937 rng(kPerturbationSeed);
+  X_ = perturb_rotations(X_, kPerturbation, rng);
   QuadraticProblem problem(X_.rows(), pose_count(X_), problem_.edges(), heard);
   problem.set_fixed(fixed_);
   X_ = minimise(problem, std::move(X_), options).X;

@@ -28,7 +28,8 @@ class SessionBlock {
 
   /// Brings the whole block into the frame of the neighbours heard so far, then solves it with the
   /// edges to them alone: the block bends on its first move already, since over a long odometry no
-  /// rigid transform fits. Precondition: at least one neighbour was set.
+  /// rigid transform fits. It leaves the subspace of ordinary poses, see perturb_rotations().
+  /// Precondition: at least one neighbour was set.
   void align(const AlignmentTolerance& tolerance, const TruncatedNewtonOptions& options);
 
   /// Lowers the cost of the block, all neighbours fixed: towards its minimum, and beyond by

@@ -57,6 +57,14 @@ LiftedPoses retract(const LiftedPoses& X, const LiftedPoses& V) {
   return moved;
 }
 
+LiftedPoses perturb_rotations(const LiftedPoses& X, double sigma, std::mt19937& rng) {
+  std::normal_distribution<double> normal(0.0, sigma);
+  LiftedPoses V = LiftedPoses::Zero(X.rows(), X.cols());
+  for (Eigen::Index i = 0; i < pose_count(X); ++i)
+    for (double& v : V.middleCols<3>(4 * i).reshaped()) v = normal(rng);
+  return retract(X, project_tangent(X, V));
+}
+
 Eigen::MatrixXd lifting_matrix(Eigen::Index rank) {
   return Eigen::MatrixXd::Identity(rank, 3);
 }

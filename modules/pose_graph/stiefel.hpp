@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <random>
 
 #include "modules/core/geometry.hpp"
 
@@ -34,6 +35,11 @@ inline Eigen::Index pose_count(const LiftedPoses& X) {
 /// The point reached from `X` along tangent `V` by the polar retraction,
 /// (Y_i + V_i) (I + V_i^T V_i)^(-1/2), of second order; translations are added.
 [[nodiscard]] LiftedPoses retract(const LiftedPoses& X, const LiftedPoses& V);
+
+/// `X` moved along a random tangent vector with entries of standard deviation `sigma` on the
+/// rotations. Ordinary poses, lifted, have a gradient without components in the added dimensions:
+/// only beside them does a descent find its way through those.
+[[nodiscard]] LiftedPoses perturb_rotations(const LiftedPoses& X, double sigma, std::mt19937& rng);
 
 /// The matrix of St(3, r) by which every robot lifts its frame: the first three unit vectors. Equal
 /// on all robots without an exchange. Precondition: rank >= 3.

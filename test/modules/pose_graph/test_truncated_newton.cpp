@@ -60,6 +60,32 @@ TEST_CASE("steps never raise the cost and keep the poses feasible", "[pose_graph
   }
 }
 
+TEST_CASE("the relaxation unwinds a ring that rigid poses cannot", "[pose_graph]") {
+  // Equal poses on a ring, started with one full turn: a closed geodesic of SO(3) that cannot be
+  // contracted there, while St(3, 5) is simply connected.
+  constexpr Eigen::Index kPoses = 24;
+  WholeGraph ring{.poses = kPoses, .edges = {}};
+  std::vector<SE3> wound;
+  for (Eigen::Index i = 0; i < kPoses; ++i) {
+    ring.edges.push_back({i, (i + 1) % kPoses, SE3::Identity(), 1.0, 1.0});
+    const Eigen::AngleAxisd R(2.0 * M_PI * static_cast<double>(i) / kPoses,
+                              Eigen::Vector3d::UnitZ());
+    wound.push_back(make_pose(R.toRotationMatrix(), Eigen::Vector3d::Zero()));
+  }
+  const auto lowest_cost = [&](Eigen::Index rank, double sigma) {
+    std::mt19937 rng(1);
+    const QuadraticProblem problem(rank, kPoses, ring.edges, {});
+    return minimise(problem, perturb_rotations(lift(wound, rank), sigma, rng),
+                    {.max_iterations = 500})
+        .cost;
+  };
+  const double wound_cost = lowest_cost(3, 0.0);
+  CHECK(wound_cost > 1.0);
+  CHECK(lowest_cost(3, 1e-3) == Approx(wound_cost));
+  CHECK(lowest_cost(5, 0.0) == Approx(wound_cost));
+  CHECK(lowest_cost(5, 1e-3) < 1e-6);
+}
+
 TEST_CASE("whole graphs reach their certified optima", "[pose_graph]") {
   // Relative tolerance: quaternions are rounded in the files and normalised here, not there.
   const Known known = GENERATE(Known{"tinyGrid3D", 18.5193868}, Known{"smallGrid3D", 1025.39802},
