@@ -48,27 +48,29 @@ std::optional<double> image_motion(const TrackedFrame& a, const TrackedFrame& b,
   return *median;
 }
 
+// Means of the samples, and how far those of the first and the second half are apart: rotors that
+// idle make large deviations but no change of the mean.
 struct InertialMean {
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero(), accel = Eigen::Vector3d::Zero();
-  double gyro_deviation = 0.0, accel_deviation = 0.0;  // root mean square of the norm
+  double gyro_change = 0.0, accel_change = 0.0;
 };
 
 InertialMean inertial_mean(std::span<const InertialFrame> frames) {
+  Eigen::Matrix<double, 3, 2> gyro = Eigen::Matrix<double, 3, 2>::Zero(), accel = gyro;
+  Eigen::Vector2d count = Eigen::Vector2d::Zero();
+  for (std::size_t k = 1; k < frames.size(); ++k) {
+    const Eigen::Index half = 2 * k < frames.size() ? 0 : 1;
+    for (const ImuSample& sample : frames[k].samples) {
+      gyro.col(half) += sample.gyro;
+      accel.col(half) += sample.accel;
+      count(half) += 1.0;
+    }
+  }
   InertialMean mean;
-  double n = 0.0;
-  const auto each = [&](const auto& function) {
-    for (std::size_t k = 1; k < frames.size(); ++k)
-      for (const ImuSample& sample : frames[k].samples) function(sample);
-  };
-  each([&](const ImuSample& s) { mean.gyro += s.gyro, mean.accel += s.accel, n += 1.0; });
-  mean.gyro /= n;
-  mean.accel /= n;
-  each([&](const ImuSample& s) {
-    mean.gyro_deviation += (s.gyro - mean.gyro).squaredNorm() / n;
-    mean.accel_deviation += (s.accel - mean.accel).squaredNorm() / n;
-  });
-  mean.gyro_deviation = std::sqrt(mean.gyro_deviation);
-  mean.accel_deviation = std::sqrt(mean.accel_deviation);
+  mean.gyro = gyro.rowwise().sum() / count.sum();
+  mean.accel = accel.rowwise().sum() / count.sum();
+  mean.gyro_change = (gyro.col(1) / count(1) - gyro.col(0) / count(0)).norm();
+  mean.accel_change = (accel.col(1) / count(1) - accel.col(0) / count(0)).norm();
   return mean;
 }
 
@@ -179,8 +181,7 @@ StartGuess guess_start(std::span<const InertialFrame> frames, const SensorRig& r
   const auto motion_px = image_motion(frames.front().tracked, frames.back().tracked, focal_px);
   guess.image_motion_px = motion_px.value_or(0.0);
   if (motion_px && *motion_px < config.rest_parallax_px &&
-      mean.accel_deviation < config.rest_accel_mps2 &&
-      mean.gyro_deviation < config.rest_gyro_radps) {
+      mean.accel_change < config.rest_accel_mps2 && mean.gyro_change < config.rest_gyro_radps) {
     guess.status = StartStatus::kAtRest;
     guess.states = states_at_rest(frames, mean);
     return guess;

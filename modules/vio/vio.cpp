@@ -138,10 +138,11 @@ void Vio::try_start(VioResult& result) {
 // A start defines its own first position and heading: both become those of the last pose.
 void Vio::continue_from_last_pose(std::vector<OdometryState>& states) const {
   if (!last_) return;
-  const auto heading = [](const SE3& T) { return std::atan2(T.linear()(1, 0), T.linear()(0, 0)); };
   const SE3 first = states.front().T_odom_body;
-  const Eigen::Matrix3d R =
-      so3_exp((heading(last_->T_odom_body) - heading(first)) * Eigen::Vector3d::UnitZ());
+  // The turn about the vertical that brings the two attitudes nearest to each other.
+  const Eigen::Matrix3d Q = last_->T_odom_body.linear() * first.linear().transpose();
+  const double turn = std::atan2(Q(1, 0) - Q(0, 1), Q(0, 0) + Q(1, 1));
+  const Eigen::Matrix3d R = so3_exp(turn * Eigen::Vector3d::UnitZ());
   const SE3 T = make_pose(R, last_->T_odom_body.translation() - R * first.translation());
   for (OdometryState& state : states) {
     state.T_odom_body = T * state.T_odom_body;

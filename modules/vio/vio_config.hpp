@@ -59,7 +59,8 @@ struct VioConfig {
 
   /// A start at rest needs less image motion than this over the images held back [px],
   double rest_parallax_px = 1.0;
-  /// and less deviation of the accelerometer [m/s^2] and of the gyroscope [rad/s] than this.
+  /// and less change of the mean accelerometer [m/s^2] and gyroscope [rad/s] from their first half
+  /// to the second than this.
   double rest_accel_mps2 = 0.5;
   double rest_gyro_radps = 0.05;
 

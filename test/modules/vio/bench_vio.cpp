@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <iostream>
 #include <map>
@@ -176,22 +175,6 @@ int run(int argc, char** argv) {
     print_piece(piece.name, run, last - first);
     if (run.states.size() >= 3)
       for (const std::size_t steps : {1U, 3U, 8U}) print_consistency(run, steps);
-    if (std::getenv("DUMP")) {
-      const SE3 A = run.truth.back() * run.states.back().T_odom_body.inverse();
-      for (std::size_t k = 0; k < run.states.size(); k += 5) {
-        const auto& x = run.states[k];
-        const Eigen::Vector3d e =
-            57.3 * so3_log(A.linear() * x.T_odom_body.linear() * run.truth[k].linear().transpose());
-        const Eigen::Vector3d up = 57.3 * x.T_odom_body.linear().row(2).transpose().cross(
-                                              run.truth[k].linear().row(2).transpose());
-        std::printf(
-            "%5.2f err_w %6.3f %6.3f %6.3f  tilt_b %6.3f %6.3f %6.3f bg %8.5f %8.5f %8.5f ba %6.3f "
-            "%6.3f %6.3f v %5.2f\n",
-            seconds_between(run.states[0].stamp, x.stamp), e.x(), e.y(), e.z(), up.x(), up.y(),
-            up.z(), x.gyro_bias.x(), x.gyro_bias.y(), x.gyro_bias.z(), x.accel_bias.x(),
-            x.accel_bias.y(), x.accel_bias.z(), x.v_odom.norm());
-      }
-    }
   }
   if (black) run_black(recording, tracker, config);
   if (!starts) return 0;

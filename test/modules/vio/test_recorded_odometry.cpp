@@ -1,0 +1,138 @@
+#include <unistd.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include "modules/sensors/euroc_reader.hpp"
+#include "modules/vio/vio_node.hpp"
+#include "odometry_errors.hpp"
+#include "odometry_run.hpp"
+#include "test/support/shared_data.hpp"
+
+namespace km {
+namespace {
+
+// Four seconds of MH_01_easy, which is in motion from the first image on.
+const Recording* recording() {
+  const auto folder = shared_data("euroc/MH_01_easy");
+  if (!folder) return nullptr;
+  static const Recording instance = read_recording(*folder, 0.0, 4.0);
+  return &instance;
+}
+
+TEST_CASE("MH_01_easy: every image has a pose, within a centimetre", "[vio]") {
+  const Recording* const data = recording();
+  if (data == nullptr) return;
+  const auto solver = GENERATE(SmootherSolver::kSchur, SmootherSolver::kCeres);
+  VioConfig config;
+  config.solver = solver;
+  const OdometryRun run = run_odometry(*data, 0, data->packets.size(), TrackerConfig{}, config);
+  CHECK(run.states.size() == data->packets.size());
+  CHECK(run.statistics.starts == 1);
+  CHECK(run.results[15].start == StartStatus::kInMotion);
+  const OdometryErrors errors = odometry_errors(run.states, run.truth);
+  CHECK(errors.ate_m < 0.010);  // measured: 0.005
+  CHECK(errors.rpe_deg < 0.2);  // measured: 0.11
+  CHECK(errors.tilt_deg < 1.5);
+  CHECK(errors.scale == Approx(1.0).epsilon(0.03));
+}
+
+TEST_CASE("MH_01_easy: a second of black images does not lose it", "[vio]") {
+  const Recording* const data = recording();
+  if (data == nullptr) return;
+  Recording black = *data;
+  for (std::size_t k = 36; k < 56; ++k) {
+    auto frame = std::make_shared<StereoFrame>(*black.packets[k].frame);
+    std::fill(frame->left.pixels.begin(), frame->left.pixels.end(), std::uint8_t{0});
+    std::fill(frame->right.pixels.begin(), frame->right.pixels.end(), std::uint8_t{0});
+    black.packets[k].frame = frame;
+  }
+  const OdometryRun run = run_odometry(black, 0, black.packets.size(), TrackerConfig{}, {});
+  CHECK(run.states.size() == black.packets.size());
+  CHECK(run.statistics.starts == 1);
+  CHECK(run.statistics.divergences == 0);
+  const OdometryErrors errors = odometry_errors(run.states, run.truth);
+  CHECK(errors.ate_m < 0.03);
+  CHECK(errors.max_m < 0.10);
+}
+
+// A EuRoC folder of links to the images, which lie apart from their calibration in the data.
+class LinkedFolder {
+ public:
+  explicit LinkedFolder(const std::filesystem::path& recording) {
+    std::filesystem::create_directories(path_ / "mav0");
+    const auto source = std::filesystem::absolute(recording);
+    std::filesystem::create_symlink(source / "mav0/imu0", path_ / "mav0/imu0");
+    for (const std::string camera : {"cam0", "cam1"}) {
+      const auto target = path_ / "mav0" / camera;
+      std::filesystem::create_directories(target);
+      std::filesystem::create_symlink(source / "mav0" / camera / "sensor.yaml",
+                                      target / "sensor.yaml");
+      std::filesystem::create_symlink(source / "static_start" / camera, target / "data");
+      std::set<std::string> names;
+      for (const auto& file : std::filesystem::directory_iterator(target / "data"))
+        names.insert(file.path().filename());
+      std::ofstream list(target / "data.csv");
+      for (const std::string& name : names) list << name.substr(0, 19) << ',' << name << '\n';
+    }
+  }
+  ~LinkedFolder() { std::filesystem::remove_all(path_); }
+  LinkedFolder(const LinkedFolder&) = delete;
+  LinkedFolder& operator=(const LinkedFolder&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_ =
+      std::filesystem::temp_directory_path() / ("km_vio_rest_" + std::to_string(::getpid()));
+};
+
+TEST_CASE("V1_01_easy: a start at rest, at five images a second", "[vio]") {
+  const auto folder = shared_data("euroc/V1_01_easy");
+  if (!folder) return;
+  const LinkedFolder links(*folder);
+  EurocReader reader(links.path());
+  Vio vio(0, reader.rig(), TrackerConfig{}, VioConfig{});
+  std::vector<OdometryState> states;
+  std::optional<StartStatus> start;
+  while (const auto packet = reader.next()) {
+    const VioResult result = vio.process(*packet);
+    if (result.start) start = result.start;
+    states.insert(states.end(), result.states.begin(), result.states.end());
+  }
+  CHECK(start == StartStatus::kAtRest);
+  REQUIRE(states.size() == 24);
+  for (const OdometryState& state : states) {  // it stands: what moves is the estimate
+    CHECK(state.T_odom_body.translation().norm() < 5e-3);
+    CHECK(state.v_odom.norm() < 0.02);
+  }
+  // Ground truth: gyro bias (-0.00225, 0.02154, 0.07703) rad/s at the start of V1_01_easy.
+  CHECK((states.back().gyro_bias - Eigen::Vector3d(-0.00225, 0.02154, 0.07703)).norm() < 2e-3);
+}
+
+TEST_CASE("The odometry node publishes what odometry gives, in order of time", "[vio][node]") {
+  const Recording* const data = recording();
+  if (data == nullptr) return;
+  Topic<SensorPacket> packets;
+  Topic<OdometryState> odometry;
+  Topic<KeyframeOdometry> keyframes;
+  std::vector<Stamp> stamps;  // of the node's thread, read after it has ended
+  std::vector<std::uint32_t> indices;
+  odometry.subscribe([&](const auto& state) { stamps.push_back(state->stamp); });
+  keyframes.subscribe([&](const auto& keyframe) { indices.push_back(keyframe->id.index); });
+  VioNode node(5, data->rig, TrackerConfig{}, VioConfig{}, {packets, odometry, keyframes});
+  node.start();
+  for (std::size_t k = 0; k < 40; ++k) packets.publish(data->packets[k]);
+  node.stop();  // drains the queue
+  CHECK(node.error() == nullptr);
+  CHECK(stamps.size() == 40);
+  CHECK(std::is_sorted(stamps.begin(), stamps.end()));
+  REQUIRE(indices.size() >= 2);
+  for (std::size_t k = 0; k < indices.size(); ++k) CHECK(indices[k] == k);
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,196 @@
+#include <catch2/catch.hpp>
+
+#include <limits>
+
+#include "modules/vio/vio.hpp"
+#include "synthetic_motion.hpp"
+#include "textured_plane.hpp"
+
+namespace km {
+namespace {
+
+// A rig at rest before a textured wall, x of the body upwards, and packets as sensors make them.
+class Bench {
+ public:
+  Bench() {
+    rig_.stereo = test_rig();
+    const TexturedPlane wall;
+    frame_.left = wall.render(rig_.stereo.cameras[0], SE3::Identity());
+    frame_.right = wall.render(rig_.stereo.cameras[1], SE3::Identity());
+  }
+
+  SensorPacket packet(int image) const {
+    SensorPacket packet;
+    auto frame = std::make_shared<StereoFrame>(frame_);
+    frame->stamp = image * kFrameStep;
+    packet.frame = std::move(frame);
+    for (Stamp s = std::max(image - 1, 0) * kFrameStep; s <= image * kFrameStep; s += kImuStep)
+      packet.imu.push_back({s, {0.01, 0.02, -0.01}, {kGravity_mps2, 0.0, 0.0}});
+    return packet;
+  }
+
+  Vio vio() const {
+    VioConfig config;
+    config.gravity_mps2 = kGravity_mps2;
+    return Vio(3, rig_, TrackerConfig{}, config);
+  }
+  const SensorRig& rig() const { return rig_; }
+
+  static constexpr Stamp kFrameStep = 50'000'000;
+  static constexpr Stamp kImuStep = 5'000'000;
+  static constexpr int kStartImages = 16;
+
+ private:
+  SensorRig rig_;
+  StereoFrame frame_;
+};
+
+// Feeds images `first` to `last`, not included; the results together.
+VioResult feed(Vio& vio, const Bench& bench, int first, int last) {
+  VioResult all;
+  for (int k = first; k < last; ++k) {
+    const VioResult result = vio.process(bench.packet(k));
+    all.states.insert(all.states.end(), result.states.begin(), result.states.end());
+    all.keyframes.insert(all.keyframes.end(), result.keyframes.begin(), result.keyframes.end());
+    if (result.start) all.start = result.start;
+    if (result.problem != VioProblem::kNone) all.problem = result.problem;
+  }
+  return all;
+}
+
+TEST_CASE("Every image has a pose, at rest the same", "[vio]") {
+  const Bench bench;
+  Vio vio = bench.vio();
+  const VioResult result = feed(vio, bench, 0, 80);
+  CHECK(result.start == StartStatus::kAtRest);
+  CHECK(result.problem == VioProblem::kNone);
+  REQUIRE(result.states.size() == 80);
+  for (std::size_t k = 0; k < result.states.size(); ++k) {
+    CHECK(result.states[k].stamp == static_cast<Stamp>(k) * Bench::kFrameStep);
+    CHECK(result.states[k].T_odom_body.translation().norm() < 1e-3);
+    // x of the body points upwards.
+    CHECK(result.states[k].T_odom_body.linear()(2, 0) == Approx(1.0).margin(1e-4));
+  }
+}
+
+TEST_CASE("Keyframes are numbered without gaps and chain by their relative poses", "[vio]") {
+  const Bench bench;
+  Vio vio = bench.vio();
+  const VioResult result = feed(vio, bench, 0, 150);
+  REQUIRE(result.keyframes.size() >= 3);  // 7.5 s at rest, one every 2 s
+  SE3 T_odom_kf = SE3::Identity();
+  for (std::size_t k = 0; k < result.keyframes.size(); ++k) {
+    const KeyframeOdometry& keyframe = result.keyframes[k];
+    CHECK(keyframe.id == KeyframeId{3, static_cast<std::uint32_t>(k)});
+    T_odom_kf = T_odom_kf * keyframe.T_previous_kf;
+    CHECK((T_odom_kf.matrix() - keyframe.T_odom_kf.matrix()).norm() < 1e-9);
+    REQUIRE(keyframe.frame != nullptr);
+    CHECK(keyframe.frame->stamp == keyframe.stamp);
+    CHECK(is_covariance(keyframe.covariance));
+    CHECK((keyframe.covariance.trace() > 0.0) == (k > 0));
+  }
+}
+
+TEST_CASE("Packets without a usable image are refused and counted", "[vio]") {
+  const Bench bench;
+  Vio vio = bench.vio();
+  REQUIRE(feed(vio, bench, 0, 20).states.size() == 20);
+
+  SensorPacket no_image = bench.packet(20);
+  no_image.frame = nullptr;
+  CHECK(vio.process(no_image).problem == VioProblem::kNoImage);
+  SensorPacket small = bench.packet(21);
+  auto frame = std::make_shared<StereoFrame>(*small.frame);
+  frame->right.pixels.pop_back();
+  small.frame = frame;
+  CHECK(vio.process(small).problem == VioProblem::kNoImage);
+  CHECK(vio.process(bench.packet(19)).problem == VioProblem::kUnorderedImage);
+  CHECK(vio.statistics().refused_images == 3);
+
+  // Their inertial samples were kept: the next image goes on without a new start.
+  const VioResult next = vio.process(bench.packet(22));
+  CHECK(next.problem == VioProblem::kNone);
+  CHECK(next.states.size() == 1);
+  CHECK(vio.statistics().starts == 1);
+}
+
+TEST_CASE("Broken inertial samples are refused, the image still has a pose", "[vio]") {
+  const Bench bench;
+  Vio vio = bench.vio();
+  REQUIRE(feed(vio, bench, 0, 20).states.size() == 20);
+  SensorPacket packet = bench.packet(20);
+  packet.imu[3].gyro.x() = std::numeric_limits<double>::quiet_NaN();
+  packet.imu[5].stamp -= 100 * Bench::kFrameStep;
+  packet.imu[7].stamp += 1000 * Bench::kFrameStep;
+  packet.imu[8].accel.z() = std::numeric_limits<double>::infinity();
+  const VioResult result = vio.process(packet);
+  CHECK(result.problem == VioProblem::kBadSamples);
+  CHECK(vio.statistics().refused_samples == 4);
+  REQUIRE(result.states.size() == 1);
+  CHECK(result.states[0].T_odom_body.translation().norm() < 1e-3);
+  CHECK(feed(vio, bench, 21, 30).states.size() == 9);
+}
+
+TEST_CASE("A gap in the inertial samples leads to a new start from the last pose", "[vio]") {
+  const Bench bench;
+  Vio vio = bench.vio();
+  const VioResult before = feed(vio, bench, 0, 30);
+  SensorPacket gap = bench.packet(40);  // half a second later
+  const VioResult at_gap = vio.process(gap);
+  CHECK(at_gap.problem == VioProblem::kInertialGap);
+  CHECK(at_gap.states.empty());
+  const VioResult after = feed(vio, bench, 41, 41 + Bench::kStartImages);
+  CHECK(vio.statistics().gaps == 1);
+  CHECK(vio.statistics().starts == 2);
+  REQUIRE(after.states.size() == 1 + Bench::kStartImages);  // those held back, too
+  CHECK(after.states.front().stamp == gap.frame->stamp);
+  const SE3 jump = before.states.back().T_odom_body.inverse() * after.states.front().T_odom_body;
+  CHECK(jump.translation().norm() < 5e-3);
+  CHECK(angle_of(jump.linear()) < 5e-3);
+  // The step across the gap is known to be uncertain.
+  REQUIRE_FALSE(after.keyframes.empty());
+  CHECK(after.keyframes.front().id.index == before.keyframes.back().id.index + 1);
+  CHECK(after.keyframes.front().covariance(5, 5) > 0.1);
+}
+
+TEST_CASE("An impossible motion is found out and odometry starts anew", "[vio]") {
+  const Bench bench;
+  Vio vio = bench.vio();
+  REQUIRE(feed(vio, bench, 0, 30).states.size() == 30);
+  bool diverged = false;
+  for (int k = 30; k < 45 && !diverged; ++k) {
+    SensorPacket packet = bench.packet(k);
+    for (ImuSample& sample : packet.imu) sample.accel = {5e3, -2e3, 1e3};  // stuck at 500 g
+    const VioResult result = vio.process(packet);
+    diverged = result.problem == VioProblem::kDiverged;
+    for (const OdometryState& state : result.states) CHECK(state.T_odom_body.matrix().allFinite());
+  }
+  REQUIRE(diverged);
+  CHECK(vio.statistics().divergences == 1);
+  const VioResult after = feed(vio, bench, 46, 46 + 4 * Bench::kStartImages);
+  CHECK(vio.statistics().starts == 2);
+  REQUIRE_FALSE(after.states.empty());
+  CHECK(after.states.back().T_odom_body.translation().norm() < 1.0);
+}
+
+TEST_CASE("Without features odometry waits for images to start with", "[vio]") {
+  const Bench bench;
+  Vio vio = bench.vio();
+  VioProblem worst = VioProblem::kNone;
+  for (int k = 0; k < 70; ++k) {  // 3.5 s, more than start_timeout_s
+    SensorPacket packet = bench.packet(k);
+    auto black = std::make_shared<StereoFrame>(*packet.frame);
+    std::fill(black->left.pixels.begin(), black->left.pixels.end(), std::uint8_t{0});
+    std::fill(black->right.pixels.begin(), black->right.pixels.end(), std::uint8_t{0});
+    packet.frame = black;
+    const VioResult result = vio.process(packet);
+    CHECK(result.states.empty());
+    if (result.problem != VioProblem::kNone) worst = result.problem;
+  }
+  CHECK(worst == VioProblem::kStartTimeout);
+  CHECK(vio.statistics().images_without_pose > 0);
+  CHECK_FALSE(feed(vio, bench, 70, 140).states.empty());
+}
+
+}  // namespace
+}  // namespace km
