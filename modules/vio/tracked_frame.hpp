@@ -11,10 +11,10 @@ namespace km {
 
 /// One landmark seen in a stereo pair. Bearings are undistorted points on z = 1 of each camera.
 struct TrackedFeature {
-  std::uint64_t id = 0;                                 ///< Same id, same landmark; never reused.
-  Eigen::Vector2d left = Eigen::Vector2d::Zero();       ///< Bearing in the left camera.
-  std::optional<Eigen::Vector2d> right;                 ///< Bearing in the right camera, if matched.
-  int length = 1;                                       ///< Images it has been tracked in.
+  std::uint64_t id = 0;                            ///< Same id, same landmark; never reused.
+  Eigen::Vector2d left = Eigen::Vector2d::Zero();  ///< Bearing in the left camera.
+  std::optional<Eigen::Vector2d> right;            ///< Bearing in the right camera, if matched.
+  int length = 1;                                  ///< Images it has been tracked in.
 };
 
 /// What the front end hands to the back end for one image.
