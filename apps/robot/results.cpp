@@ -69,6 +69,15 @@ G2oGraph graph_of(const RunRecord& record) {
   return graph;
 }
 
+void write_rounds(const fs::path& file, const RunRecord& record) {
+  std::ofstream out = open(file);
+  out << "seconds,round,members,cost,gradient_norm\n";
+  for (const RunRecord::OptimizerRound& row : record.rounds())
+    out << row.seconds << ',' << row.round << ',' << row.members << ',' << row.cost << ','
+        << row.gradient_norm << '\n';
+  close(out, file);
+}
+
 void write_summary(const fs::path& file, const RunRecord& record, const RunSummary& summary) {
   RunRecord::StageCounts total;
   for (const auto& [peer, counts] : record.stages_per_peer()) {
@@ -137,6 +146,7 @@ void write_results(const fs::path& folder, const RunRecord& record, const RunSum
   write_tum(folder / "optimized.tum", record.optimized());
   write_g2o(folder / "pose_graph.g2o", graph_of(record));
   write_closures(folder / "loop_closures.csv", record);
+  write_rounds(folder / "optimizer.csv", record);
   write_summary(folder / "summary.json", record, summary);
 }
 

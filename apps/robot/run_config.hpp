@@ -19,7 +19,6 @@ struct RunConfig {
   /// The robot leaves when it and all present peers have had nothing to do for this long [s].
   double settle_s = 3.0;
 
-
   void visit_fields(auto& visitor) {
     visitor.field("vocabulary", vocabulary, "file, or one that comes with the program");
     visitor.field("link", link, "wired, wifi, intermittent, or a file");

@@ -31,7 +31,11 @@ void RunRecord::add(const ClosureOutcome& outcome) {
 }
 
 void RunRecord::add(const OptimizerProgress& progress) {
-  if (progress.round != progress_.round) ++activity_;
+  if (progress.round != progress_.round) {
+    ++activity_;
+    rounds_.push_back({progress.seconds, progress.round, progress.members.size(), progress.cost,
+                       progress.gradient_norm});
+  }
   progress_ = progress;
 }
 

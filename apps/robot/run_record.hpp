@@ -40,6 +40,16 @@ class RunRecord {
   [[nodiscard]] const std::optional<Trajectory>& trajectory() const { return trajectory_; }
   [[nodiscard]] const OptimizerProgress& progress() const { return progress_; }
 
+  /// State of the optimiser after one round.
+  struct OptimizerRound {
+    double seconds = 0.0;  ///< Time spent optimising.
+    std::uint32_t round = 0;
+    std::size_t members = 0;
+    double cost = 0.0;
+    double gradient_norm = 0.0;
+  };
+  [[nodiscard]] const std::vector<OptimizerRound>& rounds() const { return rounds_; }
+
   /// Closures of this robot that are inliers, with its own and its peers' measurements.
   [[nodiscard]] std::vector<Closure> inlier_closures() const;
 
@@ -69,6 +79,7 @@ class RunRecord {
   std::map<ClosureId, ClosureOutcome> outcomes_;
   std::optional<Trajectory> trajectory_;
   OptimizerProgress progress_;
+  std::vector<OptimizerRound> rounds_;
   std::uint64_t activity_ = 0;
 };
 

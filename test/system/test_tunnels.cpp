@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <fstream>
 #include <iostream>
+#include <limits>
 #include <map>
 
 #include "test/support/pose_graph_problems.hpp"
@@ -64,6 +67,22 @@ double position_rmse(const std::vector<SE3>& poses, const LiftedPoses& optimum) 
   return std::sqrt((aligned - b).colwise().squaredNorm().mean());
 }
 
+/// Rounds, from the start of the run, after which the whole team's cost stays within `cost`.
+int rounds_to(double cost, const std::filesystem::path& optimizer_csv) {
+  std::ifstream file(optimizer_csv);
+  std::string line;
+  std::getline(file, line);  // names of the columns
+  int reached = 0;
+  int last = 0;
+  for (double seconds = 0, members = 0, value = 0, gradient = 0; std::getline(file, line);) {
+    REQUIRE(std::sscanf(line.c_str(), "%lf,%d,%lf,%lf,%lf", &seconds, &last, &members, &value,
+                        &gradient) == 5);
+    // A part of the graph costs less than the whole: it has not got there either.
+    if (members < kRobots || value > cost || value < 0.98 * cost) reached = last + 1;
+  }
+  return reached <= last ? reached : std::numeric_limits<int>::max();
+}
+
 TEST_CASE("Eight processes bring the tunnels graph into one frame", "[system][slow]") {
   const auto dataset = shared_data("multi_robot/tunnels_8robots");
   if (!dataset) return;
@@ -72,9 +91,7 @@ TEST_CASE("Eight processes bring the tunnels graph into one frame", "[system][sl
   CAPTURE(run.result.output);
   REQUIRE(run.result.exit_code == 0);
 
-  int rounds = 0;
   for (const auto& robot : run.json["robots"]) {
-    rounds = std::max(rounds, robot["pgo"]["rounds"].as<int>());
     CHECK(robot["pgo"]["members"].size() == kRobots);
     CHECK(robot["pgo"]["anchor"].as<int>() == 0);
   }
@@ -84,11 +101,12 @@ TEST_CASE("Eight processes bring the tunnels graph into one frame", "[system][sl
 
   const TruncatedNewtonResult central = solve_centrally(team.graph);
   const double reached = cost_of(team.graph, team.poses);
+  const int rounds = rounds_to(1.01 * central.cost, folder.path() / "robot0" / "optimizer.csv");
   const double gap = reached / central.cost - 1.0;
   const double rmse_m = position_rmse(team.poses, central.X);
-  std::cout << "tunnels: closures kept " << team.graph.edges.size() - 1247 << ", rounds " << rounds
-            << ", cost " << reached << ", gap " << gap << ", RMSE to the optimum " << rmse_m
-            << " m\n";
+  std::cout << "tunnels: closures kept " << team.graph.edges.size() - 1247 << ", rounds to 1e-2 "
+            << rounds << ", cost " << reached << ", gap " << gap << ", RMSE to the optimum "
+            << rmse_m << " m\n";
   CHECK(gap < 1e-2);
   CHECK(rounds <= 254);  // what the authors' own program needs for that gap, its start included
   CHECK(rmse_m < 1.0);   // paths are 475 to 886 m long
