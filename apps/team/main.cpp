@@ -101,6 +101,13 @@ int run(const TeamOptions& options) {
     write_json(json, team);
     if (!file.flush()) throw std::runtime_error(options.json.string() + ": cannot be written");
   }
+  if (!team.plot.empty()) {
+    const fs::path path = plan.output / "trajectories.svg";
+    std::ofstream file(path);
+    file << team.plot;
+    if (!file.flush()) throw std::runtime_error(path.string() + ": cannot be written");
+    std::cout << "\nSeen from above: " << path.string() << '\n';
+  }
   const bool ok = std::all_of(team.robots.begin(), team.robots.end(),
                               [](const km::RobotResult& robot) { return robot.run.exit.ok(); });
   return ok ? 0 : 3;

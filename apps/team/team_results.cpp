@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "modules/evaluation/trajectory_file.hpp"
+#include "modules/evaluation/trajectory_plot.hpp"
 #include "modules/sensors/euroc_reader.hpp"
 
 namespace km {
@@ -108,7 +109,10 @@ TeamResult collect_results(const TeamPlan& plan, std::vector<RobotRun> runs) {
       optimized.push_back(*input);
     result.robots.push_back(std::move(robot));
   }
-  if (!optimized.empty()) result.optimized = trajectory_error(optimized);
+  if (!optimized.empty()) {
+    result.optimized = trajectory_error(optimized);
+    result.plot = plot_from_above(optimized, *result.optimized);
+  }
   return result;
 }
 

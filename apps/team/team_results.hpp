@@ -46,6 +46,7 @@ struct RobotResult {
 struct TeamResult {
   std::vector<RobotResult> robots;
   std::optional<TeamError> optimized;  ///< Of the robots that have poses, under one alignment.
+  std::string plot;                    ///< SVG of `optimized` from above; empty without it.
 };
 
 /// Collects the results of a run: summaries, and errors where the truth is known. Completeness is

@@ -5,8 +5,9 @@
 #include <array>
 #include <cmath>
 #include <iomanip>
-#include <set>
+#include <map>
 #include <sstream>
+#include <utility>
 #include <vector>
 
 namespace km {
@@ -34,14 +35,35 @@ std::string escaped(const std::string& text) {
   return result;
 }
 
-Line truth_line(const TrajectoryInput& input) {
+Line line_between(std::span<const StampedPose> truth, Stamp first, Stamp last) {
   Line line;
-  for (const StampedPose& pose : input.truth) {
-    if (input.window && (pose.stamp < input.window->from || pose.stamp > input.window->to))
-      continue;
-    line.emplace_back(pose.T.translation().head<2>());
-  }
+  for (const StampedPose& pose : truth)
+    if (pose.stamp >= first && pose.stamp <= last)
+      line.emplace_back(pose.T.translation().head<2>());
   return line;
+}
+
+// Each truth once, over the time that its estimates cover: the rest of a long recording would only
+// make what is compared small.
+std::vector<Line> truth_lines(std::span<const TrajectoryInput> inputs) {
+  struct Drawn {
+    std::span<const StampedPose> truth;
+    Stamp first, last;
+  };
+  std::map<const StampedPose*, Drawn> drawn;
+  for (const TrajectoryInput& input : inputs) {
+    if (input.truth.empty() || input.estimate.empty()) continue;
+    const Stamp first = input.estimate.front().stamp;
+    const Stamp last = input.estimate.back().stamp;
+    Drawn& entry =
+        drawn.try_emplace(input.truth.data(), Drawn{input.truth, first, last}).first->second;
+    entry.first = std::min(entry.first, first);
+    entry.last = std::max(entry.last, last);
+  }
+  std::vector<Line> lines;
+  for (const auto& [key, entry] : drawn)
+    lines.push_back(line_between(entry.truth, entry.first, entry.last));
+  return lines;
 }
 
 Line estimate_line(const TrajectoryInput& input, const Alignment& alignment) {
@@ -115,16 +137,12 @@ void draw_legend(std::ostream& svg, double top_px, const TeamError& team) {
 }  // namespace
 
 std::string plot_from_above(std::span<const TrajectoryInput> inputs, const TeamError& team) {
-  std::vector<Line> truths;
+  const std::vector<Line> truths = truth_lines(inputs);
   std::vector<Line> estimates;
-  std::set<std::pair<const StampedPose*, Stamp>> drawn;
   Eigen::AlignedBox2d box;
-  for (const TrajectoryInput& input : inputs) {
-    if (drawn.emplace(input.truth.data(), input.window ? input.window->from : 0).second)
-      truths.push_back(truth_line(input));
+  for (const TrajectoryInput& input : inputs)
     estimates.push_back(estimate_line(input, team.alignment));
-  }
-  for (const auto* lines : {&truths, &estimates})
+  for (const std::vector<Line>* lines : {&truths, &std::as_const(estimates)})
     for (const Line& line : *lines)
       for (const Eigen::Vector2d& point : line) box.extend(point);
   if (box.isEmpty()) box.extend(Eigen::Vector2d::Zero());

@@ -49,4 +49,13 @@ TEST_CASE("The plot draws a shared truth once and every estimate", "[evaluation]
   CHECK_THAT(svg, !Catch::Contains("nan") && !Catch::Contains("inf") && !Catch::Contains("e+"));
 }
 
+TEST_CASE("The plot leaves out the truth before and after the estimates", "[evaluation]") {
+  const std::vector<StampedPose> part(kTruth.begin() + 40, kTruth.begin() + 60);
+  const std::vector<TrajectoryInput> inputs = {{"part", kTruth, part, {}}};
+  const std::string svg = plot_from_above(inputs, trajectory_error(inputs));
+  const auto line = svg.find("<polyline");
+  const std::string truth = svg.substr(line, svg.find("/>", line) - line);
+  CHECK(count(truth, ",") == part.size());  // one comma between x and y of a point
+}
+
 }  // namespace km
