@@ -24,11 +24,12 @@ struct KeyframeFeaturesConfig {
   double min_stereo_correlation = 0.8;
 
   void visit_fields(auto& visitor) {
-    visitor.field("max_keypoints", max_keypoints, {50, 4000});
-    visitor.field("min_contrast", min_contrast, {2, 100});
-    visitor.field("min_depth_m", min_depth_m, {0.05, 10.0});
-    visitor.field("max_depth_m", max_depth_m, {1.0, 1000.0});
-    visitor.field("min_stereo_correlation", min_stereo_correlation, {0.0, 0.99});
+    visitor.field("max_keypoints", max_keypoints, {50, 4000}, "per keyframe");
+    visitor.field("min_contrast", min_contrast, {2, 100}, "[grey levels] of a corner");
+    visitor.field("min_depth_m", min_depth_m, {0.05, 10.0}, "[m] nearest in stereo");
+    visitor.field("max_depth_m", max_depth_m, {1.0, 1000.0}, "[m] farthest in stereo");
+    visitor.field("min_stereo_correlation", min_stereo_correlation, {0.0, 0.99},
+                  "of left and right patch");
   }
 };
 

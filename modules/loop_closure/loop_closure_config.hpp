@@ -59,7 +59,8 @@ struct LoopClosureConfig {
     visitor.field("disparity_noise_px", disparity_noise_px, {0.02, 10.0}, "[px]");
     visitor.field("max_match_ratio", max_match_ratio, {0.1, 1.0}, "best over second best");
     visitor.field("max_match_distance", max_match_distance, {1, 256}, "[bit] of 256");
-    visitor.field("max_ransac_iterations", max_ransac_iterations, {10, 1000000});
+    visitor.field("max_ransac_iterations", max_ransac_iterations, {10, 1000000},
+                  "samples drawn at most");
     visitor.field("min_consensus", min_consensus, {3, 1000}, "matches that agree with the pose");
     visitor.field("min_inliers", min_inliers, {6, 1000}, "correspondences in the end");
     visitor.field("max_position_sigma_m", max_position_sigma_m, {1e-3, 100.0},

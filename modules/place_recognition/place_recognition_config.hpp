@@ -30,12 +30,16 @@ struct PlaceRecognitionConfig {
   int max_waiting_keyframes = 10;
 
   void visit_fields(auto& visitor) {
-    visitor.field("similarity_threshold", similarity_threshold, {0.0, 10.0});
-    visitor.field("min_normalizer", min_normalizer, {0.0, 1.0});
-    visitor.field("max_candidates", max_candidates, {1, 1000});
-    visitor.field("min_gap_s", min_gap_s, {0.0, 1e6});
-    visitor.field("candidate_separation_s", candidate_separation_s, {0.0, 1e6});
-    visitor.field("max_waiting_keyframes", max_waiting_keyframes, {0, 10000});
+    visitor.field("similarity_threshold", similarity_threshold, {0.0, 10.0},
+                  "normalised score of a candidate");
+    visitor.field("min_normalizer", min_normalizer, {0.0, 1.0},
+                  "score against the keyframe before");
+    visitor.field("max_candidates", max_candidates, {1, 1000}, "per query");
+    visitor.field("min_gap_s", min_gap_s, {0.0, 1e6}, "[s] within one robot");
+    visitor.field("candidate_separation_s", candidate_separation_s, {0.0, 1e6},
+                  "[s] between candidates of a query, 0: any");
+    visitor.field("max_waiting_keyframes", max_waiting_keyframes, {0, 10000},
+                  "of a peer, until their predecessor comes");
   }
 };
 

@@ -41,16 +41,18 @@ struct TrackerConfig {
   int seed = 1;
 
   void visit_fields(auto& visitor) {
-    visitor.field("max_features", max_features, {1, 5000});
-    visitor.field("min_distance_px", min_distance_px, {4, 200});
-    visitor.field("fast_threshold", fast_threshold, {1, 100});
-    visitor.field("window_px", window_px, {5, 41});
-    visitor.field("pyramid_levels", pyramid_levels, {1, 6});
-    visitor.field("max_forward_backward_px", max_forward_backward_px, {0.0, 10.0});
-    visitor.field("max_epipolar_px", max_epipolar_px, {0.1, 20.0});
-    visitor.field("max_reprojection_px", max_reprojection_px, {0.1, 50.0});
-    visitor.field("min_depth_m", min_depth_m, {0.02, 10.0});
-    visitor.field("seed", seed, {0, 2147483647});
+    visitor.field("max_features", max_features, {1, 5000}, "in one image");
+    visitor.field("min_distance_px", min_distance_px, {4, 200}, "[px] between features");
+    visitor.field("fast_threshold", fast_threshold, {1, 100}, "[grey levels] of new corners");
+    visitor.field("window_px", window_px, {5, 41}, "[px] side, odd");
+    visitor.field("pyramid_levels", pyramid_levels, {1, 6}, "above the full image");
+    visitor.field("max_forward_backward_px", max_forward_backward_px, {0.0, 10.0},
+                  "[px] 0: no check");
+    visitor.field("max_epipolar_px", max_epipolar_px, {0.1, 20.0}, "[px] of right image points");
+    visitor.field("max_reprojection_px", max_reprojection_px, {0.1, 50.0},
+                  "[px] from the common motion");
+    visitor.field("min_depth_m", min_depth_m, {0.02, 10.0}, "[m] nearest in stereo");
+    visitor.field("seed", seed, {0, 2147483647}, "of the random samples");
   }
 };
 
