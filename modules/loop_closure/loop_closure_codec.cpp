@@ -3,9 +3,11 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "runtime/dds/wire_pose.hpp"
+#include "runtime/dds/wire_sequence.hpp"
 
 namespace km {
 namespace {
@@ -65,33 +67,32 @@ Keypoint from_wire(const km_wire_Keypoint& wire, const Steps& steps) {
   return point;
 }
 
+using WireKeypoints = std::span<const km_wire_Keypoint>;
+
 // Why the part of a reply that describes features cannot be used, or nullptr.
-const char* refusal(const km_wire_KeyframeReply& wire) {
-  if (wire.keypoints._length > kMaxKeypoints) return "too many keypoints";
-  if (wire.keypoints._length != 0 && wire.keypoints._buffer == nullptr)
-    return "keypoints are missing";
+const char* refusal(const km_wire_KeyframeReply& wire, WireKeypoints keypoints) {
   if (!in_range(wire.bearing_step, kMaxBearing / kBearingSteps)) return "bearings out of range";
   if (!in_range(wire.inverse_depth_step, kMaxInverseDepth / kDepthSteps))
     return "depths out of range";
   if (!in_range(wire.focal_px, kMaxFocal_px)) return "focal length out of range";
   if (!in_range(wire.baseline_m, kMaxBaseline_m)) return "baseline out of range";
-  if (wire.keypoints._length != 0 && !(wire.focal_px > 0.0F && wire.baseline_m > 0.0F))
+  if (!keypoints.empty() && !(wire.focal_px > 0.0F && wire.baseline_m > 0.0F))
     return "keypoints without focal length or baseline";
-  for (std::uint32_t i = 0; i < wire.keypoints._length; ++i)
-    if (wire.keypoints._buffer[i].octave > kMaxOctave) return "octave out of range";
+  for (const km_wire_Keypoint& point : keypoints)
+    if (point.octave > kMaxOctave) return "octave out of range";
   return nullptr;
 }
 
-KeyframeFeatures features_of(const km_wire_KeyframeReply& wire, const SE3& T_body_cam) {
+KeyframeFeatures features_of(const km_wire_KeyframeReply& wire, WireKeypoints keypoints,
+                             const SE3& T_body_cam) {
   KeyframeFeatures features;
   features.T_body_cam = T_body_cam;
   features.focal_px = static_cast<double>(wire.focal_px);
   features.baseline_m = static_cast<double>(wire.baseline_m);
-  features.keypoints.reserve(wire.keypoints._length);
-  features.descriptors.reserve(wire.keypoints._length);
+  features.keypoints.reserve(keypoints.size());
+  features.descriptors.reserve(keypoints.size());
   const Steps steps{wire.bearing_step, wire.inverse_depth_step};
-  for (std::uint32_t i = 0; i < wire.keypoints._length; ++i) {
-    const km_wire_Keypoint& point = wire.keypoints._buffer[i];
+  for (const km_wire_Keypoint& point : keypoints) {
     features.keypoints.push_back(from_wire(point, steps));
     std::copy(std::begin(point.descriptor), std::end(point.descriptor),
               features.descriptors.emplace_back().begin());
@@ -134,9 +135,7 @@ Codec<KeyframeReply>::Encoded Codec<KeyframeReply>::encode(const KeyframeReply& 
   encoded.keypoints.reserve(features.keypoints.size());
   for (std::size_t i = 0; i < features.keypoints.size(); ++i)
     encoded.keypoints.push_back(to_wire(features.keypoints[i], features.descriptors[i], steps));
-  const auto size = static_cast<std::uint32_t>(encoded.keypoints.size());
-  wire.keypoints = {
-      ._maximum = size, ._length = size, ._buffer = encoded.keypoints.data(), ._release = false};
+  borrow(wire.keypoints, encoded.keypoints);
   return encoded;
 }
 
@@ -154,10 +153,12 @@ Decoded<KeyframeReply> Codec<KeyframeReply>::decode(const Wire& wire) {
     return Result::refuse("odometry of another keyframe");
   const auto T_body_cam = from_wire(wire.T_body_cam);
   if (!T_body_cam) return Result::refuse("the camera's place is not a pose");
-  if (const char* why = refusal(wire)) return Result::refuse(why);
+  const auto keypoints = elements_of(wire.keypoints, kMaxKeypoints);
+  if (!keypoints) return Result::refuse("keypoints are missing or too many");
+  if (const char* why = refusal(wire, *keypoints)) return Result::refuse(why);
   reply.keyframe.odometry = *odometry;
   reply.keyframe.stamp = wire.stamp;
-  reply.keyframe.features = features_of(wire, *T_body_cam);
+  reply.keyframe.features = features_of(wire, *keypoints, *T_body_cam);
   return Result::accept(std::move(reply));
 }
 

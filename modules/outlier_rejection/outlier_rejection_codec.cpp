@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "runtime/dds/wire_pose.hpp"
+#include "runtime/dds/wire_sequence.hpp"
 
 namespace km {
 
@@ -15,9 +16,7 @@ Codec<InlierSet>::Encoded Codec<InlierSet>::encode(const InlierSet& set) {
   encoded.wire.a = set.a;
   encoded.wire.b = set.b;
   encoded.wire.set_version = set.version;
-  const auto size = static_cast<std::uint32_t>(encoded.closures.size());
-  encoded.wire.closures = {
-      ._maximum = size, ._length = size, ._buffer = encoded.closures.data(), ._release = false};
+  borrow(encoded.wire.closures, encoded.closures);
   return encoded;
 }
 
@@ -25,14 +24,12 @@ Decoded<InlierSet> Codec<InlierSet>::decode(const Wire& wire) {
   using Result = Decoded<InlierSet>;
   if (wire.a > wire.b) return Result::refuse("the pair is not in ascending order");
   if (wire.header.robot != wire.a) return Result::refuse("decided by another robot than the lower");
-  if (wire.closures._length > kMaxInliers) return Result::refuse("too many closures");
-  if (wire.closures._length != 0 && wire.closures._buffer == nullptr)
-    return Result::refuse("closures are missing");
+  const auto closures = elements_of(wire.closures, kMaxInliers);
+  if (!closures) return Result::refuse("closures are missing or too many");
 
   InlierSet set{.a = wire.a, .b = wire.b, .version = wire.set_version, .closures = {}};
-  set.closures.reserve(wire.closures._length);
-  for (std::uint32_t i = 0; i < wire.closures._length; ++i) {
-    const km_wire_ClosureRef& ref = wire.closures._buffer[i];
+  set.closures.reserve(closures->size());
+  for (const km_wire_ClosureRef& ref : *closures) {
     const ClosureId id{from_wire(ref.from), from_wire(ref.to)};
     const auto [low, high] = std::minmax(id.from.robot, id.to.robot);
     if (low != set.a || high != set.b) return Result::refuse("a closure of another pair");

@@ -3,10 +3,13 @@
 #include <limits>
 #include <utility>
 
+#include "runtime/dds/wire_sequence.hpp"
+
 namespace km {
 namespace {
 
 constexpr std::uint64_t kMax32 = std::numeric_limits<std::uint32_t>::max();
+constexpr std::size_t kMaxPackedBytes = 10 * kMaxBagWords;  // two numbers of 5 bytes for a word
 
 void append_number(std::vector<std::uint8_t>& bytes, std::uint64_t number) {
   for (; number >= 0x80; number >>= 7U)
@@ -67,18 +70,16 @@ Codec<KeyframeBow>::Encoded Codec<KeyframeBow>::encode(const KeyframeBow& messag
   wire.keyframe = {.robot = message.id.robot, .index = message.id.index};
   wire.stamp = message.stamp;
   wire.vocabulary = message.vocabulary;
-  const auto size = static_cast<std::uint32_t>(encoded.words.size());
-  wire.words = {
-      ._maximum = size, ._length = size, ._buffer = encoded.words.data(), ._release = false};
+  borrow(wire.words, encoded.words);
   return encoded;
 }
 
 Decoded<KeyframeBow> Codec<KeyframeBow>::decode(const Wire& wire) {
   if (wire.keyframe.robot != wire.header.robot)
     return Decoded<KeyframeBow>::refuse("a keyframe of another robot than the writer");
-  if (wire.words._length != 0 && wire.words._buffer == nullptr)
-    return Decoded<KeyframeBow>::refuse("words are missing");
-  std::optional<BagOfWords> words = unpack({wire.words._buffer, wire.words._length});
+  const auto packed = elements_of(wire.words, kMaxPackedBytes);
+  if (!packed) return Decoded<KeyframeBow>::refuse("words are missing or too many");
+  std::optional<BagOfWords> words = unpack(*packed);
   if (!words) return Decoded<KeyframeBow>::refuse("the words cannot be decoded");
   return Decoded<KeyframeBow>::accept({.id = {wire.keyframe.robot, wire.keyframe.index},
                                        .stamp = wire.stamp,

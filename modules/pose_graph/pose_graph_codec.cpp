@@ -1,9 +1,9 @@
 #include "modules/pose_graph/pose_graph_codec.hpp"
 
 #include <cmath>
-#include <set>
-#include <span>
 #include <utility>
+
+#include "runtime/dds/wire_sequence.hpp"
 
 namespace km {
 namespace {
@@ -18,22 +18,6 @@ PgoPeer from_wire(const km_wire_PgoPeer& wire) {
 
 PgoPeer writer_of(const km_wire_Header& header) {
   return {header.robot, header.boot};
-}
-
-// Points a generated sequence at elements it does not own.
-template <typename Sequence, typename T>
-void borrow(Sequence& sequence, std::vector<T>& elements) {
-  const auto size = static_cast<std::uint32_t>(elements.size());
-  sequence = {._maximum = size, ._length = size, ._buffer = elements.data(), ._release = false};
-}
-
-// nullopt if there are more than `max` elements or the buffer is missing.
-template <typename Sequence>
-auto elements_of(const Sequence& sequence, std::size_t max) {
-  using Span = std::span<const std::remove_pointer_t<decltype(sequence._buffer)>>;
-  const bool usable =
-      sequence._length <= max && (sequence._length == 0 || sequence._buffer != nullptr);
-  return usable ? std::optional(Span(sequence._buffer, sequence._length)) : std::nullopt;
 }
 
 bool is_rank(std::uint32_t rank) {

@@ -20,9 +20,8 @@ namespace km {
 ///         Wire wire{};
 ///         std::vector<km_wire_ClosureRef> closures;
 ///       };
-///       static Encoded encode(const InlierSet&);        // all but wire.header: the writer fills
-///       it static Decoded<InlierSet> decode(const Wire&);  // trusts nothing; header already
-///       checked
+///       static Encoded encode(const InlierSet&);  // all but wire.header, which the writer fills
+///       static Decoded<InlierSet> decode(const Wire&);  // trusts nothing; header is checked
 ///     };
 template <typename T>
 struct Codec;

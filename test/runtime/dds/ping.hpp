@@ -5,6 +5,7 @@
 
 #include "ping.h"
 #include "runtime/dds/codec.hpp"
+#include "runtime/dds/wire_sequence.hpp"
 
 namespace km {
 
@@ -31,9 +32,7 @@ struct Codec<Ping> {
     encoded.payload = ping.payload;
     encoded.wire.robot = ping.robot;
     encoded.wire.index = ping.index;
-    encoded.wire.payload._buffer = encoded.payload.data();
-    encoded.wire.payload._length = static_cast<std::uint32_t>(encoded.payload.size());
-    encoded.wire.payload._maximum = encoded.wire.payload._length;
+    borrow(encoded.wire.payload, encoded.payload);
     return encoded;
   }
   /// Refuses payloads that start with 0xFF.
