@@ -15,6 +15,11 @@ double wall_now_s() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
+std::chrono::steady_clock::duration steady_duration(double s) {
+  return std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+      std::chrono::duration<double>(s));
+}
+
 ReplayClock::ReplayClock(double rate) : rate_(rate) {
   if (!(rate > 0.0))
     throw std::invalid_argument("ReplayClock: rate " + std::to_string(rate) + " is not positive");
@@ -43,8 +48,7 @@ std::optional<ReplayClock::TimePoint> ReplayClock::due_locked(Stamp stamp, TimeP
     first_stamp_ = stamp;
     first_time_ = now;
   }
-  const std::chrono::duration<double> since(seconds_between(first_stamp_, stamp) / rate_);
-  return first_time_ + std::chrono::duration_cast<TimePoint::duration>(since);
+  return first_time_ + steady_duration(seconds_between(first_stamp_, stamp) / rate_);
 }
 
 double ReplayClock::lag_s() const {

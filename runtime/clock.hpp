@@ -15,6 +15,9 @@ namespace km {
 /// Time since 1970 [s].
 [[nodiscard]] double wall_now_s();
 
+/// Seconds as a duration of the steady clock, for waits.
+[[nodiscard]] std::chrono::steady_clock::duration steady_duration(double s);
+
 /// Paces the playing of a recording: sensor time passes `rate` times as fast as real time, from
 /// the first stamp asked for. Thread-safe.
 class ReplayClock {

@@ -1,21 +1,17 @@
 #include "modules/outlier_rejection/pcm_node.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
 namespace {
 
 constexpr std::size_t kQueue = 256;
-
-Periodic::Duration seconds(double s) {
-  return std::chrono::duration_cast<Periodic::Duration>(std::chrono::duration<double>(s));
-}
 
 }  // namespace
 
@@ -29,7 +25,7 @@ PcmNode::PcmNode(const PcmConfig& config, RobotId self, Topic<Closure>& closures
           [this](const Input& closure) { closure ? step(*closure) : publish_changes(); },
           PcmConfig::kSection),
       ticks_(
-          seconds(config.publish_period_s), [this] { worker_.post(nullptr); }, "pcm tick") {
+          steady_duration(config.publish_period_s), [this] { worker_.post(nullptr); }, "pcm tick") {
   closures.subscribe([this](const auto& message) { worker_.post(message); });
 }
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "modules/core/lie.hpp"
+#include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -67,12 +68,11 @@ void GraphPlaybackNode::play(std::size_t index) {
 
 void GraphPlaybackNode::wait_until_due(std::size_t index) {
   if (std::isinf(rate_)) return;
-  const std::chrono::duration<double> due(static_cast<double>(index) / poses_per_second_ / rate_);
+  const double due_s = static_cast<double>(index) / poses_per_second_ / rate_;
   std::mutex unshared;  // the stop token is all there is to wait for
   std::condition_variable_any never;
   std::unique_lock lock(unshared);
-  never.wait_until(lock, stop_.get_token(),
-                   begin_ + std::chrono::duration_cast<Clock::duration>(due), [] { return false; });
+  never.wait_until(lock, stop_.get_token(), begin_ + steady_duration(due_s), [] { return false; });
 }
 
 void GraphPlaybackNode::step(std::size_t index) {

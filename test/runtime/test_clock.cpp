@@ -20,6 +20,11 @@ TEST_CASE("Stamps are due in proportion to the rate, from the first one on", "[c
   CHECK(std::chrono::duration<double>(*due - start).count() == Approx(10.0 / rate));
 }
 
+TEST_CASE("Seconds become a duration of the steady clock", "[clock]") {
+  CHECK(steady_duration(0.25) == std::chrono::milliseconds(250));
+  CHECK(steady_duration(-3.0) == std::chrono::seconds(-3));
+}
+
 TEST_CASE("Playing as fast as possible never waits", "[clock]") {
   ReplayClock clock(std::numeric_limits<double>::infinity());
   CHECK(clock.wait_until(0));
