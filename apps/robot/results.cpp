@@ -108,10 +108,7 @@ void write_summary(const fs::path& file, const RunRecord& record, const RunSumma
   json.field("gradient_norm", progress.gradient_norm);
   json.field("anchor", progress.anchor);
   json.field("settled", progress.settled);
-  json.key("members");
-  json.begin_array();
-  for (const RobotId member : progress.members) json.value(member);
-  json.end_array();
+  json.array("members", progress.members);
   json.end_object();
   json.key("traffic");
   json.begin_object();

@@ -127,10 +127,7 @@ void write_summary(JsonWriter& json, const RobotSummary& summary) {
   json.field("seconds", summary.pgo_seconds);
   json.field("cost", summary.pgo_cost);
   if (summary.pgo_anchor) json.field("anchor", *summary.pgo_anchor);
-  json.key("members");
-  json.begin_array();
-  for (const RobotId member : summary.pgo_members) json.value(member);
-  json.end_array();
+  json.array("members", summary.pgo_members);
   json.end_object();
   json.key("traffic");
   json.begin_object();
@@ -150,10 +147,7 @@ void write_robot(JsonWriter& json, const RobotResult& robot) {
     json.key("odometry");
     write_json(json, *robot.odometry);
   }
-  json.key("notes");
-  json.begin_array();
-  for (const std::string& note : robot.notes) json.value(note);
-  json.end_array();
+  json.array("notes", robot.notes);
   json.end_object();
 }
 

@@ -38,6 +38,15 @@ class JsonWriter {
     value(content);
   }
 
+  /// A field that is an array of plain values.
+  template <typename Range>
+  void array(std::string_view name, const Range& contents) {
+    key(name);
+    begin_array();
+    for (const auto& content : contents) value(content);
+    end_array();
+  }
+
  private:
   void open(char bracket);
   void close(char bracket);

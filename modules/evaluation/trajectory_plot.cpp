@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "modules/core/xml_text.hpp"
+
 namespace km {
 namespace {
 
@@ -21,19 +23,6 @@ constexpr std::array kColours = {"#d62728", "#1f77b4", "#2ca02c", "#9467bd",
                                  "#ff7f0e", "#17becf", "#8c564b", "#e377c2"};
 
 using Line = std::vector<Eigen::Vector2d>;
-
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    if (c == '<')
-      result += "&lt;";
-    else if (c == '&')
-      result += "&amp;";
-    else
-      result += c;
-  }
-  return result;
-}
 
 Line line_between(std::span<const StampedPose> truth, Stamp first, Stamp last) {
   Line line;
@@ -124,7 +113,7 @@ void draw_legend(std::ostream& svg, double top_px, const TeamError& team) {
   double y = top_px;
   const auto entry = [&](const char* colour, const std::string& text) {
     svg << "<text x=\"" << kMargin_px << "\" y=\"" << y << "\" fill=\"" << colour << "\">"
-        << escaped(text) << "</text>\n";
+        << xml_escaped(text) << "</text>\n";
     y += kLegendLine_px;
   };
   entry("#888888", "truth");

@@ -39,14 +39,8 @@ void write_alignment(JsonWriter& json, const Alignment& alignment) {
   const Eigen::Quaterniond q(alignment.T_truth_estimate.linear());
   json.begin_object();
   json.field("scale", alignment.scale);
-  json.key("translation_m");
-  json.begin_array();
-  for (const double c : alignment.T_truth_estimate.translation()) json.value(c);
-  json.end_array();
-  json.key("rotation_xyzw");
-  json.begin_array();
-  for (const double c : q.coeffs()) json.value(c);
-  json.end_array();
+  json.array("translation_m", alignment.T_truth_estimate.translation());
+  json.array("rotation_xyzw", q.coeffs());
   json.end_object();
 }
 

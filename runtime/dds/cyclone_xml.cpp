@@ -3,34 +3,10 @@
 #include <cmath>
 #include <sstream>
 
+#include "modules/core/xml_text.hpp"
+
 namespace km {
 namespace {
-
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        result += "&amp;";
-        break;
-      case '<':
-        result += "&lt;";
-        break;
-      case '>':
-        result += "&gt;";
-        break;
-      case '\'':
-        result += "&apos;";
-        break;
-      case '"':
-        result += "&quot;";
-        break;
-      default:
-        result += c;
-    }
-  }
-  return result;
-}
 
 std::string milliseconds(double seconds) {
   return std::to_string(std::llround(seconds * 1e3)) + "ms";
@@ -38,7 +14,7 @@ std::string milliseconds(double seconds) {
 
 void write_general(std::ostream& xml, const DdsConfig& config, const NetworkInterface& interface) {
   const bool multicast = config.discovery == Discovery::kMulticast;
-  xml << "<General><Interfaces><NetworkInterface name='" << escaped(interface.name) << '\'';
+  xml << "<General><Interfaces><NetworkInterface name='" << xml_escaped(interface.name) << '\'';
   // Linux does not flag loopback as capable of multicast, yet it is.
   if (multicast && interface.loopback) xml << " multicast='true'";
   // Data goes by unicast: on radio, multicast runs at the base rate and without acknowledgement.
@@ -61,11 +37,12 @@ void write_peers(std::ostream& xml, const DdsConfig& config, const std::string& 
   for (const std::string& peer : config.peers) {
     if (peer == own_address) continue;
     if (peer.find(':') != std::string::npos) {
-      xml << "<Peer address='" << escaped(peer) << "'/>";
+      xml << "<Peer address='" << xml_escaped(peer) << "'/>";
       continue;
     }
     for (int i = 0; i < config.robots_per_peer; ++i)
-      xml << "<Peer address='" << escaped(peer) << ':' << discovery_port(config.domain, i) << "'/>";
+      xml << "<Peer address='" << xml_escaped(peer) << ':' << discovery_port(config.domain, i)
+          << "'/>";
   }
   xml << "</Peers>";
 }
@@ -79,7 +56,7 @@ void write_discovery(std::ostream& xml, const DdsConfig& config,
       << "</ParticipantIndex><MaxAutoParticipantIndex>" << config.max_participant_index
       << "</MaxAutoParticipantIndex><LeaseDuration>" << milliseconds(config.lease_s)
       << "</LeaseDuration><SPDPInterval>" << milliseconds(config.spdp_interval_s)
-      << "</SPDPInterval><Tag>" << escaped(config.team) << "</Tag>";
+      << "</SPDPInterval><Tag>" << xml_escaped(config.team) << "</Tag>";
   if (by_address) write_peers(xml, config, interface.address);
   xml << "</Discovery>";
 }

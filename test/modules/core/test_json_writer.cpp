@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <limits>
 #include <sstream>
+#include <string>
+#include <vector>
 
 namespace km {
 
@@ -42,6 +44,16 @@ TEST_CASE("Numbers keep their value, what is no number becomes null", "[core]") 
   json.value(-std::numeric_limits<double>::infinity());
   json.end_array();
   CHECK(text.str() == "[\n  0.1,\n  1e-300,\n  18446744073709551615,\n  null,\n  null\n]\n");
+}
+
+TEST_CASE("A list of values is a field of its own", "[core]") {
+  std::ostringstream text;
+  JsonWriter json(text);
+  json.begin_object();
+  json.array("names", std::vector<std::string>{"a", "b"});
+  json.array("none", std::vector<int>{});
+  json.end_object();
+  CHECK(text.str() == "{\n  \"names\": [\n    \"a\",\n    \"b\"\n  ],\n  \"none\": []\n}\n");
 }
 
 }  // namespace km

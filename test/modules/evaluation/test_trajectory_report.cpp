@@ -45,7 +45,7 @@ TEST_CASE("The plot draws a shared truth once and every estimate", "[evaluation]
   const std::string svg = plot_from_above(kInputs, trajectory_error(kInputs));
   CHECK_THAT(svg, Catch::StartsWith("<svg ") && Catch::EndsWith("</svg>\n"));
   CHECK(count(svg, "<polyline") == 3);
-  CHECK_THAT(svg, Catch::Contains("alpha, position rmse") && Catch::Contains("b&lt;&amp;>eta"));
+  CHECK_THAT(svg, Catch::Contains("alpha, position rmse") && Catch::Contains("b&lt;&amp;&gt;eta"));
   CHECK_THAT(svg, !Catch::Contains("nan") && !Catch::Contains("inf") && !Catch::Contains("e+"));
 }
 
