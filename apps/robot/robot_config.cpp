@@ -1,24 +1,14 @@
 #include "apps/robot/robot_config.hpp"
 
-#include <unistd.h>
-
 #include <array>
-#include <climits>
 
+#include "apps/program_folder.hpp"
 #include "runtime/config_layers.hpp"
 
 namespace km {
 namespace {
 
 namespace fs = std::filesystem;
-
-fs::path program_folder() {
-  std::array<char, PATH_MAX> buffer{};
-  const ssize_t length = readlink("/proc/self/exe", buffer.data(), buffer.size() - 1);
-  return length > 0
-             ? fs::path(std::string(buffer.data(), static_cast<std::size_t>(length))).parent_path()
-             : fs::current_path();
-}
 
 // Which link profile the files or the command line choose: it must be read before all of them.
 std::string chosen_link(const RobotOptions& options) {

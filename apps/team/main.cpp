@@ -1,5 +1,3 @@
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
@@ -7,6 +5,7 @@
 #include <iostream>
 #include <random>
 
+#include "apps/program_folder.hpp"
 #include "apps/team/run_team.hpp"
 #include "apps/team/team_report.hpp"
 #include "apps/team/team_results.hpp"
@@ -40,12 +39,8 @@ struct TeamOptions {
   std::vector<std::string> arguments;
 };
 
-fs::path program_folder() {
-  return fs::read_symlink("/proc/self/exe").parent_path();
-}
-
 void define(CLI::App& app, TeamOptions& options) {
-  options.robot_binary = program_folder() / "kimera_multi_robot";
+  options.robot_binary = km::program_folder() / "kimera_multi_robot";
   app.add_option("--config", options.config, "Team file")->required();
   app.add_option("--dataset", options.dataset, "What ${DATASET} stands for in the team file");
   app.add_option("--rate", options.rate, "Times real time, or max (default: the file's, 1.0)");
