@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "modules/loop_closure/image_view.hpp"
+
 namespace km {
 namespace {
 
@@ -27,11 +29,6 @@ constexpr int kNeighbour = 2;               // [px]
 constexpr int kMaxLeftRightDifference = 1;  // [px]
 constexpr double kMaxRefinement_px = 1.5;   // in disparity
 constexpr double kMaxRowOffset_px = 1.5;    // what calibration leaves of the epipolar constraint
-
-cv::Mat view(const GrayImage& image) {
-  // OpenCV has no read-only view; nothing here writes through it.
-  return {image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.pixels.data())};
-}
 
 // Axes of the rectified frame, in the left camera: x along the baseline, z midway between the
 // optical axes, as far as x leaves it free.

@@ -7,6 +7,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "modules/loop_closure/image_view.hpp"
+
 namespace km {
 namespace {
 
@@ -16,11 +18,6 @@ constexpr int kEdge = 31;
 
 // Corners to choose from, per corner kept: more give a more even cover and cost time.
 constexpr int kCandidatesPerKeypoint = 4;
-
-cv::Mat view(const GrayImage& image) {
-  // OpenCV has no read-only view; nothing here writes through it.
-  return {image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.pixels.data())};
-}
 
 // Strongest first; ties by position, so that the order does not depend on the detector's.
 void sort_by_response(std::vector<cv::KeyPoint>& corners) {
