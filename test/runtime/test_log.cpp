@@ -7,30 +7,10 @@
 
 #include "runtime/log.hpp"
 #include "runtime/status_line.hpp"
+#include "test/support/captured_log.hpp"
 
 namespace km {
 namespace {
-
-// Redirects the log while it lives.
-class CapturedLog {
- public:
-  CapturedLog() : previous_(log::set_output(&text_)) {}
-  ~CapturedLog() { log::set_output(previous_); }
-  CapturedLog(const CapturedLog&) = delete;
-  CapturedLog& operator=(const CapturedLog&) = delete;
-
-  std::vector<std::string> lines() const {
-    std::vector<std::string> result;
-    std::istringstream input(text_.str());
-    for (std::string line; std::getline(input, line);) result.push_back(line);
-    return result;
-  }
-  std::ostringstream& stream() { return text_; }
-
- private:
-  std::ostringstream text_;
-  std::ostream* previous_;
-};
 
 TEST_CASE("A rate limit passes one message per interval and tells how many it held", "[log]") {
   RateLimit limit(5.0);

@@ -3,14 +3,13 @@
 
 #include <catch2/catch.hpp>
 #include <csignal>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "runtime/log.hpp"
 #include "runtime/supervisor.hpp"
 #include "runtime/worker.hpp"
+#include "test/support/captured_log.hpp"
 
 namespace km {
 namespace {
@@ -59,24 +58,21 @@ TEST_CASE("Nodes are started in order and stopped in order, sources first", "[su
 }
 
 TEST_CASE("A failed node ends the run with its name and its message", "[supervisor]") {
-  std::ostringstream captured;
-  std::ostream* previous = log::set_output(&captured);
+  const CapturedLog captured;
   std::vector<std::string> diary;
   SignalWatch signals;
   Supervisor supervisor(signals);
   supervisor.emplace<ToyNode>("camera", diary);
   supervisor.emplace<ToyNode>("odometry", diary).post(true);
   const RunResult result = supervisor.run([] { return false; }, 0.001);
-  log::set_output(previous);
   REQUIRE(result.failure.has_value());
   CHECK(result.failure->node == "odometry");
   CHECK(result.failure->message == "the reason");
-  CHECK_THAT(captured.str(), Catch::Matchers::Contains("odometry failed: the reason"));
+  CHECK_THAT(captured.text(), Catch::Matchers::Contains("odometry failed: the reason"));
 }
 
 TEST_CASE("A node that fails while it finishes its work is still reported", "[supervisor]") {
-  std::ostringstream captured;
-  std::ostream* previous = log::set_output(&captured);
+  const CapturedLog captured;
   std::vector<std::string> diary;
   SignalWatch signals;
   Supervisor supervisor(signals);
@@ -85,7 +81,6 @@ TEST_CASE("A node that fails while it finishes its work is still reported", "[su
     node.post(true);
     return true;
   });
-  log::set_output(previous);
   REQUIRE(result.failure.has_value());
 }
 
@@ -99,8 +94,7 @@ TEST_CASE("Two nodes of one name are refused", "[supervisor]") {
 
 TEST_CASE("The first signal ends the run in order", "[supervisor]") {
   const int signal = GENERATE(SIGINT, SIGTERM);
-  std::ostringstream captured;
-  std::ostream* previous = log::set_output(&captured);
+  const CapturedLog captured;
   std::vector<std::string> diary;
   SignalWatch signals;
   Supervisor supervisor(signals);
@@ -110,7 +104,6 @@ TEST_CASE("The first signal ends the run in order", "[supervisor]") {
     if (!std::exchange(sent, true)) kill(getpid(), signal);
     return false;
   });
-  log::set_output(previous);
   CHECK(result.interrupted);
   CHECK(diary.back() == "stop camera");
 }

@@ -101,11 +101,9 @@ inline void feed(RbcdAgent& agent, RobotId robot, const SplitGraph& graph) {
     (void)agent.add(inlier_set(graph, std::min(robot, other), std::max(robot, other)));
 }
 
-/// Cost of the whole graph at the agents' lifted poses. Precondition: all are in one frame.
-inline double team_cost(PgoTeam& team, const SplitGraph& graph) {
-  const auto pose = [&](const KeyframeId& id) {
-    return team.agent(id.robot).lifted_poses()->middleCols<4>(4 * Eigen::Index{id.index});
-  };
+/// Cost of the whole graph at the 3x4 or lifted poses that `pose` gives for keyframes.
+template <typename PoseOf>
+double cost_at(const SplitGraph& graph, const PoseOf& pose) {
   double cost = 0.0;
   for (const auto* edges : {&graph.odometry, &graph.closures})
     for (const RelativePose& e : *edges) {
@@ -115,18 +113,18 @@ inline double team_cost(PgoTeam& team, const SplitGraph& graph) {
   return cost;
 }
 
+/// Cost of the whole graph at the agents' lifted poses. Precondition: all are in one frame.
+inline double team_cost(PgoTeam& team, const SplitGraph& graph) {
+  return cost_at(graph, [&](const KeyframeId& id) {
+    return team.agent(id.robot).lifted_poses()->middleCols<4>(4 * Eigen::Index{id.index});
+  });
+}
+
 /// Cost of the published trajectories, i.e. after rounding. Precondition: all have been published.
 inline double rounded_cost(const PgoTeam& team, const SplitGraph& graph) {
-  const auto pose = [&](const KeyframeId& id) -> Eigen::MatrixXd {
+  return cost_at(graph, [&](const KeyframeId& id) -> Eigen::MatrixXd {
     return team.trajectory(id.robot)->T_world_kf.at(id.index).matrix().topRows<3>();
-  };
-  double cost = 0.0;
-  for (const auto* edges : {&graph.odometry, &graph.closures})
-    for (const RelativePose& e : *edges) {
-      const Precision weight = precision_of(e.covariance);
-      cost += edge_cost(pose(e.from), pose(e.to), e.T_from_to, weight.kappa, weight.tau);
-    }
-  return cost;
+  });
 }
 
 }  // namespace km

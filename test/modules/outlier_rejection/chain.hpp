@@ -6,6 +6,7 @@
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/core/pose_graph.hpp"
+#include "modules/outlier_rejection/pcm_config.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {
@@ -40,6 +41,16 @@ inline SE3 rotz(double angle_rad, double x = 0.0, double y = 0.0) {
 inline Closure closure(const OdometryPose& from, const OdometryPose& to, const SE3& T_from_to,
                        double variance = 1e-4) {
   return {from, to, T_from_to, variance * Matrix6::Identity(), 20, 0.8};
+}
+
+/// Closed cycles may be off by so much per transform, whatever the covariances.
+inline PcmConfig bounds_per_transform(double translation_m, double rotation_rad) {
+  PcmConfig config;
+  config.criterion = CycleCriterion::kBounds;
+  config.bounds_per_transform = true;
+  config.max_cycle_translation_m = translation_m;
+  config.max_cycle_rotation_rad = rotation_rad;
+  return config;
 }
 
 /// The same measurement given from the other side.

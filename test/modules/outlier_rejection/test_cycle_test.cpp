@@ -19,29 +19,20 @@ Chain square(double variance = 1e-4) {
   return chain;
 }
 
-PcmConfig bounds(double translation_m, double rotation_rad) {
-  PcmConfig config;
-  config.criterion = CycleCriterion::kBounds;
-  config.bounds_per_transform = true;
-  config.max_cycle_translation_m = translation_m;
-  config.max_cycle_rotation_rad = rotation_rad;
-  return config;
-}
-
 bool passes_gate(const PcmConfig& config, const Chain& chain, const SE3& T_3_0) {
   const CycleTest test(config);
   return test.agrees_with_odometry(test.orient(closure(chain.at(3), chain.at(0), T_3_0)));
 }
 
 TEST_CASE("The odometry gate bounds translation per transform", "[pcm]") {
-  const PcmConfig config = bounds(0.051, kPi);
+  const PcmConfig config = bounds_per_transform(0.051, kPi);
   CHECK(passes_gate(config, square(), rotz(kPi / 2, 1.0)));
   CHECK(passes_gate(config, square(), rotz(kPi / 2, 0.8)));          // 0.200 / 4 = 0.050
   CHECK_FALSE(passes_gate(config, square(), rotz(kPi / 2, 0.792)));  // 0.208 / 4 = 0.052
 }
 
 TEST_CASE("The odometry gate bounds rotation per transform", "[pcm]") {
-  const PcmConfig config = bounds(100.0, 0.005);
+  const PcmConfig config = bounds_per_transform(100.0, 0.005);
   CHECK(passes_gate(config, square(), rotz(1.551, 1.0)));       // 0.0198 / 4 = 0.00495
   CHECK_FALSE(passes_gate(config, square(), rotz(1.55, 1.0)));  // 0.0208 / 4 = 0.0052
 }

@@ -22,11 +22,7 @@ Chain hook() {
 }
 
 PcmConfig per_transform(double translation_m, double rotation_rad) {
-  PcmConfig config;
-  config.criterion = CycleCriterion::kBounds;
-  config.bounds_per_transform = true;
-  config.max_cycle_translation_m = translation_m;
-  config.max_cycle_rotation_rad = rotation_rad;
+  PcmConfig config = bounds_per_transform(translation_m, rotation_rad);
   config.min_inliers = 1;
   return config;
 }
