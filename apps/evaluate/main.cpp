@@ -49,19 +49,19 @@ void define(CLI::App& app, km::TrajectoryCommand& command) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   CLI::App app(kAbout);
   app.require_subcommand(1);
   km::TrajectoryCommand trajectory;
   define(*app.add_subcommand("trajectory", kTrajectory), trajectory);
   try {
     app.parse(argc, argv);
-    km::evaluate_trajectories(trajectory);
-    return 0;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 1;
-  } catch (const std::exception& error) {
-    std::cerr << "kimera_multi_evaluate: " << error.what() << '\n';
-    return 1;
   }
+  km::evaluate_trajectories(trajectory);
+  return 0;
+} catch (const std::exception& error) {
+  std::cerr << "kimera_multi_evaluate: " << error.what() << '\n';
+  return 1;
 }

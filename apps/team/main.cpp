@@ -110,17 +110,17 @@ int run(const TeamOptions& options) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   CLI::App app(kAbout);
   TeamOptions options;
+  define(app, options);
   try {
-    define(app, options);
     app.parse(argc, argv);
-    return run(options);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 1;
-  } catch (const std::exception& error) {
-    std::cerr << "kimera_multi_team: " << error.what() << '\n';
-    return 1;
   }
+  return run(options);
+} catch (const std::exception& error) {
+  std::cerr << "kimera_multi_team: " << error.what() << '\n';
+  return 1;
 }

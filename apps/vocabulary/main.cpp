@@ -73,7 +73,7 @@ void define(CLI::App& app, km::EvaluateCommand& command) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   CLI::App app(kAbout);
   app.require_subcommand(1);
   km::TrainCommand training;
@@ -86,13 +86,15 @@ int main(int argc, char** argv) {
   define(*train, training);
   define(*inspect, inspection);
   define(*evaluate, evaluation);
-  CLI11_PARSE(app, argc, argv);
   try {
-    if (train->parsed()) return km::train(training);
-    if (inspect->parsed()) return km::inspect(inspection);
-    return km::evaluate(evaluation);
-  } catch (const std::exception& error) {
-    std::cerr << "kimera_multi_vocabulary: " << error.what() << '\n';
-    return 1;
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 1;
   }
+  if (train->parsed()) return km::train(training);
+  if (inspect->parsed()) return km::inspect(inspection);
+  return km::evaluate(evaluation);
+} catch (const std::exception& error) {
+  std::cerr << "kimera_multi_vocabulary: " << error.what() << '\n';
+  return 1;
 }
