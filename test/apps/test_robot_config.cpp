@@ -5,6 +5,7 @@
 #include <string>
 
 #include "apps/robot/robot_config.hpp"
+#include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {
@@ -34,12 +35,10 @@ TEST_CASE("The effective configuration gives the same configuration again", "[ro
   options.configs = {"config/datasets/tunnels.yaml"};
   options.settings = {"vio.iterations=5", "dds.team=blue"};
   const std::string effective = load_robot_config(options).effective;
-  const auto path = std::filesystem::temp_directory_path() / "km_effective.yaml";
-  std::ofstream(path) << effective;
+  const TemporaryFolder folder;
   RobotOptions again;
-  again.configs = {path};
+  again.configs = {folder.write("effective.yaml", effective)};
   CHECK(load_robot_config(again).effective == effective);
-  std::filesystem::remove(path);
 }
 
 TEST_CASE("What comes later wins: profile, files, settings, options", "[robot]") {
