@@ -82,7 +82,7 @@ WindowSolution FixedLagSmoother::solve(int iterations) {
                                                   : optimize(window_, iterations);
 }
 
-void FixedLagSmoother::append(const InertialFrame& frame, const OdometryState& state) {
+void FixedLagSmoother::append(const InertialFrame& frame, OdometryState state) {
   WindowFrame& added = window_.frames.emplace_back();
   added.id = next_id_++;
   added.state = state;

@@ -69,7 +69,7 @@ class FixedLagSmoother {
 
  private:
   WindowSolution solve(int iterations);
-  void append(const InertialFrame& frame, const OdometryState& state);
+  void append(const InertialFrame& frame, OdometryState state);  // by value: it may be the window's
   void decide_keyframe();
   int reject_outliers();
   void locate_landmarks();
