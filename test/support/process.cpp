@@ -91,7 +91,7 @@ std::optional<TimedLine> Process::wait_for(const std::string& line, std::size_t 
 std::optional<TimedLine> Process::wait_for_prefix(const std::string& prefix) {
   std::optional<TimedLine> found;
   std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, std::chrono::seconds(20), [&] {
+  changed_.wait_for(lock, kPatience, [&] {
     const auto line = std::ranges::find_if(
         lines_, [&](const TimedLine& l) { return l.text.starts_with(prefix); });
     if (line != lines_.end()) found = *line;

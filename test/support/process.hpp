@@ -10,6 +10,8 @@
 #include <thread>
 #include <vector>
 
+#include "test/support/patience.hpp"
+
 namespace km {
 
 /// A line a process printed, and when this process read it.
@@ -38,7 +40,7 @@ class Process {
   /// Waits until it has printed `line` `times` times; the last of them, or nullopt after
   /// `patience`.
   std::optional<TimedLine> wait_for(const std::string& line, std::size_t times = 1,
-                                    std::chrono::seconds patience = std::chrono::seconds(20));
+                                    std::chrono::seconds patience = kPatience);
 
   /// Waits for a line that begins so.
   std::optional<TimedLine> wait_for_prefix(const std::string& prefix);

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "modules/pose_graph/pose_graph_node.hpp"
+#include "test/support/patience.hpp"
 #include "test/support/split_graph.hpp"
 
 namespace km {
@@ -54,7 +55,7 @@ struct Robot {
   // Waits for a trajectory in the frame of `anchor`.
   std::optional<Trajectory> await_trajectory(RobotId anchor, std::size_t size) {
     std::unique_lock lock(mutex);
-    const bool came = changed.wait_for(lock, std::chrono::seconds(60), [&] {
+    const bool came = changed.wait_for(lock, kPatience, [&] {
       return latest && latest->anchor == anchor && latest->T_world_kf.size() == size;
     });
     return came ? latest : std::nullopt;

@@ -18,11 +18,9 @@
 #include "runtime/dds/robot_status_codec.hpp"
 #include "runtime/dds/robot_status_node.hpp"
 #include "test/runtime/dds/ping.hpp"
+#include "test/support/patience.hpp"
 
 namespace km {
-
-/// Upper bound on anything a test waits for: only a failing test takes that long.
-inline constexpr std::chrono::seconds kPatience{20};
 
 /// Loopback, a domain and a team of this process alone: tests that run side by side never meet.
 inline DdsConfig loopback_config() {
