@@ -50,6 +50,7 @@ std::vector<Line> truth_lines(std::span<const TrajectoryInput> inputs) {
     entry.last = std::max(entry.last, last);
   }
   std::vector<Line> lines;
+  lines.reserve(drawn.size());
   for (const auto& [key, entry] : drawn)
     lines.push_back(line_between(entry.truth, entry.first, entry.last));
   return lines;

@@ -108,7 +108,7 @@ void LoopClosureNode::step(const LoopClosureTick& tick) {
   send_due_requests();
 }
 
-void LoopClosureNode::accept(Work work) {
+void LoopClosureNode::accept(const Work& work) {
   const auto& [from, to] = work.id;
   if (from == to || from.robot != self_) {
     log::limited(log::Level::kWarn, name(), "foreign closure")

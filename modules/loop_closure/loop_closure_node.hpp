@@ -87,7 +87,7 @@ class LoopClosureNode final : public Node {
     bool requested = false;                ///< The other end has been asked for.
   };
 
-  void accept(Work work);
+  void accept(const Work& work);
   void advance(const Work& work);
   void arrived(const KeyframePtr& keyframe);
   KeyframePtr find(const KeyframeId& id);

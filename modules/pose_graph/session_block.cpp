@@ -70,7 +70,7 @@ Eigen::MatrixXd SessionBlock::align_rigidly(const std::vector<PublicEdge>& edges
   std::vector<Eigen::MatrixXd> candidates;
   for (const PublicEdge& e : edges) {
     const SE3 T_fixed_own = e.from_own ? e.T.inverse() : e.T;
-    const SE3 T_own_kf = poses[static_cast<std::size_t>(e.own)];
+    const SE3& T_own_kf = poses[static_cast<std::size_t>(e.own)];
     candidates.push_back(
         lift(fixed_.middleCols<4>(4 * e.fixed), T_fixed_own * T_own_kf.inverse() * T_own_centre));
   }
