@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/frame.hpp"
+#include "modules/core/geometry.hpp"
+#include "modules/simulation/world/world.hpp"
+
+namespace km {
+
+/// What the lens throws on the sensor, before exposure, noise and quantisation; row-major,
+/// width * height each. Vectors not asked for are empty.
+struct RenderedView {
+  int width = 0;
+  int height = 0;
+  std::vector<float> radiance;       ///< Linear grey, anti-aliased; a white wall in the sun is 1.
+  std::vector<Eigen::Vector3f> rgb;  ///< Linear colour, anti-aliased.
+  std::vector<float> depth_m;        ///< z in the camera frame at the pixel's centre [m]; 0: sky.
+  std::vector<LabelId> labels;       ///< At the pixel's centre; sky is SurfaceClass::kSky.
+};
+
+struct RenderRequest {
+  bool radiance = true;
+  bool rgb = false;
+  bool depth = false;
+  bool labels = false;
+};
+
+struct RenderOptions {
+  int samples_per_pixel = 4;  ///< At least this many visibility samples where edges are.
+  bool shadows = true;
+};
+
+/// Ray caster over one world. Immutable after construction; render() may be called from several
+/// threads at once and gives the same bytes whatever their number.
+class Renderer {
+ public:
+  /// Builds the acceleration structure and bakes ambient light. `world` must outlive the renderer.
+  explicit Renderer(const World& world, const RenderOptions& options = {});
+  ~Renderer();
+
+  /// One view through `camera` (distortion included), its body at T_world_body.
+  [[nodiscard]] RenderedView render(const PinholeCamera& camera, const SE3& T_world_body,
+                                    const RenderRequest& request) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<const Impl> impl_;
+};
+
+}  // namespace km
