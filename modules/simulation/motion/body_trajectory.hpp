@@ -15,9 +15,9 @@ struct BodyMotion {
 };
 
 /// A rigid motion, twice differentiable in time. Immutable, safe to use from several threads.
-class Trajectory {
+class BodyTrajectory {
  public:
-  virtual ~Trajectory() = default;
+  virtual ~BodyTrajectory() = default;
   [[nodiscard]] virtual double start_s() const = 0;
   [[nodiscard]] virtual double end_s() const = 0;
 
