@@ -7,6 +7,7 @@
 #include "modules/core/camera.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/core/geometry.hpp"
+#include "modules/simulation/rendering/pixel_rays.hpp"
 #include "modules/simulation/world/world.hpp"
 
 namespace km {
@@ -42,7 +43,10 @@ class Renderer {
   explicit Renderer(const World& world, const RenderOptions& options = {});
   ~Renderer();
 
-  /// One view through `camera` (distortion included), its body at T_world_body.
+  /// One view through a camera (distortion included), its body at T_world_body.
+  [[nodiscard]] RenderedView render(const PixelRays& rays, const SE3& T_world_body,
+                                    const RenderRequest& request) const;
+  /// The same for a single view: computes the camera's rays first.
   [[nodiscard]] RenderedView render(const PinholeCamera& camera, const SE3& T_world_body,
                                     const RenderRequest& request) const;
 
