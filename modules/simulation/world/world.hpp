@@ -2,13 +2,13 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "modules/core/label_palette.hpp"
+#include "modules/simulation/world/surface_mesh.hpp"
 #include "modules/simulation/world/texture.hpp"
 
 namespace km {
@@ -49,18 +49,6 @@ struct Material {
   float base_period_m = 4.0F;    ///< Edge of one tile of `base` on the surface [m].
   float detail_period_m = 1.0F;  ///< Edge of one tile of `detail` [m].
   float specular = 0.0F;         ///< Share of mirrored sky, 0 to 1 (windows, car paint).
-};
-
-/// Triangles of the whole world, frame `world`: metres, z up. No vertex is shared between triangles
-/// that meet at an edge which shall look sharp.
-struct SurfaceMesh {
-  std::vector<Eigen::Vector3f> vertices;                ///< [m]
-  std::vector<Eigen::Vector3f> normals;                 ///< Per vertex, unit length.
-  std::vector<Eigen::Vector2f> uv;                      ///< Per vertex, along the surface [m].
-  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Counter-clockwise seen from outside.
-  std::vector<std::uint16_t> materials;  ///< Per triangle: index into World::materials.
-
-  void append(const SurfaceMesh& other);
 };
 
 /// Lights of a world. Outdoors the sun and the sky, indoors lamps and a constant ambient term.
