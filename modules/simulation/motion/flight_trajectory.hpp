@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+
+#include "modules/simulation/motion/spline_trajectory.hpp"
+
+namespace km {
+
+/// How a multicopter flies. Defaults: like the easy and medium sequences of EuRoC's Vicon room.
+struct FlightOptions {
+  std::uint64_t seed = 1;
+  double duration_s = 60.0;     ///< From time 0, standstill included.
+  double standstill_s = 2.0;    ///< Exactly at rest on the ground at the start.
+  double max_speed_mps = 1.0;   ///< Towards the next waypoint.
+  double max_yaw_rate = 1.047;  ///< [rad/s]
+  double gusts_m = 0.008;       ///< Standard deviation by which gusts push it off its way [m].
+  /// The body in the vehicle's frame (x forward, y left, z up); see vehicle_from_body().
+  Eigen::Matrix3d R_vehicle_body = Eigen::Matrix3d::Identity();
+};
+
+/// A flight inside `volume` (frame `world`, z up): at rest at its floor, takes off, then from one
+/// random waypoint to the next with changes of yaw. The vehicle's z axis is along the thrust,
+/// acceleration minus gravity, as a multicopter's must be. The whole curve stays in `volume`.
+/// Throws std::invalid_argument for a volume that is empty or smaller than 1 m across, and options
+/// out of range.
+[[nodiscard]] SplineTrajectory make_flight_trajectory(const Eigen::AlignedBox3d& volume,
+                                                      const FlightOptions& options);
+
+}  // namespace km

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/frame.hpp"
+#include "modules/core/stamp.hpp"
+#include "modules/simulation/motion/body_trajectory.hpp"
+
+namespace km {
+
+struct ImuSimulation {
+  ImuNoise noise;  ///< Its rate_hz is the sampling rate.
+  std::uint64_t seed = 1;
+  bool ideal = false;                ///< Neither noise nor bias.
+  double initial_gyro_bias = 0.03;   ///< Standard deviation per axis when switched on [rad/s].
+  double initial_accel_bias = 0.05;  ///< The same [m/s^2].
+  double gravity_mps2 = 9.81;        ///< Gravity is [0, 0, -gravity_mps2] in `world`.
+};
+
+/// A sample and the biases in it: what EuRoC's ground-truth state lists.
+struct SimulatedImu {
+  ImuSample sample;
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< [rad/s]
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< [m/s^2]
+};
+
+/// What an inertial sensor in the body's origin measures on the whole of `trajectory`: samples at
+/// epoch + k / rate, k = 0, 1, ... for times from 0 (or start_s if later) to end_s, stamps rounded
+/// to nanoseconds and the motion taken at the rounded stamp:
+///   gyro = w + b_g + n_g,   accel = R^T (a - g) + b_a + n_a.
+/// White noise and bias walk in discrete time as in Kalibr's IMU noise model: standard deviations
+/// density / sqrt(dt) and walk * sqrt(dt). Throws std::invalid_argument for a rate or a noise that
+/// is not finite and positive (noise may be 0).
+[[nodiscard]] std::vector<SimulatedImu> simulate_imu(const BodyTrajectory& trajectory, Stamp epoch,
+                                                     const ImuSimulation& options);
+
+}  // namespace km

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "modules/core/stamped_pose.hpp"
+#include "modules/simulation/motion/spline_trajectory.hpp"
+
+namespace km {
+
+/// How closely a recording is followed.
+struct RecordingOptions {
+  double interval_s = 0.05;  ///< Of the spline's controls.
+  /// Deviations taken for ordinary noise; larger ones lose weight, as outliers do.
+  double position_noise_m = 0.0005;
+  double rotation_noise_rad = 0.0005;
+  /// Changes of acceleration taken for ordinary, standard deviation of its derivative.
+  double jerk_mps3 = 20.0;
+  double rotation_jerk = 60.0;  ///< [rad/s^3]
+};
+
+/// Distances between the recorded poses and the curve.
+struct FitDeviation {
+  double position_rms_m = 0.0;
+  double position_max_m = 0.0;
+  double rotation_rms_rad = 0.0;
+  double rotation_max_rad = 0.0;
+};
+
+struct RecordedTrajectory {
+  SplineTrajectory trajectory;  ///< Time 0 is `epoch`.
+  Stamp epoch = 0;
+  FitDeviation deviation;
+};
+
+/// A smooth motion through recorded poses, by penalised and robust linear least squares: it passes
+/// within the noise of them and bridges gaps. Time 0 of the trajectory is `epoch`, so that stamps
+/// of images and inertial data convert by seconds_between(epoch, stamp). `poses` ascend strictly in
+/// time; the curve covers the first to the last. Throws std::invalid_argument for fewer than two
+/// poses, stamps that do not ascend and options that are not positive. O(poses + controls).
+[[nodiscard]] RecordedTrajectory fit_recording(std::span<const StampedPose> poses, Stamp epoch,
+                                               const RecordingOptions& options = {});
+
+}  // namespace km

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "modules/simulation/motion/spline_trajectory.hpp"
+#include "modules/simulation/world/world.hpp"
+
+namespace km {
+
+/// How a vehicle drives. Defaults: a car in town.
+struct VehicleOptions {
+  std::uint64_t seed = 1;     ///< Of speed changes, stops, steering and the road's roughness.
+  double duration_s = 60.0;   ///< Of the whole trajectory, standstill included.
+  double start_m = 0.0;       ///< Way along the route from its first point at which it starts [m].
+  double standstill_s = 2.0;  ///< Exactly at rest at the start.
+  double rig_height_m = 1.5;  ///< Origin of the body above the ground.
+  double corner_radius_m = 5.0;   ///< Of rounded corners, smaller where the route leaves no room.
+  double max_lateral_mps2 = 2.5;  ///< In curves.
+  double max_longitudinal_mps2 = 1.5;  ///< Speeding up and braking.
+  double stop_every_m = 120.0;         ///< Mean way between short stops; 0: none.
+  double roughness = 1.0;  ///< Of the road: 1 is a good street (ISO 8608 class A), 0 smooth.
+};
+
+/// A vehicle that drives along `route`, once around and on, for `duration_s` from time 0. Body:
+/// x forward, y left, z up. Heading is the path's tangent; pitch and roll are the ground's under
+/// four wheels, seen through a suspension (damped oscillators in heave, pitch and roll, excited by
+/// ground, roughness and the vehicle's accelerations: nose down under braking, leaning out of
+/// curves). `ground_height` may be null: level ground at 0.
+///
+/// The limits hold for the way of the point on the ground below the body; the body itself sways
+/// above it by a few centimetres. Throws std::invalid_argument for a route with fewer than three
+/// points or shorter than 20 m, a speed that is not positive, and options out of range.
+[[nodiscard]] SplineTrajectory make_vehicle_trajectory(
+    const Route& route, const std::function<double(double, double)>& ground_height,
+    const VehicleOptions& options);
+
+}  // namespace km
