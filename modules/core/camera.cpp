@@ -2,6 +2,8 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 namespace km {
 namespace {
@@ -49,6 +51,16 @@ std::optional<Eigen::Vector2d> PinholeCamera::unproject(const Eigen::Vector2d& p
     if (!bearing.allFinite()) return std::nullopt;
   }
   return std::nullopt;
+}
+
+StereoRig rgbd_rig(const PinholeCamera& camera, double baseline_m) {
+  if (!(baseline_m > 0.0) || !std::isfinite(baseline_m))
+    throw std::invalid_argument("rgbd_rig: a virtual baseline of " + std::to_string(baseline_m) +
+                                " m");
+  StereoRig rig{{camera, camera}, DepthSource::kDepthImage};
+  rig.cameras[1].T_body_cam =
+      camera.T_body_cam * Eigen::Translation3d(baseline_m * Eigen::Vector3d::UnitX());
+  return rig;
 }
 
 }  // namespace km

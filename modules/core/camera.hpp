@@ -24,14 +24,39 @@ struct PinholeCamera {
   [[nodiscard]] std::optional<Eigen::Vector2d> unproject(const Eigen::Vector2d& pixel) const;
 };
 
+/// Where the depth of single image points comes from.
+enum class DepthSource {
+  kRightImage,  ///< Stereo: cameras[1] takes the right image.
+  kDepthImage,  ///< RGB-D: frames have a depth image and no right one; cameras[1] is virtual.
+};
+
 /// Two cameras on one body; [0] is the left, the reference for keypoints and depth.
+///
+/// With an RGB-D rig the right camera is a virtual one (see rgbd_rig()): depth z is worth the
+/// disparity f * baseline / z there, so that whatever works on stereo observations works on it, and
+/// an error of one pixel stands for one of z^2 / (f * baseline) in depth (as in Mur-Artal and
+/// Tardos, "ORB-SLAM2: an open-source SLAM system for monocular, stereo and RGB-D cameras", 2017).
 struct StereoRig {
   std::array<PinholeCamera, 2> cameras;
+  DepthSource depth_source = DepthSource::kRightImage;
 
   [[nodiscard]] SE3 T_left_right() const {
     return cameras[0].T_body_cam.inverse() * cameras[1].T_body_cam;
   }
   [[nodiscard]] double baseline_m() const { return T_left_right().translation().norm(); }
+};
+
+/// An RGB-D camera: `camera` beside a virtual one like it, `baseline_m` to the right. The larger
+/// the baseline, the more the depth is trusted; that of a sensor that measures depth by stereo or
+/// structured light, or any b for which depth errors are about z^2 * 1 px / (f * b). Throws
+/// std::invalid_argument unless the baseline is positive and finite.
+[[nodiscard]] StereoRig rgbd_rig(const PinholeCamera& camera, double baseline_m);
+
+/// Distances along the optical axis that a depth sensor measures [m]; others are none in its
+/// images.
+struct DepthRange {
+  double min_m = 0.0;
+  double max_m = 65.0;
 };
 
 /// Continuous-time noise of an inertial sensor.
@@ -47,6 +72,7 @@ struct ImuNoise {
 struct SensorRig {
   StereoRig stereo;
   ImuNoise imu;
+  std::optional<DepthRange> depth;  ///< Absent: no frame has a depth image.
 };
 
 }  // namespace km

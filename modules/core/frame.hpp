@@ -16,11 +16,30 @@ struct GrayImage {
   std::vector<std::uint8_t> pixels;
 };
 
-/// A stereo pair taken at one instant.
+/// Distances along the optical axis of the left camera, pixel by pixel: of its size, through its
+/// lens. Row-major: millimetres.size() == width * height.
+struct DepthImage {
+  int width = 0;                           ///< [px]
+  int height = 0;                          ///< [px]
+  std::vector<std::uint16_t> millimetres;  ///< z [mm]; 0: none.
+};
+
+/// Semantic classes (LabelId, modules/core/label_palette.hpp) of the left image, pixel by pixel.
+/// Row-major: ids.size() == width * height.
+struct LabelImage {
+  int width = 0;                  ///< [px]
+  int height = 0;                 ///< [px]
+  std::vector<std::uint8_t> ids;  ///< 0: unknown.
+};
+
+/// What the cameras of a robot saw at one instant: a stereo pair, or, with an RGB-D rig (see
+/// DepthSource), a left image with depth. Depth and labels may come at a lower rate than images.
 struct StereoFrame {
   Stamp stamp = 0;
   GrayImage left;
-  GrayImage right;
+  GrayImage right;                                     ///< 0 x 0 with an RGB-D rig.
+  std::shared_ptr<const DepthImage> depth = nullptr;   ///< Null: none.
+  std::shared_ptr<const LabelImage> labels = nullptr;  ///< Null: none.
 };
 
 /// One inertial sample in the body frame.
@@ -30,7 +49,7 @@ struct ImuSample {
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< Specific force [m/s^2]: at rest, minus g.
 };
 
-/// A stereo pair and the inertial samples since the one before, in order of time. The last sample
+/// A frame and the inertial samples since the one before, in order of time. The last sample
 /// is the first at or after the frame's stamp, so that the interval is covered; it is repeated as
 /// the first of the next packet.
 struct SensorPacket {
