@@ -1,0 +1,139 @@
+#include "modules/core/label_palette.hpp"
+
+#include <algorithm>
+#include <map>
+#include <stdexcept>
+
+#include "modules/core/text_rows.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::string_view kHeader = "name,red,green,blue,alpha,id";
+constexpr std::size_t kFields = 6;
+
+std::uint32_t packed(const std::array<std::uint8_t, 3>& color) {
+  return static_cast<std::uint32_t>(color[0]) << 16 | static_cast<std::uint32_t>(color[1]) << 8 |
+         color[2];
+}
+
+std::string text_of(const std::array<std::uint8_t, 3>& color) {
+  return std::to_string(color[0]) + "," + std::to_string(color[1]) + "," + std::to_string(color[2]);
+}
+
+void require_storable(const std::string& name) {
+  constexpr std::string_view kBlanks = " \t\r\f\v";
+  if (name.empty() || name.find_first_of(",#\n\r") != std::string::npos ||
+      kBlanks.find(name.front()) != kBlanks.npos || kBlanks.find(name.back()) != kBlanks.npos) {
+    throw std::invalid_argument(
+        "label palette: the name '" + name +
+        "' is empty, has blanks around it, or a comma, # or line end in it");
+  }
+}
+
+bool by_id(const LabelClass& a, const LabelClass& b) {
+  return a.id < b.id;
+}
+
+std::uint8_t parse_byte(std::string_view field, const char* what, const std::string& place) {
+  const std::optional<std::int64_t> value = parse_int64(field);
+  if (!value || *value < 0 || *value > 255) {
+    throw std::invalid_argument(place + what + " '" + std::string(field) +
+                                "' is no integer from 0 to 255");
+  }
+  return static_cast<std::uint8_t>(*value);
+}
+
+LabelClass parse_entry(const TextRow& row, const std::string& place) {
+  if (row.fields.size() != kFields) {
+    throw std::invalid_argument(place + "'" + std::string(row.fields[0]) + "' with " +
+                                std::to_string(row.fields.size()) + " fields, needed are " +
+                                std::string(kHeader));
+  }
+  LabelClass entry;
+  entry.name = row.fields[0];
+  if (entry.name.empty()) throw std::invalid_argument(place + "the class has no name");
+  entry.color = {parse_byte(row.fields[1], "red", place), parse_byte(row.fields[2], "green", place),
+                 parse_byte(row.fields[3], "blue", place)};
+  static_cast<void>(parse_byte(row.fields[4], "alpha", place));
+  entry.id = parse_byte(row.fields[5], "id", place);
+  return entry;
+}
+
+}  // namespace
+
+LabelPalette::LabelPalette(const std::vector<LabelClass>& entries) {
+  for (const LabelClass& entry : entries) {
+    require_storable(entry.name);
+    const std::pair key(packed(entry.color), entry.id);
+    const auto known = std::lower_bound(id_by_color_.begin(), id_by_color_.end(),
+                                        std::pair(key.first, LabelId{0}));
+    const bool color_known = known != id_by_color_.end() && known->first == key.first;
+    if (color_known && known->second != entry.id) {
+      throw std::invalid_argument("label palette: the colour " + text_of(entry.color) + " of '" +
+                                  entry.name + "' stands for id " + std::to_string(known->second) +
+                                  " and id " + std::to_string(entry.id));
+    }
+    if (color_known) continue;
+    id_by_color_.insert(known, key);
+    auto& list = find(entry.id) == nullptr ? classes_ : others_;
+    list.insert(std::upper_bound(list.begin(), list.end(), entry, by_id), entry);
+  }
+}
+
+const LabelClass* LabelPalette::find(LabelId id) const {
+  LabelClass wanted;
+  wanted.id = id;
+  const auto found = std::lower_bound(classes_.begin(), classes_.end(), wanted, by_id);
+  return found != classes_.end() && found->id == id ? &*found : nullptr;
+}
+
+std::optional<LabelId> LabelPalette::id_of(const std::array<std::uint8_t, 3>& color) const {
+  const auto found = std::lower_bound(id_by_color_.begin(), id_by_color_.end(),
+                                      std::pair(packed(color), LabelId{0}));
+  if (found == id_by_color_.end() || found->first != packed(color)) return std::nullopt;
+  return found->second;
+}
+
+std::vector<LabelClass> LabelPalette::entries() const {
+  std::vector<LabelClass> all = classes_;
+  all.insert(all.end(), others_.begin(), others_.end());
+  std::stable_sort(all.begin(), all.end(), by_id);
+  return all;
+}
+
+LabelPalette parse_label_palette(std::string_view csv, std::string_view source) {
+  const std::string where(source);
+  const std::vector<TextRow> rows = split_rows(csv);
+  const std::vector<std::string_view> header = {"name", "red", "green", "blue", "alpha", "id"};
+  if (rows.empty() || rows.front().fields != header) {
+    throw std::invalid_argument(where + ": the first line is not '" + std::string(kHeader) + "'");
+  }
+  std::vector<LabelClass> entries;
+  std::map<std::uint32_t, std::pair<LabelId, int>> first_use;  // of a colour: id and line
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    const int line = rows[i].line;
+    const std::string place = where + ":" + std::to_string(line) + ": ";
+    entries.push_back(parse_entry(rows[i], place));
+    const LabelClass& entry = entries.back();
+    const auto [use, is_new] = first_use.try_emplace(packed(entry.color), entry.id, line);
+    if (use->second.first != entry.id) {
+      throw std::invalid_argument(place + "the colour " + text_of(entry.color) + " of '" +
+                                  entry.name + "' stands for id " + std::to_string(entry.id) +
+                                  ", but for id " + std::to_string(use->second.first) +
+                                  " in line " + std::to_string(use->second.second));
+    }
+  }
+  return LabelPalette(entries);
+}
+
+std::string to_csv(const LabelPalette& palette) {
+  std::string csv(kHeader);
+  csv += '\n';
+  for (const LabelClass& entry : palette.entries()) {
+    csv += entry.name + "," + text_of(entry.color) + ",255," + std::to_string(entry.id) + "\n";
+  }
+  return csv;
+}
+
+}  // namespace km
