@@ -25,6 +25,8 @@ namespace fs = std::filesystem;
 const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"loop_closure", {"place_recognition"}},
     {"pose_graph", {"outlier_rejection"}},
+    {"evaluation", {"mesh"}},
+    {"simulation", {"mesh"}},
 };
 
 // Files whose job is a format on disk that is YAML: the calibration of EuRoC recordings.

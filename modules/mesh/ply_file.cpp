@@ -1,0 +1,201 @@
+#include "modules/mesh/ply_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+
+#include "modules/mesh/ply_header.hpp"
+
+namespace km {
+namespace {
+
+// Values of the body one after the other, whatever the encoding.
+class Body {
+ public:
+  Body(std::istream& stream, PlyFormat format) : stream_(stream), format_(format) {}
+
+  double next(PlyType type) {
+    if (format_ == PlyFormat::kAscii) {
+      std::string word;  // operator>> of a double refuses "nan"
+      if (!(stream_ >> word)) throw std::runtime_error("ends before its last element");
+      char* end = nullptr;
+      const double value = std::strtod(word.c_str(), &end);
+      if (*end != '\0') throw std::runtime_error("'" + word.substr(0, 20) + "' is not a number");
+      return value;
+    }
+    switch (type) {
+      case PlyType::kInt8:
+        return binary<std::int8_t>();
+      case PlyType::kUint8:
+        return binary<std::uint8_t>();
+      case PlyType::kInt16:
+        return binary<std::int16_t>();
+      case PlyType::kUint16:
+        return binary<std::uint16_t>();
+      case PlyType::kInt32:
+        return binary<std::int32_t>();
+      case PlyType::kUint32:
+        return binary<std::uint32_t>();
+      case PlyType::kFloat:
+        return static_cast<double>(binary<float>());
+      case PlyType::kDouble:
+        return binary<double>();
+    }
+    throw std::logic_error("PlyType");
+  }
+
+ private:
+  template <typename T>
+  T binary() {
+    std::array<char, sizeof(T)> bytes;
+    if (!stream_.read(bytes.data(), sizeof(T)))
+      throw std::runtime_error("ends before its last element");
+    const bool little = format_ == PlyFormat::kLittleEndian;
+    if (little != (std::endian::native == std::endian::little))
+      std::reverse(bytes.begin(), bytes.end());
+    return std::bit_cast<T>(bytes);
+  }
+
+  std::istream& stream_;
+  PlyFormat format_;
+};
+
+// One instance of an element: its scalar properties by position, and its last list.
+struct Row {
+  std::vector<double> scalars;
+  std::vector<double> list;
+};
+
+void read_row(const PlyElement& element, Body& body, Row& row) {
+  row.scalars.clear();
+  for (const PlyProperty& property : element.properties) {
+    if (!property.is_list) {
+      row.scalars.push_back(body.next(property.type));
+      continue;
+    }
+    const double count = body.next(property.count_type);
+    if (!(count >= 0 && count <= 1e6))
+      throw std::runtime_error(element.name + " with a list of " + std::to_string(count));
+    const bool wanted = property.name == "vertex_indices" || property.name == "vertex_index";
+    if (wanted) row.list.clear();
+    for (int i = 0; i < static_cast<int>(count); ++i) {
+      const double value = body.next(property.type);
+      if (wanted) row.list.push_back(value);
+    }
+    row.scalars.push_back(0.0);
+  }
+}
+
+// Position of a scalar property, or -1.
+int find(const PlyElement& element, const char* name) {
+  for (std::size_t i = 0; i < element.properties.size(); ++i)
+    if (element.properties[i].name == name && !element.properties[i].is_list)
+      return static_cast<int>(i);
+  return -1;
+}
+
+std::uint8_t as_byte(double value, const char* what) {
+  if (value >= 0 && value <= 255) return static_cast<std::uint8_t>(value);
+  throw std::runtime_error(std::string(what) + " " + std::to_string(value) +
+                           " is outside 0 to 255");
+}
+
+double value_of(const Row& row, int property) {
+  return row.scalars[static_cast<std::size_t>(property)];
+}
+
+void read_vertices(const PlyElement& element, Body& body, LabelledMesh& mesh) {
+  const int x = find(element, "x"), y = find(element, "y"), z = find(element, "z");
+  const int red = find(element, "red"), green = find(element, "green"),
+            blue = find(element, "blue"), label = find(element, "label");
+  if (x < 0 || y < 0 || z < 0) throw std::runtime_error("vertices without x, y, z");
+  Row row;
+  for (std::size_t i = 0; i < element.count; ++i) {
+    read_row(element, body, row);
+    const Eigen::Vector3d point(value_of(row, x), value_of(row, y), value_of(row, z));
+    if (!point.allFinite())
+      throw std::runtime_error("vertex " + std::to_string(i) + " is not finite");
+    mesh.vertices.push_back(point.cast<float>());
+    if (red >= 0 && green >= 0 && blue >= 0)
+      mesh.colors.push_back({as_byte(value_of(row, red), "red"),
+                             as_byte(value_of(row, green), "green"),
+                             as_byte(value_of(row, blue), "blue")});
+    if (label >= 0) mesh.labels.push_back(as_byte(value_of(row, label), "label"));
+  }
+}
+
+std::uint32_t as_index(double value, std::size_t face, std::size_t vertices) {
+  if (value >= 0 && value < static_cast<double>(vertices)) return static_cast<std::uint32_t>(value);
+  throw std::runtime_error("face " + std::to_string(face) + " names vertex " +
+                           std::to_string(value) + " of " + std::to_string(vertices));
+}
+
+// Faces may come before the vertices: `vertices` is the number the header promises.
+std::vector<LabelId> read_faces(const PlyElement& element, std::size_t vertices, Body& body,
+                                std::vector<LabelledMesh::Face>& faces) {
+  const int label = find(element, "label");
+  std::vector<LabelId> labels;
+  Row row;
+  for (std::size_t i = 0; i < element.count; ++i) {
+    read_row(element, body, row);
+    if (row.list.size() < 3)
+      throw std::runtime_error("face " + std::to_string(i) + " has fewer than 3 corners");
+    std::vector<std::uint32_t> corners;
+    for (const double index : row.list) corners.push_back(as_index(index, i, vertices));
+    for (std::size_t k = 2; k < corners.size(); ++k) {
+      faces.push_back({corners[0], corners[k - 1], corners[k]});
+      if (label >= 0) labels.push_back(as_byte(value_of(row, label), "label"));
+    }
+  }
+  return labels;
+}
+
+std::size_t vertex_count(const PlyHeader& header) {
+  for (const PlyElement& element : header.elements)
+    if (element.name == "vertex") return element.count;
+  throw std::runtime_error("no element 'vertex'");
+}
+
+LabelledMesh read(std::istream& stream) {
+  const PlyHeader header = read_ply_header(stream);
+  Body body(stream, header.format);
+  LabelledMesh mesh;
+  std::vector<LabelId> face_labels;
+  Row row;
+  for (const PlyElement& element : header.elements) {
+    if (element.properties.empty() && element.count > 0)
+      throw std::runtime_error("element '" + element.name + "' without properties");
+    if (element.name == "vertex") {
+      read_vertices(element, body, mesh);
+    } else if (element.name == "face") {
+      face_labels = read_faces(element, vertex_count(header), body, mesh.faces);
+    } else {
+      for (std::size_t i = 0; i < element.count; ++i) read_row(element, body, row);
+    }
+  }
+  if (mesh.vertices.size() != vertex_count(header)) throw std::runtime_error("vertices twice");
+  if (mesh.labels.empty() && !face_labels.empty()) {
+    mesh.labels.assign(mesh.vertices.size(), 0);
+    for (std::size_t i = 0; i < face_labels.size(); ++i)
+      for (const std::uint32_t corner : mesh.faces[i]) mesh.labels[corner] = face_labels[i];
+  }
+  return mesh;
+}
+
+}  // namespace
+
+LabelledMesh read_ply(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw MeshFileError(file.string() + ": cannot be opened");
+  try {
+    return read(stream);
+  } catch (const std::runtime_error& error) {
+    throw MeshFileError(file.string() + ": " + error.what());
+  }
+}
+
+}  // namespace km
