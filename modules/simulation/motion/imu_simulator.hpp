@@ -28,7 +28,7 @@ struct SimulatedImu {
 };
 
 /// What an inertial sensor in the body's origin measures on the whole of `trajectory`: samples at
-/// epoch + k / rate, k = 0, 1, ... for times from 0 (or start_s if later) to end_s, stamps rounded
+/// epoch + k / rate for all whole k within the trajectory, stamps rounded
 /// to nanoseconds and the motion taken at the rounded stamp:
 ///   gyro = w + b_g + n_g,   accel = R^T (a - g) + b_a + n_a.
 /// White noise and bias walk in discrete time as in Kalibr's IMU noise model: standard deviations
