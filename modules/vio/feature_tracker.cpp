@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "modules/core/depth_lookup.hpp"
 #include "modules/vio/klt.hpp"
 #include "modules/vio/local_warp.hpp"
 
@@ -25,18 +26,21 @@ void check_rig(const StereoRig& rig) {
   }
 }
 
-void check_image(const GrayImage& image, const PinholeCamera& camera, const char* side) {
-  const auto pixels =
-      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
-  if (image.width == camera.width && image.height == camera.height &&
-      image.pixels.size() == pixels) {
-    return;
-  }
+template <typename Image>
+void check_image(const Image& image, const PinholeCamera& camera, const char* side) {
+  if (fits(image, camera)) return;
   throw std::invalid_argument("FeatureTracker::track: the " + std::string(side) + " image is " +
                               std::to_string(image.width) + " x " + std::to_string(image.height) +
-                              " px with " + std::to_string(image.pixels.size()) +
-                              " bytes, its camera " + std::to_string(camera.width) + " x " +
-                              std::to_string(camera.height));
+                              " px, or not as many as that; its camera has " +
+                              std::to_string(camera.width) + " x " + std::to_string(camera.height));
+}
+
+void check_images(const StereoFrame& frame, const StereoRig& rig) {
+  check_image(frame.left, rig.cameras[0], "left");
+  if (rig.depth_source == DepthSource::kRightImage)
+    check_image(frame.right, rig.cameras[1], "right");
+  else if (frame.depth != nullptr)
+    check_image(*frame.depth, rig.cameras[0], "depth");
 }
 
 std::unique_ptr<const AlignmentPatch> cut_patch(const ImagePyramid& image,
@@ -52,20 +56,19 @@ FeatureTracker::FeatureTracker(const StereoRig& rig, const TrackerConfig& config
       config_(checked(config)),
       focal_px_(rig.cameras[0].fx),
       detector_(config_),
-      matcher_(rig, config_),
+      stereo_matcher_(rig, config_),
       rng_(static_cast<std::mt19937::result_type>(config_.seed)) {
   check_rig(rig);
+  if (rig.depth_source == DepthSource::kDepthImage) depth_matcher_.emplace(rig, config_);
 }
 
 TrackedFrame FeatureTracker::track(const StereoFrame& frame,
                                    const Eigen::Matrix3d& R_previous_current_body) {
-  check_image(frame.left, rig_.cameras[0], "left");
-  check_image(frame.right, rig_.cameras[1], "right");
+  check_images(frame, rig_);
   if (!R_previous_current_body.allFinite()) {
     throw std::invalid_argument("FeatureTracker::track: the rotation is not finite");
   }
   ImagePyramid left(frame.left, config_, true);
-  const ImagePyramid right(frame.right, config_, false);
 
   statistics_ = {};
   const SE3 guess = predicted_motion(frame.stamp, R_previous_current_body);
@@ -84,7 +87,7 @@ TrackedFrame FeatureTracker::track(const StereoFrame& frame,
   statistics_.tracked = static_cast<int>(tracks_.size());
   statistics_.motion_known = motion.has_value();
   add_corners(left);
-  match_right(left, right);
+  match_right(left, frame);
   previous_left_ = std::move(left);
   stamp_ = frame.stamp;
   return output();
@@ -206,16 +209,20 @@ void FeatureTracker::add_corners(const ImagePyramid& left) {
   }
 }
 
-void FeatureTracker::match_right(const ImagePyramid& left, const ImagePyramid& right) {
+void FeatureTracker::match_right(const ImagePyramid& left, const StereoFrame& frame) {
   std::vector<StereoQuery> queries;
   std::vector<Track*> asked;
   for (Track& track : tracks_) {
-    if (!track.inverse_depth && (track.length - 1) % kSearchEvery != 0) continue;
+    const bool search = !depth_matcher_ && !track.inverse_depth;  // costs time
+    if (search && (track.length - 1) % kSearchEvery != 0) continue;
     queries.push_back({track.px, track.left, track.inverse_depth});
     asked.push_back(&track);
   }
-  const auto matches = matcher_.match(left, right, queries);
-  statistics_.stereo = matcher_.statistics();
+  const auto matches =
+      depth_matcher_
+          ? depth_matcher_->match(frame.depth.get(), queries)
+          : stereo_matcher_.match(left, ImagePyramid(frame.right, config_, false), queries);
+  statistics_.stereo = depth_matcher_ ? depth_matcher_->statistics() : stereo_matcher_.statistics();
   const double threshold = config_.max_reprojection_px / focal_px_;
   for (std::size_t i = 0; i < asked.size(); ++i) {
     Track& track = *asked[i];
@@ -224,7 +231,8 @@ void FeatureTracker::match_right(const ImagePyramid& left, const ImagePyramid& r
       continue;
     }
     if (track.inverse_depth) {
-      const Eigen::Vector2d expected = matcher_.right_bearing(track.left, *track.inverse_depth);
+      const Eigen::Vector2d expected =
+          stereo_matcher_.right_bearing(track.left, *track.inverse_depth);
       if ((expected - matches[i]->right).norm() > threshold) {
         // One of two depths is wrong: both go, and the next image searches again.
         track.inverse_depth.reset();

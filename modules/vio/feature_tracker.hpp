@@ -9,6 +9,7 @@
 
 #include "modules/core/camera.hpp"
 #include "modules/core/frame.hpp"
+#include "modules/vio/depth_matcher.hpp"
 #include "modules/vio/feature_detector.hpp"
 #include "modules/vio/image_pyramid.hpp"
 #include "modules/vio/patch_alignment.hpp"
@@ -33,15 +34,16 @@ struct TrackerStatistics {
   bool motion_known = false;  ///< The stereo features agreed on a motion.
 };
 
-/// Tracks corners through a stereo recording. Not thread-safe, starts no threads of its own;
-/// deterministic for equal images and config.
+/// Tracks corners through a stereo or RGB-D recording. Not thread-safe, starts no threads of its
+/// own; deterministic for equal images and config.
 ///
 /// Left image to left image by pyramidal KLT (Bouguet 2001) from a predicted start: the gyroscope's
 /// rotation, the last translation, and the depth of the feature or of its neighbours; then to the
 /// patch that the track began with, so that errors do not add up (AlignmentPatch). Outliers are
 /// rejected against the one motion that the stereo features agree on (estimate_motion()), by
-/// two-point RANSAC where these are too few. Left to right by StereoMatcher from the depth that the
-/// motion predicts. Then corners are added where there are none.
+/// two-point RANSAC where these are too few. Then corners are added where there are none. Left to
+/// right by StereoMatcher from the depth that the motion predicts; with an RGB-D rig the right
+/// observations are those of the virtual camera, by DepthMatcher.
 class FeatureTracker {
  public:
   /// Throws ConfigError, and std::invalid_argument for cameras without size or focal length.
@@ -49,8 +51,8 @@ class FeatureTracker {
 
   /// The features of `frame`, possibly none. `R_previous_current_body` is the rotation of the body
   /// since the frame before, p_previous = R * p_current; identity if it is not known.
-  /// Throws std::invalid_argument if an image does not have the size of its camera or the
-  /// rotation is not finite; the tracker is then unchanged.
+  /// Throws std::invalid_argument if the frame does not fit the rig (see fits()) or the rotation is
+  /// not finite; the tracker is then unchanged.
   [[nodiscard]] TrackedFrame track(const StereoFrame& frame,
                                    const Eigen::Matrix3d& R_previous_current_body);
 
@@ -93,14 +95,15 @@ class FeatureTracker {
              const SE3& T_previous_current) const;
   [[nodiscard]] bool place_on_patch(Track& track, const ImagePyramid& left) const;
   void add_corners(const ImagePyramid& left);
-  void match_right(const ImagePyramid& left, const ImagePyramid& right);
+  void match_right(const ImagePyramid& left, const StereoFrame& frame);
   [[nodiscard]] TrackedFrame output() const;
 
   StereoRig rig_;
   TrackerConfig config_;
   double focal_px_;
   FeatureDetector detector_;
-  StereoMatcher matcher_;
+  StereoMatcher stereo_matcher_;
+  std::optional<DepthMatcher> depth_matcher_;  // With an RGB-D rig.
   std::mt19937 rng_;
   std::uint64_t next_id_ = 0;
   std::vector<Track> tracks_;  // Of the last image, ascending ids.

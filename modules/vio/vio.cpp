@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "modules/core/depth_lookup.hpp"
 #include "modules/core/lie.hpp"
 
 namespace km {
@@ -26,13 +27,8 @@ VioResult Vio::process(const SensorPacket& packet) {
   const int refused = take_samples(packet);
   if (refused > 0) result.problem = VioProblem::kBadSamples;
   statistics_.refused_samples += refused;
-  const auto fits = [](const GrayImage& image, const PinholeCamera& camera) {
-    return image.width == camera.width && image.height == camera.height &&
-           image.pixels.size() == static_cast<std::size_t>(image.width * image.height);
-  };
   const Frame& frame = packet.frame;
-  const bool usable = frame != nullptr && fits(frame->left, rig_.stereo.cameras[0]) &&
-                      fits(frame->right, rig_.stereo.cameras[1]);
+  const bool usable = frame != nullptr && fits(*frame, rig_.stereo);
   if (!usable || (last_image_ && frame->stamp <= *last_image_)) {
     result.problem = usable ? VioProblem::kUnorderedImage : VioProblem::kNoImage;
     ++statistics_.refused_images;
@@ -119,7 +115,7 @@ void Vio::try_start(VioResult& result) {
       running_ = true;
       hand_on_first(states->front(), held_.front().frame, result);
       for (std::size_t k = 1; k < held_.size(); ++k)
-        if (smoother_.window().frames[k].keyframe && due((*states)[k]))
+        if (smoother_.window().frames[k].keyframe && due((*states)[k], *held_[k].frame))
           hand_on((*states)[k], held_[k].frame, result);
       held_.clear();
       return;
@@ -160,7 +156,7 @@ void Vio::advance(const Held& held, VioResult& result) {
   }
   result.states.push_back(result.smoother->state);
   const bool last_chance = last_keyframe_ && smoother_.leaving(last_keyframe_->stamp);
-  if (result.smoother->keyframe && (last_chance || due(result.smoother->state)))
+  if (result.smoother->keyframe && (last_chance || due(result.smoother->state, *held.frame)))
     hand_on(result.smoother->state, held.frame, result);
 }
 

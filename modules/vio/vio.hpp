@@ -17,7 +17,7 @@ namespace km {
 /// What kept a packet from being used in full. The first that applies.
 enum class VioProblem {
   kNone,
-  kNoImage,         ///< The packet holds none, or of the wrong size: inertial samples are kept.
+  kNoImage,         ///< The packet has none that fit the rig: inertial samples are kept.
   kUnorderedImage,  ///< Not later than the image before: dropped.
   kBadSamples,      ///< Some inertial samples are not finite or not in order: those are dropped.
   kInertialGap,     ///< Too long without inertial samples: a new start from the last pose.
@@ -47,7 +47,7 @@ struct VioResult {
   std::optional<SmootherUpdate> smoother;   ///< Not before the start.
 };
 
-/// Stereo-inertial odometry: one call per image, a pose for every image.
+/// Stereo-inertial or RGB-D-inertial odometry: one call per image, a pose for every image.
 ///
 /// Images of the first VioConfig::start_s are held back; then all their poses come at once, and
 /// from there one pose per image. Bad input is refused and reported, an estimate that diverges
@@ -79,7 +79,7 @@ class Vio {
   void continue_from_last_pose(std::vector<OdometryState>& states) const;
   void hand_on_first(const OdometryState& state, const Frame& frame, VioResult& result);
   void hand_on(const OdometryState& state, const Frame& frame, VioResult& result);
-  [[nodiscard]] bool due(const OdometryState& state) const;
+  [[nodiscard]] bool due(const OdometryState& state, const StereoFrame& frame) const;
 
   RobotId robot_;
   SensorRig rig_;

@@ -19,7 +19,9 @@ Matrix6 restart_covariance() {
 
 }  // namespace
 
-bool Vio::due(const OdometryState& state) const {
+bool Vio::due(const OdometryState& state, const StereoFrame& frame) const {
+  // Without depth no point of a keyframe is located: a frame that has one will come.
+  if (rig_.stereo.depth_source == DepthSource::kDepthImage && frame.depth == nullptr) return false;
   const double dt = seconds_between(last_keyframe_->stamp, state.stamp);
   if (dt < config_.output_interval_s - 1e-3) return false;
   if (dt >= config_.output_rest_interval_s) return true;

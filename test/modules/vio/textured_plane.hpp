@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "modules/core/camera.hpp"
@@ -67,6 +69,25 @@ struct TexturedPlane {
   [[nodiscard]] StereoFrame render(const StereoRig& rig, const SE3& T_world_body,
                                    Stamp stamp) const {
     return {stamp, render(rig.cameras[0], T_world_body), render(rig.cameras[1], T_world_body)};
+  }
+
+  /// What an RGB-D camera sees: `rig` as rgbd_rig() makes it.
+  [[nodiscard]] StereoFrame render_rgbd(const StereoRig& rig, const SE3& T_world_body,
+                                        Stamp stamp) const {
+    const PinholeCamera& camera = rig.cameras[0];
+    const SE3 T_world_cam = T_world_body * camera.T_body_cam;
+    DepthImage depth{camera.width, camera.height, {}};
+    for (int y = 0; y < camera.height; ++y) {
+      for (int x = 0; x < camera.width; ++x) {
+        const auto bearing = camera.unproject(Eigen::Vector2d(x, y));
+        const double z_m =
+            bearing ? (T_world_cam.inverse() * meet(T_world_cam, *bearing)).z() : 0.0;
+        depth.millimetres.push_back(static_cast<std::uint16_t>(std::lround(1e3 * z_m)));
+      }
+    }
+    StereoFrame frame{stamp, render(camera, T_world_body), {}};
+    frame.depth = std::make_shared<const DepthImage>(std::move(depth));
+    return frame;
   }
 
   /// Where the ray of `bearing` meets the plane, in the world.
