@@ -1,0 +1,119 @@
+#include "modules/simulation/world/texture.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace km {
+namespace {
+
+const Eigen::Vector3f kRec709{0.2126F, 0.7152F, 0.0722F};
+
+void require_valid(int size, const std::vector<Eigen::Vector3f>& rgb, int max_size) {
+  if (size < 1 || size > max_size || !std::has_single_bit(static_cast<unsigned>(size))) {
+    throw std::invalid_argument("texture: size " + std::to_string(size) +
+                                " is no power of two from 1 to " + std::to_string(max_size));
+  }
+  const auto wanted = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
+  if (rgb.size() != wanted) {
+    throw std::invalid_argument("texture: " + std::to_string(rgb.size()) + " texels given, " +
+                                std::to_string(wanted) + " needed");
+  }
+  for (const Eigen::Vector3f& texel : rgb) {
+    if (!(texel.minCoeff() >= 0.0F && texel.maxCoeff() <= 1.0F)) {
+      throw std::invalid_argument("texture: an albedo of (" + std::to_string(texel.x()) + ", " +
+                                  std::to_string(texel.y()) + ", " + std::to_string(texel.z()) +
+                                  ") is outside [0, 1]");
+    }
+  }
+}
+
+/// Each texel of the next level is the mean of four.
+std::vector<Eigen::Vector3f> halved(int n, const std::vector<Eigen::Vector3f>& rgb) {
+  const auto width = static_cast<std::size_t>(n);
+  std::vector<Eigen::Vector3f> half;
+  half.reserve(rgb.size() / 4);
+  for (std::size_t y = 0; y < width; y += 2) {
+    for (std::size_t x = 0; x < width; x += 2) {
+      const std::size_t i = y * width + x;
+      half.push_back(0.25F * (rgb[i] + rgb[i + 1] + rgb[i + width] + rgb[i + width + 1]));
+    }
+  }
+  return half;
+}
+
+std::uint32_t quantized(float value, float step) {
+  return static_cast<std::uint32_t>(std::min(value / step + 0.5F, 255.0F));
+}
+
+}  // namespace
+
+Texture::Texture(int size, const std::vector<Eigen::Vector3f>& rgb) {
+  require_valid(size, rgb, 1 << kMaxLogSize);
+  log_size_ = std::countr_zero(static_cast<unsigned>(size));
+  float brightest = 0.0F;
+  float brightest_channel = 0.0F;
+  for (const Eigen::Vector3f& texel : rgb) {
+    brightest = std::max(brightest, texel.dot(kRec709));
+    brightest_channel = std::max(brightest_channel, texel.maxCoeff());
+  }
+  constexpr float kDarkest = 1e-6F;  // black: any step will do
+  luminance_scale_ = std::max(brightest, kDarkest) / 255.0F;
+  color_scale_ = std::max(brightest_channel, kDarkest) / 255.0F;
+
+  luminance_.reserve(rgb.size() * 4 / 3 + 1);
+  color_.reserve(rgb.size() * 4 / 3 + 1);
+  append_level(size, rgb);
+  std::vector<Eigen::Vector3f> level = rgb;
+  for (int n = size; n > 1; n /= 2) {
+    level = halved(n, level);
+    append_level(n / 2, level);
+  }
+}
+
+void Texture::append_level(int n, const std::vector<Eigen::Vector3f>& rgb) {
+  const auto level = log_size_ - std::countr_zero(static_cast<unsigned>(n));
+  level_begin_[static_cast<std::size_t>(level)] = static_cast<std::uint32_t>(color_.size());
+  std::vector<std::uint32_t> grey(rgb.size());
+  for (std::size_t i = 0; i < rgb.size(); ++i) {
+    grey[i] = quantized(rgb[i].dot(kRec709), luminance_scale_);
+    color_.push_back(quantized(rgb[i].x(), color_scale_) |
+                     quantized(rgb[i].y(), color_scale_) << 8 |
+                     quantized(rgb[i].z(), color_scale_) << 16);
+  }
+  const auto width = static_cast<std::size_t>(n);
+  for (std::size_t y = 0; y < width; ++y) {
+    const std::size_t row = y * width;
+    const std::size_t next_row = (y + 1) % width * width;
+    for (std::size_t x = 0; x < width; ++x) {
+      const std::size_t next = (x + 1) % width;
+      luminance_.push_back(grey[row + x] | grey[row + next] << 8 | grey[next_row + x] << 16 |
+                           grey[next_row + next] << 24);
+    }
+  }
+}
+
+Eigen::Vector3f Texture::bilinear_color(int level, const Eigen::Vector2f& uv) const {
+  const Cell cell = cell_of(level, uv);
+  const auto texel = [this](std::uint32_t index) {
+    const std::uint32_t packed = color_[index];
+    return Eigen::Vector3f(static_cast<float>(packed & 0xFFU),
+                           static_cast<float>((packed >> 8) & 0xFFU),
+                           static_cast<float>((packed >> 16) & 0xFFU));
+  };
+  const Eigen::Vector3f low =
+      (1.0F - cell.x) * texel(cell.row0 + cell.column0) + cell.x * texel(cell.row0 + cell.column1);
+  const Eigen::Vector3f high =
+      (1.0F - cell.x) * texel(cell.row1 + cell.column0) + cell.x * texel(cell.row1 + cell.column1);
+  return (1.0F - cell.y) * low + cell.y * high;
+}
+
+Eigen::Vector3f Texture::color(const Eigen::Vector2f& uv, float footprint) const {
+  const LevelBlend blend = blend_of(footprint);
+  const Eigen::Vector3f fine = bilinear_color(blend.fine, uv);
+  const Eigen::Vector3f coarse = bilinear_color(blend.coarse, uv);
+  return color_scale_ * ((1.0F - blend.share) * fine + blend.share * coarse);
+}
+
+}  // namespace km
