@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/simulate/robot_scenario.hpp"
+#include "modules/simulation/dataset/dataset_record.hpp"
+
+namespace km {
+
+/// team.yaml: the robots and their true poses, for kimera_multi_team.
+[[nodiscard]] std::string team_yaml(const SimulationOptions& options);
+
+/// README.md: how the folder was made and what is in it.
+[[nodiscard]] std::string dataset_readme(const SimulationOptions& options,
+                                         const DatasetRecord& record, const World& world,
+                                         const std::vector<RobotScenario>& robots);
+
+}  // namespace km

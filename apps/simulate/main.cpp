@@ -1,0 +1,57 @@
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <iostream>
+
+#include "apps/simulate/simulate.hpp"
+
+namespace {
+
+constexpr int kInterrupted = 130;  // as shells count SIGINT
+
+constexpr const char* kAbout =
+    "Makes recordings of robots that move through a built-in world: EuRoC/ASL folders with "
+    "images,\n"
+    "inertial data and the truth, and a team file to run on them.\n\n"
+    "Worlds: city and camp have roads for vehicles, vicon_room is for flying robots. The same "
+    "seed\n"
+    "makes the same bytes, whatever the number of threads. Ctrl-C stops in order; the same "
+    "command\n"
+    "goes on where it was stopped.\n\n"
+    "Examples:\n"
+    "  kimera_multi_simulate --world city --robots 3 --duration 60 --output city\n"
+    "  kimera_multi_simulate --world camp --rig rgbd --labels --depth-rate 5 --output camp\n"
+    "  kimera_multi_simulate --world vicon_room --resolution 376x240 --output small\n"
+    "  kimera_multi_team --config small/team.yaml --output results/small\n\n"
+    "With --trajectory and --imu the robots move as recorded flights did, and keep the recorded\n"
+    "inertial data; only the images are rendered:\n"
+    "  kimera_multi_simulate --world vicon_room --trajectory V1_02.csv V1_03.csv \\\n"
+    "      --imu V1_02.imu.csv V1_03.imu.csv --names a b --end 60 --output vicon1\n\n"
+    "Exit code: 0 if the recordings are complete, 1 for input that cannot be used or a disk that\n"
+    "cannot be written, 130 if it was stopped.";
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  CLI::App app(kAbout);
+  km::SimulationOptions options;
+  km::define(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 1;
+  }
+  options = km::completed(options);
+  km::SignalWatch signals;
+  km::Progress progress;
+  if (km::simulate(options, signals, progress) == km::SimulationOutcome::kComplete) {
+    std::cout << "Complete: " << options.output.string() << "\nRun a team on it:\n  "
+              << "kimera_multi_team --config " << (options.output / "team.yaml").string()
+              << " --output results" << std::endl;
+    return 0;
+  }
+  std::cout << "Stopped; the same command goes on from here." << std::endl;
+  return kInterrupted;
+} catch (const std::exception& error) {
+  std::cerr << "kimera_multi_simulate: " << error.what() << '\n';
+  return 1;
+}
