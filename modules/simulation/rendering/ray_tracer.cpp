@@ -1,0 +1,93 @@
+#include "modules/simulation/rendering/ray_tracer.hpp"
+
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+namespace km {
+namespace {
+
+struct alignas(64) ValidLanes {
+  std::array<int, kLanes> lanes;
+
+  explicit ValidLanes(LaneMask active) {
+    for (int i = 0; i < kLanes; ++i)
+      lanes[static_cast<std::size_t>(i)] = (active >> i & 1U) != 0U ? -1 : 0;
+  }
+};
+
+RTCIntersectContext context_for(RayKind kind) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  if (kind == RayKind::kCoherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  return context;
+}
+
+void prepare(RTCRay16& rays) {
+  std::memset(rays.time, 0, sizeof(rays.time));
+  std::memset(rays.mask, 0xFF, sizeof(rays.mask));
+  std::memset(rays.flags, 0, sizeof(rays.flags));
+}
+
+void require_no_error(RTCDevice device) {
+  const RTCError error = rtcGetDeviceError(device);
+  if (error != RTC_ERROR_NONE)
+    throw std::runtime_error("Embree failed with error " + std::to_string(error));
+}
+
+// Embree keeps pointers into the mesh: nothing is copied but a padded copy of the vertices, since
+// it reads 16 bytes at the last one.
+void attach_mesh(RTCDevice device, RTCScene scene, const SurfaceMesh& mesh) {
+  if (mesh.triangles.empty()) return;
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  constexpr std::size_t kVertexBytes = 3 * sizeof(float);
+  void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                           kVertexBytes, mesh.vertices.size());
+  void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                          sizeof(mesh.triangles[0]), mesh.triangles.size());
+  if (vertices != nullptr && indices != nullptr) {
+    std::memcpy(vertices, mesh.vertices.data(), kVertexBytes * mesh.vertices.size());
+    std::memcpy(indices, mesh.triangles.data(), sizeof(mesh.triangles[0]) * mesh.triangles.size());
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene, geometry);
+  }
+  rtcReleaseGeometry(geometry);
+}
+
+}  // namespace
+
+RayTracer::RayTracer(const SurfaceMesh& mesh)
+    // One thread builds: the tree is then the same every time.
+    : device_(rtcNewDevice("threads=1,set_affinity=0")) {
+  require_no_error(device_.get());
+  scene_.reset(rtcNewScene(device_.get()));
+  // Without it, rays slip through between triangles that share an edge.
+  rtcSetSceneFlags(scene_.get(), RTC_SCENE_FLAG_ROBUST);
+  attach_mesh(device_.get(), scene_.get(), mesh);
+  rtcCommitScene(scene_.get());
+  require_no_error(device_.get());
+}
+
+void RayTracer::intersect(LaneMask active, RayKind kind, RayPacket& rays) const {
+  prepare(rays.ray);
+  std::memset(rays.hit.primID, 0xFF, sizeof(rays.hit.primID));
+  std::memset(rays.hit.geomID, 0xFF, sizeof(rays.hit.geomID));
+  if (active == 0) return;
+  const ValidLanes valid(active);
+  RTCIntersectContext context = context_for(kind);
+  rtcIntersect16(valid.lanes.data(), scene_.get(), &context, &rays);
+}
+
+LaneMask RayTracer::occluded(LaneMask active, RayKind kind, RayPacket& rays) const {
+  if (active == 0) return 0;
+  prepare(rays.ray);
+  const ValidLanes valid(active);
+  RTCIntersectContext context = context_for(kind);
+  rtcOccluded16(valid.lanes.data(), scene_.get(), &context, &rays.ray);
+  LaneMask hit = 0;  // Embree marks them with tfar = -infinity
+  for (int i = 0; i < kLanes; ++i) hit |= static_cast<LaneMask>(rays.ray.tfar[i] < 0.0F) << i;
+  return hit & active;
+}
+
+}  // namespace km

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <memory>
+
+#include "modules/simulation/world/surface_mesh.hpp"
+
+namespace km {
+
+/// Rays travel in packets of sixteen, side by side in memory.
+inline constexpr int kLanes = 16;
+using LaneMask = std::uint32_t;  ///< Bit i stands for lane i.
+inline constexpr LaneMask kAllLanes = 0xFFFFU;
+
+struct alignas(64) Lanes : std::array<float, kLanes> {};
+
+/// What rays have in common: neighbours that run side by side are traced faster together.
+enum class RayKind { kCoherent, kIncoherent };
+
+/// Triangle of a ray that hit nothing.
+inline constexpr std::uint32_t kNoTriangle = RTC_INVALID_GEOMETRY_ID;
+
+/// A packet of rays with what they hit. Embree's layout.
+using RayPacket = RTCRayHit16;
+
+/// Embree's acceleration structure over a mesh. Immutable, safe to use from several threads.
+class RayTracer {
+ public:
+  /// `mesh` must outlive the tracer. Throws std::runtime_error with Embree's message.
+  explicit RayTracer(const SurfaceMesh& mesh);
+
+  /// Nearest hits of the rays in `active` between tnear and tfar: primID, u, v, and tfar shrinks to
+  /// the hit. The other lanes get kNoTriangle.
+  void intersect(LaneMask active, RayKind kind, RayPacket& rays) const;
+
+  /// Which of the rays in `active` hit anything.
+  [[nodiscard]] LaneMask occluded(LaneMask active, RayKind kind, RayPacket& rays) const;
+
+ private:
+  struct Release {
+    void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+    void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+  };
+  std::unique_ptr<RTCDeviceTy, Release> device_;
+  std::unique_ptr<RTCSceneTy, Release> scene_;
+};
+
+/// Sets ray `lane` of a packet.
+inline void set_ray(RayPacket& rays, int lane, const Eigen::Vector3f& origin,
+                    const Eigen::Vector3f& direction, float near, float far) {
+  rays.ray.org_x[lane] = origin.x();
+  rays.ray.org_y[lane] = origin.y();
+  rays.ray.org_z[lane] = origin.z();
+  rays.ray.dir_x[lane] = direction.x();
+  rays.ray.dir_y[lane] = direction.y();
+  rays.ray.dir_z[lane] = direction.z();
+  rays.ray.tnear[lane] = near;
+  rays.ray.tfar[lane] = far;
+}
+
+}  // namespace km

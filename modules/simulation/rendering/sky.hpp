@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "modules/simulation/world/world.hpp"
+
+namespace km {
+
+/// Radiance of a sky with clouds, brighter towards the horizon and around the sun, tabulated.
+/// Scaled so that an unshaded roof gets Lighting::ambient from it. Below the horizon it continues
+/// as the horizon. Immutable.
+class Sky {
+ public:
+  explicit Sky(const Lighting& lighting);
+
+  /// `direction` need not have unit length.
+  [[nodiscard]] float luminance(const Eigen::Vector3f& direction) const;
+  [[nodiscard]] Eigen::Vector3f color(const Eigen::Vector3f& direction) const;
+
+  /// Mean radiance at the horizon: what distance fades to.
+  [[nodiscard]] float haze_luminance() const { return haze_luminance_; }
+  [[nodiscard]] const Eigen::Vector3f& haze_color() const { return haze_color_; }
+
+ private:
+  /// Position in the table: the upper hemisphere in stereographic projection.
+  struct Cell {
+    std::size_t index = 0;
+    float x = 0.0F, y = 0.0F;
+  };
+  [[nodiscard]] static Cell cell_of(const Eigen::Vector3f& direction);
+  void measure_and_scale(float ambient);
+
+  std::vector<float> luminance_;
+  std::vector<Eigen::Vector3f> color_;
+  float haze_luminance_ = 0.0F;
+  Eigen::Vector3f haze_color_ = Eigen::Vector3f::Zero();
+};
+
+}  // namespace km
