@@ -6,6 +6,7 @@
 #include <random>
 
 #include "apps/program_folder.hpp"
+#include "apps/team/finished_run.hpp"
 #include "apps/team/run_team.hpp"
 #include "apps/team/team_report.hpp"
 #include "apps/team/team_results.hpp"
@@ -29,7 +30,8 @@ constexpr const char* kAbout =
     "Ctrl-C asks the robots to end in order and prints what there is; a second one ends them.\n\n"
     "Examples:\n"
     "  kimera_multi_team --config config/teams/euroc_two_robots.yaml --dataset MH_01_easy\n"
-    "  kimera_multi_team --config config/teams/tunnels.yaml --dataset tunnels_8robots --rate max";
+    "  kimera_multi_team --config config/teams/tunnels.yaml --dataset tunnels_8robots --rate max\n"
+    "  kimera_multi_team --config team.yaml --output results --report   # robots ran elsewhere";
 
 struct TeamOptions {
   fs::path config, dataset, output, truth, json, robot_binary;
@@ -37,6 +39,7 @@ struct TeamOptions {
   std::optional<std::uint32_t> domain;
   std::optional<double> time_limit_s;
   std::vector<std::string> arguments;
+  bool report = false;
 };
 
 void define(CLI::App& app, TeamOptions& options) {
@@ -53,6 +56,8 @@ void define(CLI::App& app, TeamOptions& options) {
   app.add_option("--json", options.json, "Also write the results to this file, as JSON");
   app.add_option("--robot-binary", options.robot_binary, "Program of a robot")
       ->capture_default_str();
+  app.add_flag("--report", options.report,
+               "Start nothing: the tables of a run that has ended, from its folders in --output");
   app.add_option("arguments", options.arguments, "After --: more arguments of every robot");
 }
 
@@ -75,8 +80,7 @@ km::TeamPlan make_plan(const TeamOptions& options) {
   return plan;
 }
 
-int run(const TeamOptions& options) {
-  const km::TeamPlan plan = make_plan(options);
+std::vector<km::RobotRun> run_robots(const TeamOptions& options, const km::TeamPlan& plan) {
   if (access(options.robot_binary.c_str(), X_OK) != 0)
     throw std::runtime_error(options.robot_binary.string() + ": no such program; build it, or " +
                              "give --robot-binary");
@@ -86,10 +90,16 @@ int run(const TeamOptions& options) {
   std::cout << names.size() << " robots in DDS domain " << *plan.domain << ", results in "
             << plan.output.string() << std::endl;
   km::TeamDisplay display(names);
-  const km::TeamResult team =
-      km::collect_results(plan, km::run_team(options.robot_binary, plan, signals, display));
+  std::vector<km::RobotRun> runs = km::run_team(options.robot_binary, plan, signals, display);
+  std::cout << '\n';
+  return runs;
+}
 
-  std::cout << '\n' << to_table(team);
+int run(const TeamOptions& options) {
+  const km::TeamPlan plan = make_plan(options);
+  const km::TeamResult team = km::collect_results(
+      plan, options.report ? km::finished_runs(plan) : run_robots(options, plan));
+  std::cout << to_table(team);
   if (!options.json.empty()) {
     std::ofstream file(options.json);
     km::JsonWriter json(file);
