@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <random>
 #include <vector>
 
 #include "modules/core/frame.hpp"
@@ -42,13 +43,21 @@ class SensorEffects {
   [[nodiscard]] ColorImage color(const RenderedView& view, const Shot& shot) const;
 
  private:
-  /// Image motion [px/s] of each pixel is affine in its inverse depth: rotation + inverse_depth *
-  /// translation.
+  static constexpr int kResponseSteps = 1024;
+
+  void require_complete(const RenderedView& view, std::size_t values) const;
+  template <typename Value>
+  [[nodiscard]] std::vector<Value> smeared(const std::vector<Value>& image,
+                                           const RenderedView& view, const Shot& shot) const;
+  [[nodiscard]] std::uint8_t quantized(float signal) const;
+  void expose(const float* linear, std::size_t stride, const Shot& shot, std::mt19937& random,
+              std::uint8_t* levels) const;
+
   SensorEffectsConfig config_;
-  PinholeCamera camera_;
-  std::vector<Eigen::Vector2f> bearings_;  ///< Of the pixels' centres, on z = 1.
-  std::vector<float> relative_light_;      ///< 1 at the centre, less in the corners.
-  std::vector<float> noise_tile_;          ///< Unit variance, correlated, kNoiseTile^2, repeats.
+  PixelRays rays_;
+  std::vector<float> relative_light_;  ///< 1 at the centre, less in the corners.
+  std::vector<float> noise_tile_;      ///< Unit variance, correlated, square; it repeats.
+  std::vector<float> response_;        ///< Grey level over the square root of the signal.
 };
 
 }  // namespace km

@@ -8,8 +8,8 @@ namespace km {
 struct SensorEffectsConfig {
   static constexpr const char* kSection = "sensor";
 
-  /// Share of the light that the corners of the image lose; it grows as cos^4 does, with the fourth
-  /// power near the edge.
+  /// Share of the light that the corners of the image lose; towards them it falls like the fourth
+  /// power of a cosine.
   double vignetting = 0.2;
 
   /// Standard deviation of the noise in the dark, in grey levels.
