@@ -26,7 +26,9 @@ RobotInput open_input(const RobotOptions& options, const RobotConfig& config) {
         options.dataset,
         EurocOptions{.from_s = options.from_s.value_or(0.0),
                      .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
-                     .stereo_tolerance_s = config.sensors.stereo_tolerance_s});
+                     .stereo_tolerance_s = config.sensors.stereo_tolerance_s,
+                     .depth = config.sensors.depth,
+                     .labels = config.sensors.labels});
   RecordedGraph graph = read_recorded_graph(options.graph);
   if (graph.robot != options.robot)
     throw std::invalid_argument(options.graph.string() + " holds robot " +

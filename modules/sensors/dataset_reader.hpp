@@ -30,7 +30,7 @@ class DatasetReader {
   /// Faults met so far.
   [[nodiscard]] virtual const ReaderReport& report() const = 0;
 
-  /// Stereo pairs that next() can give at most.
+  /// Frames that next() can give at most.
   [[nodiscard]] virtual std::size_t pair_count() const = 0;
 };
 

@@ -18,8 +18,11 @@ std::filesystem::path find_mav0(const std::filesystem::path& folder) {
   if (!std::filesystem::is_directory(folder))
     throw DatasetError(folder.string() + ": no such folder");
   if (std::filesystem::is_directory(folder / "mav0")) return folder / "mav0";
+  const auto has = [&folder](const char* sensor) {
+    return std::filesystem::is_directory(folder / sensor);
+  };
   for (const char* sensor : {"cam0", "cam1", "imu0"})
-    if (!std::filesystem::is_directory(folder / sensor))
+    if (!has(sensor) && !(sensor == std::string_view("cam1") && has("depth0")))
       throw DatasetError(folder.string() + ": neither a folder mav0 nor " + sensor +
                          " in it: not a EuRoC recording");
   return folder;
@@ -49,23 +52,24 @@ bool is_before(const ImuSample& sample, Stamp stamp) {
   return sample.stamp < stamp;
 }
 
-ReaderFault fault_of(ImageStatus status) {
-  if (status == ImageStatus::kMissing) return ReaderFault::kMissingImage;
-  return status == ImageStatus::kWrongSize ? ReaderFault::kWrongImageSize
-                                           : ReaderFault::kUnreadableImage;
+bool is_rgbd(const SensorRig& rig) {
+  return rig.stereo.depth_source == DepthSource::kDepthImage;
 }
 
 }  // namespace
 
 EurocReader::EurocReader(const std::filesystem::path& folder, const EurocOptions& options)
     : mav0_(find_mav0(folder)),
-      rig_(read_euroc_rig(mav0_)),
-      pairs_(list_euroc_pairs(mav0_, options.stereo_tolerance_s, report_)),
+      rig_(read_euroc_rig(mav0_, options.depth)),
+      side_images_(mav0_, rig_, options.labels),
+      pairs_(is_rgbd(rig_) ? list_euroc_lefts(mav0_, report_)
+                           : list_euroc_pairs(mav0_, options.stereo_tolerance_s, report_)),
       imu_(read_imu(mav0_ / "imu0" / "data.csv", report_)),
       recording_start_(pairs_.front().stamp) {
   if (!(options.from_s < options.to_s))
     throw std::invalid_argument("EurocReader: the window from " + std::to_string(options.from_s) +
                                 " s to " + std::to_string(options.to_s) + " s is empty");
+  side_images_.list(options.stereo_tolerance_s, pairs_, report_);
   select(options);
 }
 
@@ -113,11 +117,14 @@ std::optional<SensorPacket> EurocReader::next() {
     const StereoPairFile& pair = pairs_[next_pair_++];
     if (!has_imu(pair)) continue;
     StereoPairResult loaded = load_stereo_pair(pair, rig_.stereo);
-    if (loaded.status == ImageStatus::kOk)
-      return SensorPacket{std::make_shared<const StereoFrame>(std::move(loaded.frame)),
-                          imu_until(pair.stamp)};
-    report_.add(fault_of(loaded.status),
-                at_line(mav0_ / "cam0" / "data.csv", pair.line) + ": " + loaded.problem);
+    if (loaded.status != ImageStatus::kOk) {
+      report_.add(fault_of(loaded.status),
+                  at_line(mav0_ / "cam0" / "data.csv", pair.line) + ": " + loaded.problem);
+      continue;
+    }
+    side_images_.load(pair, loaded.frame, report_);
+    return SensorPacket{std::make_shared<const StereoFrame>(std::move(loaded.frame)),
+                        imu_until(pair.stamp)};
   }
   return std::nullopt;
 }

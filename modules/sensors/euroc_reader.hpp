@@ -6,19 +6,24 @@
 #include <vector>
 
 #include "modules/sensors/dataset_reader.hpp"
+#include "modules/sensors/side_images.hpp"
 #include "modules/sensors/stereo_pairs.hpp"
 
 namespace km {
 
-/// Part of a recording, in seconds since the first stereo pair of the WHOLE recording.
+/// Part of a recording, in seconds since the first frame of the WHOLE recording, and what is read.
 struct EurocOptions {
   double from_s = 0.0;                                    ///< First instant that belongs to it.
   double to_s = std::numeric_limits<double>::infinity();  ///< First that does not.
-  double stereo_tolerance_s = 1e-3;                       ///< Left to right stamp, at most.
+  double stereo_tolerance_s = 1e-3;  ///< Left to right (depth, label) stamp, at most.
+  bool depth = false;                ///< Depth images also where a right camera gives depth.
+  bool labels = false;               ///< Label images.
 };
 
 /// Reads a EuRoC/ASL folder: mav0/{cam0,cam1,imu0} with data.csv and sensor.yaml, images in any
-/// format OpenCV decodes, as the csv names them.
+/// format OpenCV decodes, as the csv names them. Without cam1 the rig is RGB-D: depth0 in its
+/// place, 16-bit images of one channel. Labels: label0, 8-bit ids, or colours of label_palette.csv
+/// beside it. Both may come at a lower rate than images: a frame then has none.
 ///
 /// The first packet starts up to kLeadIn_s before its frame, also where that lies before `from_s`:
 /// odometry can begin with what the inertial sensor felt before the first image.
@@ -27,8 +32,9 @@ class EurocReader final : public DatasetReader {
   static constexpr double kLeadIn_s = 1.0;
 
   /// `folder` holds `mav0` or is it. Reads the calibration and the lists, no image. Throws
-  /// DatasetError for what is missing or unusable (see read_euroc_rig()) and for a window without
-  /// a stereo pair; std::invalid_argument for a window that is empty or not a number.
+  /// DatasetError for what is missing or unusable (see read_euroc_rig()), depth and labels asked
+  /// for included, and for a window without a frame; std::invalid_argument for a window that is
+  /// empty or not a number.
   explicit EurocReader(const std::filesystem::path& folder, const EurocOptions& options = {});
 
   [[nodiscard]] const SensorRig& rig() const override { return rig_; }
@@ -36,10 +42,13 @@ class EurocReader final : public DatasetReader {
   [[nodiscard]] const ReaderReport& report() const override { return report_; }
   [[nodiscard]] std::size_t pair_count() const override { return pairs_.size(); }
 
-  /// First stereo pair of the whole recording: the origin of the window's times.
+  /// Of the labels; empty if none are read, or for ids without one.
+  [[nodiscard]] const LabelPalette& label_palette() const { return side_images_.palette(); }
+
+  /// First frame of the whole recording: the origin of the window's times.
   [[nodiscard]] Stamp recording_start() const { return recording_start_; }
 
-  /// First and last stereo pair of the window.
+  /// First and last frame of the window.
   [[nodiscard]] Stamp first_stamp() const { return pairs_.front().stamp; }
   [[nodiscard]] Stamp last_stamp() const { return pairs_.back().stamp; }
 
@@ -51,6 +60,7 @@ class EurocReader final : public DatasetReader {
   std::filesystem::path mav0_;
   ReaderReport report_;
   SensorRig rig_;
+  SideImages side_images_;
   std::vector<StereoPairFile> pairs_;  // of the window
   std::vector<ImuSample> imu_;         // of the recording
   Stamp recording_start_ = 0;

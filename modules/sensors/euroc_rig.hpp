@@ -6,12 +6,21 @@
 
 namespace km {
 
-/// The rig described by cam0, cam1 and imu0 `sensor.yaml` below `mav0` (EuRoC/ASL format). The body
-/// frame is the IMU's: T_body_cam = T_BS(imu0)^-1 T_BS(cam). Rotations that are orthonormal to 1e-3
-/// are replaced by the nearest rotation. Throws DatasetError, naming file and line, for a missing
-/// file or key, a T_BS that is not a rigid transform (with how far off it is), a camera or
-/// distortion model other than pinhole with four radial-tangential coefficients, and numbers
-/// without sense.
-[[nodiscard]] SensorRig read_euroc_rig(const std::filesystem::path& mav0);
+/// The rig described by the `sensor.yaml` of cam0, cam1 and imu0 below `mav0` (EuRoC/ASL format).
+/// Without a folder cam1 it is an RGB-D rig: depth0 in place of the right camera. The body frame is
+/// the IMU's: T_body_cam = T_BS(imu0)^-1 T_BS(cam). Rotations that are orthonormal to 1e-3 are
+/// replaced by the nearest rotation. Throws DatasetError, naming file and line, for a missing file
+/// or key, a T_BS that is not a rigid transform (with how far off it is), a camera or distortion
+/// model other than pinhole with four radial-tangential coefficients, and numbers without sense.
+///
+/// depth0/sensor.yaml: T_BS, resolution, intrinsics and, where given, distortion are those of cam0,
+/// else it is refused, as depth must be aligned with the left image. Optional keys: `depth_scale`
+/// (of a stored unit [m], default 0.001), `min_range_m` (0), `max_range_m` (65) and `baseline_m`,
+/// the virtual baseline (see rgbd_rig(); default 0.1). SensorRig::depth is set for an RGB-D rig
+/// and, `with_depth`, for stereo cameras with depth0 beside them.
+[[nodiscard]] SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth = false);
+
+/// `depth_scale` of depth0: metres of one unit stored in its images.
+[[nodiscard]] double read_depth_scale(const std::filesystem::path& mav0);
 
 }  // namespace km

@@ -1,58 +1,29 @@
 #include "modules/sensors/image_file.hpp"
 
-#include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <opencv2/imgcodecs.hpp>
-#include <string_view>
-#include <vector>
+#include <utility>
+
+#include "modules/sensors/decoded_image.hpp"
 
 namespace km {
-namespace {
 
-std::vector<char> read_bytes(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::error_code ignored;  // a size that cannot be had reads as an empty file, which is refused
-  const auto size = std::filesystem::file_size(file, ignored);
-  std::vector<char> bytes(ignored ? 0 : size);
-  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(stream.gcount()));
-  return bytes;
+ReaderFault fault_of(ImageStatus status) {
+  switch (status) {
+    case ImageStatus::kMissing:
+      return ReaderFault::kMissingImage;
+    case ImageStatus::kWrongSize:
+      return ReaderFault::kWrongImageSize;
+    case ImageStatus::kWrongFormat:
+      return ReaderFault::kWrongImageFormat;
+    default:
+      return ReaderFault::kUnreadableImage;
+  }
 }
-
-// The marker must lie near the end: embedded thumbnails have one of their own.
-bool is_truncated(std::string_view bytes) {
-  const std::string_view tail =
-      bytes.substr(bytes.size() - std::min<std::size_t>(64, bytes.size()));
-  if (bytes.starts_with("\xFF\xD8")) return tail.find("\xFF\xD9") == tail.npos;
-  if (bytes.starts_with("\x89PNG")) return tail.find("IEND") == tail.npos;
-  return false;
-}
-
-ImageResult failure(ImageStatus status, const std::filesystem::path& file, const std::string& why) {
-  return {status, file.string() + ": " + why, {}};
-}
-
-}  // namespace
 
 ImageResult load_gray_image(const std::filesystem::path& file, int width, int height) {
-  if (!std::filesystem::is_regular_file(file))
-    return failure(ImageStatus::kMissing, file, "no such image");
-  std::vector<char> bytes = read_bytes(file);
-  if (bytes.empty()) return failure(ImageStatus::kUnreadable, file, "empty or unreadable file");
-  if (is_truncated({bytes.data(), bytes.size()}))
-    return failure(ImageStatus::kUnreadable, file, "truncated image");
-
-  const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8UC1, bytes.data());
-  const cv::Mat decoded =
-      cv::imdecode(encoded, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
-  if (decoded.empty())
-    return failure(ImageStatus::kUnreadable, file, "not an image that can be decoded");
-  if (decoded.cols != width || decoded.rows != height)
-    return failure(ImageStatus::kWrongSize, file,
-                   std::to_string(decoded.cols) + 'x' + std::to_string(decoded.rows) +
-                       " px, the calibration says " + std::to_string(width) + 'x' +
-                       std::to_string(height));
+  LoadedImage<cv::Mat> loaded = decode_image(file, cv::IMREAD_GRAYSCALE, {width, height});
+  if (loaded.status != ImageStatus::kOk) return failure_of<GrayImage>(std::move(loaded));
+  const cv::Mat& decoded = loaded.image;
   return {ImageStatus::kOk, {}, {width, height, {decoded.datastart, decoded.dataend}}};
 }
 

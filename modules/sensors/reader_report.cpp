@@ -26,6 +26,14 @@ const char* to_string(ReaderFault fault) {
       return "gaps between inertial samples";
     case ReaderFault::kPairWithoutImu:
       return "stereo pairs without inertial samples";
+    case ReaderFault::kWrongImageFormat:
+      return "images of the wrong format";
+    case ReaderFault::kImageWithoutFrame:
+      return "depth or label images without a frame";
+    case ReaderFault::kUnknownColor:
+      return "label images with colours that are not in the palette";
+    case ReaderFault::kWithoutPose:
+      return "frames without a pose";
   }
   return "unknown faults";
 }

@@ -7,19 +7,24 @@
 namespace km {
 
 /// What can be wrong with a piece of a recording without making the rest useless. Each is a skip of
-/// the row, sample or stereo pair concerned, except kImuGap, after which reading goes on as it is.
+/// the row, sample or frame concerned, with two exceptions: a depth or label image that cannot be
+/// used leaves its frame without one, and after kImuGap and kUnknownColor reading goes on.
 enum class ReaderFault {
-  kMalformedRow,      ///< Too few fields, or a stamp or value that is not a number.
-  kNotFinite,         ///< NaN or infinity in an inertial sample.
-  kUnorderedStamp,    ///< Earlier than the row before.
-  kRepeatedStamp,     ///< Equal to the row before.
-  kLeftWithoutRight,  ///< No right image within the tolerance.
-  kRightWithoutLeft,  ///< No left image within the tolerance.
-  kMissingImage,      ///< Listed, but not on disk.
-  kUnreadableImage,   ///< Truncated, corrupt or of an unknown format.
-  kWrongImageSize,    ///< Not the resolution of the calibration.
-  kImuGap,            ///< Inertial samples further apart than 2.5 periods.
-  kPairWithoutImu,    ///< Outside the time that inertial samples cover.
+  kMalformedRow,       ///< Too few fields, or a stamp or value that is not a number.
+  kNotFinite,          ///< NaN or infinity in an inertial sample.
+  kUnorderedStamp,     ///< Earlier than the row before.
+  kRepeatedStamp,      ///< Equal to the row before.
+  kLeftWithoutRight,   ///< No right image within the tolerance.
+  kRightWithoutLeft,   ///< No left image within the tolerance.
+  kMissingImage,       ///< Listed, but not on disk.
+  kUnreadableImage,    ///< Truncated, corrupt or of an unknown format.
+  kWrongImageSize,     ///< Not the resolution of the calibration.
+  kImuGap,             ///< Inertial samples further apart than 2.5 periods.
+  kPairWithoutImu,     ///< Outside the time that inertial samples cover.
+  kWrongImageFormat,   ///< Not the bits or channels of its kind: depth, labels.
+  kImageWithoutFrame,  ///< A depth or label image that belongs to no frame.
+  kUnknownColor,       ///< A label image with colours that are not in the palette.
+  kWithoutPose,        ///< A frame without a given pose.
 };
 
 /// A short plural for tables and log lines: "malformed rows".

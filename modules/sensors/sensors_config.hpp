@@ -18,12 +18,20 @@ struct SensorsConfig {
   /// would overwrite it [s]. Its inertial samples stay. Larger: slow consumers lose less, later.
   double max_lag_s = 0.5;
 
+  /// Depth images are read also where a right camera gives depth. An RGB-D rig always reads them.
+  bool depth = false;
+
+  /// Label images are read.
+  bool labels = false;
+
   void visit_fields(auto& visitor) {
     visitor.field("stereo_tolerance_s", stereo_tolerance_s, {0.0, 0.1},
                   "[s] largest difference between the stamps of left and right");
     visitor.field("read_ahead", read_ahead, {1, 1000}, "stereo pairs decoded ahead");
     visitor.field("max_lag_s", max_lag_s, {0.0, 1e6},
                   "[s] at a real-time rate, pairs later than this are skipped");
+    visitor.field("depth", depth, "read depth images also beside a right camera");
+    visitor.field("labels", labels, "read label images");
   }
 };
 

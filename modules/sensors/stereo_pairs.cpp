@@ -48,7 +48,7 @@ std::vector<StereoPairFile> list_euroc_pairs(const std::filesystem::path& mav0, 
     } else if (no_left || offset_s < -tolerance_s) {
       lonely(ReaderFault::kRightWithoutLeft, "cam1", *right++);
     } else {
-      pairs.push_back({left->stamp, left->file, right->file, left->line});
+      pairs.push_back({left->stamp, left->file, right->file, left->line, {}, {}});
       ++left, ++right;
     }
   }
@@ -58,12 +58,35 @@ std::vector<StereoPairFile> list_euroc_pairs(const std::filesystem::path& mav0, 
   return pairs;
 }
 
+std::vector<StereoPairFile> list_euroc_lefts(const std::filesystem::path& mav0,
+                                             ReaderReport& report) {
+  std::vector<StereoPairFile> frames;
+  for (ListedImage& left : list_images(mav0 / "cam0", report))
+    frames.push_back({left.stamp, std::move(left.file), {}, left.line, {}, {}});
+  return frames;
+}
+
+void list_beside(const std::filesystem::path& folder, std::filesystem::path StereoPairFile::*member,
+                 double tolerance_s, std::vector<StereoPairFile>& frames, ReaderReport& report) {
+  auto frame = frames.begin();
+  for (ListedImage& image : list_images(folder, report)) {
+    while (frame != frames.end() && seconds_between(frame->stamp, image.stamp) > tolerance_s)
+      ++frame;
+    if (frame == frames.end() || seconds_between(frame->stamp, image.stamp) < -tolerance_s) {
+      report.add(ReaderFault::kImageWithoutFrame,
+                 at_line(folder / "data.csv", image.line) + ": " + image.file.filename().string());
+      continue;
+    }
+    (*frame++).*member = std::move(image.file);
+  }
+}
+
 std::vector<StereoPairFile> list_keyframe_pairs(const std::filesystem::path& folder,
                                                 ReaderReport& report) {
   std::vector<StereoPairFile> pairs;
   const std::filesystem::path list = folder / "pairs.csv";
   read_ordered_rows(list, 3, report, [&](Stamp stamp, const TextRow& row) {
-    pairs.push_back({stamp, folder / row.fields[1], folder / row.fields[2], row.line});
+    pairs.push_back({stamp, folder / row.fields[1], folder / row.fields[2], row.line, {}, {}});
     return std::string();
   });
   if (pairs.empty()) throw DatasetError(list.string() + ": lists no stereo pair");
@@ -75,7 +98,8 @@ StereoPairResult load_stereo_pair(const StereoPairFile& files, const StereoRig& 
   result.frame.stamp = files.stamp;
   const std::pair<const std::filesystem::path&, GrayImage&> images[] = {
       {files.left, result.frame.left}, {files.right, result.frame.right}};
-  for (std::size_t i = 0; i < 2; ++i) {
+  const std::size_t count = rig.depth_source == DepthSource::kRightImage ? 2 : 1;
+  for (std::size_t i = 0; i < count; ++i) {
     const PinholeCamera& camera = rig.cameras[i];
     ImageResult loaded = load_gray_image(images[i].first, camera.width, camera.height);
     if (loaded.status != ImageStatus::kOk) return {loaded.status, std::move(loaded.problem), {}};

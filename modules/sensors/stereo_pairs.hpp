@@ -10,12 +10,14 @@
 
 namespace km {
 
-/// Where the two images of a stereo pair are listed and lie.
+/// Where the images of a frame are listed and lie.
 struct StereoPairFile {
-  Stamp stamp = 0;              ///< Of the left image.
-  std::filesystem::path left;   ///< Image files.
-  std::filesystem::path right;  ///<
-  int line = 0;                 ///< Of the left image's row in the list.
+  Stamp stamp = 0;               ///< Of the left image.
+  std::filesystem::path left;    ///< Image files.
+  std::filesystem::path right;   ///< Empty with an RGB-D rig.
+  int line = 0;                  ///< Of the left image's row in the list.
+  std::filesystem::path depth;   ///< Empty: none.
+  std::filesystem::path labels;  ///< Empty: none.
 };
 
 /// The stereo pairs of a EuRoC folder: rows `stamp [ns], file` of cam0/data.csv and cam1/data.csv,
@@ -25,12 +27,23 @@ struct StereoPairFile {
                                                            double tolerance_s,
                                                            ReaderReport& report);
 
+/// The left images of a EuRoC folder alone, for an RGB-D rig. Faults and errors as above.
+[[nodiscard]] std::vector<StereoPairFile> list_euroc_lefts(const std::filesystem::path& mav0,
+                                                           ReaderReport& report);
+
+/// Enters the images that `folder`/data.csv lists (depth0, label0) as the `member` of the frame
+/// whose stamp is at most `tolerance_s` away. There may be fewer of them than frames; those of no
+/// frame are counted. Throws DatasetError if the list is missing or holds no image.
+void list_beside(const std::filesystem::path& folder, std::filesystem::path StereoPairFile::*member,
+                 double tolerance_s, std::vector<StereoPairFile>& frames, ReaderReport& report);
+
 /// The stereo pairs of a folder of keyframes: rows `stamp [ns], left file, right file` of its
 /// pairs.csv; ascending. Faults and errors as above.
 [[nodiscard]] std::vector<StereoPairFile> list_keyframe_pairs(const std::filesystem::path& folder,
                                                               ReaderReport& report);
 
-/// A stereo pair from disk; `status` and `problem` are those of the first image that failed.
+/// A stereo pair from disk, or the left image with an RGB-D rig; `status` and `problem` are those
+/// of the first image that failed. Without depth and labels.
 struct StereoPairResult {
   ImageStatus status = ImageStatus::kOk;
   std::string problem;

@@ -69,6 +69,37 @@ class EurocFolder {
     cv::imwrite((mav0() / relative).string(), cv::Mat(height, width, CV_8UC1, cv::Scalar(grey)));
   }
 
+  /// Writes depth0 with an image every `every` frames, all at `depth` units, a scale of 1 mm.
+  void add_depth(int every = 1, int depth = 2000) const {
+    write_list("depth0", every);
+    for (int i = 0; i < kPairs; i += every)
+      write_pixels(side_image("depth0", i), cv::Mat(24, 32, CV_16UC1, cv::Scalar(depth)));
+    write("depth0/sensor.yaml", depth_yaml());
+  }
+  /// Writes label0 with an image every `every` frames, all of class `id`.
+  void add_labels(int every = 1, int id = 3) const {
+    write_list("label0", every);
+    for (int i = 0; i < kPairs; i += every)
+      write_pixels(side_image("label0", i), cv::Mat(24, 32, CV_8UC1, cv::Scalar(id)));
+  }
+  /// An RGB-D recording: depth in place of the right camera.
+  void make_rgbd(int depth_every = 1) const {
+    std::filesystem::remove_all(mav0() / "cam1");
+    add_depth(depth_every);
+  }
+  static std::string side_image(const std::string& sensor, int i) {
+    return sensor + "/data/" + std::to_string(image_stamp(i)) + ".png";
+  }
+  void write_pixels(const std::string& relative, const cv::Mat& pixels) const {
+    std::filesystem::create_directories((mav0() / relative).parent_path());
+    cv::imwrite((mav0() / relative).string(), pixels);
+  }
+
+  static std::string depth_yaml() {
+    std::string text = camera_yaml(0.0);
+    text.replace(text.find("camera"), 6, "depth");
+    return text + "depth_scale: 0.001\nmin_range_m: 0.4\nmax_range_m: 20.0\nbaseline_m: 0.08\n";
+  }
   static std::string camera_yaml(double x_m) {
     return "sensor_type: camera\n"
            "T_BS:\n"
@@ -104,6 +135,15 @@ class EurocFolder {
   }
 
  private:
+  void write_list(const std::string& sensor, int every) const {
+    std::string list = "#timestamp [ns],filename\n";
+    for (int i = 0; i < kPairs; i += every) {
+      const std::string stamp = std::to_string(image_stamp(i));
+      list += stamp + ',' + stamp + ".png\n";
+    }
+    write(sensor + "/data.csv", list);
+  }
+
   std::filesystem::path root_;
 };
 
