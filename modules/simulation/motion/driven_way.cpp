@@ -124,7 +124,8 @@ DrivenWay drive(const RoutePath& path, double speed_mps, const VehicleOptions& o
       static_cast<int>(std::ceil(kSmoothReach * kPedalTime_s / DrivenWay::kInterval_s));
   const double reach_s = (reach + 3) * DrivenWay::kInterval_s;  // 3: the spline of the poses
   const auto count =
-      static_cast<std::size_t>(std::ceil(options.duration_s / DrivenWay::kInterval_s)) + 1;
+      static_cast<std::size_t>(std::ceil(options.duration_s / DrivenWay::kInterval_s)) +
+      DrivenWay::kBeyondEnd;
   const double farthest = speed_mps * (options.duration_s + 2.0 * reach_s) + 10.0;
 
   const auto points = static_cast<std::size_t>(farthest / kStep_m);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "modules/simulation/motion/route_path.hpp"
@@ -7,9 +8,11 @@
 
 namespace km {
 
-/// The way along a path driven until each instant [m], one every kInterval_s from time 0 on.
+/// The way along a path driven until each instant [m], one every kInterval_s from time 0 to a
+/// little after the end.
 struct DrivenWay {
   static constexpr double kInterval_s = 0.01;
+  static constexpr std::size_t kBeyondEnd = 4;  ///< Values at or after the end.
   std::vector<double> way_m;
 };
 

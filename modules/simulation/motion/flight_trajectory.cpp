@@ -138,10 +138,11 @@ SplineTrajectory make_flight_trajectory(const Eigen::AlignedBox3d& volume,
   const UniformSpline<4> plan = flight_plan(volume, air, options);
   const UniformSpline<3> push = gusts(options, time_above(plan, air.min().z()));
 
-  const auto count = static_cast<std::size_t>(std::ceil(options.duration_s / kPoseInterval_s)) + 1;
+  // From two poses before the start, where it is at rest, to a little after the end.
+  const auto count = static_cast<std::size_t>(std::ceil(options.duration_s / kPoseInterval_s)) + 6;
   std::vector<SE3> poses;
   for (std::size_t k = 0; k < count; ++k) {
-    const double t = kPoseInterval_s * static_cast<double>(k);
+    const double t = kPoseInterval_s * (static_cast<double>(k) - 2.0);
     const auto planned = plan.at(t);
     const auto pushed = push.at(t);
     const Eigen::Vector3d acceleration = planned.second.head<3>() + pushed.second;

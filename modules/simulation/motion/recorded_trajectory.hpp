@@ -10,13 +10,13 @@ namespace km {
 
 /// How closely a recording is followed.
 struct RecordingOptions {
-  double interval_s = 0.05;  ///< Of the spline's controls.
+  double interval_s = 0.02;  ///< Of the spline's controls.
   /// Deviations taken for ordinary noise; larger ones lose weight, as outliers do.
   double position_noise_m = 0.0005;
   double rotation_noise_rad = 0.0005;
   /// Changes of acceleration taken for ordinary, standard deviation of its derivative.
-  double jerk_mps3 = 20.0;
-  double rotation_jerk = 60.0;  ///< [rad/s^3]
+  double jerk_mps3 = 100.0;
+  double rotation_jerk = 1000.0;  ///< [rad/s^3]
 };
 
 /// Distances between the recorded poses and the curve.

@@ -70,10 +70,8 @@ SplineTrajectory::Control spline_control(const SE3& T) {
 }
 
 SplineTrajectory spline_along(double start_s, double interval_s, std::span<const SE3> poses) {
-  if (poses.empty()) refuse("no poses");
-  std::vector<Control> controls(2, spline_control(poses.front()));
+  std::vector<Control> controls;
   for (const SE3& T : poses) controls.push_back(spline_control(T));
-  controls.insert(controls.end(), 3, controls.back());
   return {start_s, interval_s, std::move(controls)};
 }
 

@@ -41,8 +41,8 @@ class SplineTrajectory final : public BodyTrajectory {
 /// The control at pose `T`.
 [[nodiscard]] SplineTrajectory::Control spline_control(const SE3& T);
 
-/// The trajectory whose controls are `poses`, one every `interval_s`, the first at `start_s`; those
-/// missing beyond either end repeat it. It smooths what is faster than two or three intervals.
+/// The trajectory whose controls are `poses`, one every `interval_s`: at its start near poses[2],
+/// at its end near the last but two. It smooths what is faster than two or three intervals.
 [[nodiscard]] SplineTrajectory spline_along(double start_s, double interval_s,
                                             std::span<const SE3> poses);
 

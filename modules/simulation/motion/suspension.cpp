@@ -7,10 +7,10 @@ namespace {
 
 // A passenger car's: eigenfrequencies of the body, damping, and how far it tilts per acceleration
 // (about 4 and 5 degrees per g).
-constexpr double kHeave_hz = 1.3;
+constexpr double kHeave_hz = 1.5;
 constexpr double kPitch_hz = 1.6;
 constexpr double kRoll_hz = 1.4;
-constexpr double kDamping = 0.35;
+constexpr double kDamping = 0.4;
 constexpr double kPitchGain = -0.007;  // [rad/(m/s^2)]: speeding up lifts the nose
 constexpr double kRollGain = 0.009;    // [rad/(m/s^2)]
 constexpr int kSubsteps = 5;

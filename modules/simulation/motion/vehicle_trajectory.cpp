@@ -133,16 +133,18 @@ SplineTrajectory make_vehicle_trajectory(const Route& route, const GroundHeight&
   const Road road(route, ground_height, options, ways.front(), ways.back());
 
   std::vector<SE3> poses;
-  Suspension suspension(road.under_wheels(road.point(ways.front()), ways.front()));
-  for (std::size_t k = 0; k < ways.size(); ++k) {
+  SprungBody body = road.under_wheels(road.point(ways.front()), ways.front());
+  Suspension suspension(body);
+  for (std::size_t k = 0; k + 1 < ways.size(); ++k) {
     const double before = ways[k == 0 ? k : k - 1];
-    const double after = ways[std::min(k + 1, ways.size() - 1)];
     const GroundPoint point = road.point(ways[k]);
-    const double speed = (after - before) / (2.0 * dt);
-    const double forward = (after - 2.0 * ways[k] + before) / (dt * dt);
-    const SprungBody body = suspension.step(road.under_wheels(point, ways[k]), forward,
-                                            speed * speed * point.curvature, dt);
+    const double speed = (ways[k + 1] - before) / (2.0 * dt);
+    const double forward = (ways[k + 1] - 2.0 * ways[k] + before) / (dt * dt);
+    if (k > 0)
+      body = suspension.step(road.under_wheels(point, ways[k]), forward,
+                             speed * speed * point.curvature, dt);
     poses.push_back(body_pose(point, body, options.rig_height_m));
+    if (k == 0) poses.insert(poses.end(), 2, poses.back());  // at rest before the start
   }
   return spline_along(0.0, dt, poses);
 }

@@ -19,10 +19,11 @@ struct VehicleOptions {
   double max_lateral_mps2 = 2.5;  ///< In curves.
   double max_longitudinal_mps2 = 1.5;  ///< Speeding up and braking.
   double stop_every_m = 120.0;         ///< Mean way between short stops; 0: none.
-  double roughness = 1.0;  ///< Of the road: 1 is a good street (ISO 8608 class A), 0 smooth.
+  double roughness = 2.0;  ///< Of the road, ISO 8608: 1 is class A, 2 B, 4 C; 0 is smooth.
 };
 
-/// A vehicle that drives along `route`, once around and on, for `duration_s` from time 0. Body:
+/// A vehicle that drives along `route`, once around and on, from time 0 to `duration_s` or a
+/// few milliseconds more. Body:
 /// x forward, y left, z up. Heading is the path's tangent; pitch and roll are the ground's under
 /// four wheels, seen through a suspension (damped oscillators in heave, pitch and roll, excited by
 /// ground, roughness and the vehicle's accelerations: nose down under braking, leaning out of
