@@ -30,9 +30,6 @@ class EpipolarMatcher {
   [[nodiscard]] std::vector<float> inverse_depths(const StereoFrame& frame,
                                                   std::span<const Eigen::Vector2f> bearings) const;
 
-  /// Focal length of the rectified images [px]: that of the left camera.
-  [[nodiscard]] double focal_px() const { return focal_px_; }
-
  private:
   struct Rectified {
     cv::Mat left, right;            // resampled
@@ -43,7 +40,8 @@ class EpipolarMatcher {
   [[nodiscard]] float disparity(const Rectified& images, const Eigen::Vector2d& pixel) const;
 
   KeyframeFeaturesConfig config_;
-  double focal_px_ = 0.0, baseline_m_ = 0.0;
+  double focal_px_ = 0.0;  // of the rectified images: that of the left camera
+  double baseline_m_ = 0.0;
   Eigen::Vector2d centre_;       // principal point of both rectified images
   Eigen::Matrix3d R_rect_left_;  // left camera to rectified
   cv::Size size_;

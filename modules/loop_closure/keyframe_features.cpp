@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "modules/core/depth_lookup.hpp"
 #include "modules/loop_closure/image_view.hpp"
 
 namespace km {
@@ -78,20 +79,21 @@ std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> corners, std::size_t 
 
 KeyframeFeatureExtractor::KeyframeFeatureExtractor(const StereoRig& rig,
                                                    const KeyframeFeaturesConfig& config)
-    : config_(checked(config)), rig_(rig), stereo_(rig, config) {}
+    : config_(checked(config)), rig_(rig) {
+  if (rig.depth_source == DepthSource::kRightImage) stereo_.emplace(rig, config);
+}
 
 KeyframeFeatures KeyframeFeatureExtractor::without_images() const {
   KeyframeFeatures features;
   features.T_body_cam = rig_.cameras[0].T_body_cam;
-  features.focal_px = stereo_.focal_px();
+  features.focal_px = 0.5 * (rig_.cameras[0].fx + rig_.cameras[0].fy);
   features.baseline_m = rig_.baseline_m();
   return features;
 }
 
 KeyframeFeatures KeyframeFeatureExtractor::extract(const StereoFrame& frame) const {
-  const PinholeCamera& camera = rig_.cameras[0];
-  if (frame.left.width != camera.width || frame.left.height != camera.height)
-    throw std::invalid_argument("KeyframeFeatureExtractor: left image of another size");
+  if (!fits(frame, rig_))
+    throw std::invalid_argument("KeyframeFeatureExtractor: images of another size than the rig's");
   const cv::Mat image = view(frame.left);
   const auto orb = cv::ORB::create(kCandidatesPerKeypoint * config_.max_keypoints, kScale, kLevels,
                                    kEdge, 0, 2, cv::ORB::HARRIS_SCORE, 31, config_.min_contrast);
@@ -103,11 +105,13 @@ KeyframeFeatures KeyframeFeatureExtractor::extract(const StereoFrame& frame) con
   orb->compute(image, corners, descriptors);  // drops what is too near the border
 
   KeyframeFeatures features = without_images();
-  std::vector<Eigen::Vector2f> bearings;
+  std::vector<Eigen::Vector2f> pixels, bearings;
   for (int i = 0; i < descriptors.rows; ++i) {
     const cv::KeyPoint& corner = corners[static_cast<std::size_t>(i)];
-    const std::optional<Eigen::Vector2d> bearing = camera.unproject({corner.pt.x, corner.pt.y});
+    const std::optional<Eigen::Vector2d> bearing =
+        rig_.cameras[0].unproject({corner.pt.x, corner.pt.y});
     if (!bearing) continue;
+    pixels.emplace_back(corner.pt.x, corner.pt.y);
     bearings.push_back(bearing->cast<float>());
     features.keypoints.push_back({.bearing = bearings.back(),
                                   .inverse_depth = 0.0F,
@@ -115,10 +119,25 @@ KeyframeFeatures KeyframeFeatureExtractor::extract(const StereoFrame& frame) con
     std::memcpy(features.descriptors.emplace_back().data(), descriptors.ptr(i),
                 sizeof(OrbDescriptor));
   }
-  const std::vector<float> inverse_depths = stereo_.inverse_depths(frame, bearings);
-  for (std::size_t i = 0; i < inverse_depths.size(); ++i)
-    features.keypoints[i].inverse_depth = inverse_depths[i];
+  const std::vector<float> depths = inverse_depths(frame, pixels, bearings);
+  for (std::size_t i = 0; i < depths.size(); ++i) features.keypoints[i].inverse_depth = depths[i];
   return features;
+}
+
+std::vector<float> KeyframeFeatureExtractor::inverse_depths(
+    const StereoFrame& frame, std::span<const Eigen::Vector2f> pixels,
+    std::span<const Eigen::Vector2f> bearings) const {
+  if (stereo_) return stereo_->inverse_depths(frame, bearings);
+  std::vector<float> result(pixels.size(), 0.0F);
+  if (frame.depth == nullptr) return result;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const auto inverse_depth =
+        inverse_depth_at(*frame.depth, pixels[i].cast<double>(), depth_edge(rig_));
+    if (inverse_depth && *inverse_depth >= 1.0 / config_.max_depth_m &&
+        *inverse_depth <= 1.0 / config_.min_depth_m)
+      result[i] = static_cast<float>(*inverse_depth);
+  }
+  return result;
 }
 
 }  // namespace km

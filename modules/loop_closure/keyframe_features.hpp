@@ -1,5 +1,9 @@
 #pragma once
 
+#include <optional>
+#include <span>
+#include <vector>
+
 #include "modules/core/camera.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/core/keyframe.hpp"
@@ -8,9 +12,10 @@
 
 namespace km {
 
-/// Makes of a stereo pair what place recognition and verification work on: ORB keypoints of the
-/// left image, evenly spread, with depth where stereo gives one (Rublee et al., "ORB: an efficient
-/// alternative to SIFT or SURF", ICCV 2011). Const members are safe to call from several threads.
+/// Makes of a frame what place recognition and verification work on: ORB keypoints of the left
+/// image, evenly spread, with depth where the right image or the depth image gives one (Rublee et
+/// al., "ORB: an efficient alternative to SIFT or SURF", ICCV 2011). Const members are safe to call
+/// from several threads.
 class KeyframeFeatureExtractor {
  public:
   /// Throws ConfigError if `config` is out of bounds, std::invalid_argument if the rig cannot be
@@ -18,16 +23,20 @@ class KeyframeFeatureExtractor {
   KeyframeFeatureExtractor(const StereoRig& rig, const KeyframeFeaturesConfig& config);
 
   /// Features of `frame`, at most max_keypoints. An image without corners gives none. Throws
-  /// std::invalid_argument if an image is not of its camera's size.
+  /// std::invalid_argument if the frame does not fit the rig (see fits()).
   [[nodiscard]] KeyframeFeatures extract(const StereoFrame& frame) const;
 
   /// The rig's numbers without any keypoint: for a keyframe that has no images.
   [[nodiscard]] KeyframeFeatures without_images() const;
 
  private:
+  [[nodiscard]] std::vector<float> inverse_depths(const StereoFrame& frame,
+                                                  std::span<const Eigen::Vector2f> pixels,
+                                                  std::span<const Eigen::Vector2f> bearings) const;
+
   KeyframeFeaturesConfig config_;
   StereoRig rig_;
-  EpipolarMatcher stereo_;
+  std::optional<EpipolarMatcher> stereo_;  // absent with an RGB-D rig
 };
 
 }  // namespace km

@@ -16,7 +16,7 @@ struct KeyframeFeaturesConfig {
   /// Smallest contrast of a corner [grey levels]. Lower finds more points in dim scenes.
   int min_contrast = 7;
 
-  /// Depths that stereo is trusted with, along the optical axis [m].
+  /// Depths that stereo or a depth image is trusted with, along the optical axis [m].
   double min_depth_m = 0.4;
   double max_depth_m = 40.0;
 
@@ -26,8 +26,8 @@ struct KeyframeFeaturesConfig {
   void visit_fields(auto& visitor) {
     visitor.field("max_keypoints", max_keypoints, {50, 4000}, "per keyframe");
     visitor.field("min_contrast", min_contrast, {2, 100}, "[grey levels] of a corner");
-    visitor.field("min_depth_m", min_depth_m, {0.05, 10.0}, "[m] nearest in stereo");
-    visitor.field("max_depth_m", max_depth_m, {1.0, 1000.0}, "[m] farthest in stereo");
+    visitor.field("min_depth_m", min_depth_m, {0.05, 10.0}, "[m] nearest trusted");
+    visitor.field("max_depth_m", max_depth_m, {1.0, 1000.0}, "[m] farthest trusted");
     visitor.field("min_stereo_correlation", min_stereo_correlation, {0.0, 0.99},
                   "of left and right patch");
   }

@@ -34,7 +34,7 @@ struct TrackerConfig {
   /// Largest distance of a feature from where the motion common to all features puts it [px].
   double max_reprojection_px = 1.5;
 
-  /// Nearest depth searched in stereo [m].
+  /// Nearest depth searched in stereo, or believed of a depth image [m].
   double min_depth_m = 0.3;
 
   /// Seed of the random samples.

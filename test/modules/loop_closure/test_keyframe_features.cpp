@@ -1,0 +1,110 @@
+#include "modules/loop_closure/keyframe_features.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <memory>
+#include <random>
+
+namespace km {
+namespace {
+
+PinholeCamera test_camera() {
+  return {.width = 320,
+          .height = 240,
+          .fx = 200.0,
+          .fy = 202.0,
+          .cx = 161.0,
+          .cy = 118.0,
+          .distortion = {-0.28, 0.07, 2e-4, 1e-5}};
+}
+
+// Squares of random grey levels: corners everywhere.
+GrayImage checkered(const PinholeCamera& camera) {
+  std::mt19937 rng(5);
+  std::vector<std::uint8_t> levels(32 * 24);
+  for (std::uint8_t& level : levels) level = static_cast<std::uint8_t>(rng() & 0xFFU);
+  GrayImage image{camera.width, camera.height, {}};
+  for (int y = 0; y < camera.height; ++y)
+    for (int x = 0; x < camera.width; ++x)
+      image.pixels.push_back(levels[static_cast<std::size_t>(y / 10 * 32 + x / 10)]);
+  return image;
+}
+
+const Eigen::Vector3d kNormal(0.2, -0.4, 0.9);
+constexpr double kDistance_m = 3.0;
+
+// The plane kNormal . p = kDistance_m, none of it in the left third.
+std::shared_ptr<const DepthImage> plane_depth(const PinholeCamera& camera) {
+  DepthImage image{camera.width, camera.height, {}};
+  for (int y = 0; y < camera.height; ++y)
+    for (int x = 0; x < camera.width; ++x) {
+      const Eigen::Vector2d bearing = *camera.unproject(Eigen::Vector2d(x, y));
+      const double z_m = kDistance_m / kNormal.dot(bearing.homogeneous());
+      const bool hole = x < camera.width / 3;
+      image.millimetres.push_back(hole ? std::uint16_t{0}
+                                       : static_cast<std::uint16_t>(std::lround(1e3 * z_m)));
+    }
+  return std::make_shared<const DepthImage>(std::move(image));
+}
+
+TEST_CASE("keypoints of an RGB-D frame have the depth of their pixel", "[loop_closure]") {
+  const StereoRig rig = rgbd_rig(test_camera(), 0.08);
+  const KeyframeFeatureExtractor extractor(rig, {});
+  StereoFrame frame{0, checkered(rig.cameras[0]), {}};
+  frame.depth = plane_depth(rig.cameras[0]);
+  const KeyframeFeatures features = extractor.extract(frame);
+  CHECK(features.focal_px == 201.0);
+  CHECK(features.baseline_m == Approx(0.08));
+  REQUIRE(features.keypoints.size() > 200);
+  int holes = 0;
+  for (const Keypoint& keypoint : features.keypoints) {
+    const Eigen::Vector2d bearing = keypoint.bearing.cast<double>();
+    const double x = rig.cameras[0].project(bearing).x();
+    CAPTURE(x);
+    if (x < 106 - 1) {  // a third, less the reach of a neighbour
+      ++holes;
+      CHECK_FALSE(keypoint.has_depth());
+    } else if (x > 107) {
+      REQUIRE(keypoint.has_depth());
+      // Rounded to millimetres: 1e-3 / z.
+      CHECK(keypoint.point_cam().dot(kNormal) == Approx(kDistance_m).epsilon(1e-3));
+    }
+  }
+  CHECK(holes > 20);
+}
+
+TEST_CASE("depths that are not trusted, or not there, are none", "[loop_closure]") {
+  const StereoRig rig = rgbd_rig(test_camera(), 0.08);
+  KeyframeFeaturesConfig config;
+  config.min_depth_m = 3.0;
+  config.max_depth_m = 4.0;
+  const KeyframeFeatureExtractor extractor(rig, config);
+  StereoFrame frame{0, checkered(rig.cameras[0]), {}};
+  for (const Keypoint& keypoint : extractor.extract(frame).keypoints)
+    CHECK_FALSE(keypoint.has_depth());
+  frame.depth = plane_depth(rig.cameras[0]);
+  std::size_t trusted = 0;
+  for (const Keypoint& keypoint : extractor.extract(frame).keypoints) {
+    if (!keypoint.has_depth()) continue;
+    ++trusted;
+    CHECK(keypoint.inverse_depth >= 0.25F);
+    CHECK(keypoint.inverse_depth <= 1.0F / 3.0F);
+  }
+  CHECK(trusted > 50);
+}
+
+TEST_CASE("a frame that does not fit its rig is refused", "[loop_closure]") {
+  const StereoRig rgbd = rgbd_rig(test_camera(), 0.08);
+  StereoRig stereo = rgbd;
+  stereo.depth_source = DepthSource::kRightImage;
+  StereoFrame frame{0, checkered(rgbd.cameras[0]), {}};
+  CHECK_THROWS_AS(KeyframeFeatureExtractor(stereo, {}).extract(frame), std::invalid_argument);
+  frame.depth = std::make_shared<const DepthImage>(DepthImage{320, 200, {}});
+  CHECK_THROWS_AS(KeyframeFeatureExtractor(rgbd, {}).extract(frame), std::invalid_argument);
+  frame.depth = nullptr;
+  frame.left.width = 319;
+  CHECK_THROWS_AS(KeyframeFeatureExtractor(rgbd, {}).extract(frame), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace km
