@@ -2,6 +2,8 @@
 #include <exception>
 #include <iostream>
 
+#include "apps/evaluate/closures.hpp"
+#include "apps/evaluate/images.hpp"
 #include "apps/evaluate/trajectory.hpp"
 
 namespace {
@@ -25,6 +27,75 @@ constexpr const char* kTrajectory =
     "  kimera_multi_evaluate trajectory --truth data.csv \\\n"
     "      --estimate robot0/optimized.tum robot1/optimized.tum --json team.json --plot team.svg\n"
     "  kimera_multi_evaluate trajectory --truth a.csv --truth b.csv --estimate a.tum b.tum";
+
+constexpr const char* kClosures =
+    "Loop closures of a finished run against the truth, per stage: how many there are, which "
+    "share\n"
+    "is true (precision), and which share of what there was to be found it found (recall)\n\n"
+    "A candidate is true if both keyframes see the same place: --min-overlap of either's image, "
+    "at\n"
+    "the median depth that the keyframe sees, lies in the other's. A verified closure and an "
+    "inlier\n"
+    "are true if the pose measured is off by at most --max-translation and --max-rotation.\n"
+    "Recall counts pairs of keyframes of two robots that see the same place, and, as a system "
+    "needs\n"
+    "only one match per keyframe, keyframes that are part of such a pair.\n\n"
+    "Example:\n"
+    "  kimera_multi_evaluate closures --dataset MH_01_easy --truth groundtruth_tum.txt \\\n"
+    "      --results results/two/a results/two/b";
+
+void define(CLI::App& app, km::ClosuresCommand& command) {
+  app.add_option("--truth", command.truths,
+                 "True poses in one common world: one file for all robots or one for each")
+      ->required();
+  app.add_option("--results", command.results, "Results folders of all robots of the run")
+      ->required();
+  app.add_option("--dataset", command.dataset, "EuRoC/ASL folder: its left camera is the robots'")
+      ->required();
+  km::ClosureTruthOptions& options = command.options;
+  app.add_option("--max-translation", options.max_translation_m,
+                 "Error of a true pose, at most [m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--max-rotation", options.max_rotation_deg, "Error of a true pose, at most [deg]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--min-overlap", options.min_overlap, "Share of the image that is seen by both")
+      ->check(CLI::Range(0.01, 1.0))
+      ->capture_default_str();
+  app.add_option("--default-depth", options.default_depth_m,
+                 "Depth of the scene where a keyframe does not know it [m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--json", command.json, "Also write the numbers to this file, as JSON");
+}
+
+constexpr const char* kImages =
+    "What the images of a recording are like: corners, how long they can be tracked, how well "
+    "they\n"
+    "are found in the other camera, gradients, grey levels, exposure, blur and noise\n\n"
+    "Tracking depends on motion most of all: compare two recordings by the rows \"flow A-B px\",\n"
+    "frames of like median flow. Rows that differ by more than 25 % are marked. Noise over time\n"
+    "needs the camera to stand still for a second; --still-from and --still-to say where.\n\n"
+    "Examples:\n"
+    "  kimera_multi_evaluate images --dataset MH_01_easy --to 15 --still-from 21 --still-to 25.5\n"
+    "  kimera_multi_evaluate images --dataset V1_01_easy --compare simulated --json images.json";
+
+void define(CLI::App& app, km::ImagesCommand& command) {
+  app.add_option("--dataset", command.dataset, "EuRoC/ASL folder with stereo images")->required();
+  app.add_option("--compare", command.compare, "Another one: its figures beside, and the ratios");
+  app.add_option("--from", command.from_s, "Look from here on [s since the first stereo pair]")
+      ->capture_default_str();
+  app.add_option("--to", command.to_s, "Look up to here [s]; default: the end");
+  app.add_option("--still-from", command.still_from_s,
+                 "Also look for standing still from here on [s]");
+  app.add_option("--still-to", command.still_to_s, "Also look for standing still up to here [s]");
+  app.add_option("--stride", command.options.stride,
+                 "Match ORB and stereo, and start KLT tracks, at every so many pairs")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--json", command.json, "Also write the figures to this file, as JSON");
+}
 
 void define(CLI::App& app, km::TrajectoryCommand& command) {
   app.add_option("--truth", command.truths,
@@ -53,13 +124,19 @@ int main(int argc, char** argv) try {
   CLI::App app(kAbout);
   app.require_subcommand(1);
   km::TrajectoryCommand trajectory;
+  km::ClosuresCommand closures;
+  km::ImagesCommand images;
   define(*app.add_subcommand("trajectory", kTrajectory), trajectory);
+  define(*app.add_subcommand("closures", kClosures), closures);
+  define(*app.add_subcommand("images", kImages), images);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 1;
   }
-  km::evaluate_trajectories(trajectory);
+  if (app.got_subcommand("trajectory")) km::evaluate_trajectories(trajectory);
+  if (app.got_subcommand("closures")) km::evaluate_closures(closures);
+  if (app.got_subcommand("images")) km::evaluate_images(images);
   return 0;
 } catch (const std::exception& error) {
   std::cerr << "kimera_multi_evaluate: " << error.what() << '\n';

@@ -16,4 +16,8 @@ struct Statistics {
 
 [[nodiscard]] Statistics statistics_of(std::vector<double> values);
 
+/// The value below which a share `p` in [0, 1] of the sample lies, linear between neighbours in
+/// order of size; NaN for an empty sample. O(n).
+[[nodiscard]] double quantile(std::vector<double> values, double p);
+
 }  // namespace km

@@ -1,6 +1,7 @@
 #include "modules/evaluation/trajectory_error.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -12,9 +13,14 @@ namespace {
 constexpr std::size_t kMinPairs = 3;
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
+void append(std::vector<double>& to, const std::vector<double>& from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
+
 // Raw errors of one or several estimates, before they are summed up.
 struct Errors {
   std::vector<double> position_m, rotation_deg, rpe_translation_m, rpe_rotation_deg;
+  SegmentErrors segments;
   std::size_t poses = 0;
   double covered_s = 0.0;
   double window_s = 0.0;
@@ -22,7 +28,10 @@ struct Errors {
   void append(const Errors& other) {
     for (const auto list : {&Errors::position_m, &Errors::rotation_deg, &Errors::rpe_translation_m,
                             &Errors::rpe_rotation_deg})
-      (this->*list).insert((this->*list).end(), (other.*list).begin(), (other.*list).end());
+      km::append(this->*list, other.*list);
+    for (const auto list : {&SegmentErrors::translation_percent, &SegmentErrors::rotation_deg_per_m,
+                            &SegmentErrors::lengths_m})
+      km::append(segments.*list, other.segments.*list);
     poses += other.poses;
     covered_s += other.covered_s;
     window_s += other.window_s;
@@ -30,12 +39,18 @@ struct Errors {
 };
 
 TrajectoryError summary(const std::string& name, const Errors& errors) {
+  std::vector<double> lengths_m = errors.segments.lengths_m;  // of several robots: repeated
+  std::sort(lengths_m.begin(), lengths_m.end());
+  lengths_m.erase(std::unique(lengths_m.begin(), lengths_m.end()), lengths_m.end());
   return {.name = name,
           .poses = errors.poses,
           .position_m = statistics_of(errors.position_m),
           .rotation_deg = statistics_of(errors.rotation_deg),
           .rpe_translation_m = statistics_of(errors.rpe_translation_m),
           .rpe_rotation_deg = statistics_of(errors.rpe_rotation_deg),
+          .segment_lengths_m = lengths_m,
+          .drift_percent = statistics_of(errors.segments.translation_percent),
+          .drift_deg_per_m = statistics_of(errors.segments.rotation_deg_per_m),
           .completeness = errors.window_s > 0.0 ? errors.covered_s / errors.window_s : 0.0};
 }
 
@@ -141,6 +156,7 @@ TeamError trajectory_error(std::span<const TrajectoryInput> inputs,
     Errors errors;
     add_absolute_errors(pairs[r], team.alignment, errors);
     add_relative_errors(pairs[r], team.alignment, options.rpe_delta_s, errors);
+    errors.segments = segment_errors(pairs[r], team.alignment.scale);
     const TimeWindow window = window_of(inputs[r]);
     errors.poses = inputs[r].estimate.size();
     errors.covered_s = covered_seconds(inputs[r].estimate, window, options.max_coverage_gap_s);

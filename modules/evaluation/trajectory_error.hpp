@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "modules/evaluation/association.hpp"
+#include "modules/evaluation/segment_error.hpp"
 #include "modules/evaluation/statistics.hpp"
 
 namespace km {
@@ -51,7 +52,10 @@ struct TrajectoryError {
   Statistics rotation_deg;       ///< Angle to the truth after the same alignment.
   Statistics rpe_translation_m;  ///< Relative pose error over rpe_delta_s.
   Statistics rpe_rotation_deg;
-  double completeness = 0.0;  ///< Share of the window covered, 0 to 1.
+  std::vector<double> segment_lengths_m;  ///< Pieces of the path over which drift is taken.
+  Statistics drift_percent;               ///< Relative position error in percent of the distance.
+  Statistics drift_deg_per_m;             ///< Relative rotation error over the distance.
+  double completeness = 0.0;              ///< Share of the window covered, 0 to 1.
 };
 
 /// Errors of a team under ONE alignment.
@@ -66,6 +70,7 @@ struct TeamError {
 /// Absolute: distance between the aligned and the true position, at every pair of associate().
 /// Relative: for pairs i, j with j the nearest to rpe_delta_s after i, at most a tenth of it off,
 /// (T_truth_i^-1 T_truth_j)^-1 (T_estimate_i^-1 T_estimate_j), with the estimate's scale corrected.
+/// Drift: segment_errors() over lengths that fit the path; of the team, those of all robots.
 /// Completeness: covered time of the estimate over the window; of the team, sums of both.
 /// Throws std::invalid_argument, naming the estimate, if one shares fewer than three poses with its
 /// truth, and for no input or options out of range.

@@ -70,6 +70,9 @@ void write_json(JsonWriter& json, const TrajectoryError& error) {
   write_statistics(json, "rotation_deg", error.rotation_deg);
   write_statistics(json, "rpe_translation_m", error.rpe_translation_m);
   write_statistics(json, "rpe_rotation_deg", error.rpe_rotation_deg);
+  json.array("segment_lengths_m", error.segment_lengths_m);
+  write_statistics(json, "drift_percent", error.drift_percent);
+  write_statistics(json, "drift_deg_per_m", error.drift_deg_per_m);
   json.end_object();
 }
 

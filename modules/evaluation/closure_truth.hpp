@@ -1,0 +1,94 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/pose_graph.hpp"
+#include "modules/evaluation/statistics.hpp"
+
+namespace km {
+
+/// A keyframe where it truly was. The worlds of all keyframes are one.
+struct TrueKeyframe {
+  KeyframeId id;
+  SE3 T_world_body = SE3::Identity();
+  double scene_depth_m = 0.0;  ///< Median depth of what its left camera sees; 0: unknown.
+};
+
+/// A loop closure that a robot considered.
+struct ClosureRecord {
+  ClosureId id;
+  ClosureStage stage = ClosureStage::kCandidate;
+  std::optional<SE3> T_from_to;  ///< Measured pose of body `to` in body `from`; from kVerified on.
+};
+
+/// When a closure counts as true.
+struct ClosureTruthOptions {
+  /// A measured pose is true if it is off by at most this [m], and
+  double max_translation_m = 0.5;
+  /// by at most this angle [deg].
+  double max_rotation_deg = 5.0;
+  /// Two keyframes see the same place if at least this share of either's image lies in the other's:
+  /// see view_overlap().
+  double min_overlap = 0.3;
+  /// Depth of the scene for keyframes that do not know theirs [m].
+  double default_depth_m = 5.0;
+};
+
+/// Share of the image of a camera at `a` that one at `b` sees, 0 to 1, assumed that everything lies
+/// `depth_m` before `a` (z in its frame): a grid of 8x6 pixels, lifted to that depth, counts where
+/// it projects into the other's image with between half and twice that depth. T_a_b: of the
+/// cameras.
+[[nodiscard]] double view_overlap(const PinholeCamera& camera, const SE3& T_a_b, double depth_m);
+
+/// How many closures of one stage are true. Each direction of a pair is a closure of its own.
+struct StageScore {
+  std::size_t judged = 0;          ///< Closures both of whose keyframes have a true pose.
+  std::size_t correct = 0;         ///< Of those, the true ones.
+  std::size_t pairs_found = 0;     ///< True pairs of keyframes of two robots with a true closure.
+  std::size_t frames_found = 0;    ///< Keyframes that have such a pair with a true closure.
+  Statistics translation_error_m;  ///< Of measured poses; none in the candidates' stage.
+  Statistics rotation_error_deg;
+
+  [[nodiscard]] double precision() const;  ///< correct / judged; NaN without one.
+};
+
+/// All closures of a team against the truth.
+struct ClosureScores {
+  StageScore candidates;        ///< All; true: both keyframes see the same place.
+  StageScore verified;          ///< Stages kVerified and kInlier; true: the measured pose is.
+  StageScore inliers;           ///< Stage kInlier; true: the measured pose is.
+  std::size_t true_pairs = 0;   ///< Pairs of keyframes of two robots that see the same place.
+  std::size_t true_frames = 0;  ///< Keyframes that see a place which another robot's sees.
+  std::size_t unjudged = 0;     ///< Closures with a keyframe whose true pose is unknown.
+
+  /// Share of the true pairs that a stage found. NaN without a true pair.
+  [[nodiscard]] double pair_recall(const StageScore& stage) const;
+  /// Share of the keyframes that see another robot's place for which a stage found one: what a
+  /// system that takes the best match per keyframe can reach. NaN without one.
+  [[nodiscard]] double frame_recall(const StageScore& stage) const;
+};
+
+/// Judges the closures of a team.
+///
+/// A candidate is true if its two keyframes see the same place: the overlap of their left cameras'
+/// views, the smaller of both directions, is at least min_overlap. So its limits on distance and
+/// angle scale with the depth of the scene. A verified closure and an inlier are true if
+/// E = (T_world_from^-1 T_world_to)^-1 T_from_to is within the limits. Precision counts closures
+/// inside a robot too, recall only pairs of keyframes of two robots, each pair once: one is found
+/// by a stage if it sees the same place and has, in either direction, a closure there that is true.
+/// `camera` is the left one of every robot. Throws std::invalid_argument for a keyframe given
+/// twice, a closure past kVerified without a pose, and options out of range. O(k^2) for k
+/// keyframes.
+[[nodiscard]] ClosureScores score_closures(std::span<const TrueKeyframe> keyframes,
+                                           std::span<const ClosureRecord> closures,
+                                           const PinholeCamera& camera,
+                                           const ClosureTruthOptions& options = {});
+
+}  // namespace km

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <limits>
+#include <map>
+#include <vector>
+
+#include "modules/core/stamp.hpp"
+#include "modules/evaluation/images/flow_bins.hpp"
+#include "modules/evaluation/images/image_figure.hpp"
+#include "modules/evaluation/images/round_trip.hpp"
+
+namespace km {
+
+/// How corners of one camera survive KLT tracking. A corner survives a step if it comes back within
+/// 1 px (for the strict figures 0.5 px) and stays inside the image; one that does not and ends less
+/// than 10 px inside has left the image, any other has failed. Fresh corners of every frame give
+/// the figures of one step; sets of corners that are followed without being refilled, a new set
+/// every `stride` frames, give survival over many. Where a frame is missing, tracks go on, but the
+/// step is none of the figures of one step.
+class TrackStatistics {
+ public:
+  /// A step of more than `max_step_s` ends all tracks.
+  TrackStatistics(int stride, double max_step_s) : stride_(stride), max_step_s_(max_step_s) {}
+
+  /// The next image and corners_of() it. Returns the median flow since the image before [px/frame];
+  /// NaN if there is none.
+  double add(Stamp stamp, const KltImage& image, const std::vector<cv::Point2f>& corners);
+
+  void append_to(std::vector<ImageFigure>& figures) const;
+
+ private:
+  // Corners of one frame, followed ever since; those that are lost are taken out.
+  struct TrackSet {
+    std::size_t start_count = 0;
+    std::size_t age = 0;  // steps
+    double flow_sum_px = 0.0;
+    std::vector<cv::Point2f> points;
+    std::vector<bool> strict;  // within 0.5 px in every step
+  };
+
+  // What became of the corners of the last image.
+  struct Step {
+    double corners = 0.0, survived = 0.0, left = 0.0;
+    double flow_px = 0.0;  // median of those that survived; NaN without one
+  };
+
+  [[nodiscard]] Step one_step(const KltImage& image) const;
+  void record(const Step& step);
+  void follow(const KltImage& image, double flow_px);
+  void record(const TrackSet& set);
+
+  int stride_;
+  double max_step_s_;
+  std::size_t frames_ = 0;
+  Stamp last_stamp_ = 0;
+  double period_s_ = std::numeric_limits<double>::infinity();  // shortest step so far
+  KltImage last_;
+  std::vector<cv::Point2f> last_corners_;
+  std::vector<TrackSet> sets_;
+
+  std::vector<double> corner_counts_, flow_, survived_, left_, failed_;
+  FlowBinMeans survived_by_flow_, left_by_flow_, corners_by_flow_;
+  std::map<std::size_t, std::vector<double>> survival_, strict_survival_;  // by age
+  FlowBinMeans ten_frames_by_flow_;
+};
+
+}  // namespace km
