@@ -21,8 +21,8 @@ Examples
   The back-end alone, on a recorded pose graph:
     kimera_multi_robot --config config/datasets/tunnels.yaml --robot 3 --graph robot3.csv --rate max --output results/3
 
-Files written to --output: odometry.tum, optimized.tum, pose_graph.g2o, loop_closures.csv, optimizer.csv,
-traffic.csv, timing.csv, config.yaml, summary.json.
+Files written to --output: odometry.tum, optimized.tum, pose_graph.g2o, keyframes.csv, loop_closures.csv,
+optimizer.csv, traffic.csv, timing.csv, config.yaml, summary.json.
 Ctrl-C ends the run in order with everything written; a second Ctrl-C ends it at once.
 Exit codes: 0 done, 1 bad input or configuration, 2 bad command line, 3 a module failed while running.)";
 

@@ -40,13 +40,37 @@ const char* to_string(ClosureStage stage) {
   return "";
 }
 
+void write_keyframes(const fs::path& file, const RunRecord& record) {
+  std::ofstream out = open(file);
+  out << "robot,keyframe,stamp_ns,median_depth_m\n";
+  for (const KeyframeOdometry& keyframe : record.keyframes())
+    out << keyframe.id.robot << ',' << keyframe.id.index << ',' << keyframe.stamp << ','
+        << record.median_depth_m(keyframe.id.index) << '\n';
+  close(out, file);
+}
+
+// tx,ty,tz,qx,qy,qz,qw of the closure's pose, all empty if it was not measured.
+std::string pose_fields(const RunRecord& record, const ClosureOutcome& outcome) {
+  const auto closure = record.closures().find(outcome.id);
+  if (outcome.stage < ClosureStage::kVerified || closure == record.closures().end())
+    return ",,,,,,";
+  const Eigen::Vector3d& t = closure->second.T_from_to.translation();
+  const Eigen::Quaterniond q(closure->second.T_from_to.linear());
+  char text[192];
+  std::snprintf(text, sizeof text, "%.6f,%.6f,%.6f,%.8f,%.8f,%.8f,%.8f", t.x(), t.y(), t.z(), q.x(),
+                q.y(), q.z(), q.w());
+  return text;
+}
+
 void write_closures(const fs::path& file, const RunRecord& record) {
   std::ofstream out = open(file);
-  out << "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,inliers,reason\n";
+  out << "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,inliers,"
+         "tx,ty,tz,qx,qy,qz,qw,reason\n";
   for (const ClosureOutcome& row : record.outcomes())
     out << row.id.from.robot << ',' << row.id.from.index << ',' << row.id.to.robot << ','
         << row.id.to.index << ',' << row.similarity << ',' << to_string(row.stage) << ','
-        << row.matches << ',' << row.inliers << ",\"" << row.reason << "\"\n";
+        << row.matches << ',' << row.inliers << ',' << pose_fields(record, row) << ",\""
+        << row.reason << "\"\n";
   close(out, file);
 }
 
@@ -142,6 +166,7 @@ void write_results(const fs::path& folder, const RunRecord& record, const RunSum
   write_tum(folder / "odometry.tum", record.odometry());
   write_tum(folder / "optimized.tum", record.optimized());
   write_g2o(folder / "pose_graph.g2o", graph_of(record));
+  write_keyframes(folder / "keyframes.csv", record);
   write_closures(folder / "loop_closures.csv", record);
   write_rounds(folder / "optimizer.csv", record);
   write_summary(folder / "summary.json", record, summary);

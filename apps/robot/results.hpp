@@ -24,8 +24,8 @@ struct RunSummary {
 /// Throws std::runtime_error naming the file if it cannot be written; so do all functions below.
 void write_tum(const std::filesystem::path& file, std::span<const StampedPose> poses);
 
-/// odometry.tum, optimized.tum, pose_graph.g2o, loop_closures.csv, optimizer.csv and summary.json
-/// into `folder`.
+/// odometry.tum, optimized.tum, pose_graph.g2o, keyframes.csv, loop_closures.csv, optimizer.csv and
+/// summary.json into `folder`.
 void write_results(const std::filesystem::path& folder, const RunRecord& record,
                    const RunSummary& summary);
 

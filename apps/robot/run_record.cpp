@@ -12,6 +12,16 @@ void RunRecord::add(const KeyframeOdometry& keyframe) {
   keyframes_.back().frame = nullptr;  // a run of an hour would keep every keyframe's images
 }
 
+void RunRecord::add(const Keyframe& keyframe) {
+  std::vector<double> depths_m;
+  for (const Keypoint& keypoint : keyframe.features.keypoints)
+    if (keypoint.has_depth()) depths_m.push_back(1.0 / static_cast<double>(keypoint.inverse_depth));
+  if (depths_m.empty()) return;
+  const auto middle = depths_m.begin() + static_cast<std::ptrdiff_t>(depths_m.size() / 2);
+  std::nth_element(depths_m.begin(), middle, depths_m.end());
+  median_depths_m_[keyframe.odometry.id.index] = *middle;
+}
+
 void RunRecord::add(const Closure& closure) {
   ++activity_;
   if (closure.from.id.robot == robot_ || closure.to.id.robot == robot_)
@@ -41,6 +51,11 @@ void RunRecord::add(const OptimizerProgress& progress) {
 
 void RunRecord::add(const Trajectory& trajectory) {
   if (trajectory.robot == robot_) trajectory_ = trajectory;
+}
+
+double RunRecord::median_depth_m(std::uint32_t keyframe) const {
+  const auto found = median_depths_m_.find(keyframe);
+  return found != median_depths_m_.end() ? found->second : 0.0;
 }
 
 bool RunRecord::is_inlier(const ClosureId& id) const {

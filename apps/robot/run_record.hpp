@@ -21,6 +21,7 @@ class RunRecord {
 
   void add(const OdometryState& state) { odometry_.push_back({state.stamp, state.T_odom_body}); }
   void add(const KeyframeOdometry& keyframe);
+  void add(const Keyframe& keyframe);  ///< Of this robot: what depth it sees.
   void add(const Closure& closure);
   void add(const InlierSet& set);  ///< Kept if newer than the pair's last.
   void add(const ClosureOutcome& outcome);
@@ -37,6 +38,9 @@ class RunRecord {
 
   [[nodiscard]] const std::vector<StampedPose>& odometry() const { return odometry_; }
   [[nodiscard]] const std::vector<KeyframeOdometry>& keyframes() const { return keyframes_; }
+  /// Median depth of a keyframe's keypoints in its left camera [m]; 0: unknown.
+  [[nodiscard]] double median_depth_m(std::uint32_t keyframe) const;
+
   [[nodiscard]] const std::optional<Trajectory>& trajectory() const { return trajectory_; }
   [[nodiscard]] const OptimizerProgress& progress() const { return progress_; }
 
@@ -49,6 +53,9 @@ class RunRecord {
     double gradient_norm = 0.0;
   };
   [[nodiscard]] const std::vector<OptimizerRound>& rounds() const { return rounds_; }
+
+  /// Closures that touch this robot, with what was measured, by whichever of its ends.
+  [[nodiscard]] const std::map<ClosureId, Closure>& closures() const { return closures_; }
 
   /// Closures of this robot that are inliers, with its own and its peers' measurements.
   [[nodiscard]] std::vector<Closure> inlier_closures() const;
@@ -73,7 +80,8 @@ class RunRecord {
 
   RobotId robot_;
   std::vector<StampedPose> odometry_;
-  std::vector<KeyframeOdometry> keyframes_;  // without their images
+  std::vector<KeyframeOdometry> keyframes_;          // without their images
+  std::map<std::uint32_t, double> median_depths_m_;  // by keyframe
   std::map<ClosureId, Closure> closures_;
   std::map<std::pair<RobotId, RobotId>, InlierSet> inlier_sets_;
   std::map<ClosureId, ClosureOutcome> outcomes_;

@@ -116,6 +116,7 @@ void Robot::add_records() {
   recorder_ = &add<RecorderNode>(false, identity_.robot);
   recorder_->record(topics_.odometry);
   recorder_->record(topics_.keyframe_odometry);
+  recorder_->record(topics_.keyframes);
   recorder_->record(topics_.closures);
   recorder_->record(topics_.outcomes);
   recorder_->record(topics_.own_inlier_sets);
