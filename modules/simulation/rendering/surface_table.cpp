@@ -39,8 +39,10 @@ ShadingMaterial shading_material(const World& world, const Material& material) {
   result.base_per_m = 1.0F / material.base_period_m;
   result.detail_per_m = 1.0F / material.detail_period_m;
   result.specular = material.specular;
+  result.glow = material.glow;
   if (material.label == SurfaceClass::kVegetation) result.transmission = 0.5F;
   if (material.label == SurfaceClass::kTent) result.transmission = 0.15F;
+  if (material.label == SurfaceClass::kCurtain) result.transmission = 0.3F;
   result.mean_color = material.tint.cwiseProduct(result.base->color({0.5F, 0.5F}, 1.0F));
   result.mean_luminance = luminance_of(result.mean_color);
   result.label = static_cast<LabelId>(material.label);

@@ -28,6 +28,7 @@ struct ShadingMaterial {
   float base_per_m = 1.0F;    ///< Tiles per metre.
   float detail_per_m = 1.0F;  ///< Tiles per metre.
   float specular = 0.0F;
+  float glow = 0.0F;
   float transmission = 0.0F;    ///< Share of light that comes through from behind: leaves, cloth.
   float mean_luminance = 0.0F;  ///< Of the albedo.
   Eigen::Vector3f mean_color = Eigen::Vector3f::Zero();

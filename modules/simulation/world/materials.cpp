@@ -11,13 +11,13 @@ namespace {
 bool equal(const Material& a, const Material& b) {
   return a.label == b.label && a.tint == b.tint && a.base == b.base && a.detail == b.detail &&
          a.base_period_m == b.base_period_m && a.detail_period_m == b.detail_period_m &&
-         a.specular == b.specular;
+         a.specular == b.specular && a.glow == b.glow;
 }
 
 }  // namespace
 
 std::uint16_t MaterialLibrary::add(SurfaceClass label, Recipe recipe, const Eigen::Vector3f& tint,
-                                   float scale, float specular) {
+                                   float scale, float specular, float glow) {
   const RecipeTraits& traits = traits_of(recipe);
   Material material;
   material.label = label;
@@ -27,6 +27,7 @@ std::uint16_t MaterialLibrary::add(SurfaceClass label, Recipe recipe, const Eige
   material.base_period_m = scale * traits.period_m;
   material.detail_period_m = scale * traits.detail_period_m;
   material.specular = specular;
+  material.glow = glow;
 
   const auto known = std::find_if(materials_.begin(), materials_.end(),
                                   [&](const Material& other) { return equal(other, material); });

@@ -21,7 +21,7 @@ class MaterialLibrary {
   /// beyond 65535 materials.
   [[nodiscard]] std::uint16_t add(SurfaceClass label, Recipe recipe,
                                   const Eigen::Vector3f& tint = Eigen::Vector3f::Ones(),
-                                  float scale = 1.0F, float specular = 0.0F);
+                                  float scale = 1.0F, float specular = 0.0F, float glow = 0.0F);
 
   /// Hands what was made to a world. The library is empty afterwards.
   void move_to(World& world);

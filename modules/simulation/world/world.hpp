@@ -49,6 +49,8 @@ struct Material {
   float base_period_m = 4.0F;    ///< Edge of one tile of `base` on the surface [m].
   float detail_period_m = 1.0F;  ///< Edge of one tile of `detail` [m].
   float specular = 0.0F;         ///< Share of mirrored sky, 0 to 1 (windows, car paint).
+  float glow = 0.0F;             ///< Light it sends out by itself, as if it got so much irradiance
+                                 ///< more (lamps, screens, curtains before a window).
 };
 
 /// Lights of a world. Outdoors the sun and the sky, indoors lamps and a constant ambient term.
