@@ -85,6 +85,10 @@ DepthSensorOptions depth_options(const SensorRig& rig) {
   DepthSensorOptions options;
   options.focal_px = rig.stereo.cameras[0].fx;
   options.baseline_m = rig.stereo.baseline_m();
+  if (rig.depth) {
+    options.min_range_m = rig.depth->min_m;
+    options.max_range_m = rig.depth->max_m;
+  }
   return options;
 }
 

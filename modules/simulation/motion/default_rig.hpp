@@ -19,7 +19,8 @@ enum class RigKind {
 /// Rotation of the body in the vehicle's frame (x forward, y left, z up), R_vehicle_body.
 [[nodiscard]] Eigen::Matrix3d vehicle_from_body(RigKind kind);
 
-/// A depth camera in place of the rig's left camera, with the rig's baseline.
+/// A depth camera in place of the rig's left camera, with the rig's baseline and, where it has one,
+/// its range.
 [[nodiscard]] DepthSensorOptions depth_options(const SensorRig& rig);
 
 }  // namespace km

@@ -15,28 +15,6 @@ namespace {
 constexpr double kLargest_mm = 65535.0;
 constexpr double kBlockTolerance_px = 0.5;  // by which something nearer must cover a pixel
 
-[[noreturn]] void refuse(const std::string& problem) {
-  throw std::invalid_argument("depth sensor: " + problem);
-}
-
-const DepthSensorOptions& checked_options(const DepthSensorOptions& options) {
-  const auto within = [](const char* name, double value, double min, double max) {
-    if (!(min <= value && value <= max))
-      refuse(std::string(name) + " = " + std::to_string(value) + " is outside [" +
-             std::to_string(min) + ", " + std::to_string(max) + "]");
-  };
-  within("focal_px", options.focal_px, 1.0, 1e5);
-  within("baseline_m", options.baseline_m, 1e-3, 10.0);
-  within("disparity_noise_px", options.disparity_noise_px, 0.0, 10.0);
-  within("disparity_step_px", options.disparity_step_px, 0.0, 1.0);
-  within("correlation_px", options.correlation_px, 1, 64);
-  within("min_range_m", options.min_range_m, 0.0, 65.0);
-  within("max_range_m", options.max_range_m, options.min_range_m, kLargest_mm / 1000.0);
-  within("edge_disparity_px", options.edge_disparity_px, 0.0, 1e4);
-  within("edge_loss", options.edge_loss, 0.0, 1.0);
-  return options;
-}
-
 std::uint16_t millimetres(double depth_m) {
   const double rounded = std::round(1000.0 * depth_m);
   return rounded > 0.0 && rounded <= kLargest_mm ? static_cast<std::uint16_t>(rounded) : 0;
@@ -104,14 +82,14 @@ bool at_edge(std::span<const double> disparity, std::size_t width, std::size_t k
 
 }  // namespace
 
-DepthSensor::DepthSensor(const DepthSensorOptions& options) : options_(checked_options(options)) {}
+DepthSensor::DepthSensor(const DepthSensorOptions& options) : options_(checked(options)) {}
 
 std::vector<std::uint16_t> DepthSensor::measure(std::span<const float> depth_m, int width,
                                                 int height, std::uint64_t seed) const {
   if (width <= 0 || height <= 0 ||
       depth_m.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
-    refuse(std::to_string(depth_m.size()) + " depths for " + std::to_string(width) + "x" +
-           std::to_string(height) + " pixels");
+    throw std::invalid_argument("depth sensor: " + std::to_string(depth_m.size()) + " depths for " +
+                                std::to_string(width) + "x" + std::to_string(height) + " pixels");
   std::vector<std::uint16_t> measured(depth_m.size(), 0);
   if (options_.ideal) {
     std::transform(depth_m.begin(), depth_m.end(), measured.begin(),

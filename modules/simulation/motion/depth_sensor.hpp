@@ -4,10 +4,14 @@
 #include <span>
 #include <vector>
 
+#include "modules/core/config.hpp"
+
 namespace km {
 
 /// A stereo camera that measures depth.
 struct DepthSensorOptions {
+  static constexpr const char* kSection = "depth_sensor";
+
   double focal_px = 458.0;
   double baseline_m = 0.1;
   double disparity_noise_px = 0.15;     ///< Standard deviation.
@@ -18,12 +22,25 @@ struct DepthSensorOptions {
   double edge_disparity_px = 1.0;  ///< Jump to a neighbour from which a pixel counts as an edge.
   double edge_loss = 0.5;          ///< Probability of no depth at an edge.
   bool ideal = false;              ///< Rounding to mm only.
+
+  void visit_fields(auto& visitor) {
+    visitor.field("focal_px", focal_px, {1.0, 1e5});
+    visitor.field("baseline_m", baseline_m, {1e-3, 10.0});
+    visitor.field("disparity_noise_px", disparity_noise_px, {0.0, 10.0});
+    visitor.field("disparity_step_px", disparity_step_px, {0.0, 1.0});
+    visitor.field("correlation_px", correlation_px, {1, 64});
+    visitor.field("min_range_m", min_range_m, {0.0, max_range_m});
+    visitor.field("max_range_m", max_range_m, {1e-3, 65.535});
+    visitor.field("edge_disparity_px", edge_disparity_px, {0.0, 1e4});
+    visitor.field("edge_loss", edge_loss, {0.0, 1.0});
+    visitor.field("ideal", ideal);
+  }
 };
 
 /// Depth images of a stereo camera from true ones.
 class DepthSensor {
  public:
-  /// Throws std::invalid_argument for options out of range.
+  /// Throws ConfigError for options out of range.
   explicit DepthSensor(const DepthSensorOptions& options);
 
   /// Depth in mm of a true depth image (z in the camera's frame [m], row-major, 0: sky); 0 where

@@ -20,6 +20,7 @@ constexpr double kPlanInterval_s = 1.0;   // of the flight plan's controls
 constexpr double kGustInterval_s = 0.25;  // of the gusts'
 constexpr double kPoseInterval_s = 0.01;
 constexpr double kGravity_mps2 = 9.81;
+constexpr double kRotorDrag_hz = 0.3;  // deceleration by drag per speed
 constexpr double kSmallestVolume_m = 1.0;
 constexpr double kMaxGusts = 2.5;  // standard deviations
 constexpr double kMinLeg_m = 0.8;
@@ -30,19 +31,10 @@ constexpr int kTries = 20;
 }
 
 void check(const Eigen::AlignedBox3d& volume, const FlightOptions& options) {
-  const auto within = [](const char* name, double value, double min, double max) {
-    if (!(min <= value && value <= max))
-      refuse(std::string(name) + " = " + std::to_string(value) + " is outside [" +
-             std::to_string(min) + ", " + std::to_string(max) + "]");
-  };
+  checked(options);
   if (volume.isEmpty() || !(volume.sizes().minCoeff() >= kSmallestVolume_m) ||
       !volume.sizes().allFinite())
     refuse("the volume is not at least 1 m in every direction");
-  within("duration_s", options.duration_s, 0.1, 36000.0);
-  within("standstill_s", options.standstill_s, 0.0, 3600.0);
-  within("max_speed_mps", options.max_speed_mps, 0.05, 5.0);
-  within("max_yaw_rate", options.max_yaw_rate, 0.0, 2.0 * std::numbers::pi);
-  within("gusts_m", options.gusts_m, 0.0, 0.05);
   const Eigen::Matrix3d& R = options.R_vehicle_body;
   if (!((R * R.transpose()).isIdentity(1e-6) && R.determinant() > 0.0))
     refuse("R_vehicle_body is no rotation");
@@ -118,8 +110,8 @@ double time_above(const UniformSpline<4>& plan, double height) {
 }
 
 // The z axis along the thrust, the x axis as near to `yaw` as that leaves it.
-Eigen::Matrix3d attitude(const Eigen::Vector3d& acceleration, double yaw) {
-  const Eigen::Vector3d z = (acceleration + kGravity_mps2 * Eigen::Vector3d::UnitZ()).normalized();
+Eigen::Matrix3d attitude(const Eigen::Vector3d& thrust, double yaw) {
+  const Eigen::Vector3d z = thrust.normalized();
   const Eigen::Vector3d y =
       z.cross(Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0.0)).normalized();
   Eigen::Matrix3d R;
@@ -145,8 +137,10 @@ SplineTrajectory make_flight_trajectory(const Eigen::AlignedBox3d& volume,
     const double t = kPoseInterval_s * (static_cast<double>(k) - 2.0);
     const auto planned = plan.at(t);
     const auto pushed = push.at(t);
-    const Eigen::Vector3d acceleration = planned.second.head<3>() + pushed.second;
-    poses.push_back(make_pose(attitude(acceleration, planned.value[3]) * options.R_vehicle_body,
+    const Eigen::Vector3d thrust = planned.second.head<3>() + pushed.second +
+                                   kRotorDrag_hz * (planned.first.head<3>() + pushed.first) +
+                                   kGravity_mps2 * Eigen::Vector3d::UnitZ();
+    poses.push_back(make_pose(attitude(thrust, planned.value[3]) * options.R_vehicle_body,
                               planned.value.head<3>() + pushed.value));
   }
   return spline_along(0.0, kPoseInterval_s, poses);

@@ -3,12 +3,15 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 
+#include "modules/core/config.hpp"
 #include "modules/simulation/motion/spline_trajectory.hpp"
 
 namespace km {
 
 /// How a multicopter flies. Defaults: like the easy and medium sequences of EuRoC's Vicon room.
 struct FlightOptions {
+  static constexpr const char* kSection = "flight";
+
   std::uint64_t seed = 1;
   double duration_s = 60.0;     ///< From time 0, standstill included.
   double standstill_s = 2.0;    ///< Exactly at rest on the ground at the start.
@@ -17,13 +20,21 @@ struct FlightOptions {
   double gusts_m = 0.008;       ///< Standard deviation by which gusts push it off its way [m].
   /// The body in the vehicle's frame (x forward, y left, z up); see vehicle_from_body().
   Eigen::Matrix3d R_vehicle_body = Eigen::Matrix3d::Identity();
+
+  void visit_fields(auto& visitor) {
+    visitor.field("duration_s", duration_s, {0.1, 36000.0});
+    visitor.field("standstill_s", standstill_s, {0.0, 3600.0});
+    visitor.field("max_speed_mps", max_speed_mps, {0.05, 5.0});
+    visitor.field("max_yaw_rate", max_yaw_rate, {0.0, 6.3});
+    visitor.field("gusts_m", gusts_m, {0.0, 0.05});
+  }
 };
 
 /// A flight inside `volume` (frame `world`, z up): at rest at its floor, takes off, then from one
-/// random waypoint to the next with changes of yaw. The vehicle's z axis is along the thrust,
-/// acceleration minus gravity, as a multicopter's must be. The whole curve stays in `volume`.
-/// Throws std::invalid_argument for a volume that is empty or smaller than 1 m across, and options
-/// out of range.
+/// random waypoint to the next with changes of yaw. The vehicle's z axis is along the thrust:
+/// acceleration minus gravity plus the rotors' drag, which is linear in velocity. The whole curve
+/// stays in `volume`. Throws ConfigError for options out of range, std::invalid_argument for a
+/// volume that is empty or smaller than 1 m across or an R_vehicle_body that is no rotation.
 [[nodiscard]] SplineTrajectory make_flight_trajectory(const Eigen::AlignedBox3d& volume,
                                                       const FlightOptions& options);
 

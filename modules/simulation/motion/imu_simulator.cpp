@@ -11,23 +11,6 @@
 namespace km {
 namespace {
 
-void require_at_least(const char* name, double value, double least) {
-  if (value >= least && std::isfinite(value)) return;
-  throw std::invalid_argument(std::string("IMU simulator: ") + name + " = " +
-                              std::to_string(value));
-}
-
-void check(const ImuSimulation& options) {
-  require_at_least("rate_hz", options.noise.rate_hz, 1.0);
-  require_at_least("gyro_noise_density", options.noise.gyro_noise_density, 0.0);
-  require_at_least("gyro_random_walk", options.noise.gyro_random_walk, 0.0);
-  require_at_least("accel_noise_density", options.noise.accel_noise_density, 0.0);
-  require_at_least("accel_random_walk", options.noise.accel_random_walk, 0.0);
-  require_at_least("initial_gyro_bias", options.initial_gyro_bias, 0.0);
-  require_at_least("initial_accel_bias", options.initial_accel_bias, 0.0);
-  require_at_least("gravity_mps2", options.gravity_mps2, 0.0);
-}
-
 // White noise on a bias that walks, for one of the two sensors. Kalibr's IMU noise model in
 // discrete time: n[k] = density / sqrt(dt) w[k], b[k] = b[k-1] + walk * sqrt(dt) w[k].
 class SensorError {
@@ -55,7 +38,7 @@ GaussianRandom stream(const ImuSimulation& options, std::uint64_t part) {
 
 std::vector<SimulatedImu> simulate_imu(const BodyTrajectory& trajectory, Stamp epoch,
                                        const ImuSimulation& options) {
-  check(options);
+  checked(options);
   const ImuNoise& n = options.noise;
   const double on = options.ideal ? 0.0 : 1.0;
   SensorError gyro(on * options.initial_gyro_bias, on * n.gyro_noise_density,

@@ -5,19 +5,35 @@
 #include <vector>
 
 #include "modules/core/camera.hpp"
+#include "modules/core/config.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/simulation/motion/body_trajectory.hpp"
 
 namespace km {
 
+/// How inertial samples are made.
 struct ImuSimulation {
+  static constexpr const char* kSection = "imu";
+
   ImuNoise noise;  ///< Its rate_hz is the sampling rate.
   std::uint64_t seed = 1;
   bool ideal = false;                ///< Neither noise nor bias.
   double initial_gyro_bias = 0.03;   ///< Standard deviation per axis when switched on [rad/s].
   double initial_accel_bias = 0.05;  ///< The same [m/s^2].
   double gravity_mps2 = 9.81;        ///< Gravity is [0, 0, -gravity_mps2] in `world`.
+
+  void visit_fields(auto& visitor) {
+    visitor.field("rate_hz", noise.rate_hz, {1.0, 1e5});
+    visitor.field("gyro_noise_density", noise.gyro_noise_density, {0.0, 1.0});
+    visitor.field("gyro_random_walk", noise.gyro_random_walk, {0.0, 1.0});
+    visitor.field("accel_noise_density", noise.accel_noise_density, {0.0, 10.0});
+    visitor.field("accel_random_walk", noise.accel_random_walk, {0.0, 10.0});
+    visitor.field("ideal", ideal);
+    visitor.field("initial_gyro_bias", initial_gyro_bias, {0.0, 1.0});
+    visitor.field("initial_accel_bias", initial_accel_bias, {0.0, 10.0});
+    visitor.field("gravity_mps2", gravity_mps2, {0.0, 20.0});
+  }
 };
 
 /// A sample and the biases in it: what EuRoC's ground-truth state lists.
@@ -32,8 +48,7 @@ struct SimulatedImu {
 /// to nanoseconds and the motion taken at the rounded stamp:
 ///   gyro = w + b_g + n_g,   accel = R^T (a - g) + b_a + n_a.
 /// White noise and bias walk in discrete time as in Kalibr's IMU noise model: standard deviations
-/// density / sqrt(dt) and walk * sqrt(dt). Throws std::invalid_argument for a rate or a noise that
-/// is not finite and positive (noise may be 0).
+/// density / sqrt(dt) and walk * sqrt(dt). Throws ConfigError for options out of range.
 [[nodiscard]] std::vector<SimulatedImu> simulate_imu(const BodyTrajectory& trajectory, Stamp epoch,
                                                      const ImuSimulation& options);
 

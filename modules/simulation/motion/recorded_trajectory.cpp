@@ -14,17 +14,7 @@ namespace {
 
 using Control = SplineTrajectory::Control;
 
-void check(std::span<const StampedPose> poses, const RecordingOptions& options) {
-  const auto positive = [](const char* name, double value) {
-    if (!(value > 0.0) || !std::isfinite(value))
-      throw std::invalid_argument(std::string("recorded trajectory: ") + name + " = " +
-                                  std::to_string(value) + " is not positive");
-  };
-  positive("interval_s", options.interval_s);
-  positive("position_noise_m", options.position_noise_m);
-  positive("rotation_noise_rad", options.rotation_noise_rad);
-  positive("jerk_mps3", options.jerk_mps3);
-  positive("rotation_jerk", options.rotation_jerk);
+void check(std::span<const StampedPose> poses) {
   if (poses.size() < 2)
     throw std::invalid_argument("recorded trajectory: " + std::to_string(poses.size()) +
                                 " poses, at least 2 are needed");
@@ -72,7 +62,8 @@ FitDeviation deviation_from(std::span<const StampedPose> poses, Stamp epoch,
 
 RecordedTrajectory fit_recording(std::span<const StampedPose> poses, Stamp epoch,
                                  const RecordingOptions& options) {
-  check(poses, options);
+  checked(options);
+  check(poses);
   // The intervals are stretched a little, so that a whole number of them spans the recording.
   const double span_s = seconds_between(poses.front().stamp, poses.back().stamp);
   const double intervals = std::max(1.0, std::round(span_s / options.interval_s));

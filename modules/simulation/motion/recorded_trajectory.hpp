@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <span>
 
+#include "modules/core/config.hpp"
 #include "modules/core/stamped_pose.hpp"
 #include "modules/simulation/motion/spline_trajectory.hpp"
 
@@ -10,6 +11,8 @@ namespace km {
 
 /// How closely a recording is followed.
 struct RecordingOptions {
+  static constexpr const char* kSection = "recording";
+
   double interval_s = 0.02;  ///< Of the spline's controls.
   /// Deviations taken for ordinary noise; larger ones lose weight, as outliers do.
   double position_noise_m = 0.0005;
@@ -17,6 +20,14 @@ struct RecordingOptions {
   /// Changes of acceleration taken for ordinary, standard deviation of its derivative.
   double jerk_mps3 = 100.0;
   double rotation_jerk = 1000.0;  ///< [rad/s^3]
+
+  void visit_fields(auto& visitor) {
+    visitor.field("interval_s", interval_s, {1e-3, 1.0});
+    visitor.field("position_noise_m", position_noise_m, {1e-6, 1.0});
+    visitor.field("rotation_noise_rad", rotation_noise_rad, {1e-6, 1.0});
+    visitor.field("jerk_mps3", jerk_mps3, {1e-3, 1e6});
+    visitor.field("rotation_jerk", rotation_jerk, {1e-3, 1e6});
+  }
 };
 
 /// Distances between the recorded poses and the curve.
@@ -36,8 +47,9 @@ struct RecordedTrajectory {
 /// A smooth motion through recorded poses, by penalised and robust linear least squares: it passes
 /// within the noise of them and bridges gaps. Time 0 of the trajectory is `epoch`, so that stamps
 /// of images and inertial data convert by seconds_between(epoch, stamp). `poses` ascend strictly in
-/// time; the curve covers the first to the last. Throws std::invalid_argument for fewer than two
-/// poses, stamps that do not ascend and options that are not positive. O(poses + controls).
+/// time; the curve covers the first to the last. Throws ConfigError for options out of range,
+/// std::invalid_argument for fewer than two poses and stamps that do not ascend.
+/// O(poses + controls).
 [[nodiscard]] RecordedTrajectory fit_recording(std::span<const StampedPose> poses, Stamp epoch,
                                                const RecordingOptions& options = {});
 

@@ -18,30 +18,13 @@ namespace {
 
 using GroundHeight = std::function<double(double, double)>;
 
+constexpr double kSlowest_mps = 0.1;  // of a route
+constexpr double kFastest_mps = 60.0;
 constexpr double kWheelbase_m = 2.7;
 constexpr double kTrack_m = 1.6;
 constexpr double kWander_m = 0.08;          // standard deviation of the driver's aim
 constexpr double kWanderInterval_m = 12.0;  // way over which it changes
 constexpr double kQuinticShrink = 0.63;     // of white noise by the spline through it
-
-void require_within(const char* name, double value, double min, double max) {
-  if (min <= value && value <= max) return;
-  throw std::invalid_argument(std::string("vehicle trajectory: ") + name + " = " +
-                              std::to_string(value) + " is outside [" + std::to_string(min) + ", " +
-                              std::to_string(max) + "]");
-}
-
-const VehicleOptions& checked_options(const VehicleOptions& options) {
-  require_within("duration_s", options.duration_s, 0.1, 36000.0);
-  require_within("start_m", options.start_m, 0.0, 1e6);
-  require_within("standstill_s", options.standstill_s, 0.0, 3600.0);
-  require_within("rig_height_m", options.rig_height_m, 0.0, 10.0);
-  require_within("max_lateral_mps2", options.max_lateral_mps2, 0.1, 10.0);
-  require_within("max_longitudinal_mps2", options.max_longitudinal_mps2, 0.1, 10.0);
-  require_within("stop_every_m", options.stop_every_m, 0.0, 1e6);
-  require_within("roughness", options.roughness, 0.0, 10.0);
-  return options;
-}
 
 // How far to the left of the path the driver keeps, by way.
 UniformSpline<1> wander(double begin_m, double end_m, std::uint64_t seed) {
@@ -125,8 +108,10 @@ SE3 body_pose(const GroundPoint& point, const SprungBody& body, double height_m)
 
 SplineTrajectory make_vehicle_trajectory(const Route& route, const GroundHeight& ground_height,
                                          const VehicleOptions& options) {
-  checked_options(options);
-  require_within("speed_mps of the route", route.speed_mps, 0.1, 60.0);
+  checked(options);
+  if (!(route.speed_mps >= kSlowest_mps && route.speed_mps <= kFastest_mps))
+    throw std::invalid_argument("route: speed " + std::to_string(route.speed_mps) +
+                                " m/s is outside [0.1, 60]");
   const double dt = DrivenWay::kInterval_s;
   const std::vector<double> ways =
       drive(RoutePath(route, options.corner_radius_m), route.speed_mps, options).way_m;

@@ -69,6 +69,10 @@ TEST_CASE("The vehicle's rig has a street's baseline", "[motion]") {
   const DepthSensorOptions depth = depth_options(rig);
   CHECK(depth.baseline_m == Approx(0.27));
   CHECK(depth.focal_px == Approx(458.654));
+  SensorRig ranged = rig;
+  ranged.depth = DepthRange{0.5, 12.0};
+  CHECK(depth_options(ranged).min_range_m == 0.5);
+  CHECK(depth_options(ranged).max_range_m == 12.0);
 }
 
 TEST_CASE("A rig refuses resolutions without sense", "[motion]") {

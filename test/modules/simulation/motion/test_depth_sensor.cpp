@@ -113,7 +113,7 @@ TEST_CASE("The depth sensor refuses options and sizes without sense", "[motion]"
   const auto refused = [](auto change) {
     DepthSensorOptions options;
     change(options);
-    CHECK_THROWS_AS(DepthSensor(options), std::invalid_argument);
+    CHECK_THROWS_AS(DepthSensor(options), ConfigError);
   };
   refused([](DepthSensorOptions& o) { o.focal_px = 0.0; });
   refused([](DepthSensorOptions& o) { o.baseline_m = -0.1; });

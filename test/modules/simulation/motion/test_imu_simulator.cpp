@@ -183,7 +183,7 @@ TEST_CASE("The IMU simulator refuses rates and noises without sense", "[motion]"
   const auto refused = [&](auto change) {
     ImuSimulation options;
     change(options);
-    CHECK_THROWS_AS(simulate_imu(still, kEpoch, options), std::invalid_argument);
+    CHECK_THROWS_AS(simulate_imu(still, kEpoch, options), ConfigError);
   };
   refused([](ImuSimulation& o) { o.noise.rate_hz = 0.0; });
   refused([](ImuSimulation& o) { o.noise.rate_hz = std::numeric_limits<double>::quiet_NaN(); });

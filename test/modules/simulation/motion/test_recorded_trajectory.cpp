@@ -124,10 +124,10 @@ TEST_CASE("A fit refuses poses without order and options without sense", "[motio
   CHECK_THROWS_AS(fit_recording(bad, kEpoch), std::invalid_argument);
   RecordingOptions options;
   options.interval_s = 0.0;
-  CHECK_THROWS_AS(fit_recording(good, kEpoch, options), std::invalid_argument);
+  CHECK_THROWS_AS(fit_recording(good, kEpoch, options), ConfigError);
   options = {};
   options.jerk_mps3 = -1.0;
-  CHECK_THROWS_AS(fit_recording(good, kEpoch, options), std::invalid_argument);
+  CHECK_THROWS_AS(fit_recording(good, kEpoch, options), ConfigError);
 }
 
 // Rows `t[ns], gyro x y z, ...` of a recorded inertial sensor.

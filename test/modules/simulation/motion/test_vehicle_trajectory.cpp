@@ -197,7 +197,7 @@ TEST_CASE("A vehicle refuses options that cannot be driven", "[motion]") {
   const auto refused = [](auto change) {
     VehicleOptions options;
     change(options);
-    CHECK_THROWS_AS(make_vehicle_trajectory(kBlock, nullptr, options), std::invalid_argument);
+    CHECK_THROWS_AS(make_vehicle_trajectory(kBlock, nullptr, options), ConfigError);
   };
   refused([](VehicleOptions& o) { o.duration_s = 0.0; });
   refused([](VehicleOptions& o) { o.duration_s = std::nan(""); });
