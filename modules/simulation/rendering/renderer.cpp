@@ -6,12 +6,12 @@
 namespace km {
 
 struct Renderer::Impl {
-  Scene scene;
+  RenderScene scene;
   RenderOptions options;
 };
 
 Renderer::Renderer(const World& world, const RenderOptions& options)
-    : impl_(new Impl{Scene(world), options}) {}
+    : impl_(new Impl{RenderScene(world), options}) {}
 
 Renderer::~Renderer() = default;
 

@@ -127,8 +127,8 @@ float lamp_light(const Lighting& lighting, const LightVolume::Light& light,
 
 // What a glossy surface mirrors: the sky, as far as the surroundings leave it open that way.
 template <typename Value>
-Value mirrored(const Scene& scene, const Eigen::Vector3f& point, const Eigen::Vector3f& direction,
-               const Eigen::Vector3f& normal) {
+Value mirrored(const RenderScene& scene, const Eigen::Vector3f& point,
+               const Eigen::Vector3f& direction, const Eigen::Vector3f& normal) {
   using C = Channels<Value>;
   const Eigen::Vector3f d = direction - 2.0F * direction.dot(normal) * normal;
   const float around = scene.light.at(point, d).ambient;
@@ -147,7 +147,7 @@ float mirrored_share(float specular, float cosine) {
 }
 
 template <typename Value>
-Shade<Value> shade_surface(const Scene& scene, const SurfacePoints& points, std::size_t lane,
+Shade<Value> shade_surface(const RenderScene& scene, const SurfacePoints& points, std::size_t lane,
                            const Eigen::Vector3f& view, float distance_m) {
   using C = Channels<Value>;
   const ShadingMaterial& material = *points.material[lane];
@@ -179,7 +179,7 @@ Shade<Value> shade_surface(const Scene& scene, const SurfacePoints& points, std:
 
 }  // namespace
 
-Scene::Scene(const World& world)
+RenderScene::RenderScene(const World& world)
     : lighting(world.lighting),
       surfaces(world),
       tracer(world.mesh),
@@ -227,7 +227,7 @@ void locate(const SurfaceTable& surfaces, const SurfaceHits& hits, SurfacePoints
   }
 }
 
-LaneMask shadowed(const Scene& scene, LaneMask wanted, const SurfacePoints& points) {
+LaneMask shadowed(const RenderScene& scene, LaneMask wanted, const SurfacePoints& points) {
   const Eigen::Vector3f& to_sun = scene.lighting.to_sun;
   RayPacket rays;
   LaneMask dark = 0;
@@ -250,7 +250,7 @@ LaneMask shadowed(const Scene& scene, LaneMask wanted, const SurfacePoints& poin
 }
 
 template <typename Value>
-void shade(const Scene& scene, const SurfaceHits& hits, const SurfacePoints& points,
+void shade(const RenderScene& scene, const SurfaceHits& hits, const SurfacePoints& points,
            LaneMask wanted, std::array<Shade<Value>, kLanes>& shades) {
   using C = Channels<Value>;
   for (int i = 0; i < kLanes; ++i) {
@@ -267,9 +267,9 @@ void shade(const Scene& scene, const SurfaceHits& hits, const SurfacePoints& poi
   }
 }
 
-template void shade<float>(const Scene&, const SurfaceHits&, const SurfacePoints&, LaneMask,
+template void shade<float>(const RenderScene&, const SurfaceHits&, const SurfacePoints&, LaneMask,
                            std::array<Shade<float>, kLanes>&);
-template void shade<Eigen::Vector3f>(const Scene&, const SurfaceHits&, const SurfacePoints&,
+template void shade<Eigen::Vector3f>(const RenderScene&, const SurfaceHits&, const SurfacePoints&,
                                      LaneMask, std::array<Shade<Eigen::Vector3f>, kLanes>&);
 
 }  // namespace km

@@ -12,8 +12,8 @@
 namespace km {
 
 /// A world made ready for rendering. Immutable.
-struct Scene {
-  explicit Scene(const World& world);
+struct RenderScene {
+  explicit RenderScene(const World& world);
 
   const Lighting lighting;
   const SurfaceTable surfaces;
@@ -55,11 +55,12 @@ struct SurfacePoints {
 void locate(const SurfaceTable& surfaces, const SurfaceHits& hits, SurfacePoints& points);
 
 /// Lanes of `wanted` whose points the sun does not reach: shadowed, or turned away.
-[[nodiscard]] LaneMask shadowed(const Scene& scene, LaneMask wanted, const SurfacePoints& points);
+[[nodiscard]] LaneMask shadowed(const RenderScene& scene, LaneMask wanted,
+                                const SurfacePoints& points);
 
 /// Radiance of each active lane, haze included.
 template <typename Value>
-void shade(const Scene& scene, const SurfaceHits& hits, const SurfacePoints& points,
+void shade(const RenderScene& scene, const SurfaceHits& hits, const SurfacePoints& points,
            LaneMask wanted, std::array<Shade<Value>, kLanes>& shades);
 
 }  // namespace km

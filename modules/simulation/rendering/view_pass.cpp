@@ -17,7 +17,7 @@ int usable_samples(int wanted) {
 
 }  // namespace
 
-ViewPass::ViewPass(const Scene& scene, const RenderOptions& options, const PixelRays& rays,
+ViewPass::ViewPass(const RenderScene& scene, const RenderOptions& options, const PixelRays& rays,
                    const SE3& T_world_body, const RenderRequest& request)
     : scene_(scene),
       options_(options),

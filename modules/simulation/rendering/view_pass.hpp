@@ -16,7 +16,7 @@ namespace km {
 /// has edges.
 class ViewPass {
  public:
-  ViewPass(const Scene& scene, const RenderOptions& options, const PixelRays& rays,
+  ViewPass(const RenderScene& scene, const RenderOptions& options, const PixelRays& rays,
            const SE3& T_world_body, const RenderRequest& request);
 
   [[nodiscard]] RenderedView run();
@@ -68,7 +68,7 @@ class ViewPass {
            static_cast<std::size_t>(x);
   }
 
-  const Scene& scene_;
+  const RenderScene& scene_;
   const RenderOptions& options_;
   const PixelRays& rays_;
   const RenderRequest& request_;
