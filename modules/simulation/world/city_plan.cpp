@@ -5,6 +5,7 @@
 #include <numbers>
 #include <span>
 
+#include "modules/simulation/world/crossing_routes.hpp"
 #include "modules/simulation/world/lane.hpp"
 #include "modules/simulation/world/mesh_builder.hpp"
 #include "modules/simulation/world/seeded_random.hpp"
@@ -14,8 +15,6 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr double kCruise_mps = 8.0;
-
-using Crossing = std::array<int, 2>;  // street along y, street along x
 
 /// The lane through the crossings. It starts half-way along the first street, where a vehicle may
 /// stand.
@@ -112,19 +111,11 @@ CityPlan make_city_plan(std::uint64_t seed) {
 }
 
 std::vector<Route> city_routes(const CityPlan& plan) {
-  // Robots 0 and 1 share four streets in one direction; robot 2 meets both on some and follows
-  // them on others; robot 3 follows 2. Every route comes back to a street of its own after the
-  // first block.
-  static constexpr std::array<Crossing, 8> kFirst = {
-      {{1, 1}, {2, 1}, {2, 0}, {1, 0}, {1, 1}, {2, 1}, {2, 2}, {1, 2}}};
-  static constexpr std::array<Crossing, 8> kSecond = {
-      {{1, 1}, {2, 1}, {2, 2}, {3, 2}, {3, 1}, {2, 1}, {2, 2}, {1, 2}}};
-  static constexpr std::array<Crossing, 10> kThird = {
-      {{1, 2}, {2, 2}, {2, 1}, {2, 0}, {3, 0}, {3, 1}, {2, 1}, {2, 0}, {1, 0}, {1, 1}}};
-  static constexpr std::array<Crossing, 8> kFourth = {
-      {{1, 2}, {0, 2}, {0, 1}, {1, 1}, {1, 2}, {2, 2}, {2, 1}, {1, 1}}};
-  return {route_over(plan, kFirst), route_over(plan, kSecond), route_over(plan, kThird),
-          route_over(plan, kFourth)};
+  std::vector<Route> routes;
+  for (const std::vector<Crossing>& crossings : crossing_routes()) {
+    routes.push_back(route_over(plan, crossings));
+  }
+  return routes;
 }
 
 }  // namespace km

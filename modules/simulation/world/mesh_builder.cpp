@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 #include <string>
@@ -159,26 +160,29 @@ void MeshBuilder::extrude(std::span<const Vector2f> outline, float z_low, float 
 }
 
 void MeshBuilder::grid(int rows, int columns, const std::function<GridPoint(int, int)>& point,
-                       MaterialId material, const std::function<bool(int, int)>& kept) {
-  const auto first = static_cast<std::uint32_t>(mesh_.vertices.size());
-  for (int row = 0; row <= rows; ++row) {
-    for (int column = 0; column <= columns; ++column) {
-      const GridPoint at = point(row, column);
-      vertex(at.position, at.normal, at.uv);
-    }
-  }
+                       const CellMaterial& material) {
+  constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
+  const auto columns1 = static_cast<std::size_t>(columns) + 1;
+  std::vector<std::uint32_t> vertices(columns1 * (static_cast<std::size_t>(rows) + 1), kUnused);
   const auto index = [&](int row, int column) {
-    return first + static_cast<std::uint32_t>(row * (columns + 1) + column);
+    std::uint32_t& i =
+        vertices[static_cast<std::size_t>(row) * columns1 + static_cast<std::size_t>(column)];
+    if (i == kUnused) {
+      const GridPoint at = point(row, column);
+      i = vertex(at.position, at.normal, at.uv);
+    }
+    return i;
   };
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
-      if (kept && !kept(row, column)) continue;
+      const std::optional<MaterialId> cell = material(row, column);
+      if (!cell) continue;
       const std::uint32_t a = index(row, column);
       const std::uint32_t b = index(row, column + 1);
       const std::uint32_t c = index(row + 1, column + 1);
       const std::uint32_t d = index(row + 1, column);
-      face(a, b, c, material);
-      face(a, c, d, material);
+      face(a, b, c, *cell);
+      face(a, c, d, *cell);
     }
   }
 }
@@ -213,7 +217,7 @@ void MeshBuilder::cylinder(const Vector3f& from, const Vector3f& to, float radiu
     return GridPoint{
         base + radius * out, out + slope * axis, {share * girth, row == 0 ? 0.0F : length}};
   };
-  grid(1, segments, point, material);
+  grid(1, segments, point, [&](int, int) { return material; });
   if (!closed) return;
   if (radius_to > 0.0F) disc(to, radius_to * x, radius_to * y, segments, material);
   if (radius_from > 0.0F) disc(from, radius_from * y, radius_from * x, segments, material);
@@ -236,7 +240,7 @@ void MeshBuilder::ellipsoid(const Vector3f& center, const Vector3f& radii, int s
                          unit.cwiseQuotient(radii),
                          {round * girth, up * height}};
       },
-      material);
+      [&](int, int) { return material; });
 }
 
 void MeshBuilder::revolve(std::span<const Vector2f> profile, int segments, MaterialId material) {
@@ -257,14 +261,13 @@ void MeshBuilder::revolve(std::span<const Vector2f> profile, int segments, Mater
                            {out.x() * c, out.x() * s, out.y()},
                            {round * girth, row == 0 ? length : length + along.norm()}};
         },
-        material);
+        [&](int, int) { return material; });
     length += along.norm();
   }
 }
 
 void MeshBuilder::sheet(int rows, int columns, const std::function<Vector3f(int, int)>& point,
-                        MaterialId material, bool flat_uv,
-                        const std::function<bool(int, int)>& kept) {
+                        const CellMaterial& material, bool flat_uv) {
   const auto columns1 = static_cast<std::size_t>(columns) + 1;
   std::vector<Vector3f> points;
   points.reserve(columns1 * (static_cast<std::size_t>(rows) + 1));
@@ -294,7 +297,13 @@ void MeshBuilder::sheet(int rows, int columns, const std::function<Vector3f(int,
                                                along_column[static_cast<std::size_t>(row)]);
         return GridPoint{p, n, uv};
       },
-      material, kept);
+      material);
+}
+
+void MeshBuilder::sheet(int rows, int columns, const std::function<Vector3f(int, int)>& point,
+                        MaterialId material, bool flat_uv) {
+  sheet(
+      rows, columns, point, [&](int, int) { return material; }, flat_uv);
 }
 
 void MeshBuilder::leaf_cluster(const Vector3f& center, const Vector3f& radii, int count,

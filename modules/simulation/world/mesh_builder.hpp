@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -74,12 +75,16 @@ class MeshBuilder {
   /// The surface that `profile`, points (radius, z) in ascending z, sweeps around the z axis.
   void revolve(std::span<const Eigen::Vector2f> profile, int segments, MaterialId material);
 
+  /// Material of a cell (row, column) of a sheet; nullopt leaves a hole.
+  using CellMaterial = std::function<std::optional<MaterialId>(int, int)>;
+
   /// A smooth sheet of (rows + 1) x (columns + 1) points; point(row, column) gives the position,
-  /// and the sheet is seen from where rows x columns points. Texture coordinates are lengths along
-  /// the first row and column, or (x, y) if `flat_uv`. `kept`, if set, tells which cells exist.
+  /// and the sheet is seen from columns x rows points (their cross product). Texture coordinates
+  /// are lengths along the first row and column, or (x, y) if `flat_uv`.
   void sheet(int rows, int columns, const std::function<Eigen::Vector3f(int, int)>& point,
-             MaterialId material, bool flat_uv = false,
-             const std::function<bool(int, int)>& kept = {});
+             const CellMaterial& material, bool flat_uv = false);
+  void sheet(int rows, int columns, const std::function<Eigen::Vector3f(int, int)>& point,
+             MaterialId material, bool flat_uv = false);
 
   /// `count` leaves of about `leaf_m` scattered within an ellipsoid, denser at its outside; their
   /// normals lean outwards, which makes the crown look round.
@@ -103,7 +108,7 @@ class MeshBuilder {
                        const Eigen::Vector2f& uv);
   void face(std::uint32_t a, std::uint32_t b, std::uint32_t c, MaterialId material);
   void grid(int rows, int columns, const std::function<GridPoint(int, int)>& point,
-            MaterialId material, const std::function<bool(int, int)>& kept = {});
+            const CellMaterial& material);
   void disc(const Eigen::Vector3f& center, const Eigen::Vector3f& x, const Eigen::Vector3f& y,
             int segments, MaterialId material);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 namespace km {
@@ -32,10 +33,13 @@ void add_ground(Scene& scene, const AlignedBox2f& box, float z, MaterialId mater
         const Vector2f p = at(static_cast<float>(row), static_cast<float>(column));
         return Vector3f(p.x(), p.y(), z);
       },
-      material, true,
-      [&](int row, int column) {
-        return !kept || kept(at(static_cast<float>(row) + 0.5F, static_cast<float>(column) + 0.5F));
-      });
+      [&](int row, int column) -> std::optional<MaterialId> {
+        const Vector2f middle =
+            at(static_cast<float>(row) + 0.5F, static_cast<float>(column) + 0.5F);
+        if (kept && !kept(middle)) return std::nullopt;
+        return material;
+      },
+      true);
 }
 
 AlignedBox2f rectangle(float x0, float y0, float x1, float y1) {

@@ -81,9 +81,9 @@ void add_body(Scene& scene, std::span<const BodyStation> stations, const Vehicle
   };
   const int rows = static_cast<int>(stations.size()) - 1;
   const int columns = kSectionPoints - 1;
-  scene.mesh.sheet(rows, columns, point, paints.body, false,
-                   [&](int row, int column) { return !is_glass(row, column); });
-  scene.mesh.sheet(rows, columns, point, paints.glass, false, is_glass);
+  scene.mesh.sheet(rows, columns, point, [&](int row, int column) {
+    return is_glass(row, column) ? paints.glass : paints.body;
+  });
   add_end(scene, stations.front(), true, paints.body);
   add_end(scene, stations.back(), false, paints.body);
   for (int row = 0; row < rows; ++row) {
