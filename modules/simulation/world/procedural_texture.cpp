@@ -22,7 +22,7 @@ constexpr Recipe kStains = Recipe::kDetailStains;
 // Recipe, name, size, period, detail, period of the detail. The two periods have no common multiple
 // below some dozens of either.
 constexpr std::array<Entry, kRecipeCount> kEntries = {{
-    {{Recipe::kPlain, "plain", 256, 2.0F, kGrain, 0.73F}, recipes::plain},
+    {{Recipe::kPlain, "plain", 256, 2.0F, kFlat, 1.0F}, recipes::plain},
     {{Recipe::kAsphalt, "asphalt", 1024, 4.0F, kStains, 9.31F}, recipes::asphalt},
     {{Recipe::kConcrete, "concrete", 512, 4.0F, kGrain, 0.83F}, recipes::concrete},
     {{Recipe::kPavers, "pavers", 512, 4.0F, kGrain, 0.83F}, recipes::pavers},
@@ -44,7 +44,7 @@ constexpr std::array<Entry, kRecipeCount> kEntries = {{
     {{Recipe::kCarpet, "carpet", 512, 2.0F, kStains, 4.79F}, recipes::carpet},
     {{Recipe::kCurtain, "curtain", 512, 2.0F, kGrain, 0.43F}, recipes::curtain},
     {{Recipe::kWallpaper, "wallpaper", 512, 1.0F, kStains, 3.77F}, recipes::wallpaper},
-    {{Recipe::kMattress, "mattress", 512, 2.0F, kGrain, 0.53F}, recipes::mattress},
+    {{Recipe::kMattress, "mattress", 512, 2.0F, kFlat, 1.0F}, recipes::mattress},
     {{Recipe::kPlayMat, "play_mat", 1024, 2.0F, kStains, 3.13F}, recipes::play_mat},
     {{Recipe::kMarkerTape, "marker_tape", 1024, 2.0F, kGrain, 0.59F}, recipes::marker_tape},
     {{Recipe::kTagGrid, "tag_grid", 512, 1.0F, kFlat, 1.0F}, recipes::tag_grid},

@@ -10,9 +10,10 @@ using Eigen::Vector2f;
 using Eigen::Vector3f;
 
 constexpr float kPi = 3.14159265F;
-// A pane shows an outside far brighter than the room: its paint throws back more than it gets.
-constexpr float kOutside = 7.0F;
-constexpr float kBacklit = 1.9F;
+// Irradiance that would make a white surface in the room as bright as the outside is, and as the
+// day makes the thin curtains.
+constexpr float kOutside = 4.0F;
+constexpr float kBacklit = 0.55F;
 constexpr float kBehind_m = 0.16F;  // depth of the window's niche
 
 /// Cloth in folds from z_low to z_high, from x = 0 to `width`, its mean at y = `depth`.
@@ -43,7 +44,8 @@ void add_window(Scene& scene, const WallWindow& window, SeededRandom& random) {
   const float half = 0.5F * window.width_m;
   const float low = window.sill_m;
   const float top = window.top_m;
-  const MaterialId outside = scene.plain(SurfaceClass::kWall, kOutside, kOutside, kOutside);
+  const MaterialId outside = scene.library.add(SurfaceClass::kWall, Recipe::kPlain,
+                                               Vector3f::Ones(), 1.0F, 0.0F, kOutside);
   const MaterialId frame = scene.plain(SurfaceClass::kWall, 0.6F, 0.6F, 0.58F);
   scene.mesh.quad({-half, kBehind_m, low}, {half, kBehind_m, low}, {half, kBehind_m, top},
                   {-half, kBehind_m, top}, outside);
@@ -66,9 +68,9 @@ void add_window(Scene& scene, const WallWindow& window, SeededRandom& random) {
                    frame);
   }
   const float warm = random.uniform(0.95F, 1.0F);
-  const MaterialId thin = scene.paint(SurfaceClass::kCurtain, Recipe::kCurtain,
-                                      kBacklit * Vector3f(1.0F, warm, warm * warm));
-  const float cloth = random.uniform(0.3F, 0.45F) * window.width_m;
+  const MaterialId thin = scene.library.add(SurfaceClass::kCurtain, Recipe::kCurtain,
+                                            {1.0F, warm, warm * warm}, 1.0F, 0.0F, kBacklit);
+  const float cloth = random.uniform(0.35F, 0.5F) * window.width_m;
   for (const float left : {-half - 0.12F, half + 0.12F - cloth}) {
     const ScopedFrame side(scene.mesh, standing_at({left, 0.0F, 0.0F}, 0.0F));
     add_folds(scene, cloth, low - 0.08F, top + 0.12F, -0.07F, thin, random);
@@ -102,7 +104,8 @@ void add_truss(Scene& scene, const Vector3f& from, const Vector3f& to, MaterialI
 
 void add_camera(Scene& scene, const Vector3f& position, float yaw) {
   const MaterialId black = scene.plain(SurfaceClass::kObject, 0.02F, 0.02F, 0.02F, 0.06F);
-  const MaterialId glow = scene.plain(SurfaceClass::kObject, 1.6F, 0.4F, 0.35F);
+  const MaterialId glow = scene.library.add(SurfaceClass::kObject, Recipe::kPlain,
+                                            {0.9F, 0.2F, 0.15F}, 1.0F, 0.0F, 1.0F);
   Eigen::Isometry3f frame = standing_at(position, yaw);
   frame.rotate(Eigen::AngleAxisf(0.5F, Vector3f::UnitX()));  // looks down, along -y
   const ScopedFrame scope(scene.mesh, frame);
@@ -115,8 +118,7 @@ void add_camera(Scene& scene, const Vector3f& position, float yaw) {
 
 void add_wall(Scene& scene, float length_m, float height_m, const WallWindow* window,
               SeededRandom& random) {
-  const MaterialId plaster =
-      scene.paint(SurfaceClass::kWall, Recipe::kPlaster, {1.0F, 0.99F, 0.97F});
+  const MaterialId plaster = scene.plain(SurfaceClass::kWall, 0.92F, 0.91F, 0.88F);
   const MaterialId skirting = scene.plain(SurfaceClass::kWall, 0.55F, 0.54F, 0.5F);
   const float half = 0.5F * length_m;
   const auto panel = [&](float x0, float x1, float z0, float z1) {
@@ -138,7 +140,7 @@ void add_wall(Scene& scene, float length_m, float height_m, const WallWindow* wi
 
 void add_plank_sheet(Scene& scene, float width_m, float top_m) {
   const MaterialId print =
-      scene.paint(SurfaceClass::kWall, Recipe::kWoodPlanks, {1.6F, 1.65F, 1.8F}, 0.8F);
+      scene.paint(SurfaceClass::kWall, Recipe::kWoodPlanks, {2.0F, 2.1F, 2.3F}, 0.5F);
   const MaterialId edge = scene.plain(SurfaceClass::kWall, 0.8F, 0.8F, 0.8F);
   // The boards stand upright: in a frame turned by a quarter, x runs up.
   Eigen::Isometry3f frame = Eigen::Isometry3f::Identity();
@@ -183,7 +185,8 @@ std::vector<Vector3f> add_ceiling(Scene& scene, float width_m, float depth_m, fl
   const MaterialId plaster =
       scene.paint(SurfaceClass::kCeiling, Recipe::kPlaster, {1.0F, 1.0F, 0.98F});
   const MaterialId metal = scene.plain(SurfaceClass::kCeiling, 0.5F, 0.51F, 0.53F, 0.15F);
-  const MaterialId glow = scene.plain(SurfaceClass::kCeiling, 5.0F, 5.0F, 4.8F);
+  const MaterialId glow = scene.library.add(SurfaceClass::kCeiling, Recipe::kPlain,
+                                            {1.0F, 1.0F, 0.96F}, 1.0F, 0.0F, 4.0F);
   scene.mesh.quad({0, depth_m, height_m}, {width_m, depth_m, height_m}, {width_m, 0, height_m},
                   {0, 0, height_m}, plaster);
   const float z = height_m - 0.4F;

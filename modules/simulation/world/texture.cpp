@@ -21,7 +21,7 @@ void require_valid(int size, const std::vector<Eigen::Vector3f>& rgb, int max_si
                                 std::to_string(wanted) + " needed");
   }
   for (const Eigen::Vector3f& texel : rgb) {
-    if (!(texel.minCoeff() >= 0.0F && texel.maxCoeff() <= 1.0F)) {
+    if (!((texel.array() >= 0.0F).all() && (texel.array() <= 1.0F).all())) {  // also NaN
       throw std::invalid_argument("texture: an albedo of (" + std::to_string(texel.x()) + ", " +
                                   std::to_string(texel.y()) + ", " + std::to_string(texel.z()) +
                                   ") is outside [0, 1]");

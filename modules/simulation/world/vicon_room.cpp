@@ -166,7 +166,7 @@ World make_vicon_room(std::uint64_t seed) {
     const ScopedFrame room(scene.mesh, T_world_room);
     add_room_floor(scene, kEdge_m, kEdge_m, random);
     for (const Vector3f& lamp : add_ceiling(scene, kEdge_m, kEdge_m, kHeight_m, random)) {
-      world.lighting.lamps.push_back({T_world_room * lamp, 0.45F});
+      world.lighting.lamps.push_back({T_world_room * lamp, 1.2F});
     }
     furnish_middle(scene, random);
   }
@@ -186,7 +186,7 @@ World make_vicon_room(std::uint64_t seed) {
       world.lighting.lamps.push_back({wall * Vector3f(1.4F, -0.55F, 2.2F), 1.6F});
     }
   }
-  world.lighting.ambient = 0.35F;
+  world.lighting.ambient = 0.25F;
   world.flight_volume =
       Eigen::AlignedBox3d(Eigen::Vector3d(-3.9, -2.6, 0.8), Eigen::Vector3d(2.5, 3.6, 2.95));
   world.mesh = scene.mesh.take();

@@ -1,0 +1,143 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <vector>
+
+#include "modules/simulation/world/seeded_random.hpp"
+#include "modules/simulation/world/texture.hpp"
+
+namespace km {
+namespace {
+
+using Eigen::Vector2f;
+using Eigen::Vector3f;
+
+constexpr int kSize = 64;
+const Vector3f kRec709{0.2126F, 0.7152F, 0.0722F};
+
+std::vector<Vector3f> random_tile(int size, float brightest, SeededRandom& random) {
+  std::vector<Vector3f> rgb(static_cast<std::size_t>(size * size));
+  for (Vector3f& texel : rgb)
+    for (int channel = 0; channel < 3; ++channel) texel[channel] = random.uniform(0.0F, brightest);
+  return rgb;
+}
+
+/// Mean over the square of `edge` x `edge` texels whose lower left one is (x, y).
+Vector3f area_mean(const std::vector<Vector3f>& rgb, int size, int x, int y, int edge) {
+  Vector3f sum = Vector3f::Zero();
+  for (int row = y; row < y + edge; ++row)
+    for (int column = x; column < x + edge; ++column)
+      sum += rgb[static_cast<std::size_t>(row * size + column)];
+  return sum / static_cast<float>(edge * edge);
+}
+
+Vector2f center_of(int x, int y, int n) {
+  return Vector2f(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F) /
+         static_cast<float>(n);
+}
+
+}  // namespace
+
+TEST_CASE("A texture refuses odd sizes, missing texels and albedos beyond one",
+          "[simulation][texture]") {
+  const auto white = [](int texels) {
+    return std::vector<Vector3f>(static_cast<std::size_t>(texels), Vector3f::Ones());
+  };
+  CHECK_THROWS_WITH(Texture(3, white(9)), Catch::Contains("size 3"));
+  CHECK_THROWS_WITH(Texture(0, white(0)), Catch::Contains("size 0"));
+  CHECK_THROWS_WITH(Texture(8192, white(1)), Catch::Contains("size 8192"));
+  CHECK_THROWS_WITH(Texture(4, white(15)), Catch::Contains("15 texels given, 16 needed"));
+  std::vector<Vector3f> bad = white(4);
+  bad[2].y() = 1.5F;
+  CHECK_THROWS_WITH(Texture(2, bad), Catch::Contains("1.5"));
+  bad[2].y() = std::nanf("");
+  CHECK_THROWS_AS(Texture(2, bad), std::invalid_argument);
+  CHECK(Texture(1, white(1)).luminance({0.3F, -7.0F}, 0.2F) == Approx(1.0F));
+}
+
+TEST_CASE("Each level of a texture averages squares of the tile", "[simulation][texture]") {
+  const auto seed = GENERATE(range(1U, 4U));
+  const float brightest = GENERATE(1.0F, 0.02F);  // dark tiles keep their shades
+  CAPTURE(seed, brightest);
+  SeededRandom random(seed);
+  const std::vector<Vector3f> rgb = random_tile(kSize, brightest, random);
+  const Texture texture(kSize, rgb);
+  REQUIRE(texture.levels() == 7);
+  const float step = brightest / 255.0F;  // of the storage; rounding errs by half of it
+  for (int level = 0; level < texture.levels(); ++level) {
+    CAPTURE(level);
+    const int n = kSize >> level;
+    const float footprint = 1.0F / static_cast<float>(n);
+    float worst = 0.0F;
+    float worst_color = 0.0F;
+    double sum = 0.0;
+    for (int y = 0; y < n; ++y) {
+      for (int x = 0; x < n; ++x) {
+        const Vector2f uv = center_of(x, y, n);
+        const Vector3f expected = area_mean(rgb, kSize, x << level, y << level, 1 << level);
+        const float grey = texture.luminance(uv, footprint);
+        sum += grey;
+        worst = std::max(worst, std::abs(grey - expected.dot(kRec709)));
+        worst_color =
+            std::max(worst_color, (texture.color(uv, footprint) - expected).cwiseAbs().maxCoeff());
+      }
+    }
+    CHECK(worst < 0.51F * step);
+    CHECK(worst_color < 0.51F * step);
+    const float mean = area_mean(rgb, kSize, 0, 0, kSize).dot(kRec709);
+    CHECK(static_cast<float>(sum / (n * n)) == Approx(mean).margin(0.51F * step));
+  }
+}
+
+TEST_CASE("A lookup blends linearly between texels and between levels", "[simulation][texture]") {
+  SeededRandom random(5);
+  const Texture texture(kSize, random_tile(kSize, 1.0F, random));
+  constexpr float kTolerance = 1e-5F;  // rounding of float arithmetic on values up to 255
+  for (int i = 0; i < 200; ++i) {
+    const int x = random.below(kSize);
+    const int y = random.below(kSize);
+    const float share_x = random.uniform(0.0F, 1.0F);
+    const float share_y = random.uniform(0.0F, 1.0F);
+    const auto texel = [&](int right, int up) {
+      return texture.luminance(center_of(x + right, y + up, kSize), 0.0F);
+    };
+    const float low = texel(0, 0) + share_x * (texel(1, 0) - texel(0, 0));
+    const float high = texel(0, 1) + share_x * (texel(1, 1) - texel(0, 1));
+    const Vector2f uv = center_of(x, y, kSize) + Vector2f(share_x, share_y) / kSize;
+    CHECK(texture.luminance(uv, 0.0F) == Approx(low + share_y * (high - low)).margin(kTolerance));
+
+    const float fine = texture.luminance(uv, 2.0F / kSize);
+    const float coarse = texture.luminance(uv, 4.0F / kSize);
+    CHECK(texture.luminance(uv, 3.0F / kSize) == Approx(0.5F * (fine + coarse)).margin(kTolerance));
+    CHECK(texture.color(uv, 3.0F / kSize).dot(kRec709) ==
+          Approx(texture.luminance(uv, 3.0F / kSize)).margin(1.5F / 255.0F));
+  }
+}
+
+TEST_CASE("A texture repeats on both sides of zero", "[simulation][texture]") {
+  SeededRandom random(6);
+  const Texture texture(kSize, random_tile(kSize, 1.0F, random));
+  for (int i = 0; i < 200; ++i) {
+    // Multiples of 2^-12 tiles: the shifted coordinates are exact, and so is the result.
+    const Vector2f uv(static_cast<float>(random.below(4096)) / 4096.0F,
+                      static_cast<float>(random.below(4096)) / 4096.0F);
+    const float footprint = random.uniform(0.0F, 0.5F);
+    const Vector2f shift(static_cast<float>(random.below(401) - 200),
+                         static_cast<float>(random.below(401) - 200));
+    CAPTURE(uv.x(), uv.y(), shift.x(), shift.y(), footprint);
+    CHECK(texture.luminance(uv + shift, footprint) == texture.luminance(uv, footprint));
+    CHECK(texture.color(uv + shift, footprint) == texture.color(uv, footprint));
+  }
+}
+
+TEST_CASE("A footprint of more than the tile sees its mean", "[simulation][texture]") {
+  SeededRandom random(7);
+  const std::vector<Vector3f> rgb = random_tile(kSize, 0.5F, random);
+  const Texture texture(kSize, rgb);
+  const float mean = area_mean(rgb, kSize, 0, 0, kSize).dot(kRec709);
+  for (const float footprint : {1.0F, 1.5F, 100.0F, 1e20F}) {
+    CAPTURE(footprint);
+    CHECK(texture.luminance({0.1F, 0.7F}, footprint) == Approx(mean).margin(0.26F / 255.0F));
+  }
+}
+
+}  // namespace km
