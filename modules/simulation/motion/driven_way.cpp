@@ -11,7 +11,9 @@ namespace km {
 namespace {
 
 constexpr double kStep_m = 0.25;
-constexpr double kUsedShare = 0.85;  // of the limits; smoothing in time uses up the rest
+// Of the limits. Smoothing in time averages accelerations, but carries speed into curves.
+constexpr double kLateralShare = 0.92;
+constexpr double kLongitudinalShare = 0.97;
 constexpr double kFirstStop_m = 20.0;
 constexpr double kPedalTime_s = 0.3;    // standard deviation of the smoothing: a foot's speed
 constexpr std::size_t kLookAround = 6;  // steps before and after a curve that share its limit
@@ -24,7 +26,7 @@ struct SpeedPlan {
 };
 
 double curve_limit(double curvature, const VehicleOptions& options) {
-  return std::sqrt(kUsedShare * options.max_lateral_mps2 / std::max(std::abs(curvature), 1e-6));
+  return std::sqrt(kLateralShare * options.max_lateral_mps2 / std::max(std::abs(curvature), 1e-6));
 }
 
 // Limits from the road and its curves, each over the points around it as well.
@@ -51,7 +53,7 @@ SpeedPlan plan_speeds(std::vector<double> limits, double speed_mps, const Vehicl
   auto pace = SeededRandom::stream(options.seed, 11);
   for (std::size_t k = 0; k < count;) {
     const auto until = k + static_cast<std::size_t>(pace.uniform(25.0F, 70.0F) / kStep_m);
-    const double limit = speed_mps * pace.uniform(0.65F, 1.0F);
+    const double limit = speed_mps * pace.uniform(0.75F, 1.0F);
     for (; k < std::min(until, count); ++k) plan.limit_mps[k] = std::min(plan.limit_mps[k], limit);
   }
   plan.limit_mps[0] = 0.0;
@@ -132,7 +134,7 @@ DrivenWay drive(const RoutePath& path, double speed_mps, const VehicleOptions& o
   const SpeedPlan plan =
       plan_speeds(road_limits(path, speed_mps, points, options), speed_mps, options);
   const std::vector<double> speeds =
-      fastest(plan.limit_mps, kUsedShare * options.max_longitudinal_mps2);
+      fastest(plan.limit_mps, kLongitudinalShare * options.max_longitudinal_mps2);
   // The smoothing begins `reach` before time 0 and sees `reach` ahead of the end of the standstill.
   DrivenWay driven{smoothed(ways_in_time(speeds, plan, options.standstill_s + 2.0 * reach_s,
                                          count + 2 * static_cast<std::size_t>(reach)),

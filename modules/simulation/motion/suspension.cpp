@@ -5,35 +5,41 @@
 namespace km {
 namespace {
 
-// A passenger car's: eigenfrequencies of the body, damping, and how far it tilts per acceleration
-// (about 4 and 5 degrees per g).
+// A passenger car's: eigenfrequencies, damping, and how far it tilts per acceleration (about 4 and
+// 5 degrees per g).
 constexpr double kHeave_hz = 1.5;
 constexpr double kPitch_hz = 1.6;
 constexpr double kRoll_hz = 1.4;
-constexpr double kDamping = 0.4;
+constexpr double kDamping = 0.3;
+constexpr double kWheelHop_hz = 10.0;
+constexpr double kWheelDamping = 0.5;
 constexpr double kPitchGain = -0.007;  // [rad/(m/s^2)]: speeding up lifts the nose
 constexpr double kRollGain = 0.009;    // [rad/(m/s^2)]
 constexpr int kSubsteps = 5;
 
+constexpr double angular(double frequency_hz) {
+  return 2.0 * std::numbers::pi * frequency_hz;
+}
+
 }  // namespace
 
 Suspension::Suspension(const SprungBody& ground)
-    : heave_{ground.heave_m, 0.0, ground.heave_m},
-      pitch_{ground.pitch_rad, 0.0, ground.pitch_rad},
-      roll_{ground.roll_rad, 0.0, ground.roll_rad} {}
+    : heave_(ground.heave_m), pitch_(ground.pitch_rad), roll_(ground.roll_rad) {}
 
-// Semi-implicit Euler: stable for steps far below the period, and exactly at rest when at rest.
-double Suspension::Oscillator::advance(double next_input, double frequency_hz, double dt_s) {
-  const double w = 2.0 * std::numbers::pi * frequency_hz;
+// Semi-implicit Euler: stable for steps far below the periods.
+double Suspension::Axis::advance(double next_ground, double frequency_hz, double dt_s) {
+  const double a = angular(kWheelHop_hz), b = angular(frequency_hz);
   const double h = dt_s / kSubsteps;
-  const double input_rate = (next_input - input) / dt_s;
-  for (int k = 1; k <= kSubsteps; ++k) {
-    const double u = k == kSubsteps ? next_input : input + k * h * input_rate;
-    rate += h * (w * w * (u - value) - 2.0 * kDamping * w * (rate - input_rate));
-    value += h * rate;
+  const double ground_step = (next_ground - ground_) / kSubsteps;
+  for (int k = 0; k < kSubsteps; ++k) {
+    ground_ = k + 1 == kSubsteps ? next_ground : ground_ + ground_step;
+    wheels_rate_ += h * (a * a * (ground_ - wheels_) - 2.0 * kWheelDamping * a * wheels_rate_);
+    wheels_ += h * wheels_rate_;
+    body_rate_ +=
+        h * (b * b * (wheels_ - body_) - 2.0 * kDamping * b * (body_rate_ - wheels_rate_));
+    body_ += h * body_rate_;
   }
-  input = next_input;
-  return value;
+  return body_;
 }
 
 SprungBody Suspension::step(const SprungBody& ground, double forward_mps2, double left_mps2,

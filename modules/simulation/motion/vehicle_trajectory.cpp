@@ -1,6 +1,7 @@
 #include "modules/simulation/motion/vehicle_trajectory.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <stdexcept>
@@ -22,6 +23,8 @@ constexpr double kSlowest_mps = 0.1;  // of a route
 constexpr double kFastest_mps = 60.0;
 constexpr double kWheelbase_m = 2.7;
 constexpr double kTrack_m = 1.6;
+constexpr double kTyreStep_m = 0.15;
+constexpr std::array<double, 5> kTyreWeights = {0.0625, 0.25, 0.375, 0.25, 0.0625};
 constexpr double kWander_m = 0.08;          // standard deviation of the driver's aim
 constexpr double kWanderInterval_m = 12.0;  // way over which it changes
 constexpr double kQuinticShrink = 0.63;     // of white noise by the spline through it
@@ -83,8 +86,20 @@ class Road {
     const Eigen::Vector2d contact = point.position + 0.5 * kWheelbase_m * forward * point.heading +
                                     0.5 * kTrack_m * left * to_left;
     const RoadProfile& profile = left > 0.0 ? left_ : right_;
-    return (ground_ ? ground_(contact.x(), contact.y()) : 0.0) +
+    return ground_under(contact, point.heading) +
            profile.height_m(way_m + 0.5 * kWheelbase_m * forward);
+  }
+
+  // A tyre bridges what is shorter than itself: binomial weights along it.
+  [[nodiscard]] double ground_under(const Eigen::Vector2d& contact,
+                                    const Eigen::Vector2d& heading) const {
+    if (!ground_) return 0.0;
+    double height = 0.0;
+    for (int k = -2; k <= 2; ++k) {
+      const Eigen::Vector2d at = contact + k * kTyreStep_m * heading;
+      height += kTyreWeights[static_cast<std::size_t>(k + 2)] * ground_(at.x(), at.y());
+    }
+    return height;
   }
 
   RoutePath path_;

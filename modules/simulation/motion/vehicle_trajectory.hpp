@@ -21,7 +21,7 @@ struct VehicleOptions {
   double corner_radius_m = 5.0;   ///< Of rounded corners, smaller where the route leaves no room.
   double max_lateral_mps2 = 2.5;  ///< In curves.
   double max_longitudinal_mps2 = 1.5;  ///< Speeding up and braking.
-  double stop_every_m = 120.0;         ///< Mean way between short stops; 0: none.
+  double stop_every_m = 150.0;         ///< Mean way between short stops; 0: none.
   double roughness = 2.0;  ///< Of the road, ISO 8608: 1 is class A, 2 B, 4 C; 0 is smooth.
 
   void visit_fields(auto& visitor) {
