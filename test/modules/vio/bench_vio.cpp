@@ -1,6 +1,8 @@
 // Odometry on EuRoC MH_01_easy as in the table of results: three pieces and 21 starts.
-//   bench_vio DATASET [starts] [black] [KEY=VALUE ...]   keys of the sections vio and tracker
-// "starts" adds the 21 starts, "black" runs with one second of black images at each of 12 places.
+//   bench_vio DATASET [rgbd] [starts] [black] [KEY=VALUE ...]   keys of the sections vio and
+//   tracker
+// "rgbd" replaces the right images by depth made from both, "starts" adds the 21 starts, "black"
+// runs with one second of black images at each of 12 places.
 
 #include <algorithm>
 #include <cstdio>
@@ -10,6 +12,7 @@
 #include <sstream>
 #include <string>
 
+#include "dense_stereo.hpp"
 #include "modules/core/lie.hpp"
 #include "odometry_errors.hpp"
 #include "odometry_run.hpp"
@@ -146,13 +149,15 @@ void run_black(const Recording& recording, const TrackerConfig& tracker, const V
 }
 
 int run(int argc, char** argv) {
-  bool starts = false, black = false;
+  bool starts = false, black = false, rgbd = false;
   Overrides overrides;
   for (int a = 2; a < argc; ++a) {
     const char* equals = std::strchr(argv[a], '=');
     if (equals != nullptr)
       overrides.values[std::string(argv[a], static_cast<std::size_t>(equals - argv[a]))] =
           equals + 1;
+    else if (std::strcmp(argv[a], "rgbd") == 0)
+      rgbd = true;
     else
       (std::strcmp(argv[a], "starts") == 0 ? starts : black) = true;
   }
@@ -163,7 +168,8 @@ int run(int argc, char** argv) {
   for (const auto& [name, value] : overrides.values)
     if (!overrides.used[name]) throw std::invalid_argument("unknown key " + name);
 
-  const Recording recording = read_recording(argv[1], 0.0, 16.0);
+  Recording recording = read_recording(argv[1], 0.0, 16.0);
+  if (rgbd) recording = as_rgbd(recording);
   const struct {
     const char* name;
     double from, to;
@@ -211,7 +217,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) try {
   if (argc < 2) {
-    std::cerr << "usage: bench_vio DATASET [starts] [KEY=VALUE ...]\n";
+    std::cerr << "usage: bench_vio DATASET [rgbd] [starts] [black] [KEY=VALUE ...]\n";
     return 2;
   }
   return km::run(argc, argv);
