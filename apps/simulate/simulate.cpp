@@ -13,6 +13,7 @@
 #include "modules/simulation/dataset/sensor_yaml.hpp"
 #include "modules/simulation/dataset/whole_file.hpp"
 #include "modules/simulation/dataset/world_ply.hpp"
+#include "modules/simulation/motion/default_rig.hpp"
 #include "runtime/clock.hpp"
 
 namespace km {
@@ -35,7 +36,7 @@ World make_world(const SimulationOptions& options) {
 // Bytes of one frame's images, from what city and room take at several resolutions.
 double frame_bytes(const SimulationOptions& options) {
   const double pixels = static_cast<double>(options.width) * options.height;
-  const double gray = options.format == ImageFormat::kJpeg ? 0.45 : 0.75;
+  const double gray = options.format == ImageFormat::kJpeg ? 0.55 : 0.8;
   double bytes = gray * (options.cameras == CameraKind::kStereo ? 2.0 : 1.0);
   if (options.depth) bytes += 1.0 * options.depth_rate_hz / options.rate_hz;
   if (options.labels) bytes += 0.02;
@@ -151,10 +152,21 @@ class Simulation {
     write(ImageChannel::kLeft, camera_yaml(left, options_.rate_hz, comment));
     write(ImageChannel::kRight, camera_yaml(rig.stereo.cameras[1], options_.rate_hz, comment));
     write(ImageChannel::kColor, camera_yaml(left, options_.rate_hz, comment));
-    write(ImageChannel::kDepth, depth_yaml(left, options_.depth_rate_hz, comment));
+    write(ImageChannel::kDepth, depth_yaml(left, depth_figures(rig), comment));
     const bool recorded = options_.is_recorded();
     write_whole_file(layout.imu() / "sensor.yaml",
                      imu_yaml(rig.imu, recorded ? "recorded" : "simulated"));
+  }
+
+  DepthCameraFigures depth_figures(const SensorRig& rig) const {
+    DepthCameraFigures figures;
+    figures.rate_hz = options_.depth_rate_hz;
+    figures.baseline_m = rig.stereo.baseline_m();
+    if (options_.ideal_depth) return figures;
+    const DepthSensorOptions sensor = depth_options(rig);
+    figures.min_range_m = sensor.min_range_m;
+    figures.max_range_m = sensor.max_range_m;
+    return figures;
   }
 
   // The lists come last: a recording without them is none.

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "modules/core/text_rows.hpp"
 #include "modules/simulation/dataset/number_text.hpp"
 
 namespace km {
@@ -31,6 +32,24 @@ CLI::Option* choice(CLI::App& app, const char* name, Enum& value,
       .add_option_function<std::string>(
           name, [&value, &names](const std::string& word) { value = names.at(word); }, help)
       ->check(CLI::IsMember(words));
+}
+
+// CLI::Range lets NaN pass.
+CLI::Validator between(double min, double max) {
+  return {[min, max](const std::string& text) -> std::string {
+            const auto value = parse_double(text);
+            if (value && min <= *value && *value <= max) return {};
+            return "'" + text + "' is not a number from " + number_text(min) + " to " +
+                   number_text(max);
+          },
+          number_text(min) + " .. " + number_text(max)};
+}
+
+// CLI11 reads -1 as the largest seed.
+std::string check_seed(const std::string& text) {
+  const bool digits = !text.empty() && text.size() <= 19 &&
+                      text.find_first_not_of("0123456789") == std::string::npos;
+  return digits ? std::string() : "'" + text + "' is not a whole number of at most 19 digits";
 }
 
 // "752x480"
@@ -58,10 +77,10 @@ void define_recorded_mode(CLI::App& app, SimulationOptions& options) {
   app.add_option("--names", options.names, "Names of the robots (default: the files')")
       ->group(group);
   app.add_option("--start", options.start_s, "First image [s since the first true pose]")
-      ->check(CLI::NonNegativeNumber)
+      ->check(between(0.0, kMaxDuration_s))
       ->group(group);
   app.add_option("--end", options.end_s, "Last image [s], 0: the end of the flight")
-      ->check(CLI::NonNegativeNumber)
+      ->check(between(0.0, kMaxDuration_s))
       ->group(group);
 }
 
@@ -72,12 +91,12 @@ void define_images(CLI::App& app, SimulationOptions& options) {
       ->check(CLI::Validator(
           [&options](const std::string& text) { return parse_resolution(text, options); }, "WxH"));
   app.add_option("--rate", options.rate_hz, "Images per second")
-      ->check(CLI::Range(0.1, 200.0))
+      ->check(between(0.1, 200.0))
       ->capture_default_str();
   app.add_flag("--depth", options.depth, "Also depth images of the left camera (16 bit, mm)");
   app.add_option("--depth-rate", options.depth_rate_hz,
                  "Depth images per second, the rate divided by a whole number (default: the rate)")
-      ->check(CLI::Range(0.1, 200.0));
+      ->check(between(0.1, 200.0));
   app.add_flag("--ideal-depth", options.ideal_depth, "Depth without noise and holes");
   app.add_flag("--labels", options.labels, "Also class ids of the left camera's pixels");
   app.add_flag("--color", options.color, "Also colour images of the left camera");
@@ -94,9 +113,10 @@ void define(CLI::App& app, SimulationOptions& options) {
       ->check(CLI::Range(1, 99))
       ->capture_default_str();
   app.add_option("--seed", options.seed, "Of everything random: the same seed, the same bytes")
+      ->check(CLI::Validator(check_seed, "NUMBER"))
       ->capture_default_str();
   app.add_option("--duration", options.duration_s, "Of the recordings [s]")
-      ->check(CLI::Range(0.5, kMaxDuration_s))
+      ->check(between(0.5, kMaxDuration_s))
       ->capture_default_str();
   define_images(app, options);
   define_recorded_mode(app, options);

@@ -43,9 +43,15 @@ std::string camera_yaml(const PinholeCamera& camera, double rate_hz, const std::
   return heading("camera", comment) + extrinsics(camera.T_body_cam) + optics(camera, rate_hz);
 }
 
-std::string depth_yaml(const PinholeCamera& camera, double rate_hz, const std::string& comment) {
-  return heading("depth", comment) + extrinsics(camera.T_body_cam) + optics(camera, rate_hz) +
-         "depth_unit_m: 0.001  # 16-bit images along the optical axis; 0: no depth\n";
+std::string depth_yaml(const PinholeCamera& camera, const DepthCameraFigures& figures,
+                       const std::string& comment) {
+  return heading("depth", comment) + extrinsics(camera.T_body_cam) +
+         optics(camera, figures.rate_hz) +
+         "depth_scale: 0.001  # [m] of a unit of the 16-bit images, along the optical axis\n"
+         "min_range_m: " +
+         number_text(figures.min_range_m) + "\nmax_range_m: " + number_text(figures.max_range_m) +
+         "\nbaseline_m: " + number_text(figures.baseline_m) +
+         "  # of the stereo camera that would have its errors\n";
 }
 
 std::string imu_yaml(const ImuNoise& noise, const std::string& comment) {

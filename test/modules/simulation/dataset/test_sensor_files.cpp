@@ -63,6 +63,24 @@ TEST_CASE("The reader gets the calibration that was written", "[simulation][data
   CHECK(rig.imu.rate_hz == noise.rate_hz);
 }
 
+TEST_CASE("The reader gets the depth camera that was written", "[simulation][dataset]") {
+  const TemporaryFolder folder;
+  const RecordingLayout layout(folder.path(), ImageFormat::kJpeg);
+  const PinholeCamera camera = some_camera(0.0);
+  const DepthCameraFigures figures{5.0, 0.4, 20.0, 0.27};
+  write_whole_file(layout.calibration(ImageChannel::kLeft), camera_yaml(camera, 20.0, "left"));
+  write_whole_file(layout.calibration(ImageChannel::kDepth), depth_yaml(camera, figures, "depth"));
+  write_whole_file(layout.imu() / "sensor.yaml", imu_yaml({}, "simulated"));
+
+  const SensorRig rig = read_euroc_rig(layout.mav0());
+  CHECK(rig.stereo.depth_source == DepthSource::kDepthImage);
+  CHECK(rig.stereo.baseline_m() == Approx(figures.baseline_m));
+  REQUIRE(rig.depth);
+  CHECK(rig.depth->min_m == figures.min_range_m);
+  CHECK(rig.depth->max_m == figures.max_range_m);
+  CHECK(read_depth_scale(layout.mav0()) == 0.001);
+}
+
 TEST_CASE("Numbers in tables read back as the same doubles", "[simulation][dataset]") {
   const ImuSample sample{1000005000000, {1.0 / 3.0, -2e-17, 5e8}, {9.81, 0.0, -0.1 - 0.2}};
   const std::string text = imu_csv({sample});

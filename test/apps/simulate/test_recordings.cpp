@@ -1,0 +1,156 @@
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <thread>
+
+#include "modules/sensors/euroc_reader.hpp"
+#include "test/support/command.hpp"
+#include "test/support/patience.hpp"
+#include "test/support/process.hpp"
+#include "test/support/temporary_folder.hpp"
+
+// kimera_multi_simulate as a program, on recordings as small as they can be.
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kProgram = std::string(KM_BIN_DIR) + "/kimera_multi_simulate";
+const std::string kSmall =
+    " --world vicon_room --robots 2 --duration 0.5 --resolution 64x48 --depth --depth-rate 10 "
+    "--labels --color";
+constexpr std::size_t kFrames = 10;  // of each robot
+
+CommandResult simulate(const std::string& arguments, const fs::path& output) {
+  return run_command(kProgram + arguments + " --output " + output.string());
+}
+
+// Every file below `folder` with its bytes.
+std::map<std::string, std::string> contents(const TemporaryFolder& folder,
+                                            const std::string& name) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder.path() / name))
+    if (entry.is_regular_file()) {
+      const std::string path = fs::relative(entry.path(), folder.path() / name).string();
+      files[path] = folder.read(name + '/' + path);
+    }
+  return files;
+}
+
+std::size_t file_count(const fs::path& folder) {
+  return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), {}));
+}
+
+void wait_for_file(const fs::path& file) {
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  while (!fs::exists(file) && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::yield();
+  REQUIRE(fs::exists(file));
+}
+
+void check_equal(const std::map<std::string, std::string>& a,
+                 const std::map<std::string, std::string>& b) {
+  CHECK(a.size() == b.size());
+  for (const auto& [path, bytes] : a) {
+    CAPTURE(path);
+    REQUIRE(b.contains(path));
+    CHECK(b.at(path) == bytes);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("The ordinary reader reads a simulated recording", "[simulate]") {
+  const TemporaryFolder folder;
+  const auto result = simulate(kSmall, folder.path() / "r");
+  CAPTURE(result.output);
+  REQUIRE(result.exit_code == 0);
+  EurocReader reader(folder.path() / "r/robot1");
+  std::size_t frames = 0;
+  std::size_t samples = 0;
+  while (const auto packet = reader.next()) {
+    ++frames;
+    samples += packet->imu.size();
+    CHECK(packet->frame->left.width == 64);
+  }
+  CHECK(frames == kFrames);
+  CHECK(samples > 200 + 95);  // 1 s before the first image, 0.475 s with images, 200 Hz
+  CHECK(reader.report().empty());
+  const fs::path mav0 = folder.path() / "r/robot1/mav0";
+  CHECK(file_count(mav0 / "depth0/data") == kFrames / 2);
+  CHECK(file_count(mav0 / "label0/data") == kFrames);
+  CHECK(file_count(mav0 / "color0/data") == kFrames);
+  for (const char* file : {"world.ply", "team.yaml", "README.md", "label_palette.csv"})
+    CHECK(fs::exists(folder.path() / "r" / file));
+}
+
+TEST_CASE("A full disk leaves nothing that looks whole, and the run goes on later", "[simulate]") {
+  const TemporaryFolder folder;
+  const fs::path output = folder.path() / "full";
+  // Files beyond 2 blocks of 512 bytes cannot be written: the calibration can, tables cannot.
+  const auto result = run_command("trap '' XFSZ; ulimit -f 2; " + kProgram + kSmall + " --output " +
+                                  output.string());
+  CAPTURE(result.output);
+  CHECK(result.exit_code == 1);
+  CHECK_THAT(result.output, Catch::Contains("cannot be written: File too large") &&
+                                Catch::Contains(output.string()));
+  CHECK_FALSE(fs::exists(output / "robot0/mav0/cam0/data.csv"));
+  for (const auto& entry : fs::recursive_directory_iterator(output))
+    CHECK(entry.path().extension() != ".part");
+
+  REQUIRE(simulate(kSmall + " --threads 3", output).exit_code == 0);
+  REQUIRE(simulate(kSmall + " --threads 1", folder.path() / "whole").exit_code == 0);
+  check_equal(contents(folder, "full"), contents(folder, "whole"));
+}
+
+TEST_CASE("A run that is stopped goes on to the same bytes", "[simulate]") {
+  const TemporaryFolder folder;
+  const std::string arguments =
+      " --world vicon_room --robots 1 --duration 20 --resolution 64x48 --output ";
+  const fs::path stopped = folder.path() / "stopped";
+  Process program({"/bin/sh", "-c", "exec " + kProgram + arguments + stopped.string()});
+  REQUIRE(program.wait_for_prefix("0 of 400 frames"));
+  wait_for_file(stopped / "robot0/mav0/cam0/data/1001100000000.jpg");  // the third
+  program.kill(SIGINT);
+  CHECK(program.wait() == 130);
+  CHECK(program.lines("Stopped; the same command goes on").size() == 1);
+  CHECK_FALSE(fs::exists(stopped / "robot0/mav0/cam0/data.csv"));  // not yet a recording
+  CHECK_THROWS_AS(EurocReader(stopped / "robot0"), DatasetError);
+
+  REQUIRE(run_command(kProgram + arguments + stopped.string()).exit_code == 0);
+  REQUIRE(run_command(kProgram + arguments + (folder.path() / "whole").string()).exit_code == 0);
+  check_equal(contents(folder, "stopped"), contents(folder, "whole"));
+}
+
+TEST_CASE("Foreign folders and other parameters are refused", "[simulate]") {
+  const TemporaryFolder folder;
+  folder.write("foreign/thesis.tex", "");
+  const auto foreign = simulate(kSmall, folder.path() / "foreign");
+  CHECK(foreign.exit_code == 1);
+  CHECK_THAT(foreign.output, Catch::Contains("not made by this program"));
+
+  folder.write("other/simulation.json",
+               "{\"generator\": \"g\", \"parameters\": {\"world\": \"camp\"}, "
+               "\"finished_robots\": [], \"complete\": false}");
+  const auto other = simulate(kSmall, folder.path() / "other");
+  CHECK(other.exit_code == 1);
+  CHECK_THAT(other.output, Catch::Contains("world: camp there, vicon_room asked for"));
+
+  const auto nowhere = simulate(kSmall, "/proc/recordings");
+  CHECK(nowhere.exit_code == 1);
+  CHECK_THAT(nowhere.output, Catch::Contains("/proc/recordings"));
+}
+
+TEST_CASE("Bad arguments exit with 1 and help with 0", "[simulate]") {
+  CHECK(run_command(kProgram + " --world mars --output x").exit_code == 1);
+  CHECK(run_command(kProgram).exit_code == 1);
+  const auto help = run_command(kProgram + " --help");
+  CHECK(help.exit_code == 0);
+  CHECK_THAT(help.output, Catch::Contains("Examples:"));
+}
+
+}  // namespace km
