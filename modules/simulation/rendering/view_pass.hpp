@@ -41,6 +41,7 @@ class ViewPass {
   void compare_neighbours();
   void compare(std::size_t a, std::size_t b);
   void find_thin_things(int x0, int y0);
+  void flag_unlike(int x, int y, std::uint32_t triangle, const Eigen::Vector3f& hit);
   [[nodiscard]] bool same_surface(std::uint32_t a, const Eigen::Vector3f& at_a, std::uint32_t b,
                                   const Eigen::Vector3f& at_b) const;
   [[nodiscard]] Eigen::Vector3f position(int x, int y) const;

@@ -1,0 +1,160 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "modules/simulation/rendering/renderer.hpp"
+#include "test/modules/simulation/rendering/small_world.hpp"
+
+namespace km {
+namespace {
+
+using small_world::Builder;
+using small_world::forward_camera;
+
+float at(const RenderedView& view, int x, int y) {
+  return view.radiance[static_cast<std::size_t>(y) * static_cast<std::size_t>(view.width) +
+                       static_cast<std::size_t>(x)];
+}
+
+// Share of a pixel, centred at (x, y), right of the line x = x0 + slope * y, by many samples.
+double share_right_of(double x0, double slope, int x, int y) {
+  constexpr int kRows = 200;
+  double sum = 0.0;
+  for (int i = 0; i < kRows; ++i) {
+    const double row = y - 0.5 + (i + 0.5) / kRows;
+    sum += std::clamp(x + 0.5 - (x0 + slope * row), 0.0, 1.0);
+  }
+  return sum / kRows;
+}
+
+TEST_CASE("The grey of an edge is the share of the pixel that is covered",
+          "[simulation][rendering]") {
+  const double slope = GENERATE(0.0, 0.13, -0.4, 0.9);
+  CAPTURE(slope);
+  const PinholeCamera camera = forward_camera(48, 48, 48.0);
+  Builder builder;
+  const MaterialId white = builder.material(SurfaceClass::kWall, 1.0F);
+  const MaterialId black = builder.material(SurfaceClass::kObject, 0.0F);
+  // A screen 6 m away whose edge is the image of x = x0 + slope * y; far to the right of it.
+  const double x0 = 23.3 - slope * camera.cy;
+  const auto on_screen = [&](double x, double y) {
+    return Eigen::Vector3f(6.0F, static_cast<float>(-6.0 * (x - camera.cx) / camera.fx),
+                           static_cast<float>(-6.0 * (y - camera.cy) / camera.fy));
+  };
+  const auto edge = [&](double y) { return on_screen(x0 + slope * y, y); };
+  builder.mesh.quad(edge(200.0), on_screen(400.0, 200.0), on_screen(400.0, -200.0), edge(-200.0),
+                    white);
+  builder.wall(20.0F, 60.0F, black);
+  const World world = builder.build();
+  const RenderedView view = Renderer(world, {16, true}).render(camera, SE3::Identity(), {});
+  double squares = 0.0;
+  int partial = 0;
+  for (int y = 4; y < 44; ++y) {
+    for (int x = 4; x < 44; ++x) {
+      // The light of the screen's rim is baked: grey levels are shares of that beside the edge.
+      const double expected = share_right_of(x0, slope, x, y);
+      const double white_level = static_cast<double>(at(view, 47, y));
+      const double share = static_cast<double>(at(view, x, y)) / white_level;
+      CAPTURE(x, y);
+      REQUIRE(share == Approx(expected).margin(2.0 / 16.0));
+      if (expected <= 0.0 || expected >= 1.0) continue;
+      squares += (share - expected) * (share - expected);
+      ++partial;
+    }
+  }
+  REQUIRE(partial >= 40);
+  CHECK(std::sqrt(squares / partial) < 0.75 / 16.0);
+}
+
+TEST_CASE("A wire thinner than a pixel neither breaks nor vanishes", "[simulation][rendering]") {
+  const double shift_px = GENERATE(0.0, 0.25, 0.5, 0.75);
+  CAPTURE(shift_px);
+  const PinholeCamera camera = forward_camera(64, 64, 64.0);
+  Builder builder;
+  const MaterialId black = builder.material(SurfaceClass::kPole, 0.0F);
+  const MaterialId white = builder.material(SurfaceClass::kWall, 1.0F);
+  // 0.4 px wide, leaning a little.
+  const double px = 6.4 / 64.0;
+  const auto y = [&](double offset_px) { return static_cast<float>(px * (shift_px + offset_px)); };
+  builder.mesh.quad({6.4F, y(0.4), -8.0F}, {6.4F, y(0.0), -8.0F}, {6.4F, y(3.0), 8.0F},
+                    {6.4F, y(3.4), 8.0F}, black);
+  builder.wall(20.0F, 60.0F, white);
+  const World world = builder.build();
+  const RenderedView view = Renderer(world, {16, true}).render(camera, SE3::Identity(), {});
+  int faint = 0;
+  double total = 0.0;
+  for (int row = 2; row < 62; ++row) {
+    double missing = 0.0;  // of the wall's light, in pixels
+    for (int x = 0; x < 64; ++x)
+      missing += 1.0 - static_cast<double>(at(view, x, row) / at(view, 2, row));
+    faint += static_cast<int>(missing < 0.15);
+    total += missing;
+  }
+  CHECK(faint <= 6);                                 // of 60 rows
+  CHECK(total / 60.0 == Approx(0.4).epsilon(0.15));  // its width
+}
+
+// A floor with a random texture, seen at a grazing angle.
+World textured_floor() {
+  Builder builder;
+  constexpr int kSize = 256;
+  std::mt19937 random(5);
+  std::vector<Eigen::Vector3f> texels;
+  for (int i = 0; i < kSize * kSize; ++i)
+    texels.emplace_back(Eigen::Vector3f::Constant((random() & 1U) != 0U ? 0.9F : 0.1F));
+  builder.world().textures.emplace_back(kSize, texels);
+  const MaterialId floor = builder.material(SurfaceClass::kRoad, 1.0F, 2);
+  builder.mesh.quad({-500, -500, 0}, {500, -500, 0}, {500, 500, 0}, {-500, 500, 0}, floor);
+  return builder.build();
+}
+
+SE3 above_floor(double x, double y) {
+  return make_pose(Eigen::Matrix3d::Identity(), {x, y, 1.5});
+}
+
+double row_deviation(const RenderedView& view, int row) {
+  double sum = 0.0;
+  double squares = 0.0;
+  for (int x = 0; x < view.width; ++x) {
+    const auto value = static_cast<double>(at(view, x, row));
+    sum += value;
+    squares += value * value;
+  }
+  const double mean = sum / view.width;
+  return std::sqrt(std::max(0.0, squares / view.width - mean * mean));
+}
+
+TEST_CASE("A texture loses contrast with distance instead of aliasing", "[simulation][rendering]") {
+  const World world = textured_floor();
+  const RenderedView view =
+      Renderer(world).render(forward_camera(320, 240, 200.0), above_floor(0.3, 0.2), {});
+  // Rows at 2.5, 7 and 30 m: a pixel then covers 3, 9 and 38 texels across, more along the view.
+  const double near = row_deviation(view, 239);
+  const double middle = row_deviation(view, 162);
+  const double far = row_deviation(view, 129);
+  CHECK(middle < 0.6 * near);
+  CHECK(far < 0.5 * middle);
+}
+
+TEST_CASE("A small motion changes the picture by little", "[simulation][rendering]") {
+  const World world = textured_floor();
+  const Renderer renderer(world);
+  const PixelRays rays(forward_camera(320, 240, 200.0));
+  // 2 mm sideways: 0.16 px at the image's bottom, 0.05 px in the middle of the lower half.
+  const RenderedView a = renderer.render(rays, above_floor(0.0, 0.0), {});
+  const RenderedView b = renderer.render(rays, above_floor(0.0, 0.002), {});
+  double change = 0.0;
+  double contrast = 0.0;
+  for (int y = 170; y < 240; ++y) {
+    for (int x = 1; x < 320; ++x) {
+      change += std::abs(static_cast<double>(at(b, x, y) - at(a, x, y)));
+      contrast += std::abs(static_cast<double>(at(a, x, y) - at(a, x - 1, y)));
+    }
+  }
+  CHECK(change > 0.0);
+  CHECK(change < 0.25 * contrast);
+}
+
+}  // namespace
+}  // namespace km
