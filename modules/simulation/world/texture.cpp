@@ -94,25 +94,31 @@ void Texture::append_level(int n, const std::vector<Eigen::Vector3f>& rgb) {
   }
 }
 
-Eigen::Vector3f Texture::bilinear_color(int level, const Eigen::Vector2f& uv) const {
-  const Cell cell = cell_of(level, uv);
-  const auto texel = [this](std::uint32_t index) {
-    const std::uint32_t packed = color_[index];
+Eigen::Vector3f Texture::bilinear_color(int level, const TilePoint& point) const {
+  const int log_n = log_size_ - level;
+  const Cell cell = cell_of(log_n, point);
+  const std::uint32_t mask = (1U << log_n) - 1U;
+  const std::uint32_t* const texels = color_.data() + level_begin_[static_cast<std::size_t>(level)];
+  const auto texel = [&](std::uint32_t right, std::uint32_t up) {
+    const std::uint32_t packed =
+        texels[(((cell.row + up) & mask) << log_n) + ((cell.column + right) & mask)];
     return Eigen::Vector3f(static_cast<float>(packed & 0xFFU),
-                           static_cast<float>((packed >> 8) & 0xFFU),
-                           static_cast<float>((packed >> 16) & 0xFFU));
+                           static_cast<float>(packed >> 8 & 0xFFU),
+                           static_cast<float>(packed >> 16 & 0xFFU));
   };
-  const Eigen::Vector3f low =
-      (1.0F - cell.x) * texel(cell.row0 + cell.column0) + cell.x * texel(cell.row0 + cell.column1);
-  const Eigen::Vector3f high =
-      (1.0F - cell.x) * texel(cell.row1 + cell.column0) + cell.x * texel(cell.row1 + cell.column1);
-  return (1.0F - cell.y) * low + cell.y * high;
+  constexpr float kUnit = 1.0F / 65536.0F;
+  const float x = kUnit * static_cast<float>(cell.x);
+  const float y = kUnit * static_cast<float>(cell.y);
+  const Eigen::Vector3f low = (1.0F - x) * texel(0, 0) + x * texel(1, 0);
+  const Eigen::Vector3f high = (1.0F - x) * texel(0, 1) + x * texel(1, 1);
+  return (1.0F - y) * low + y * high;
 }
 
 Eigen::Vector3f Texture::color(const Eigen::Vector2f& uv, float footprint) const {
+  const TilePoint point = tile_point(uv);
   const LevelBlend blend = blend_of(footprint);
-  const Eigen::Vector3f fine = bilinear_color(blend.fine, uv);
-  const Eigen::Vector3f coarse = bilinear_color(blend.coarse, uv);
+  const Eigen::Vector3f fine = bilinear_color(blend.fine, point);
+  const Eigen::Vector3f coarse = bilinear_color(blend.coarse, point);
   return color_scale_ * ((1.0F - blend.share) * fine + blend.share * coarse);
 }
 

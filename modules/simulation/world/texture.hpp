@@ -21,9 +21,9 @@ class Texture {
   [[nodiscard]] int size() const { return 1 << log_size_; }
   [[nodiscard]] int levels() const { return log_size_ + 1; }
 
-  /// Trilinear lookup. `uv` in tiles: it repeats, up to 2^31 / size tiles from zero, beyond which
-  /// the result is undefined; `footprint` is the width of what one sample covers, in tiles. Between
-  /// two levels the blend is linear in the footprint.
+  /// Trilinear lookup. `uv` in tiles: it repeats, up to 2^31 tiles from zero, beyond which the
+  /// result is undefined; `footprint` is the width of what one sample covers, in tiles. Between two
+  /// levels the blend is linear in the footprint.
   [[nodiscard]] Eigen::Vector3f color(const Eigen::Vector2f& uv, float footprint) const;
   /// The same of the luminance alone (Rec. 709 weights): what a grey camera sees.
   [[nodiscard]] float luminance(const Eigen::Vector2f& uv, float footprint) const;
@@ -37,16 +37,22 @@ class Texture {
     int coarse = 0;
     float share = 0.0F;
   };
-  /// Where a point falls in a level: its texel, the one to the right and above, and the weights.
+  /// A point of the tile, each coordinate in units of 2^-32: it wraps by itself.
+  struct TilePoint {
+    std::uint32_t u = 0, v = 0;
+  };
+  /// Where a point falls in a level: its texel, and how far it is to the next one to the right and
+  /// above, in units of 2^-16.
   struct Cell {
-    std::uint32_t row0 = 0, row1 = 0, column0 = 0, column1 = 0;
-    float x = 0.0F, y = 0.0F;
+    std::uint32_t column = 0, row = 0;
+    std::int32_t x = 0, y = 0;
   };
 
+  [[nodiscard]] static TilePoint tile_point(const Eigen::Vector2f& uv);
   [[nodiscard]] LevelBlend blend_of(float footprint) const;
-  [[nodiscard]] Cell cell_of(int level, const Eigen::Vector2f& uv) const;
-  [[nodiscard]] float bilinear_luminance(int level, const Eigen::Vector2f& uv) const;
-  [[nodiscard]] Eigen::Vector3f bilinear_color(int level, const Eigen::Vector2f& uv) const;
+  [[nodiscard]] static Cell cell_of(int log_n, const TilePoint& point);
+  [[nodiscard]] float bilinear_luminance(int level, const TilePoint& point) const;
+  [[nodiscard]] Eigen::Vector3f bilinear_color(int level, const TilePoint& point) const;
   void append_level(int n, const std::vector<Eigen::Vector3f>& rgb);
 
   int log_size_ = 0;
@@ -71,42 +77,44 @@ inline Texture::LevelBlend Texture::blend_of(float footprint) const {
   return {level, level + 1, mantissa - 1.0F};
 }
 
-inline Texture::Cell Texture::cell_of(int level, const Eigen::Vector2f& uv) const {
-  const int log_n = log_size_ - level;
-  const auto n = static_cast<float>(1 << log_n);
-  const float x = uv.x() * n - 0.5F;
-  const float y = uv.y() * n - 0.5F;
-  int column = static_cast<int>(x);  // rounds towards zero
-  int row = static_cast<int>(y);
-  column -= static_cast<int>(x < static_cast<float>(column));  // floor
-  row -= static_cast<int>(y < static_cast<float>(row));
-  const std::uint32_t mask = (1U << log_n) - 1U;
-  const auto first_row = static_cast<std::uint32_t>(row);
-  const auto first_column = static_cast<std::uint32_t>(column);
-  const std::uint32_t begin = level_begin_[static_cast<std::size_t>(level)];
-  return {begin + ((first_row & mask) << log_n),
-          begin + (((first_row + 1U) & mask) << log_n),
-          first_column & mask,
-          (first_column + 1U) & mask,
-          x - static_cast<float>(column),
-          y - static_cast<float>(row)};
+inline Texture::TilePoint Texture::tile_point(const Eigen::Vector2f& uv) {
+  constexpr float kTile = 4294967296.0F;  // 2^32
+  const auto wrapped = [](float tiles) {
+    return static_cast<std::uint32_t>(static_cast<std::int64_t>(tiles * kTile));
+  };
+  return {wrapped(uv.x()), wrapped(uv.y())};
 }
 
-inline float Texture::bilinear_luminance(int level, const Eigen::Vector2f& uv) const {
-  const Cell cell = cell_of(level, uv);
-  const std::uint32_t quad = luminance_[cell.row0 + cell.column0];
-  const auto byte = [quad](int i) { return static_cast<float>((quad >> (8 * i)) & 0xFFU); };
-  const float low = byte(0) + cell.x * (byte(1) - byte(0));
-  const float high = byte(2) + cell.x * (byte(3) - byte(2));
-  return low + cell.y * (high - low);
+inline Texture::Cell Texture::cell_of(int log_n, const TilePoint& point) {
+  const std::uint32_t half_texel = 0x80000000U >> log_n;
+  const std::uint64_t u = static_cast<std::uint64_t>(point.u - half_texel) << log_n;
+  const std::uint64_t v = static_cast<std::uint64_t>(point.v - half_texel) << log_n;
+  return {static_cast<std::uint32_t>(u >> 32), static_cast<std::uint32_t>(v >> 32),
+          static_cast<std::int32_t>(u >> 16 & 0xFFFFU),
+          static_cast<std::int32_t>(v >> 16 & 0xFFFFU)};
+}
+
+/// In units of 2^-16 of a step of the storage.
+inline float Texture::bilinear_luminance(int level, const TilePoint& point) const {
+  const int log_n = log_size_ - level;
+  const Cell cell = cell_of(log_n, point);
+  const std::uint32_t quad =
+      luminance_[level_begin_[static_cast<std::size_t>(level)] + (cell.row << log_n) + cell.column];
+  const auto byte = [quad](int i) { return static_cast<std::int32_t>(quad >> (8 * i) & 0xFFU); };
+  const std::int32_t low = (byte(0) << 16) + cell.x * (byte(1) - byte(0));
+  const std::int32_t high = (byte(2) << 16) + cell.x * (byte(3) - byte(2));
+  constexpr float kUnit = 1.0F / 65536.0F;
+  return static_cast<float>(low) +
+         kUnit * static_cast<float>(cell.y) * static_cast<float>(high - low);
 }
 
 inline float Texture::luminance(const Eigen::Vector2f& uv, float footprint) const {
+  constexpr float kUnit = 1.0F / 65536.0F;
+  const TilePoint point = tile_point(uv);
   const LevelBlend blend = blend_of(footprint);
-  const float fine = bilinear_luminance(blend.fine, uv);
-  if (blend.share == 0.0F) return luminance_scale_ * fine;
-  const float coarse = bilinear_luminance(blend.coarse, uv);
-  return luminance_scale_ * (fine + blend.share * (coarse - fine));
+  const float fine = bilinear_luminance(blend.fine, point);
+  const float coarse = bilinear_luminance(blend.coarse, point);
+  return kUnit * luminance_scale_ * (fine + blend.share * (coarse - fine));
 }
 
 }  // namespace km
