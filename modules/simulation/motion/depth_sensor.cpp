@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "modules/simulation/motion/gaussian_random.hpp"
 
@@ -15,40 +17,50 @@ namespace {
 constexpr double kLargest_mm = 65535.0;
 constexpr double kBlockTolerance_px = 0.5;  // by which something nearer must cover a pixel
 
+// Half away from zero for positive values, which all are; std::round costs a call.
+double rounded(double positive) {
+  return static_cast<double>(static_cast<std::int64_t>(positive + 0.5));
+}
+
 std::uint16_t millimetres(double depth_m) {
-  const double rounded = std::round(1000.0 * depth_m);
-  return rounded > 0.0 && rounded <= kLargest_mm ? static_cast<std::uint16_t>(rounded) : 0;
+  if (!(depth_m > 0.0 && depth_m < 2e-3 * kLargest_mm)) return 0;
+  const double mm = rounded(1000.0 * depth_m);
+  return mm <= kLargest_mm ? static_cast<std::uint16_t>(mm) : std::uint16_t{0};
 }
 
 // Standard normal noise over an image, smooth between the nodes of a lattice of `spacing` pixels:
 // a matcher compares windows, so that neighbours err alike. Of variance 1 at every pixel.
 class SmoothNoise {
  public:
-  SmoothNoise(int width, int height, int spacing, GaussianRandom& random)
-      : spacing_(spacing), columns_(width / spacing + 2) {
-    const std::size_t nodes =
-        static_cast<std::size_t>(columns_) * static_cast<std::size_t>(height / spacing + 2);
+  SmoothNoise(std::size_t width, std::size_t height, std::size_t spacing, GaussianRandom& random)
+      : spacing_(spacing), columns_(width / spacing + 2), along_(columns_), row_(width) {
+    for (std::size_t k = 0; k < spacing; ++k) {
+      const double u = static_cast<double>(k) / static_cast<double>(spacing);
+      const double scale = 1.0 / std::hypot(1.0 - u, u);  // variance of the weighted sum
+      weights_.emplace_back(scale * (1.0 - u), scale * u);
+    }
+    const std::size_t nodes = columns_ * (height / spacing + 2);
     for (std::size_t k = 0; k < nodes; ++k) nodes_.push_back(random.draw());
   }
 
-  [[nodiscard]] double at(int x, int y) const {
-    const double u = static_cast<double>(x % spacing_) / spacing_;
-    const double v = static_cast<double>(y % spacing_) / spacing_;
-    const int column = x / spacing_, row = y / spacing_;
-    const double sum = (1.0 - v) * ((1.0 - u) * node(column, row) + u * node(column + 1, row)) +
-                       v * ((1.0 - u) * node(column, row + 1) + u * node(column + 1, row + 1));
-    // Variance of the sum: the squares of the four weights.
-    return sum / std::sqrt(((1.0 - u) * (1.0 - u) + u * u) * ((1.0 - v) * (1.0 - v) + v * v));
+  // Of the pixels in row `y`; valid until the next call.
+  [[nodiscard]] std::span<const double> row(std::size_t y) {
+    const auto [above, below] = weights_[y % spacing_];
+    const double* const upper = &nodes_[y / spacing_ * columns_];
+    for (std::size_t k = 0; k < columns_; ++k)
+      along_[k] = above * upper[k] + below * upper[k + columns_];
+    for (std::size_t x = 0; x < row_.size(); ++x) {
+      const auto [left, right] = weights_[x % spacing_];
+      row_[x] = left * along_[x / spacing_] + right * along_[x / spacing_ + 1];
+    }
+    return row_;
   }
 
  private:
-  [[nodiscard]] double node(int column, int row) const {
-    return nodes_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-                  static_cast<std::size_t>(column)];
-  }
-
-  int spacing_, columns_;
+  std::size_t spacing_, columns_;
+  std::vector<std::pair<double, double>> weights_;  // of the two nodes around a pixel
   std::vector<double> nodes_;
+  std::vector<double> along_, row_;
 };
 
 // True disparities [px], 0 at infinity.
@@ -71,8 +83,9 @@ void mark_blocked(std::span<const double> disparity, std::size_t width, std::vec
   }
 }
 
-bool at_edge(std::span<const double> disparity, std::size_t width, std::size_t k, double jump_px) {
-  const std::size_t x = k % width;
+// Whether a pixel's disparity is more than `jump_px` from that of a neighbour.
+bool at_edge(std::span<const double> disparity, std::size_t width, std::size_t x, std::size_t k,
+             double jump_px) {
   const auto jumps = [&](std::size_t other) {
     return std::abs(disparity[k] - disparity[other]) > jump_px;
   };
@@ -98,27 +111,35 @@ std::vector<std::uint16_t> DepthSensor::measure(std::span<const float> depth_m, 
   }
 
   const double focal_baseline = options_.focal_px * options_.baseline_m;
-  const auto columns = static_cast<std::size_t>(width);
+  const auto columns = static_cast<std::size_t>(width), rows = static_cast<std::size_t>(height);
   const std::vector<double> disparity = disparities(depth_m, focal_baseline);
   std::vector<bool> lost(depth_m.size(), false);
   mark_blocked(disparity, columns, lost);
   GaussianRandom gaussian(SeededRandom::stream(seed, 41));
-  const SmoothNoise noise(width, height, options_.correlation_px, gaussian);
+  SmoothNoise noise(columns, rows, static_cast<std::size_t>(options_.correlation_px), gaussian);
   auto edges = SeededRandom::stream(seed, 42);
-  const double step = options_.disparity_step_px;
 
-  for (std::size_t k = 0; k < measured.size(); ++k) {
-    const auto z = static_cast<double>(depth_m[k]);
-    if (lost[k] || !(z >= options_.min_range_m && z <= options_.max_range_m)) continue;
-    if (at_edge(disparity, columns, k, options_.edge_disparity_px) &&
-        edges.chance(options_.edge_loss))
-      continue;
-    const int x = static_cast<int>(k % columns), y = static_cast<int>(k / columns);
-    double d = disparity[k] + options_.disparity_noise_px * noise.at(x, y);
-    if (step > 0.0) d = step * std::round(d / step);
-    if (d > 0.0) measured[k] = millimetres(focal_baseline / d);
+  for (std::size_t y = 0; y < rows; ++y) {
+    const std::span<const double> errors = noise.row(y);
+    for (std::size_t x = 0; x < columns; ++x) {
+      const std::size_t k = y * columns + x;
+      const auto z = static_cast<double>(depth_m[k]);
+      if (lost[k] || !(z >= options_.min_range_m && z <= options_.max_range_m)) continue;
+      if (at_edge(disparity, columns, x, k, options_.edge_disparity_px) &&
+          edges.chance(options_.edge_loss))
+        continue;
+      measured[k] = depth_at(disparity[k] + options_.disparity_noise_px * errors[x]);
+    }
   }
   return measured;
+}
+
+std::uint16_t DepthSensor::depth_at(double disparity_px) const {
+  if (!(disparity_px > 0.0)) return 0;
+  const double step = options_.disparity_step_px;
+  if (step > 0.0) disparity_px = step * rounded(disparity_px / step);
+  return disparity_px > 0.0 ? millimetres(options_.focal_px * options_.baseline_m / disparity_px)
+                            : std::uint16_t{0};
 }
 
 }  // namespace km

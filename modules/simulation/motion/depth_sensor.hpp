@@ -52,6 +52,8 @@ class DepthSensor {
                                                    int height, std::uint64_t seed) const;
 
  private:
+  [[nodiscard]] std::uint16_t depth_at(double disparity_px) const;  // [mm]
+
   DepthSensorOptions options_;
 };
 

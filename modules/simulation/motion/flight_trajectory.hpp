@@ -24,7 +24,7 @@ struct FlightOptions {
   void visit_fields(auto& visitor) {
     visitor.field("duration_s", duration_s, {0.1, 36000.0});
     visitor.field("standstill_s", standstill_s, {0.0, 3600.0});
-    visitor.field("max_speed_mps", max_speed_mps, {0.05, 5.0});
+    visitor.field("max_speed_mps", max_speed_mps, {0.05, 2.5});
     visitor.field("max_yaw_rate", max_yaw_rate, {0.0, 6.3});
     visitor.field("gusts_m", gusts_m, {0.0, 0.05});
   }

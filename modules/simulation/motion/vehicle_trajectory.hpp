@@ -37,12 +37,11 @@ struct VehicleOptions {
   }
 };
 
-/// A vehicle that drives along `route`, once around and on, from time 0 to `duration_s` or a
-/// few milliseconds more. Body:
-/// x forward, y left, z up. Heading is the path's tangent; pitch and roll are the ground's under
-/// four wheels, seen through a suspension (damped oscillators in heave, pitch and roll, excited by
-/// ground, roughness and the vehicle's accelerations: nose down under braking, leaning out of
-/// curves). `ground_height` may be null: level ground at 0.
+/// A vehicle that drives along `route`, once around and on, from time 0 to `duration_s` or a few
+/// milliseconds more. Body: x forward, y left, z up. Heading is the path's tangent; pitch and roll
+/// are the ground's under four wheels, seen through a suspension that is excited by the ground, the
+/// road's roughness and the vehicle's accelerations. `ground_height` may be null: level ground at
+/// 0.
 ///
 /// The limits hold for the way of the point on the ground below the body; the body itself sways
 /// above it by a few centimetres. Throws ConfigError for options out of range,
