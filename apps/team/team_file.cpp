@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <set>
 
 namespace km {
@@ -148,6 +149,27 @@ void read_robots(Source& source, const YAML::Node& list, const fs::path& team_tr
   }
 }
 
+// Numbers above zero; what is not given keeps its default.
+ClosureTruthOptions read_closure_truth(Source& source, const YAML::Node& node) {
+  ClosureTruthOptions options;
+  if (!node) return options;
+  Keys keys(source, node);
+  const auto read = [&](const char* key, double max, double& value) {
+    const auto number = keys.get<double>(key, "a number");
+    if (number && !(*number > 0.0 && *number <= max))
+      source.problem(keys.child(key), std::string(key) + " is not above 0 and at most " +
+                                          std::to_string(std::lround(max)));
+    else
+      value = number.value_or(value);
+  };
+  read("max_translation_m", 1000.0, options.max_translation_m);
+  read("max_rotation_deg", 180.0, options.max_rotation_deg);
+  read("min_overlap", 1.0, options.min_overlap);
+  read("default_depth_m", 1000.0, options.default_depth_m);
+  keys.finish();
+  return options;
+}
+
 YAML::Node load(const fs::path& file) {
   if (!fs::is_regular_file(file)) throw TeamFileError(file.string() + ": no such file");
   try {
@@ -173,6 +195,7 @@ TeamPlan read_team_file(const fs::path& file, const fs::path& dataset) {
       keys.get<std::string>("output", "a path").value_or("results/" + file.stem().string());
   plan.time_limit_s = keys.get<double>("time_limit_s", "a number of seconds");
   const fs::path truth = keys.existing_path("truth");
+  plan.closure_truth = read_closure_truth(source, keys.child("closure_truth"));
   const auto common = keys.texts("arguments");
   const YAML::Node robots = keys.child("robots");
   if (robots && robots.IsSequence() && robots.size() > 0)

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "modules/core/ids.hpp"
+#include "modules/evaluation/closure_truth.hpp"
 
 namespace km {
 
@@ -35,6 +36,7 @@ struct TeamPlan {
   std::optional<std::uint32_t> domain;         ///< DDS domain; drawn at random if absent.
   std::filesystem::path output;                ///< Results, one folder per robot.
   std::optional<double> time_limit_s;          ///< The team is asked to end after this.
+  ClosureTruthOptions closure_truth;           ///< When a closure counts as true.
   std::vector<RobotPlan> robots;
 };
 

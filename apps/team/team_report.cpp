@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
+#include <sstream>
 
 #include "apps/team/text_table.hpp"
+#include "modules/evaluation/closure_report.hpp"
 #include "modules/evaluation/trajectory_report.hpp"
 
 namespace km {
@@ -15,6 +18,17 @@ constexpr std::array kTraffic = {"place_recognition", "geometric_verification", 
 
 std::string ate(const TrajectoryError* error) {
   return error != nullptr ? fixed(error->position_m.rmse, 4) : "-";
+}
+
+std::string drift(const TrajectoryError* error) {
+  return error != nullptr && error->drift_percent.count > 0 ? fixed(error->drift_percent.mean, 2)
+                                                            : "-";
+}
+
+std::string turn_drift(const TrajectoryError* error) {
+  return error != nullptr && error->drift_deg_per_m.count > 0
+             ? fixed(error->drift_deg_per_m.mean, 3)
+             : "-";
 }
 
 std::string covered(const TrajectoryError* error) {
@@ -37,20 +51,49 @@ std::string count_text(std::uint64_t count) {
   return std::to_string(count);
 }
 
-std::string trajectory_table(const TeamResult& team) {
-  Rows rows = {{"robot", "frames", "skipped", "keyframes", "odometry ATE [m]", "covered",
-                "optimized ATE [m]", "covered", "end"}};
+std::string run_table(const TeamResult& team) {
+  Rows rows = {{"robot", "frames", "skipped", "keyframes", "end"}};
   for (const RobotResult& robot : team.robots) {
     const RobotSummary summary = robot.summary.value_or(RobotSummary{});
+    rows.push_back({robot.plan.name, count_text(summary.frames), count_text(summary.frames_skipped),
+                    count_text(summary.keyframes), end_of(robot)});
+  }
+  return align_columns(rows);
+}
+
+// "Drift: mean over pieces of 1, 2 and 5 m of the path."
+std::string drift_remark(const TeamResult& team) {
+  std::set<double> lengths_m;
+  const auto add = [&](const TrajectoryError& error) {
+    lengths_m.insert(error.segment_lengths_m.begin(), error.segment_lengths_m.end());
+  };
+  for (const RobotResult& robot : team.robots)
+    if (robot.odometry) add(*robot.odometry);
+  if (team.optimized) add(team.optimized->joint);
+  if (lengths_m.empty()) return "";
+  std::ostringstream text;
+  text << "ATE: rmse. Drift: mean relative error, in percent of the way and in degrees per metre, "
+          "over\npieces of the path of ";
+  std::size_t left = lengths_m.size();
+  for (const double length_m : lengths_m)
+    text << length_m << (--left == 0 ? " m.\n" : left == 1 ? " and " : ", ");
+  return text.str();
+}
+
+std::string trajectory_table(const TeamResult& team) {
+  Rows rows = {{"robot", "odometry ATE [m]", "drift [%]", "[deg/m]", "covered", "optimized ATE [m]",
+                "drift [%]", "[deg/m]", "covered"}};
+  for (const RobotResult& robot : team.robots) {
     const TrajectoryError* const odometry = robot.odometry ? &*robot.odometry : nullptr;
     const TrajectoryError* const optimized = find(team.optimized, robot.plan.name);
-    rows.push_back({robot.plan.name, count_text(summary.frames), count_text(summary.frames_skipped),
-                    count_text(summary.keyframes), ate(odometry), covered(odometry), ate(optimized),
-                    covered(optimized), end_of(robot)});
+    rows.push_back({robot.plan.name, ate(odometry), drift(odometry), turn_drift(odometry),
+                    covered(odometry), ate(optimized), drift(optimized), turn_drift(optimized),
+                    covered(optimized)});
   }
   const TrajectoryError* const joint = team.optimized ? &team.optimized->joint : nullptr;
-  rows.push_back({"team, one frame", "", "", "", "", "", ate(joint), covered(joint), ""});
-  return align_columns(rows);
+  rows.push_back({"team, one frame", "", "", "", "", ate(joint), drift(joint), turn_drift(joint),
+                  covered(joint)});
+  return align_columns(rows) + drift_remark(team);
 }
 
 std::string closure_table(const TeamResult& team) {
@@ -100,6 +143,7 @@ std::string traffic_table(const TeamResult& team) {
 
 std::string failures(const TeamResult& team) {
   std::string text;
+  for (const std::string& note : team.notes) text.append("note: ").append(note).append("\n");
   for (const RobotResult& robot : team.robots) {
     for (const std::string& note : robot.notes)
       text.append("note: ").append(robot.plan.name).append(": ").append(note).append("\n");
@@ -155,7 +199,9 @@ void write_robot(JsonWriter& json, const RobotResult& robot) {
 
 std::string to_table(const TeamResult& team) {
   std::string text =
-      trajectory_table(team) + '\n' + closure_table(team) + '\n' + traffic_table(team);
+      run_table(team) + '\n' + trajectory_table(team) + '\n' + closure_table(team) + '\n';
+  if (team.closures) text += to_table(*team.closures) + '\n';
+  text += traffic_table(team);
   const std::string remarks = failures(team);
   return remarks.empty() ? text : text + '\n' + remarks;
 }
@@ -170,6 +216,11 @@ void write_json(JsonWriter& json, const TeamResult& team) {
     json.key("optimized");
     write_json(json, *team.optimized);
   }
+  if (team.closures) {
+    json.key("closures");
+    write_json(json, *team.closures);
+  }
+  json.array("notes", team.notes);
   json.end_object();
 }
 

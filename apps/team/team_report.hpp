@@ -7,11 +7,13 @@
 
 namespace km {
 
-/// The tables of a run for people: trajectories, closures and optimisation, traffic; then the notes
-/// and the last words of robots that failed.
+/// The tables of a run for people: the runs, trajectories, closures and optimisation, closures
+/// against the truth, traffic; then the notes and the last words of robots that failed. At most 120
+/// columns wide for names of up to 15 letters.
 [[nodiscard]] std::string to_table(const TeamResult& team);
 
-/// Writes the same as one JSON object: {robots: [{robot, name, exit_code, ...}], optimized: {...}}.
+/// Writes the same as one JSON object: {robots: [{robot, name, exit_code, ...}], optimized: {...},
+/// closures: {...}, notes: [...]}; what could not be had is absent.
 void write_json(JsonWriter& json, const TeamResult& team);
 
 }  // namespace km

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "modules/evaluation/closure_files.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/evaluation/trajectory_plot.hpp"
 #include "modules/sensors/euroc_reader.hpp"
@@ -29,6 +30,13 @@ std::optional<TimeWindow> window_of(const RobotPlan& plan) {
   return TimeWindow{reader.first_stamp(), reader.last_stamp()};
 }
 
+// The left camera of the team: that of the first robot that has one.
+std::optional<PinholeCamera> camera_of(const TeamPlan& plan) {
+  for (const RobotPlan& robot : plan.robots)
+    if (!robot.dataset.empty()) return EurocReader(robot.dataset).rig().stereo.cameras[0];
+  return std::nullopt;
+}
+
 // Trajectories of the robots, read once: the inputs of the evaluation refer to them.
 class Trajectories {
  public:
@@ -49,6 +57,8 @@ class Trajectories {
     return std::nullopt;
   }
 
+  const std::vector<StampedPose>& truth(const RobotPlan& robot) { return read(robot.truth); }
+
  private:
   const std::vector<StampedPose>& read(const std::filesystem::path& file) {
     const auto known = read_.find(file);
@@ -59,6 +69,34 @@ class Trajectories {
   const TeamPlan& plan_;
   std::map<std::filesystem::path, std::vector<StampedPose>> read_;
 };
+
+// The closures of all robots whose truth is known against it; nullopt where there is nothing to
+// judge. What keeps a robot out is noted with the team.
+std::optional<ClosureScores> judge_closures(const TeamPlan& plan, Trajectories& trajectories,
+                                            std::vector<std::string>& notes) try {
+  const auto camera = camera_of(plan);
+  if (!camera) return std::nullopt;
+  std::vector<TrueKeyframe> keyframes;
+  std::vector<ClosureRecord> closures;
+  for (const RobotPlan& robot : plan.robots) {
+    if (robot.truth.empty()) continue;
+    try {
+      const auto folder = plan.output / robot.name;
+      const auto own =
+          place_keyframes(read_keyframes(folder / "keyframes.csv"), trajectories.truth(robot));
+      const auto found = read_closures(folder / "loop_closures.csv");
+      keyframes.insert(keyframes.end(), own.begin(), own.end());
+      closures.insert(closures.end(), found.begin(), found.end());
+    } catch (const std::exception& error) {
+      notes.push_back(robot.name + ": closures are not judged: " + error.what());
+    }
+  }
+  if (keyframes.empty()) return std::nullopt;
+  return score_closures(keyframes, closures, *camera, plan.closure_truth);
+} catch (const std::exception& error) {
+  notes.emplace_back(error.what());
+  return std::nullopt;
+}
 
 }  // namespace
 
@@ -113,6 +151,7 @@ TeamResult collect_results(const TeamPlan& plan, std::vector<RobotRun> runs) {
     result.optimized = trajectory_error(optimized);
     result.plot = plot_from_above(optimized, *result.optimized);
   }
+  result.closures = judge_closures(plan, trajectories, result.notes);
   return result;
 }
 

@@ -9,6 +9,7 @@
 
 #include "apps/team/run_team.hpp"
 #include "apps/team/team_file.hpp"
+#include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 
 namespace km {
@@ -45,12 +46,16 @@ struct RobotResult {
 /// A team after the run.
 struct TeamResult {
   std::vector<RobotResult> robots;
-  std::optional<TeamError> optimized;  ///< Of the robots that have poses, under one alignment.
-  std::string plot;                    ///< SVG of `optimized` from above; empty without it.
+  std::optional<TeamError> optimized;     ///< Of the robots that have poses, under one alignment.
+  std::string plot;                       ///< SVG of `optimized` from above; empty without it.
+  std::optional<ClosureScores> closures;  ///< Of robots with cameras, where the truth is known.
+  std::vector<std::string> notes;         ///< Why something of the team is absent.
 };
 
 /// Collects the results of a run: summaries, and errors where the truth is known. Completeness is
-/// that of the part of the recording the robot was given. Never throws for what a robot left out.
+/// that of the part of the recording the robot was given. The true poses of all robots are in one
+/// world: closures are judged in it, with the left camera of the first robot's recording. Never
+/// throws for what a robot left out.
 [[nodiscard]] TeamResult collect_results(const TeamPlan& plan, std::vector<RobotRun> runs);
 
 }  // namespace km

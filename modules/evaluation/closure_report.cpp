@@ -27,10 +27,10 @@ void write_row(std::ostream& out, const char* name, const ClosureScores& scores,
   const Statistics& r = stage.rotation_error_deg;
   out << std::left << std::setw(11) << name << std::right << std::setw(8) << stage.judged
       << std::setw(8) << stage.correct << std::setw(11) << percent(stage.precision())
-      << std::setw(15) << percent(scores.pair_recall(stage)) << std::setw(18)
-      << percent(scores.frame_recall(stage)) << std::setw(14) << number(t, t.median, 3)
-      << std::setw(9) << number(t, t.max, 3) << std::setw(10) << number(r, r.median, 2)
-      << std::setw(9) << number(r, r.max, 2) << '\n';
+      << std::setw(15) << percent(scores.pair_recall(stage)) << std::setw(19)
+      << percent(scores.frame_recall(stage)) << std::setw(12) << number(t, t.median, 3)
+      << std::setw(9) << number(t, t.max, 3) << std::setw(14) << number(r, r.median, 2)
+      << std::setw(11) << number(r, r.max, 2) << '\n';
 }
 
 void write_statistics(JsonWriter& json, const char* name, const Statistics& statistics) {
@@ -65,7 +65,7 @@ void write_stage(JsonWriter& json, const char* name, const ClosureScores& scores
 std::string to_table(const ClosureScores& scores) {
   std::ostringstream out;
   out << "closures     judged    true  precision  recall, pairs  recall, keyframes"
-         "    error [m]      max  [deg]  max [deg]\n";
+         "  median [m]  max [m]  median [deg]  max [deg]\n";
   write_row(out, "candidates", scores, scores.candidates);
   write_row(out, "verified", scores, scores.verified);
   write_row(out, "inliers", scores, scores.inliers);

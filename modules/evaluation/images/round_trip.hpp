@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -21,18 +20,16 @@ struct RoundTrip {
   double error_px = 0.0;  ///< Between start and end after there and back; infinity: lost.
 };
 
-/// Where to start looking for a point of the other image.
-using FlowGuess = std::function<cv::Point2f(const cv::Point2f&)>;
-
-/// Tracks points from `a` to `b`, started at guess_b(point), and from where they arrived back to
-/// `a`, started at guess_a(arrival).
-[[nodiscard]] std::vector<RoundTrip> round_trip(const KltImage& a, const KltImage& b,
-                                                const std::vector<cv::Point2f>& points,
-                                                const FlowGuess& guess_b, const FlowGuess& guess_a);
-
-/// The same, started at the old place both ways.
+/// Tracks points from `a` to `b`, started at the old place, and from where they arrived back to
+/// `a`, started there.
 [[nodiscard]] std::vector<RoundTrip> round_trip(const KltImage& a, const KltImage& b,
                                                 const std::vector<cv::Point2f>& points);
+
+/// Tracks points from `a` to `b`, started at `starts_b`, one for each, and back to `a`, started at
+/// the points: between views that lie far apart, so that the way back is found if it is there.
+[[nodiscard]] std::vector<RoundTrip> round_trip(const KltImage& a, const KltImage& b,
+                                                const std::vector<cv::Point2f>& points,
+                                                std::vector<cv::Point2f> starts_b);
 
 /// Corners as all figures count them: Shi-Tomasi, quality 0.01, 15 px apart, as many as there are.
 [[nodiscard]] std::vector<cv::Point2f> corners_of(const cv::Mat& image);

@@ -62,14 +62,11 @@ std::optional<StereoStatistics::StereoMatch> StereoStatistics::judge(
   return match;
 }
 
-cv::Point2f StereoStatistics::at_infinity(const cv::Point2f& point, std::size_t from,
-                                          std::size_t to) const {
-  const auto bearing = rig_.cameras[from].unproject(vector_of(point));
-  if (!bearing) return point;
-  const Eigen::Matrix3d R_to_from =
-      (rig_.cameras[to].T_body_cam.linear().transpose() * rig_.cameras[from].T_body_cam.linear());
+cv::Point2f StereoStatistics::at_infinity(const cv::Point2f& left) const {
+  const auto bearing = rig_.cameras[0].unproject(vector_of(left));
+  if (!bearing) return left;
   const Eigen::Vector2d px =
-      rig_.cameras[to].project((R_to_from * bearing->homogeneous()).hnormalized());
+      rig_.cameras[1].project((T_right_left_.linear() * bearing->homogeneous()).hnormalized());
   return {static_cast<float>(px.x()), static_cast<float>(px.y())};
 }
 
@@ -145,9 +142,10 @@ void StereoStatistics::add_later_views(const OrbImage& left) {
 void StereoStatistics::add_klt(const KltImage& left, const KltImage& right,
                                const std::vector<cv::Point2f>& corners) {
   if (corners.empty()) return;
-  const auto trips = round_trip(
-      left, right, corners, [&](const cv::Point2f& p) { return at_infinity(p, 0, 1); },
-      [&](const cv::Point2f& p) { return at_infinity(p, 1, 0); });
+  std::vector<cv::Point2f> starts;
+  starts.reserve(corners.size());
+  for (const cv::Point2f& corner : corners) starts.push_back(at_infinity(corner));
+  const auto trips = round_trip(left, right, corners, std::move(starts));
   int passed = 0;
   int on_line = 0;
   for (std::size_t i = 0; i < trips.size(); ++i) {

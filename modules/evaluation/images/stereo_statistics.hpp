@@ -17,8 +17,8 @@ namespace km {
 /// ORB: OpenCV's, 1000 features, brute force over the whole image, ratio test 0.8. Left to right an
 /// inlier lies within 1.5 px of its epipolar line; left to left, 0.25, 0.5 and 1 s apart, within
 /// 1.5 px of that of the essential matrix that RANSAC finds. KLT from left to right starts where
-/// the point would be at infinite depth, there and back. Depth by triangulation: z [m] in the left
-/// camera.
+/// the point would be at infinite depth, and back from there at the point itself. Depth by
+/// triangulation: z [m] in the left camera.
 class StereoStatistics {
  public:
   explicit StereoStatistics(const StereoRig& rig);
@@ -47,8 +47,8 @@ class StereoStatistics {
 
   [[nodiscard]] std::optional<StereoMatch> judge(const cv::Point2f& left,
                                                  const cv::Point2f& right) const;
-  [[nodiscard]] cv::Point2f at_infinity(const cv::Point2f& point, std::size_t from,
-                                        std::size_t to) const;
+  // Where the right camera sees a point of the left image that is infinitely far.
+  [[nodiscard]] cv::Point2f at_infinity(const cv::Point2f& left) const;
   void add_orb(const OrbImage& left, const cv::Mat& right);
   void add_later_views(const OrbImage& left);
   void add_klt(const KltImage& left, const KltImage& right,

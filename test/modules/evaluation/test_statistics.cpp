@@ -17,4 +17,14 @@ TEST_CASE("Statistics of known numbers", "[evaluation]") {
   CHECK(statistics_of({}).rmse == 0.0);
 }
 
+TEST_CASE("Quantiles lie linearly between the values", "[statistics]") {
+  const std::vector<double> values = {40.0, 10.0, 30.0, 20.0, 50.0};
+  CHECK(quantile(values, 0.0) == 10.0);
+  CHECK(quantile(values, 0.5) == 30.0);
+  CHECK(quantile(values, 0.625) == Approx(35.0));
+  CHECK(quantile(values, 1.0) == 50.0);
+  CHECK(quantile({7.0}, 0.3) == 7.0);
+  CHECK(std::isnan(quantile({}, 0.5)));
+}
+
 }  // namespace km

@@ -1,0 +1,84 @@
+#include "modules/evaluation/images/stereo_statistics.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "test/modules/evaluation/images/synthetic_images.hpp"
+
+namespace km {
+namespace {
+
+constexpr int kWidth = 400;
+constexpr int kHeight = 300;
+constexpr double kFocal_px = 300.0;
+constexpr double kBaseline_m = 0.1;
+constexpr Stamp kSecond = 1'000'000'000;
+
+StereoRig rig() {
+  PinholeCamera camera;
+  camera.width = kWidth;
+  camera.height = kHeight;
+  camera.fx = camera.fy = kFocal_px;
+  camera.cx = 0.5 * kWidth;
+  camera.cy = 0.5 * kHeight;
+  StereoRig result;
+  result.cameras = {camera, camera};
+  result.cameras[1].T_body_cam.translation() << kBaseline_m, 0.0, 0.0;
+  return result;
+}
+
+std::vector<ImageFigure> figures_of(const StereoStatistics& statistics) {
+  std::vector<ImageFigure> figures;
+  statistics.append_to(figures);
+  return figures;
+}
+
+}  // namespace
+
+TEST_CASE("A wall parallel to the cameras is found at its depth", "[image_statistics]") {
+  const int disparity_px = GENERATE(6, 15);
+  CAPTURE(disparity_px);
+  const double depth_m = kFocal_px * kBaseline_m / disparity_px;
+  const cv::Mat surface = texture(kWidth + disparity_px, kHeight, 11);
+  const KltImage left = make_klt_image(view_of(surface, 0, 0, kWidth, kHeight));
+  const KltImage right = make_klt_image(view_of(surface, disparity_px, 0, kWidth, kHeight));
+  StereoStatistics statistics(rig());
+  statistics.add(kSecond, left, right, corners_of(left.image));
+  const auto figures = figures_of(statistics);
+  // All but the corners that the right camera does not see.
+  const double seen = 1.0 - disparity_px / double{kWidth};
+  CHECK(figure(figures, "KLT, left to right", "pass, share of corners") > seen - 0.05);
+  CHECK(figure(figures, "KLT, left to right", "also within 1.5 px of the epipolar line") >
+        seen - 0.05);
+  CHECK(figure(figures, "KLT, left to right", "epipolar error [px] p90") < 0.05);
+  CHECK(figure(figures, "KLT, left to right", "depth [m] median") == Approx(depth_m).epsilon(0.01));
+  CHECK(figure(figures, "KLT, left to right", "depth [m] p5") == Approx(depth_m).epsilon(0.02));
+  CHECK(figure(figures, "ORB, left to right", "matches") > 200);
+  CHECK(figure(figures, "ORB, left to right", "share within 1.5 px of the epipolar line") > 0.9);
+}
+
+TEST_CASE("A right image that is too low misses the epipolar lines", "[image_statistics]") {
+  const cv::Mat surface = texture(kWidth + 10, kHeight + 3, 11);
+  const KltImage left = make_klt_image(view_of(surface, 0, 0, kWidth, kHeight));
+  const KltImage right = make_klt_image(view_of(surface, 10, 3, kWidth, kHeight));
+  StereoStatistics statistics(rig());
+  statistics.add(kSecond, left, right, corners_of(left.image));
+  const auto figures = figures_of(statistics);
+  CHECK(figure(figures, "KLT, left to right", "pass, share of corners") > 0.9);
+  CHECK(figure(figures, "KLT, left to right", "also within 1.5 px of the epipolar line") < 0.01);
+  // What is left comes from coarse octaves, whose keypoints are off by pixels.
+  CHECK(figure(figures, "ORB, left to right", "share within 1.5 px of the epipolar line") < 0.2);
+}
+
+TEST_CASE("Later views are matched at their lags only", "[image_statistics]") {
+  const KltImage image = make_klt_image(texture(kWidth, kHeight, 11));
+  StereoStatistics statistics(rig());
+  for (const double t_s : {0.0, 0.25, 0.6})
+    statistics.add(kSecond + nanoseconds(t_s), image, {}, corners_of(image.image));
+  const auto figures = figures_of(statistics);
+  CHECK(figure(figures, "ORB, left to left", "matches, 0.25 s") > 500);
+  CHECK(std::isnan(figure(figures, "ORB, left to left", "matches, 0.5 s")));
+  CHECK(std::isnan(figure(figures, "ORB, left to left", "matches, 1 s")));
+  CHECK(std::isnan(figure(figures, "KLT, left to right", "matches a pair")));  // no right camera
+}
+
+}  // namespace km

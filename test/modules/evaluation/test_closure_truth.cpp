@@ -1,0 +1,182 @@
+#include "modules/evaluation/closure_truth.hpp"
+
+#include <catch2/catch.hpp>
+#include <numbers>
+#include <sstream>
+
+#include "modules/core/lie.hpp"
+#include "modules/evaluation/closure_report.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kRadians = std::numbers::pi / 180.0;
+
+// 90 by 73.7 degrees; it looks along the body's x axis, as a car's would.
+PinholeCamera camera() {
+  PinholeCamera camera;
+  camera.width = 640;
+  camera.height = 480;
+  camera.fx = camera.fy = 320.0;
+  camera.cx = 320.0;
+  camera.cy = 240.0;
+  camera.T_body_cam.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  return camera;
+}
+
+// A body at (x, y), turned to the left by `yaw_deg`.
+SE3 at(double x, double y, double yaw_deg = 0.0) {
+  return make_pose(so3_exp({0.0, 0.0, kRadians * yaw_deg}), {x, y, 0.0});
+}
+
+// The camera sideways of another.
+SE3 sideways(double metres) {
+  return make_pose(Eigen::Matrix3d::Identity(), {metres, 0.0, 0.0});
+}
+
+ClosureRecord closure(KeyframeId from, KeyframeId to, ClosureStage stage,
+                      const std::optional<SE3>& T_from_to = std::nullopt) {
+  return {{from, to}, stage, T_from_to};
+}
+
+// Robot 0 drives along x, robot 1 beside it with 0.4 m between; both look ahead, the scene 4 m
+// away. Robot 1's last keyframe is far off. Every 3 m a keyframe: only those side by side overlap
+// enough.
+std::vector<TrueKeyframe> two_rows(std::uint32_t count) {
+  std::vector<TrueKeyframe> keyframes;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    keyframes.push_back({{0, i}, at(3.0 * i, 0.0), 4.0});
+    keyframes.push_back({{1, i}, at(3.0 * i, i + 1 < count ? 0.4 : 500.0), 4.0});
+  }
+  return keyframes;
+}
+
+const SE3 kTruth = at(0.0, 0.4);  // of robot 1's keyframe i in robot 0's
+
+}  // namespace
+
+TEST_CASE("The overlap of two views is the share of the image in both", "[closure_truth]") {
+  const double grid = 1.0 / 16;  // half a cell of the grid's eight columns
+  CHECK(view_overlap(camera(), SE3::Identity(), 3.0) == 1.0);
+  // The image is 2 * depth wide at any depth: moved sideways by a share of it, the rest is seen.
+  const double depth_m = GENERATE(1.0, 20.0);
+  CHECK(view_overlap(camera(), sideways(0.5 * depth_m), depth_m) == Approx(0.75).margin(grid));
+  CHECK(view_overlap(camera(), sideways(1.5 * depth_m), depth_m) == Approx(0.25).margin(grid));
+  CHECK(view_overlap(camera(), sideways(2.5 * depth_m), depth_m) == 0.0);
+  // Looking the other way, or at twice the distance and more.
+  CHECK(view_overlap(camera(), make_pose(so3_exp({0.0, std::numbers::pi, 0.0}), {0, 0, 0}),
+                     depth_m) == 0.0);
+  const SE3 behind = make_pose(Eigen::Matrix3d::Identity(), {0.0, 0.0, -1.2 * depth_m});
+  CHECK(view_overlap(camera(), behind, depth_m) == 0.0);
+}
+
+TEST_CASE("Planted errors are counted, stage by stage", "[closure_truth]") {
+  using enum ClosureStage;
+  const auto keyframes = two_rows(6);
+  const SE3 off_m = kTruth * at(0.6, 0.0);
+  const SE3 off_deg = kTruth * at(0.0, 0.0, 6.0);
+  const SE3 within = kTruth * at(0.3, 0.3, 4.0);
+  const std::vector<ClosureRecord> closures = {
+      closure({0, 0}, {1, 0}, kInlier, kTruth),
+      closure({1, 0}, {0, 0}, kInlier, kTruth.inverse()),  // the same pair from the other side
+      closure({0, 1}, {1, 1}, kInlier, within),
+      closure({0, 2}, {1, 2}, kInlier, off_m),
+      closure({0, 3}, {1, 3}, kVerified, off_deg),
+      closure({0, 4}, {1, 0}, kVerified, at(0.0, 0.0)),  // another place
+      closure({0, 4}, {1, 4}, kCandidate),
+      closure({0, 0}, {1, 3}, kReceived),
+      closure({0, 0}, {7, 3}, kInlier, kTruth),  // a robot without truth
+  };
+  const ClosureScores scores = score_closures(keyframes, closures, camera());
+  CHECK(scores.unjudged == 1);
+  CHECK(scores.true_pairs == 5);
+  CHECK(scores.true_frames == 10);
+  CHECK(scores.candidates.judged == 8);
+  CHECK(scores.candidates.correct == 6);
+  CHECK(scores.candidates.pairs_found == 5);
+  CHECK(scores.candidates.frames_found == 10);
+  CHECK(scores.verified.judged == 6);
+  CHECK(scores.verified.correct == 3);
+  CHECK(scores.verified.pairs_found == 2);
+  CHECK(scores.inliers.judged == 4);
+  CHECK(scores.inliers.correct == 3);
+  CHECK(scores.inliers.precision() == Approx(0.75));
+  CHECK(scores.pair_recall(scores.inliers) == Approx(0.4));
+  CHECK(scores.frame_recall(scores.inliers) == Approx(0.4));
+  CHECK(scores.inliers.translation_error_m.max == Approx(0.6));
+  CHECK(scores.verified.rotation_error_deg.max == Approx(6.0));
+}
+
+TEST_CASE("Limits decide what is true", "[closure_truth]") {
+  using enum ClosureStage;
+  const auto keyframes = two_rows(3);
+  const std::vector<ClosureRecord> closures = {
+      closure({0, 0}, {1, 0}, kInlier, kTruth * at(0.2, 0.0, 2.0))};
+  const auto correct = [&](const ClosureTruthOptions& options) {
+    return score_closures(keyframes, closures, camera(), options).inliers.correct;
+  };
+  CHECK(correct({}) == 1);
+  CHECK(correct({.max_translation_m = 0.19}) == 0);
+  CHECK(correct({.max_rotation_deg = 1.9}) == 0);
+  CHECK(correct({.max_translation_m = 0.21, .max_rotation_deg = 2.1}) == 1);
+}
+
+TEST_CASE("Places scale with what the keyframes see", "[closure_truth]") {
+  auto keyframes = two_rows(2);  // side by side 0.4 m apart; the second robot's last is far off
+  const auto pairs = [&](double depth_m) {
+    for (TrueKeyframe& keyframe : keyframes) keyframe.scene_depth_m = depth_m;
+    return score_closures(keyframes, {}, camera()).true_pairs;
+  };
+  CHECK(pairs(0.2) == 0);   // 0.4 m is a whole view at 0.2 m
+  CHECK(pairs(2.0) == 1);   // half a view and more overlaps
+  CHECK(pairs(40.0) == 2);  // 3 m ahead is still the same place
+  CHECK(pairs(0.0) == 1);   // unknown: the default of 5 m
+}
+
+TEST_CASE("Closures inside a robot count for precision, not for recall", "[closure_truth]") {
+  std::vector<TrueKeyframe> keyframes = {{{0, 0}, at(0, 0), 4.0}, {{0, 9}, at(0.1, 0), 4.0}};
+  const ClosureScores scores = score_closures(
+      keyframes, std::vector{closure({0, 0}, {0, 9}, ClosureStage::kInlier, at(0.1, 0))}, camera());
+  CHECK(scores.inliers.precision() == 1.0);
+  CHECK(scores.true_pairs == 0);
+  CHECK(std::isnan(scores.pair_recall(scores.inliers)));
+  CHECK(std::isnan(scores.frame_recall(scores.inliers)));
+  CHECK(std::isnan(score_closures(keyframes, {}, camera()).inliers.precision()));
+}
+
+TEST_CASE("What cannot be judged is refused", "[closure_truth]") {
+  const auto keyframes = two_rows(2);
+  const std::vector<ClosureRecord> none = {
+      closure({0, 0}, {1, 0}, ClosureStage::kVerified, std::nullopt)};
+  CHECK_THROWS_WITH(score_closures(keyframes, none, camera()),
+                    Catch::Contains("closure 0:0 - 1:0 is verified, but has no pose"));
+  const std::vector<TrueKeyframe> twice = {keyframes[0], keyframes[0]};
+  CHECK_THROWS_WITH(score_closures(twice, {}, camera()),
+                    Catch::Contains("keyframe 0:0 is given twice"));
+  CHECK_THROWS_AS(score_closures(keyframes, {}, camera(), {.max_translation_m = 0.0}),
+                  std::invalid_argument);
+  CHECK_THROWS_AS(score_closures(keyframes, {}, camera(), {.min_overlap = 1.5}),
+                  std::invalid_argument);
+}
+
+TEST_CASE("Scores are shown and written", "[closure_truth]") {
+  const auto keyframes = two_rows(3);
+  const ClosureScores scores =
+      score_closures(keyframes,
+                     std::vector{closure({0, 0}, {1, 0}, ClosureStage::kInlier, kTruth),
+                                 closure({0, 1}, {1, 0}, ClosureStage::kCandidate)},
+                     camera());
+  const std::string text = to_table(scores);
+  CHECK_THAT(text, Catch::Contains("inliers") && Catch::Contains("50.0%") &&
+                       Catch::Contains("100.0%") &&
+                       Catch::Contains("2 pairs of keyframes of two robots"));
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) CHECK(line.size() <= 120);
+  std::ostringstream out;
+  JsonWriter json(out);
+  write_json(json, scores);
+  CHECK_THAT(out.str(), Catch::Contains("\"true_pairs\": 2") && Catch::Contains("\"inliers\": {") &&
+                            Catch::Contains("\"precision\": 0.5"));
+}
+
+}  // namespace km
