@@ -2,6 +2,7 @@
 #include <cmath>
 #include <string>
 
+#include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/command.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -65,6 +66,74 @@ TEST_CASE("Several truths belong to the estimates one by one", "[evaluate]") {
   const auto mismatch = run_command(two + " --estimate " + files.a);
   CHECK(mismatch.exit_code == 1);
   CHECK_THAT(mismatch.output, Catch::Contains("give one --truth"));
+}
+
+TEST_CASE("images prints the figures of a recording, in any format", "[evaluate]") {
+  const std::string extension = GENERATE(".png", ".jpg");
+  const EurocFolder recording(extension);
+  const TemporaryFolder folder;
+  const std::string json = (folder.path() / "out.json").string();
+  const auto result = run_command(kTool + "images --dataset " + recording.root().string() +
+                                  " --stride 2 --json " + json);
+  CAPTURE(result.output);
+  REQUIRE(result.exit_code == 0);
+  CHECK_THAT(result.output, Catch::Contains("corners a frame") && Catch::Contains("image mean"));
+  CHECK_THAT(folder.read("out.json"),
+             Catch::Contains("\"image mean\": 45") && Catch::Contains("\"frames\": 8"));
+}
+
+TEST_CASE("images compares two recordings over one window", "[evaluate]") {
+  const EurocFolder recording;
+  const EurocFolder other;
+  for (const char* camera : {"cam0/data/", "cam1/data/"})
+    for (int i = 0; i < EurocFolder::kPairs; ++i)
+      other.write_image(camera + std::to_string(EurocFolder::image_stamp(i)) + ".png", 32, 24, 90);
+  const auto result = run_command(kTool + "images --dataset " + recording.root().string() +
+                                  " --compare " + other.root().string() + " --to 0.2");
+  CAPTURE(result.output);
+  REQUIRE(result.exit_code == 0);
+  CHECK_THAT(result.output, Catch::Contains("ratio") && Catch::Contains("  <--\n") &&
+                                Catch::Contains("rows differ by more than 25 %"));
+}
+
+TEST_CASE("images refuses what it cannot read", "[evaluate]") {
+  const auto missing = run_command(kTool + "images --dataset /none");
+  CHECK(missing.exit_code == 1);
+  CHECK_THAT(missing.output, Catch::StartsWith("kimera_multi_evaluate: /none"));
+  const EurocFolder recording;
+  const std::string command = kTool + "images --dataset " + recording.root().string();
+  CHECK(run_command(command + " --stride 0").exit_code == 1);
+  CHECK(run_command(command + " --from 5").exit_code == 1);
+  CHECK(run_command(command + " --json /none/out.json").exit_code == 1);
+}
+
+TEST_CASE("closures judges the folders of a run", "[evaluate]") {
+  const EurocFolder recording;
+  const Files files;
+  const auto robot = [&](const std::string& id, const std::string& closures) {
+    files.folder.write("r" + id + "/keyframes.csv",
+                       "robot,keyframe,stamp_ns,median_depth_m\n" + id + ",0,105000000000,4\n");
+    files.folder.write("r" + id + "/loop_closures.csv",
+                       "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,"
+                       "inliers,tx,ty,tz,qx,qy,qz,qw,reason\n" +
+                           closures);
+    return (files.folder.path() / ("r" + id)).string();
+  };
+  const std::string a = robot("1", "1,0,2,0,0.5,inlier,80,60,0.1,0,0,0,0,0,1,\"\"\n");
+  const std::string b = robot("2", "2,0,1,0,0.5,inlier,80,60,0.9,0,0,0,0,0,1,\"\"\n");
+  const std::string json = (files.folder.path() / "closures.json").string();
+  const std::string command = kTool + "closures --dataset " + recording.root().string() +
+                              " --truth " + files.truth + " --json " + json + " --results ";
+  const auto result = run_command(command + a + ' ' + b);
+  CAPTURE(result.output);
+  REQUIRE(result.exit_code == 0);
+  CHECK_THAT(result.output, Catch::Contains("inliers           2       1      50.0%"));
+  CHECK_THAT(files.folder.read("closures.json"), Catch::Contains("\"pair_recall\": 1"));
+  CHECK_THAT(run_command(command + a + ' ' + b + " --max-translation 1").output,
+             Catch::Contains("inliers           2       2     100.0%"));
+  const auto missing = run_command(command + "/none");
+  CHECK(missing.exit_code == 1);
+  CHECK(missing.output == "kimera_multi_evaluate: /none/keyframes.csv: no such file\n");
 }
 
 TEST_CASE("Bad input ends with code 1 and one line that names it", "[evaluate]") {

@@ -72,6 +72,21 @@ TEST_CASE("A team file gives the robots their inputs", "[team]") {
   CHECK(b.arguments == std::vector<std::string>{"--link", "wifi", "--verbose"});
 }
 
+TEST_CASE("A team file may say when a closure counts as true", "[team]") {
+  const Inputs inputs;
+  const std::string robots = "robots:\n  - {id: 1, graph: recording/g.csv}\n";
+  const auto plan = read_team_file(
+      inputs.team("closure_truth: {max_translation_m: 1.5, default_depth_m: 12}\n" + robots), {});
+  CHECK(plan.closure_truth.max_translation_m == 1.5);
+  CHECK(plan.closure_truth.max_rotation_deg == ClosureTruthOptions{}.max_rotation_deg);
+  CHECK(plan.closure_truth.default_depth_m == 12.0);
+  const std::string problems = problems_of(
+      inputs.team("closure_truth: {min_overlap: 2, max_rotation_deg: -1, near: 3}\n" + robots), {});
+  CHECK_THAT(problems, Catch::Contains("line 1: min_overlap is not above 0 and at most 1\n") &&
+                           Catch::Contains("max_rotation_deg is not above 0 and at most 180") &&
+                           Catch::Contains("unknown key near"));
+}
+
 TEST_CASE("The command line of a robot says what its plan says", "[team]") {
   TeamPlan plan;
   plan.configs = {"/c.yaml", "/d.yaml"};

@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "apps/team/text_table.hpp"
+#include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -106,6 +107,60 @@ TEST_CASE("The JSON of a run holds every robot", "[team]") {
                                "\"optimized\": {", "\"members\": [\n"}) {
     CAPTURE(text.str(), expected);
     CHECK_THAT(text.str(), Catch::Contains(expected));
+  }
+}
+
+TEST_CASE("Closures are judged in the robots' common world", "[team]") {
+  const TemporaryFolder folder;
+  const EurocFolder recording;  // for its camera
+  TeamPlan plan;
+  plan.output = folder.path();
+  const std::string keyframes = "robot,keyframe,stamp_ns,median_depth_m\n";
+  const std::string closures =
+      "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,inliers,"
+      "tx,ty,tz,qx,qy,qz,qw,reason\n";
+  for (const RobotId id : {RobotId{1}, RobotId{2}}) {
+    RobotPlan robot;
+    robot.id = id;
+    robot.name = "r" + std::to_string(id);
+    robot.dataset = recording.root();
+    robot.truth = folder.write(robot.name + ".tum", straight_line(id == 1 ? 0.0 : 0.1));
+    plan.robots.push_back(robot);
+    folder.write(robot.name + "/keyframes.csv",
+                 keyframes + std::to_string(id) + ",0,5000000000,20\n");
+  }
+  folder.write("r1/loop_closures.csv",
+               closures + "1,0,2,0,0.5,inlier,80,60,0,0,0.1,0,0,0,1,\"\"\n");
+  folder.write("r2/loop_closures.csv",
+               closures + "2,0,1,0,0.5,verified,80,60,0,3,0,0,0,0,1,\"\"\n");
+  const TeamResult team = collect_results(plan, {{{0, 0}, {}}, {{0, 0}, {}}});
+  REQUIRE(team.closures);
+  CHECK(team.closures->true_pairs == 1);
+  CHECK(team.closures->candidates.correct == 2);
+  CHECK(team.closures->verified.judged == 2);
+  CHECK(team.closures->verified.correct == 1);
+  CHECK(team.closures->inliers.precision() == 1.0);
+  CHECK(team.notes.empty());
+  CHECK_THAT(to_table(team), Catch::Contains("1 pairs of keyframes of two robots"));
+  std::ostringstream text;
+  JsonWriter json(text);
+  write_json(json, team);
+  CHECK_THAT(text.str(), Catch::Contains("\"pair_recall\": 1"));
+
+  std::filesystem::remove(folder.path() / "r2/loop_closures.csv");
+  const TeamResult part = collect_results(plan, {{{0, 0}, {}}, {{0, 0}, {}}});
+  REQUIRE(part.closures);
+  CHECK(part.closures->unjudged == 1);
+  REQUIRE(part.notes.size() == 1);
+  CHECK_THAT(part.notes[0], Catch::StartsWith("r2: closures are not judged: "));
+}
+
+TEST_CASE("The tables fit into 120 columns", "[team]") {
+  const TemporaryFolder folder;
+  std::istringstream lines(to_table(example(folder)));
+  for (std::string line; std::getline(lines, line);) {
+    CAPTURE(line);
+    CHECK((line.size() <= 120 || line.starts_with("note: ")));
   }
 }
 
