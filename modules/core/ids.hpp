@@ -11,10 +11,13 @@ namespace km {
 /// Any 16-bit number, unique in the team; ids need be neither dense nor known in advance.
 using RobotId = std::uint16_t;
 
-/// A keyframe: its robot and its index there, counted from 0 without gaps.
+/// A keyframe within its robot, counted from 0 without gaps.
+using KeyframeIndex = std::uint32_t;
+
+/// A keyframe: its robot and its index there.
 struct KeyframeId {
   RobotId robot = 0;
-  std::uint32_t index = 0;
+  KeyframeIndex index = 0;
 
   auto operator<=>(const KeyframeId&) const = default;
 };
