@@ -1,0 +1,25 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "modules/core/ids.hpp"
+#include "modules/mesh/labelled_mesh.hpp"
+
+namespace km {
+
+/// The mesh of a robot's map, in the robot's odometry frame, as its mapper gives it and Local Mesh
+/// Optimization takes it. `seen_by` is as long as mesh.vertices; `ids` too, or empty.
+struct MapMesh {
+  LabelledMesh mesh;
+
+  /// First and last keyframe that saw each vertex.
+  std::vector<std::array<KeyframeIndex, 2>> seen_by = {};
+
+  /// Names the vertices from one update to the next; never given twice. Ascending, so that vertices
+  /// that are in two updates are in the same order in both, and new ones come last.
+  std::vector<std::uint64_t> ids = {};
+};
+
+}  // namespace km
