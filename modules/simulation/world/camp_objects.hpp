@@ -21,12 +21,5 @@ void add_generator(Scene& scene, SeededRandom& random);
 void add_toilet_cabin(Scene& scene, SeededRandom& random);
 void add_water_tank(Scene& scene, SeededRandom& random);
 void add_log_pile(Scene& scene, SeededRandom& random);
-/// A guard's post of timber, 6 m tall.
-void add_watch_tower(Scene& scene);
-/// A mast with two floodlights that face -y.
-void add_floodlight(Scene& scene);
-void add_flag_pole(Scene& scene, SeededRandom& random);
-/// A board with writing on two posts.
-void add_notice_board(Scene& scene, SeededRandom& random);
 
 }  // namespace km

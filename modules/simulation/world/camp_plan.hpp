@@ -12,8 +12,8 @@
 namespace km {
 
 inline constexpr float kTrackLane_m = 1.7F;   ///< Of a lane's middle from the track's.
-inline constexpr float kTrackHalf_m = 3.9F;   ///< Half of the worn width.
-inline constexpr float kTrackClear_m = 4.8F;  ///< Nothing stands nearer to a track's middle.
+inline constexpr float kTrackHalf_m = 3.4F;   ///< Half of the worn width.
+inline constexpr float kTrackClear_m = 4.2F;  ///< Nothing stands nearer to a track's middle.
 inline constexpr float kCampHalfX_m = 92.0F;  ///< The fence.
 inline constexpr float kCampHalfY_m = 66.0F;
 

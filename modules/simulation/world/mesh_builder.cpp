@@ -15,7 +15,12 @@ using Eigen::Vector2f;
 using Eigen::Vector3f;
 
 constexpr float kTwoPi = 2.0F * std::numbers::pi_v<float>;
-constexpr float kLeastArea2_m2 = 1e-7F;  // twice the area; at 300 m a float resolves 3e-5 m
+constexpr float kLeastHeight_m = 1e-4F;  // of a triangle; at 300 m a float resolves 3e-5 m
+
+bool has_area(const Vector3f& ab, const Vector3f& ac) {
+  const float longest = std::max({ab.norm(), ac.norm(), (ac - ab).norm()});
+  return ab.cross(ac).norm() > kLeastHeight_m * longest;
+}
 
 /// Texture coordinates of a point on a plane with unit normal `n`: z up on walls, (x, y) on floors.
 /// Neither axis is shortened: `u` is horizontal, `v` runs up the slope.
@@ -89,16 +94,15 @@ std::uint32_t MeshBuilder::vertex(const Vector3f& p, const Vector3f& n, const Ve
 void MeshBuilder::face(std::uint32_t a, std::uint32_t b, std::uint32_t c, MaterialId material) {
   const Vector3f ab = mesh_.vertices[b] - mesh_.vertices[a];
   const Vector3f ac = mesh_.vertices[c] - mesh_.vertices[a];
-  if (!(ab.cross(ac).norm() > kLeastArea2_m2)) return;
+  if (!has_area(ab, ac)) return;
   mesh_.triangles.push_back({a, b, c});
   mesh_.materials.push_back(material);
 }
 
 void MeshBuilder::triangle(const Vector3f& a, const Vector3f& b, const Vector3f& c,
                            MaterialId material) {
-  const Vector3f n = (b - a).cross(c - a);
-  if (!(n.norm() > kLeastArea2_m2)) return;
-  const Vector3f unit = n.normalized();
+  if (!has_area(b - a, c - a)) return;
+  const Vector3f unit = (b - a).cross(c - a).normalized();
   const std::uint32_t i = vertex(a, unit, planar_uv(a, unit));
   vertex(b, unit, planar_uv(b, unit));
   vertex(c, unit, planar_uv(c, unit));
@@ -107,9 +111,8 @@ void MeshBuilder::triangle(const Vector3f& a, const Vector3f& b, const Vector3f&
 
 void MeshBuilder::quad(const Vector3f& a, const Vector3f& b, const Vector3f& c, const Vector3f& d,
                        MaterialId material) {
-  const Vector3f n = (c - a).cross(d - b);  // twice the area, also of a quad that is not flat
-  if (!(n.norm() > kLeastArea2_m2)) return;
-  const Vector3f unit = n.normalized();
+  if (!has_area(c - a, d - b)) return;
+  const Vector3f unit = (c - a).cross(d - b).normalized();
   const std::uint32_t i = vertex(a, unit, planar_uv(a, unit));
   vertex(b, unit, planar_uv(b, unit));
   vertex(c, unit, planar_uv(c, unit));
@@ -275,8 +278,7 @@ void MeshBuilder::sheet(int rows, int columns, const std::function<Vector3f(int,
     for (int column = 0; column <= columns; ++column) points.push_back(point(row, column));
   }
   const auto at = [&](int row, int column) -> const Vector3f& {
-    return points[static_cast<std::size_t>(std::clamp(row, 0, rows)) * columns1 +
-                  static_cast<std::size_t>(std::clamp(column, 0, columns))];
+    return points[static_cast<std::size_t>(row) * columns1 + static_cast<std::size_t>(column)];
   };
   std::vector<float> along_column(1, 0.0F);
   std::vector<float> along_row(1, 0.0F);
@@ -290,8 +292,14 @@ void MeshBuilder::sheet(int rows, int columns, const std::function<Vector3f(int,
       rows, columns,
       [&](int row, int column) {
         const Vector3f& p = at(row, column);
-        const Vector3f n = (at(row, column + 1) - at(row, column - 1))
-                               .cross(at(row + 1, column) - at(row - 1, column));
+        // The sum over the cells around, by area; it holds at poles, where a row is one point.
+        Vector3f n = Vector3f::Zero();
+        for (const int r : {row - 1, row}) {
+          for (const int c : {column - 1, column}) {
+            if (r < 0 || c < 0 || r >= rows || c >= columns) continue;
+            n += (at(r + 1, c + 1) - at(r, c)).cross(at(r + 1, c) - at(r, c + 1));
+          }
+        }
         const Vector2f uv = flat_uv ? Vector2f(p.x(), p.y())
                                     : Vector2f(along_row[static_cast<std::size_t>(column)],
                                                along_column[static_cast<std::size_t>(row)]);

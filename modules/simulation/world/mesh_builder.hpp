@@ -86,6 +86,15 @@ class MeshBuilder {
   void sheet(int rows, int columns, const std::function<Eigen::Vector3f(int, int)>& point,
              MaterialId material, bool flat_uv = false);
 
+  struct GridPoint {
+    Eigen::Vector3f position;
+    Eigen::Vector3f normal;  ///< Of any length.
+    Eigen::Vector2f uv;      ///< [m]
+  };
+  /// A sheet whose normals and texture coordinates are known.
+  void grid(int rows, int columns, const std::function<GridPoint(int, int)>& point,
+            const CellMaterial& material);
+
   /// `count` leaves of about `leaf_m` scattered within an ellipsoid, denser at its outside; their
   /// normals lean outwards, which makes the crown look round.
   void leaf_cluster(const Eigen::Vector3f& center, const Eigen::Vector3f& radii, int count,
@@ -98,17 +107,9 @@ class MeshBuilder {
  private:
   friend class ScopedFrame;
 
-  struct GridPoint {
-    Eigen::Vector3f position;
-    Eigen::Vector3f normal;
-    Eigen::Vector2f uv;
-  };
-
   std::uint32_t vertex(const Eigen::Vector3f& p, const Eigen::Vector3f& n,
                        const Eigen::Vector2f& uv);
   void face(std::uint32_t a, std::uint32_t b, std::uint32_t c, MaterialId material);
-  void grid(int rows, int columns, const std::function<GridPoint(int, int)>& point,
-            const CellMaterial& material);
   void disc(const Eigen::Vector3f& center, const Eigen::Vector3f& x, const Eigen::Vector3f& y,
             int segments, MaterialId material);
 

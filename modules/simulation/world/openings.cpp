@@ -29,15 +29,17 @@ void add_pane(Scene& scene, float x0, float x1, float z0, float z1, float y, Mat
   scene.mesh.quad({x0, y, z0}, {x1, y, z0}, {x1, y, z1}, {x0, y, z1}, material);
 }
 
-void add_bar(Scene& scene, float x0, float x1, float z0, float z1, float y, MaterialId material) {
-  scene.mesh.box({x0, y - 0.045F, z0}, {x1, y, z1}, material, kSidesNoBack);
+/// A bar before the glass at depth y; `sides` are those that can be seen besides its front.
+void add_bar(Scene& scene, float x0, float x1, float z0, float z1, float y, MaterialId material,
+             unsigned sides) {
+  scene.mesh.box({x0, y - 0.045F, z0}, {x1, y, z1}, material, kSideFront | sides);
 }
 
 void add_frame(Scene& scene, const Opening& o, float y, float bar, MaterialId frame) {
-  add_bar(scene, o.x0, o.x1, o.z0, o.z0 + bar, y, frame);
-  add_bar(scene, o.x0, o.x1, o.z1 - bar, o.z1, y, frame);
-  add_bar(scene, o.x0, o.x0 + bar, o.z0 + bar, o.z1 - bar, y, frame);
-  add_bar(scene, o.x1 - bar, o.x1, o.z0 + bar, o.z1 - bar, y, frame);
+  add_bar(scene, o.x0, o.x1, o.z0, o.z0 + bar, y, frame, kSideTop);
+  add_bar(scene, o.x0, o.x1, o.z1 - bar, o.z1, y, frame, kSideBottom);
+  add_bar(scene, o.x0, o.x0 + bar, o.z0 + bar, o.z1 - bar, y, frame, kSideRight);
+  add_bar(scene, o.x1 - bar, o.x1, o.z0 + bar, o.z1 - bar, y, frame, kSideLeft);
 }
 
 /// Blinds or curtains: sheets a finger's width before the pane, which is opaque.
@@ -46,7 +48,7 @@ void add_blinds(Scene& scene, const Opening& o, float y, SeededRandom& random) {
   const float shade = 0.45F + 0.1F * static_cast<float>(random.below(4));
   const MaterialId cloth = scene.paint(SurfaceClass::kBuilding, Recipe::kCurtain,
                                        {shade, 0.97F * shade, 0.9F * shade}, 0.5F);
-  const int kind = random.below(5);
+  const int kind = random.below(6);
   if (kind == 0) {  // a roller blind
     add_pane(scene, o.x0 + kBar, o.x1 - kBar, o.z1 - random.uniform(0.25F, 0.8F) * o.height(), o.z1,
              front, cloth);
@@ -84,6 +86,36 @@ void add_shutters(Scene& scene, const Opening& o, const FacadeStyle& style) {
   }
 }
 
+/// What a shop shows: goods on two shelves and a print, flat before the pane at y, which is opaque.
+void add_display(Scene& scene, const Opening& o, float y, SeededRandom& random) {
+  MeshBuilder& mesh = scene.mesh;
+  const float shelf = o.z0 + 0.42F * o.height();
+  const MaterialId board = scene.plain(SurfaceClass::kBuilding, 0.16F, 0.13F, 0.1F);
+  const bool two_shelves = random.chance(0.6);
+  if (two_shelves)
+    mesh.box({o.x0, y - 0.045F, shelf - 0.04F}, {o.x1, y, shelf}, board, kSidesNoBack);
+  const auto level = [&] { return 0.1F + 0.09F * static_cast<float>(random.below(5)); };
+  for (const float bottom : {o.z0, shelf}) {
+    if (bottom > o.z0 && !two_shelves) break;
+    for (float x = o.x0 + 0.1F; x < o.x1 - 0.35F; x += random.uniform(0.16F, 0.5F)) {
+      const float width = random.uniform(0.08F, 0.3F);
+      const float height = random.uniform(0.1F, 0.36F * o.height());
+      const float red = level();
+      const float green = 0.5F * (red + level());  // muted colours
+      const float blue = 0.5F * (green + level());
+      mesh.box({x, y - 0.04F, bottom}, {std::min(x + width, o.x1), y, bottom + height},
+               scene.plain(SurfaceClass::kBuilding, red, green, blue), kSidesNoBack);
+    }
+  }
+  if (!random.chance(0.45) || o.width() < 0.9F) return;
+  const float x = random.uniform(o.x0, o.x1 - 0.75F);
+  const ScopedFrame frame(mesh, standing_at({x, y - 0.05F, o.z0 + 0.5F}, 0.0F));
+  mesh.set_uv_offset({static_cast<float>(random.below(4)), static_cast<float>(random.below(4))});
+  add_pane(scene, 0.0F, 0.7F, 0.0F, 0.95F, 0.0F,
+           scene.paint(SurfaceClass::kBuilding, Recipe::kPosters));
+  mesh.set_uv_offset(Eigen::Vector2f::Zero());
+}
+
 }  // namespace
 
 void add_pierced_wall(Scene& scene, float width_m, float z0, float z1,
@@ -108,13 +140,16 @@ void add_window(Scene& scene, const Opening& o, const FacadeStyle& style, Seeded
   const float half = 0.5F * kBar;
   if (style.window == WindowKind::kCasement) {
     const float transom = o.z1 - 0.28F * o.height();
-    add_bar(scene, middle - half, middle + half, o.z0 + kBar, o.z1 - kBar, y, style.frame);
+    add_bar(scene, middle - half, middle + half, o.z0 + kBar, o.z1 - kBar, y, style.frame,
+            kSideLeft | kSideRight);
     add_bar(scene, o.x0 + kBar, o.x1 - kBar, transom - half, transom + half, y - 0.004F,
-            style.frame);
+            style.frame, kSideTop | kSideBottom);
   } else if (style.window == WindowKind::kSash) {
     const float meeting = o.z0 + 0.5F * o.height();
-    add_bar(scene, o.x0 + kBar, o.x1 - kBar, meeting - half, meeting + half, y, style.frame);
-    add_bar(scene, middle - 0.015F, middle + 0.015F, meeting + half, o.z1 - kBar, y, style.frame);
+    add_bar(scene, o.x0 + kBar, o.x1 - kBar, meeting - half, meeting + half, y, style.frame,
+            kSideTop | kSideBottom);
+    add_bar(scene, middle - 0.015F, middle + 0.015F, meeting + half, o.z1 - kBar, y, style.frame,
+            kSideLeft | kSideRight);
   }
   add_sill(scene, o, style);
   if (style.surrounds) add_surround(scene, o, style);
@@ -129,7 +164,8 @@ void add_door(Scene& scene, const Opening& o, const FacadeStyle& style, SeededRa
   add_pane(scene, o.x0, o.x1, fanlight, o.z1, y, glass(scene, random));
   add_pane(scene, o.x0, o.x1, o.z0, fanlight, y, style.shutter);
   add_frame(scene, o, y, 0.09F, style.frame);
-  add_bar(scene, o.x0, o.x1, fanlight - 0.05F, fanlight + 0.05F, y, style.frame);
+  add_bar(scene, o.x0, o.x1, fanlight - 0.05F, fanlight + 0.05F, y, style.frame,
+          kSideTop | kSideBottom);
   const int panels = 2 + random.below(2);
   const float panel_height = (fanlight - o.z0 - 0.3F) / static_cast<float>(panels);
   for (int i = 0; i < panels; ++i) {
@@ -178,31 +214,14 @@ void add_shop_front(Scene& scene, const Opening& o, const FacadeStyle& style, bo
   const int panes = std::max(1, static_cast<int>((o.x1 - x0) / 1.5F));
   for (int i = 1; i < panes; ++i) {
     const float x = x0 + (o.x1 - x0) * static_cast<float>(i) / static_cast<float>(panes);
-    add_bar(scene, x - 0.03F, x + 0.03F, plinth + 0.07F, o.z1 - 0.07F, y, style.frame);
+    add_bar(scene, x - 0.03F, x + 0.03F, plinth + 0.07F, o.z1 - 0.07F, y, style.frame,
+            kSideLeft | kSideRight);
   }
   if (with_door) {
     add_frame(scene, {o.x0, x0, o.z0, o.z1}, y, 0.09F, style.frame);
-    add_bar(scene, o.x0, x0, o.z0 + 2.15F, o.z0 + 2.23F, y, style.frame);
+    add_bar(scene, o.x0, x0, o.z0 + 2.15F, o.z0 + 2.23F, y, style.frame, kSideTop | kSideBottom);
   }
-  // Goods behind the pane: boxes of all colours on the plinth, flat before the opaque glass.
-  for (float x = x0 + 0.2F; x < o.x1 - 0.4F; x += random.uniform(0.25F, 0.6F)) {
-    const float width = random.uniform(0.1F, 0.35F);
-    const float height = random.uniform(0.15F, 0.9F);
-    const MaterialId goods =
-        scene.plain(SurfaceClass::kBuilding, 0.15F + 0.12F * static_cast<float>(random.below(5)),
-                    0.15F + 0.12F * static_cast<float>(random.below(5)),
-                    0.15F + 0.12F * static_cast<float>(random.below(5)));
-    mesh.box({x, y - 0.04F, plinth + 0.07F},
-             {std::min(x + width, o.x1 - 0.1F), y, plinth + 0.07F + height}, goods, kSidesNoBack);
-  }
-  if (random.chance(0.4)) {  // a print stuck on the pane
-    const float x = random.uniform(x0 + 0.1F, std::max(x0 + 0.11F, o.x1 - 0.9F));
-    const ScopedFrame frame(mesh, standing_at({x, y - 0.045F, plinth + 0.9F}, 0.0F));
-    mesh.set_uv_offset({static_cast<float>(random.below(4)), static_cast<float>(random.below(4))});
-    add_pane(scene, 0.0F, 0.7F, 0.0F, 0.95F, 0.0F,
-             scene.paint(SurfaceClass::kBuilding, Recipe::kPosters));
-    mesh.set_uv_offset(Eigen::Vector2f::Zero());
-  }
+  add_display(scene, {x0 + 0.1F, o.x1 - 0.1F, plinth + 0.07F, o.z1 - 0.07F}, y, random);
 }
 
 void add_sign_board(Scene& scene, float x, float z, float width_m, float height_m,

@@ -51,9 +51,9 @@ void add_leg(Scene& scene, float side, float stride, const Clothes& clothes) {
   const Vector3f hip(0.095F * side, 0.0F, 0.9F);
   const Vector3f knee(0.1F * side, -0.5F * stride - 0.02F, 0.48F);
   const Vector3f ankle(0.1F * side, -stride, 0.09F);
-  mesh.cylinder(hip, knee, 0.095F, 0.065F, 10, clothes.trousers, false);
-  mesh.cylinder(knee, ankle, 0.067F, 0.05F, 10, clothes.trousers, false);
-  mesh.ellipsoid(ankle + Vector3f(0.0F, -0.06F, -0.045F), {0.05F, 0.14F, 0.05F}, 8, clothes.shoes);
+  mesh.cylinder(hip, knee, 0.095F, 0.065F, 8, clothes.trousers, false);
+  mesh.cylinder(knee, ankle, 0.067F, 0.05F, 8, clothes.trousers, false);
+  mesh.ellipsoid(ankle + Vector3f(0.0F, -0.06F, -0.045F), {0.05F, 0.14F, 0.05F}, 6, clothes.shoes);
 }
 
 void add_arm(Scene& scene, float side, float swing, const Clothes& clothes) {
@@ -61,10 +61,10 @@ void add_arm(Scene& scene, float side, float swing, const Clothes& clothes) {
   const Vector3f shoulder(0.2F * side, 0.0F, 1.4F);
   const Vector3f elbow(0.26F * side, 0.4F * swing, 1.13F);
   const Vector3f wrist(0.24F * side, swing - 0.08F, 0.9F);
-  mesh.ellipsoid(shoulder, {0.075F, 0.075F, 0.075F}, 8, clothes.coat);
-  mesh.cylinder(shoulder, elbow, 0.06F, 0.048F, 9, clothes.coat, false);
-  mesh.cylinder(elbow, wrist, 0.048F, 0.036F, 9, clothes.coat, false);
-  mesh.ellipsoid(wrist, {0.04F, 0.045F, 0.06F}, 8, clothes.skin);
+  mesh.ellipsoid(shoulder, {0.075F, 0.075F, 0.075F}, 6, clothes.coat);
+  mesh.cylinder(shoulder, elbow, 0.06F, 0.048F, 7, clothes.coat, false);
+  mesh.cylinder(elbow, wrist, 0.048F, 0.036F, 7, clothes.coat, false);
+  mesh.ellipsoid(wrist, {0.04F, 0.045F, 0.06F}, 6, clothes.skin);
 }
 
 }  // namespace
@@ -79,15 +79,15 @@ void add_person(Scene& scene, SeededRandom& random) {
   add_leg(scene, 1.0F, -stride, clothes);
   add_arm(scene, -1.0F, stride, clothes);
   add_arm(scene, 1.0F, -stride, clothes);
-  mesh.ellipsoid({0.0F, 0.0F, 1.2F}, {0.195F, 0.125F, 0.32F}, 14, clothes.coat);
-  mesh.ellipsoid({0.0F, 0.0F, 0.95F}, {0.17F, 0.125F, 0.17F}, 12,
+  mesh.ellipsoid({0.0F, 0.0F, 1.2F}, {0.195F, 0.125F, 0.32F}, 12, clothes.coat);
+  mesh.ellipsoid({0.0F, 0.0F, 0.95F}, {0.17F, 0.125F, 0.17F}, 10,
                  long_coat ? clothes.coat : clothes.trousers);
   if (long_coat) {
-    mesh.cylinder({0.0F, 0.0F, 0.62F}, {0.0F, 0.0F, 1.0F}, 0.22F, 0.17F, 14, clothes.coat);
+    mesh.cylinder({0.0F, 0.0F, 0.62F}, {0.0F, 0.0F, 1.0F}, 0.22F, 0.17F, 12, clothes.coat);
   }
-  mesh.cylinder({0.0F, 0.0F, 1.44F}, {0.0F, 0.0F, 1.58F}, 0.055F, 0.05F, 10, clothes.skin, false);
-  mesh.ellipsoid({0.0F, -0.01F, 1.65F}, {0.078F, 0.098F, 0.115F}, 14, clothes.skin);
-  mesh.ellipsoid({0.0F, 0.02F, 1.69F}, {0.086F, 0.1F, 0.095F}, 12, clothes.hair);
+  mesh.cylinder({0.0F, 0.0F, 1.44F}, {0.0F, 0.0F, 1.58F}, 0.055F, 0.05F, 8, clothes.skin, false);
+  mesh.ellipsoid({0.0F, -0.01F, 1.65F}, {0.078F, 0.098F, 0.115F}, 12, clothes.skin);
+  mesh.ellipsoid({0.0F, 0.02F, 1.69F}, {0.086F, 0.1F, 0.095F}, 10, clothes.hair);
   if (random.chance(0.35)) {  // a bag on the back
     mesh.box({-0.15F, 0.1F, 1.0F}, {0.15F, 0.28F, 1.42F}, clothes.trousers);
   }

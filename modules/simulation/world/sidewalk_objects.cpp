@@ -73,7 +73,7 @@ void add_along_kerb(Scene& scene, const StreetSide& side, SeededRandom& random) 
       const ScopedFrame turned(scene.mesh,
                                standing_at(Vector3f::Zero(), random.uniform(0.0F, 6.0F)));
       add_tree(scene,
-               {.height_m = random.uniform(5.5F, 7.5F), .crown_radius_m = 1.9F, .leaves = 1700},
+               {.height_m = random.uniform(5.5F, 7.5F), .crown_radius_m = 1.9F, .leaves = 1100},
                random);
     } else if (slot % 2 == 0 && random.chance(0.6)) {
       add_small_object(scene, random);

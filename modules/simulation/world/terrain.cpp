@@ -1,5 +1,6 @@
 #include "modules/simulation/world/terrain.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -58,6 +59,14 @@ Heightfield::Heightfield(const Eigen::Vector2f& origin, float cell_m, int column
 Eigen::Vector3f Heightfield::point(int row, int column) const {
   return {origin_.x() + cell_m_ * static_cast<float>(column),
           origin_.y() + cell_m_ * static_cast<float>(row), heights_[index(row, column)]};
+}
+
+Eigen::Vector3f Heightfield::normal(int row, int column) const {
+  const Eigen::Vector3f east = point(row, std::min(column + 1, columns_));
+  const Eigen::Vector3f west = point(row, std::max(column - 1, 0));
+  const Eigen::Vector3f north = point(std::min(row + 1, rows_), column);
+  const Eigen::Vector3f south = point(std::max(row - 1, 0), column);
+  return (east - west).cross(north - south);
 }
 
 bool Heightfield::contains(double x, double y) const {

@@ -22,6 +22,8 @@ class Heightfield {
   [[nodiscard]] int columns() const { return columns_; }
   [[nodiscard]] int rows() const { return rows_; }
   [[nodiscard]] Eigen::Vector3f point(int row, int column) const;
+  /// Normal at a grid point, of any length; from its neighbours, one-sided at the border.
+  [[nodiscard]] Eigen::Vector3f normal(int row, int column) const;
   void set_height(int row, int column, float height_m) { heights_[index(row, column)] = height_m; }
   [[nodiscard]] bool contains(double x, double y) const;
   /// Height of the surface [m]; outside the grid that of the nearest border.

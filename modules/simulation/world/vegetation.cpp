@@ -59,7 +59,7 @@ void add_tree(Scene& scene, const TreeShape& shape, SeededRandom& random) {
   const Vector3f top = add_limb(scene, fork, {0, 0, crown_half}, 0.7F * trunk_radius,
                                 0.3F * trunk_radius, 7, bark, random);
   std::vector<Vector3f> tips = {top + Vector3f(0, 0, 0.3F * crown_half)};
-  const int boughs = 7 + random.below(4);
+  const int boughs = 6 + random.below(4);
   for (int i = 0; i < boughs; ++i) {
     const float angle =
         kTwoPi * (static_cast<float>(i) + random.uniform(0.0F, 0.6F)) / static_cast<float>(boughs);
@@ -69,13 +69,13 @@ void add_tree(Scene& scene, const TreeShape& shape, SeededRandom& random) {
         crown + Vector3f(reach * std::cos(angle), reach * std::sin(angle), height * crown_half);
     const Vector3f from = fork + random.uniform(0.0F, 0.7F) * (top - fork);
     const Vector3f end = add_limb(scene, from, tip - from, 0.4F * trunk_radius,
-                                  0.12F * trunk_radius, 6, bark, random);
+                                  0.12F * trunk_radius, 5, bark, random);
     tips.push_back(end);
     const Vector3f middle = 0.5F * (from + end);
     const Vector3f twig = 0.4F * shape.crown_radius_m *
                           Vector3f(std::cos(angle + 0.9F), std::sin(angle + 0.9F), 0.4F);
     tips.push_back(
-        add_limb(scene, middle, twig, 0.2F * trunk_radius, 0.08F * trunk_radius, 5, bark, random));
+        add_limb(scene, middle, twig, 0.2F * trunk_radius, 0.08F * trunk_radius, 4, bark, random));
   }
   const int share = shape.leaves / static_cast<int>(tips.size());
   for (const Vector3f& tip : tips) {

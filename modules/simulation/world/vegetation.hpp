@@ -10,8 +10,8 @@ struct TreeShape {
   float height_m = 8.0F;
   float crown_radius_m = 2.4F;
   float clear_m = 2.8F;
-  int leaves = 2200;
-  float leaf_m = 0.3F;
+  int leaves = 1400;
+  float leaf_m = 0.36F;
 };
 void add_tree(Scene& scene, const TreeShape& shape, SeededRandom& random);
 

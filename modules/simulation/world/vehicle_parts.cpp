@@ -92,20 +92,49 @@ void add_body(Scene& scene, std::span<const BodyStation> stations, const Vehicle
   }
 }
 
+void add_seam(Scene& scene, std::span<const BodyStation> stations, float x,
+              const VehiclePaints& paints) {
+  const auto behind = std::ranges::find_if(stations, [&](const BodyStation& s) { return s.x < x; });
+  const BodyStation& a = *(behind - 1);
+  const BodyStation& b = *behind;
+  const float share = (x - a.x) / (b.x - a.x);
+  BodyStation here = a;
+  here.x = x;
+  here.bottom = std::lerp(a.bottom, b.bottom, share);
+  here.belt = std::lerp(a.belt, b.belt, share);
+  here.half_width = std::lerp(a.half_width, b.half_width, share);
+  const auto points = section(here);
+  constexpr float kHalf = 0.007F;
+  constexpr float kOut = 0.004F;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Vector3f& low = points[i];
+    const Vector3f& high = points[i + 1];
+    for (const float side : {-1.0F, 1.0F}) {  // section() begins at the right, y < 0
+      const auto corner = [&](const Vector3f& p, float dx) {
+        return Vector3f(x + side * dx, -side * p.y() + side * kOut, p.z());
+      };
+      scene.mesh.quad(corner(low, kHalf), corner(low, -kHalf), corner(high, -kHalf),
+                      corner(high, kHalf), paints.dark);
+    }
+  }
+}
+
 void add_wheel(Scene& scene, float x, float y, float radius, float width,
                const VehiclePaints& paints) {
   MeshBuilder& mesh = scene.mesh;
   const float out = y > 0.0F ? 1.0F : -1.0F;
   const float z = radius - 0.01F;  // pressed flat by its load
-  mesh.cylinder({x, y - out * width, z}, {x, y, z}, radius, radius, 20, paints.dark);
-  mesh.cylinder({x, y, z}, {x, y + out * 0.012F, z}, 0.66F * radius, 0.62F * radius, 16,
+  mesh.cylinder({x, y - out * width, z}, {x, y, z}, radius, radius, 16, paints.dark);
+  mesh.cylinder({x, y, z}, {x, y + out * 0.012F, z}, 0.66F * radius, 0.62F * radius, 12,
                 paints.metal);
   for (int spoke = 0; spoke < 5; ++spoke) {  // dark gaps between the spokes
     const float angle = 0.4F * kPi * static_cast<float>(spoke);
-    const Vector3f gap(x + 0.4F * radius * std::cos(angle), y + out * 0.008F,
-                       z + 0.4F * radius * std::sin(angle));
-    mesh.cylinder(gap, gap + Vector3f(0.0F, out * 0.009F, 0.0F), 0.13F * radius, 0.12F * radius, 6,
-                  paints.dark);
+    const Vector3f along(std::cos(angle), 0.0F, std::sin(angle));
+    const Vector3f across(-out * along.z(), 0.0F, out * along.x());
+    const Vector3f hub(x, y + out * 0.018F, z);
+    mesh.quad(hub + 0.2F * radius * along, hub + radius * (0.42F * along - 0.14F * across),
+              hub + 0.56F * radius * along, hub + radius * (0.42F * along + 0.14F * across),
+              paints.dark);
   }
 }
 
@@ -131,9 +160,11 @@ void add_number_plate(Scene& scene, float x, float z, float forward, const Vehic
   const float ink = x + forward * 0.004F;
   for (int letter = 0; letter < 7; ++letter) {
     const float y = -0.21F + 0.062F * static_cast<float>(letter);
-    const float width = random.chance(0.3) ? 0.015F : 0.04F;
-    mesh.box({std::min(x, ink), y, z + 0.02F}, {std::max(x, ink), y + width, z + 0.09F},
-             paints.dark);
+    const float end = y + (random.chance(0.3) ? 0.015F : 0.04F);
+    const float left = forward > 0.0F ? y : end;  // seen from outside
+    const float right = forward > 0.0F ? end : y;
+    mesh.quad({ink, left, z + 0.02F}, {ink, right, z + 0.02F}, {ink, right, z + 0.09F},
+              {ink, left, z + 0.09F}, paints.dark);
   }
 }
 

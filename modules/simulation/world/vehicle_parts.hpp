@@ -33,6 +33,11 @@ struct VehiclePaints {
 /// The skin over the stations, closed at both ends and below.
 void add_body(Scene& scene, std::span<const BodyStation> stations, const VehiclePaints& paints);
 
+/// The gap of a door: a dark line down the flanks from the windows to the sill, `x` within the
+/// stations.
+void add_seam(Scene& scene, std::span<const BodyStation> stations, float x,
+              const VehiclePaints& paints);
+
 /// A wheel that touches the ground at x, its outer face at y (its sign tells the side).
 void add_wheel(Scene& scene, float x, float y, float radius, float width,
                const VehiclePaints& paints);

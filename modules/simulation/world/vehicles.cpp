@@ -111,9 +111,9 @@ void add_ends(Scene& scene, const CarModel& model, const VehiclePaints& paints,
   const float tail = model.stations.back().x;
   const float w = model.half_width;
   for (const float side : {-1.0F, 1.0F}) {
-    mesh.ellipsoid({nose - 0.14F, side * 0.72F * w, model.light_z}, {0.17F, 0.17F, 0.085F}, 10,
+    mesh.ellipsoid({nose - 0.14F, side * 0.72F * w, model.light_z}, {0.17F, 0.17F, 0.085F}, 8,
                    paints.white);
-    mesh.ellipsoid({tail + 0.1F, side * 0.8F * w, model.light_z + 0.12F}, {0.13F, 0.12F, 0.1F}, 10,
+    mesh.ellipsoid({tail + 0.1F, side * 0.8F * w, model.light_z + 0.12F}, {0.13F, 0.12F, 0.1F}, 8,
                    paints.red);
     mesh.ellipsoid({model.mirror_x, side * (w + 0.09F), model.belt + 0.09F}, {0.09F, 0.11F, 0.075F},
                    8, paints.body);
@@ -129,16 +129,15 @@ void add_ends(Scene& scene, const CarModel& model, const VehiclePaints& paints,
 /// Gaps and handles of the doors, where the skin is widest.
 void add_doors(Scene& scene, const CarModel& model, const VehiclePaints& paints) {
   MeshBuilder& mesh = scene.mesh;
-  const float low = 0.32F;
+  for (const float x : {model.axle_front - 0.5F, -0.45F, model.axle_rear + 0.42F}) {
+    add_seam(scene, model.stations, x, paints);
+  }
   for (const float side : {-1.0F, 1.0F}) {
     const auto strip = [&](float x0, float x1, float z0, float z1, float out, MaterialId material) {
       const float y0 = side * (model.half_width - 0.06F);
       const float y1 = side * (model.half_width + out);
       mesh.box({x0, std::min(y0, y1), z0}, {x1, std::max(y0, y1), z1}, material);
     };
-    for (const float x : {model.axle_front - 0.5F, -0.45F, model.axle_rear + 0.42F}) {
-      strip(x - 0.008F, x + 0.008F, low, model.belt - 0.05F, 0.002F, paints.dark);
-    }
     strip(-0.36F, -0.2F, model.belt - 0.14F, model.belt - 0.11F, 0.02F, paints.metal);
     strip(model.axle_rear + 0.4F, model.axle_front - 0.45F, 0.27F, 0.33F, 0.004F, paints.dark);
   }
