@@ -24,6 +24,7 @@ constexpr double kRotorDrag_hz = 0.3;  // deceleration by drag per speed
 constexpr double kSmallestVolume_m = 1.0;
 constexpr double kMaxGusts = 2.5;  // standard deviations
 constexpr double kMinLeg_m = 0.8;
+constexpr double kStartYaw = std::numbers::pi / 4.0;  // off the way to the middle, at most
 constexpr int kTries = 20;
 
 [[noreturn]] void refuse(const std::string& problem) {
@@ -75,8 +76,11 @@ UniformSpline<4> flight_plan(const Eigen::AlignedBox3d& volume, const Eigen::Ali
   auto random = SeededRandom::stream(options.seed, 31);
   const double pi = std::numbers::pi;
   Eigen::Vector4d start;
-  start << random_point(air, random), pi * (2.0 * random.unit() - 1.0);
+  start.head<3>() = random_point(air, random);
   start.z() = volume.min().z();
+  // It is set down so that it looks into the room, not at a wall before it.
+  const Eigen::Vector3d inwards = volume.center() - start.head<3>();
+  start[3] = std::atan2(inwards.y(), inwards.x()) + kStartYaw * (2.0 * random.unit() - 1.0);
   Controls controls(5, start);
   const double end_s = std::max(0.0, options.duration_s - options.standstill_s) + 1.0;
   Eigen::Vector3d target = start.head<3>();  // first straight up

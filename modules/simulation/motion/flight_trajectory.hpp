@@ -30,11 +30,12 @@ struct FlightOptions {
   }
 };
 
-/// A flight inside `volume` (frame `world`, z up): at rest at its floor, takes off, then from one
-/// random waypoint to the next with changes of yaw. The vehicle's z axis is along the thrust:
-/// acceleration minus gravity plus the rotors' drag, which is linear in velocity. The whole curve
-/// stays in `volume`. Throws ConfigError for options out of range, std::invalid_argument for a
-/// volume that is empty or smaller than 1 m across or an R_vehicle_body that is no rotation.
+/// A flight inside `volume` (frame `world`, z up): at rest at its floor, looking inwards, takes
+/// off, then from one random waypoint to the next with changes of yaw. The vehicle's z axis is
+/// along the thrust: acceleration minus gravity plus the rotors' drag, which is linear in velocity.
+/// The whole curve stays in `volume`. Throws ConfigError for options out of range,
+/// std::invalid_argument for a volume that is empty or smaller than 1 m across or an R_vehicle_body
+/// that is no rotation.
 [[nodiscard]] SplineTrajectory make_flight_trajectory(const Eigen::AlignedBox3d& volume,
                                                       const FlightOptions& options);
 
