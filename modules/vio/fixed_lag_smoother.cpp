@@ -14,6 +14,15 @@ namespace {
 constexpr int kStartIterations = 30;
 constexpr int kMinKeyframeFeatures = 20;   // fewer are no ground to make a keyframe on
 constexpr double kStartKeyframe_s = 0.15;  // spacing of keyframes among the images of the start
+// A keyframe is for locating new landmarks: without depth it is worth waiting for an image with.
+constexpr double kPatience = 2.0;
+
+// True if anything in the last frame has a right observation.
+bool locates_new(const Window& window) {
+  return std::any_of(window.landmarks.begin(), window.landmarks.end(), [&](const auto& landmark) {
+    return tracked_now(window, landmark) && landmark.observations.back().bearings[1];
+  });
+}
 
 }  // namespace
 
@@ -113,7 +122,9 @@ void FixedLagSmoother::decide_keyframe() {
   while (last > 0 && !window_.frames[last].keyframe) --last;
   WindowFrame& newest = window_.frames[now];
   const WindowFrame& keyframe = window_.frames[last];
-  if (seconds_between(keyframe.state.stamp, newest.state.stamp) >= config_.keyframe_interval_s) {
+  const double patience = locates_new(window_) ? 1.0 : kPatience;
+  if (seconds_between(keyframe.state.stamp, newest.state.stamp) >=
+      patience * config_.keyframe_interval_s) {
     newest.keyframe = true;
     return;
   }
@@ -134,14 +145,15 @@ void FixedLagSmoother::decide_keyframe() {
     parallax.push_back((p.head<2>() / p.z() - *in_keyframe->bearings[0]).norm());
   }
   if (seen_now < kMinKeyframeFeatures) return;
-  if (static_cast<double>(parallax.size()) <= config_.keyframe_tracked_share * seen_in_keyframe ||
+  if (patience * static_cast<double>(parallax.size()) <=
+          config_.keyframe_tracked_share * seen_in_keyframe ||
       parallax.empty()) {
     newest.keyframe = true;
     return;
   }
   const auto median = parallax.begin() + static_cast<std::ptrdiff_t>(parallax.size() / 2);
   std::nth_element(parallax.begin(), median, parallax.end());
-  newest.keyframe = *median * focal_px_ > config_.keyframe_parallax_px;
+  newest.keyframe = *median * focal_px_ > patience * config_.keyframe_parallax_px;
 }
 
 void FixedLagSmoother::locate_landmarks() {

@@ -99,6 +99,11 @@ Eigen::Matrix3d Vio::turn(const std::vector<ImuSample>& samples, Stamp from, Sta
 }
 
 void Vio::try_start(VioResult& result) {
+  while (!held_.empty() && !locates_points(*held_.front().frame)) {  // nothing to start on
+    held_.erase(held_.begin());
+    ++statistics_.images_without_pose;
+  }
+  if (held_.empty()) return;
   const double span_s =
       seconds_between(held_.front().data.tracked.stamp, held_.back().data.tracked.stamp);
   if (span_s < config_.start_s - 1e-3) return;

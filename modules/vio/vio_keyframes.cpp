@@ -19,9 +19,12 @@ Matrix6 restart_covariance() {
 
 }  // namespace
 
+bool Vio::locates_points(const StereoFrame& frame) const {
+  return rig_.stereo.depth_source == DepthSource::kRightImage || frame.depth != nullptr;
+}
+
 bool Vio::due(const OdometryState& state, const StereoFrame& frame) const {
-  // Without depth no point of a keyframe is located: a frame that has one will come.
-  if (rig_.stereo.depth_source == DepthSource::kDepthImage && frame.depth == nullptr) return false;
+  if (!locates_points(frame)) return false;  // no keyframe to close a loop with; a better one comes
   const double dt = seconds_between(last_keyframe_->stamp, state.stamp);
   if (dt < config_.output_interval_s - 1e-3) return false;
   if (dt >= config_.output_rest_interval_s) return true;

@@ -1,6 +1,7 @@
 #include "dense_stereo.hpp"
 
 #include <cmath>
+#include <memory>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 #include <opencv2/imgproc.hpp>
@@ -90,14 +91,16 @@ class DenseStereo {
 
 }  // namespace
 
-Recording as_rgbd(const Recording& recording) {
+Recording as_rgbd(const Recording& recording, std::size_t every, std::size_t first) {
   const DenseStereo stereo(recording.rig.stereo);
   Recording rgbd = recording;
   rgbd.rig.stereo = rgbd_rig(recording.rig.stereo.cameras[0], recording.rig.stereo.baseline_m());
   rgbd.rig.depth = DepthRange{};
-  for (SensorPacket& packet : rgbd.packets) {
+  for (std::size_t k = 0; k < rgbd.packets.size(); ++k) {
+    SensorPacket& packet = rgbd.packets[k];
     StereoFrame frame{packet.frame->stamp, packet.frame->left, {}};
-    frame.depth = std::make_shared<const DepthImage>(stereo.depth(*packet.frame));
+    if (k % every == first)
+      frame.depth = std::make_shared<const DepthImage>(stereo.depth(*packet.frame));
     packet.frame = std::make_shared<const StereoFrame>(std::move(frame));
   }
   return rgbd;

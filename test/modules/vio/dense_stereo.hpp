@@ -1,6 +1,6 @@
 #pragma once
 
-#include <memory>
+#include <cstddef>
 
 #include "recorded_tracking.hpp"
 
@@ -8,7 +8,8 @@ namespace km {
 
 /// `recording` as an RGB-D camera in place of the stereo pair would have recorded it: its left
 /// images, with depth made from both by semi-global matching (Hirschmueller 2008, OpenCV's). The
-/// baseline stays, now virtual.
-[[nodiscard]] Recording as_rgbd(const Recording& recording);
+/// baseline stays, now virtual. Only every `every`th image has depth, from index `first` on.
+[[nodiscard]] Recording as_rgbd(const Recording& recording, std::size_t every = 1,
+                                std::size_t first = 0);
 
 }  // namespace km

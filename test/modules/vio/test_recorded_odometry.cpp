@@ -58,6 +58,23 @@ TEST_CASE("MH_01_easy: depth in place of the right image is about as good", "[vi
   CHECK(errors.scale == Approx(1.0).epsilon(0.03));
 }
 
+TEST_CASE("MH_01_easy: depth at a quarter of the rate will do", "[vio]") {
+  const Recording* const stereo = recording();
+  if (stereo == nullptr) return;
+  const std::size_t first = 2;
+  const Recording data = as_rgbd(*stereo, 4, first);
+  const OdometryRun run = run_odometry(data, 0, data.packets.size(), TrackerConfig{}, {});
+  // What came before the first depth has no pose: there was nothing to start on.
+  CHECK(run.states.size() == data.packets.size() - first);
+  CHECK(run.statistics.images_without_pose == static_cast<int>(first));
+  CHECK(run.statistics.starts == 1);
+  REQUIRE(run.keyframes.size() >= 5);  // in 4 s, in motion
+  for (const KeyframeOdometry& keyframe : run.keyframes) CHECK(keyframe.frame->depth != nullptr);
+  const OdometryErrors errors = odometry_errors(run.states, run.truth);
+  CHECK(errors.ate_m < 0.015);
+  CHECK(errors.rpe_deg < 0.3);
+}
+
 TEST_CASE("MH_01_easy: a second of black images does not lose it", "[vio]") {
   const Recording* const data = recording();
   if (data == nullptr) return;
