@@ -46,7 +46,9 @@ void print_config(const RobotOptions& options) {
 
 void add_input(CLI::App& app, RobotOptions& options) {
   auto* group = app.add_option_group("Input", "What the robot perceives");
-  group->add_option("--dataset", options.dataset, "EuRoC/ASL folder: cam0, cam1, imu0, or mav0/")
+  group
+      ->add_option("--dataset", options.dataset,
+                   "EuRoC/ASL folder: cam0, cam1 (or depth0), imu0, or mav0/")
       ->check(CLI::ExistingDirectory);
   group->add_option("--graph", options.graph, "Recorded pose graph of one robot (.g2o or .csv)")
       ->check(CLI::ExistingFile);

@@ -25,7 +25,7 @@ const char* to_string(ReaderFault fault) {
     case ReaderFault::kImuGap:
       return "gaps between inertial samples";
     case ReaderFault::kPairWithoutImu:
-      return "stereo pairs without inertial samples";
+      return "frames without inertial samples";
     case ReaderFault::kWrongImageFormat:
       return "images of the wrong format";
     case ReaderFault::kImageWithoutFrame:

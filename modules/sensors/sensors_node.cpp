@@ -61,7 +61,7 @@ void SensorsNode::step(const Packet& packet) {
   } else {
     ++skipped_;
     log::limited(log::Level::kWarn, name(), "lag")
-        << "pair skipped, consumers lag behind: " << skipped_ << " of " << reader_->pair_count();
+        << "frame skipped, consumers lag behind: " << skipped_ << " of " << reader_->pair_count();
   }
 }
 
@@ -69,7 +69,7 @@ void SensorsNode::step(const EndOfData& data) {
   if (stopped_) return;
   std::istringstream faults(to_string(data.faults));
   for (std::string line; std::getline(faults, line);) log::warn(name()) << line;
-  log::info(name()) << "end of data: " << published_ << " pairs, " << skipped_ << " skipped";
+  log::info(name()) << "end of data: " << published_ << " frames, " << skipped_ << " skipped";
   end_.publish(SensorsEnd{published_, skipped_, data.faults});
 }
 
