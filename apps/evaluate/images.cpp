@@ -4,7 +4,7 @@
 
 #include <fstream>
 #include <iostream>
-#include <sstream>
+#include <optional>
 #include <stdexcept>
 
 #include "modules/core/json_writer.hpp"
@@ -49,24 +49,45 @@ void for_each_pair(EurocReader& reader, const std::string& what, const Use& use)
   }
 }
 
-std::vector<ImageFigure> figures_of(const fs::path& dataset, const ImagesCommand& command) {
-  EurocOptions window;
-  window.from_s = command.from_s;
-  window.to_s = command.to_s;
-  EurocReader reader(dataset, window);
-  ImageStatistics statistics(reader.rig().stereo, command.options);
+EurocOptions options_of(const RecordingWindow& window) {
+  EurocOptions options;
+  options.from_s = window.from_s;
+  options.to_s = window.to_s;
+  return options;
+}
+
+std::vector<ImageFigure> figures_of(const fs::path& dataset, const RecordingWindow& window,
+                                    const std::optional<RecordingWindow>& still,
+                                    const ImageStatisticsOptions& options) {
+  EurocReader reader(dataset, options_of(window));
+  ImageStatistics statistics(reader.rig().stereo, options);
   for_each_pair(reader, dataset.string(), [&](const StereoFrame& frame) { statistics.add(frame); });
-  if (command.still_from_s || command.still_to_s) {
-    EurocOptions still;
-    still.from_s = command.still_from_s.value_or(0.0);
-    still.to_s = command.still_to_s.value_or(still.to_s);
-    EurocReader rest(dataset, still);
+  if (still) {
+    EurocReader rest(dataset, options_of(*still));
     for_each_pair(rest, dataset.string() + ", standing still",
                   [&](const StereoFrame& frame) { statistics.add_still(frame); });
   }
   if (!reader.report().empty())
     std::cerr << dataset.string() << ":\n" << to_string(reader.report());
   return statistics.figures();
+}
+
+std::optional<RecordingWindow> still_window(const ImagesCommand& command) {
+  if (!command.still_from_s && !command.still_to_s) return std::nullopt;
+  RecordingWindow window;
+  window.from_s = command.still_from_s.value_or(window.from_s);
+  window.to_s = command.still_to_s.value_or(window.to_s);
+  return window;
+}
+
+std::vector<ImageFigure> figures_of_other(const ImagesCommand& command) {
+  const bool has_own_window = command.compare_from_s || command.compare_to_s;
+  if (!has_own_window)
+    return figures_of(command.compare, command.window, still_window(command), command.options);
+  RecordingWindow window;
+  window.from_s = command.compare_from_s.value_or(window.from_s);
+  window.to_s = command.compare_to_s.value_or(window.to_s);
+  return figures_of(command.compare, window, std::nullopt, command.options);
 }
 
 void write_file(const fs::path& file, const fs::path& dataset,
@@ -90,12 +111,13 @@ void write_file(const fs::path& file, const fs::path& dataset,
 }  // namespace
 
 void evaluate_images(const ImagesCommand& command) {
-  const auto figures = figures_of(command.dataset, command);
+  const auto figures =
+      figures_of(command.dataset, command.window, still_window(command), command.options);
   std::vector<ImageFigure> other;
   if (command.compare.empty()) {
     std::cout << to_table(figures);
   } else {
-    other = figures_of(command.compare, command);
+    other = figures_of_other(command);
     std::cout << to_comparison(figures, other, command.dataset.string(), command.compare.string());
   }
   if (!command.json.empty())

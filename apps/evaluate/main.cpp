@@ -79,14 +79,19 @@ constexpr const char* kImages =
     "needs the camera to stand still for a second; --still-from and --still-to say where.\n\n"
     "Examples:\n"
     "  kimera_multi_evaluate images --dataset MH_01_easy --to 15 --still-from 21 --still-to 25.5\n"
-    "  kimera_multi_evaluate images --dataset V1_01_easy --compare simulated --json images.json";
+    "  kimera_multi_evaluate images --dataset V1_01_easy --compare simulated --compare-from 5";
 
 void define(CLI::App& app, km::ImagesCommand& command) {
   app.add_option("--dataset", command.dataset, "EuRoC/ASL folder with stereo images")->required();
   app.add_option("--compare", command.compare, "Another one: its figures beside, and the ratios");
-  app.add_option("--from", command.from_s, "Look from here on [s since the first stereo pair]")
+  app.add_option("--from", command.window.from_s,
+                 "Look from here on [s since the first stereo pair]")
       ->capture_default_str();
-  app.add_option("--to", command.to_s, "Look up to here [s]; default: the end");
+  app.add_option("--to", command.window.to_s, "Look up to here [s]; default: the end");
+  app.add_option("--compare-from", command.compare_from_s,
+                 "Look at the other from here on [s]; default: the window of --from and --to");
+  app.add_option("--compare-to", command.compare_to_s,
+                 "Look at the other up to here [s]; default: the end if --compare-from is given");
   app.add_option("--still-from", command.still_from_s,
                  "Also look for standing still from here on [s]");
   app.add_option("--still-to", command.still_to_s, "Also look for standing still up to here [s]");

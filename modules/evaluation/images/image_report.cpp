@@ -31,6 +31,20 @@ bool is_amount(const ImageFigure& figure) {
          figure.name == "pairs of images";
 }
 
+bool is_at_flow(const ImageFigure& figure) {
+  return figure.name.find("flow ") != figure.name.npos;
+}
+
+struct Count {
+  int rows = 0;
+  int marked = 0;
+
+  void add(bool is_marked) {
+    ++rows;
+    if (is_marked) ++marked;
+  }
+};
+
 void begin_row(std::ostream& out, const ImageFigure& figure, std::string& section) {
   if (figure.section != section) out << (section.empty() ? "" : "\n") << figure.section << '\n';
   section = figure.section;
@@ -54,8 +68,8 @@ std::string to_comparison(std::span<const ImageFigure> reference,
                           const std::string& other_name) {
   std::ostringstream out;
   std::string section;
-  int compared = 0;
-  int marked = 0;
+  Count all;
+  Count like_flow;
   out << "reference: " << reference_name << "\nother:     " << other_name << "\n\n"
       << std::setw(kNameWidth + 2 + kValueWidth) << "reference" << std::setw(kValueWidth) << "other"
       << std::setw(kValueWidth) << "ratio" << '\n';
@@ -68,17 +82,17 @@ std::string to_comparison(std::span<const ImageFigure> reference,
     const double ratio = partner->value / figure.value;
     out << std::setw(kValueWidth) << number(ratio, 2);
     if (std::isfinite(ratio) && !is_amount(figure)) {
-      ++compared;
-      if (std::abs(ratio - 1.0) > kMarkedDifference) {
-        ++marked;
-        out << "  <--";
-      }
+      const bool differs = std::abs(ratio - 1.0) > kMarkedDifference;
+      all.add(differs);
+      if (is_at_flow(figure)) like_flow.add(differs);
+      if (differs) out << "  <--";
     }
     out << '\n';
   }
   out << '\n'
-      << marked << " of " << compared << " rows differ by more than "
-      << std::lround(100.0 * kMarkedDifference) << " %\n";
+      << all.marked << " of " << all.rows << " rows differ by more than "
+      << std::lround(100.0 * kMarkedDifference) << " %; of those at like flow " << like_flow.marked
+      << " of " << like_flow.rows << '\n';
   return out.str();
 }
 

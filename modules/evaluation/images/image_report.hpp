@@ -17,7 +17,8 @@ inline constexpr double kMarkedDifference = 0.25;
 
 /// The same for two sequences side by side with the ratio other / reference; rows that differ by
 /// more than kMarkedDifference of the reference end with `<--`, counts of frames excepted. Figures
-/// that only one of the two has are left out. The last line counts rows compared and marked.
+/// that only one of the two has are left out. The last line counts rows compared and marked, in
+/// all and of those at like flow (one bin of the median flow).
 [[nodiscard]] std::string to_comparison(std::span<const ImageFigure> reference,
                                         std::span<const ImageFigure> other,
                                         const std::string& reference_name,

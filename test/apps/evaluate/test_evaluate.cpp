@@ -1,5 +1,6 @@
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <sstream>
 #include <string>
 
 #include "test/modules/sensors/euroc_folder.hpp"
@@ -94,6 +95,18 @@ TEST_CASE("images compares two recordings over one window", "[evaluate]") {
   REQUIRE(result.exit_code == 0);
   CHECK_THAT(result.output, Catch::Contains("ratio") && Catch::Contains("  <--\n") &&
                                 Catch::Contains("rows differ by more than 25 %"));
+  const auto frames = [&](const std::string& window) {
+    const std::string output = run_command(kTool + "images --dataset " + recording.root().string() +
+                                           " --compare " + other.root().string() + window)
+                                   .output;
+    std::istringstream row(output.substr(output.find("  frames ") + 9));
+    int reference = 0;
+    int compared = 0;
+    row >> reference >> compared;
+    return std::pair(reference, compared);
+  };
+  CHECK(frames(" --to 0.2") == std::pair(4, 4));
+  CHECK(frames(" --to 0.2 --compare-from 0.1") == std::pair(4, 6));
 }
 
 TEST_CASE("images refuses what it cannot read", "[evaluate]") {

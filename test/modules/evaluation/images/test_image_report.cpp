@@ -11,12 +11,12 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 const std::vector<ImageFigure> kReference = {
     {"corners", "mean", 100.0, 0},    {"corners", "p5", 50.0, 0},
-    {"step", "frames, flow", 9.0, 0}, {"step", "survive", 0.9, 3},
+    {"step", "frames, flow", 9.0, 0}, {"step", "survive, flow 3-6 px", 0.9, 3},
     {"step", "never had", kNone, 3},  {"step", "only here", 1.0, 3}};
 const std::vector<ImageFigure> kOther = {{"corners", "mean", 120.0, 0},
                                          {"corners", "p5", 20.0, 0},
                                          {"step", "frames, flow", 1.0, 0},
-                                         {"step", "survive", 0.675, 3},
+                                         {"step", "survive, flow 3-6 px", 0.675, 3},
                                          {"step", "never had", 0.5, 3}};
 
 }  // namespace
@@ -38,7 +38,8 @@ TEST_CASE("A comparison marks what differs by more than a quarter", "[image_stat
     CHECK(line.find("only here") == line.npos);
   }
   CHECK_THAT(text, Catch::Contains("1.20") && Catch::Contains("0.75") &&
-                       Catch::EndsWith("1 of 3 rows differ by more than 25 %\n"));
+                       Catch::EndsWith(
+                           "1 of 3 rows differ by more than 25 %; of those at like flow 0 of 1\n"));
 }
 
 TEST_CASE("The JSON nests figures in their sections, null for what is not had",
