@@ -8,9 +8,10 @@ namespace km {
 /// A crossing in a grid of ways: its column and row.
 using Crossing = std::array<int, 2>;
 
-/// Four closed ways over a grid of at least 4 columns and 3 rows of crossings. The first two share
-/// four ways in one direction; the third meets both on some and follows them on others; the fourth
-/// follows the third and meets the first two. Each comes back to a way of its own, in the same
+/// Four closed ways over a grid of at least 4 columns and 3 rows of crossings, to be begun between
+/// the first crossing and the second. The second follows the first from one street behind over
+/// three streets; the third meets both first and follows them on the street both begin with; the
+/// fourth follows the second and the third. Each comes back to a street of its own, in the same
 /// direction, after one block.
 [[nodiscard]] const std::array<std::vector<Crossing>, 4>& crossing_routes();
 

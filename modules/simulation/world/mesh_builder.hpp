@@ -137,4 +137,8 @@ class ScopedFrame {
 /// Pose of a child that stands at `position`, turned about z [rad].
 [[nodiscard]] Eigen::Isometry3f standing_at(const Eigen::Vector3f& position, float yaw_rad);
 
+/// Texture coordinates of a point on a plane with unit normal `n`: on walls v points up, on floors
+/// they are (x, y).
+[[nodiscard]] Eigen::Vector2f planar_uv(const Eigen::Vector3f& p, const Eigen::Vector3f& n);
+
 }  // namespace km

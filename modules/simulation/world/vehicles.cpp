@@ -143,6 +143,17 @@ void add_doors(Scene& scene, const CarModel& model, const VehiclePaints& paints)
   }
 }
 
+/// Two doors with windows in the tail of a van.
+void add_rear_doors(Scene& scene, const CarModel& model, const VehiclePaints& paints) {
+  MeshBuilder& mesh = scene.mesh;
+  const float tail = model.stations.back().x;
+  mesh.box({tail - 0.012F, -0.012F, 0.5F}, {tail + 0.1F, 0.012F, 1.95F}, paints.dark);
+  mesh.box({tail - 0.05F, 0.06F, 1.0F}, {tail + 0.1F, 0.14F, 1.06F}, paints.dark);
+  for (const float y : {-0.68F, 0.1F}) {
+    mesh.box({tail - 0.014F, y, 1.24F}, {tail + 0.1F, y + 0.58F, 1.8F}, paints.glass);
+  }
+}
+
 MaterialId car_paint(Scene& scene, SeededRandom& random) {
   static constexpr std::array<std::array<float, 3>, 11> kPaints = {{{0.72F, 0.72F, 0.7F},
                                                                     {0.04F, 0.04F, 0.045F},
@@ -203,6 +214,7 @@ void add_vehicle(Scene& scene, VehicleKind kind, SeededRandom& random) {
   add_running_gear(scene, model, paints);
   add_ends(scene, model, paints, random);
   add_doors(scene, model, paints);
+  if (kind == VehicleKind::kVan) add_rear_doors(scene, model, paints);
 }
 
 void add_army_truck(Scene& scene, SeededRandom& random) {
