@@ -1,0 +1,53 @@
+#include <yaml-cpp/yaml.h>
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <string>
+
+#include "test/support/command.hpp"
+#include "test/support/temporary_folder.hpp"
+
+// apps/demo from end to end: a world is rendered, and three robots find themselves in it over DDS.
+
+namespace km {
+
+TEST_CASE("The demo joins three robots of a simulated world into one frame", "[demo][slow]") {
+  constexpr std::size_t kFrames = 160;  // 8 s at 20 Hz
+  constexpr double kMaxError_m = 0.3;   // robots in frames of their own are a metre off and more
+  const TemporaryFolder folder;
+  const auto demo =
+      run_command("apps/demo --short --programs " KM_BIN_DIR " --output " + folder.path().string());
+  CAPTURE(demo.output);
+  REQUIRE(demo.exit_code == 0);
+  CHECK_THAT(demo.output, Catch::Contains("480 of 480 frames, 100 %") &&
+                              Catch::Contains("team, one frame") &&
+                              Catch::Contains("To look at, in " + folder.path().string()));
+
+  const YAML::Node team = YAML::Load(folder.read("team.json"));  // JSON is YAML
+  REQUIRE(team["robots"].size() == 3);
+  for (const YAML::Node& robot : team["robots"]) {
+    CHECK(robot["frames"].as<std::size_t>() == kFrames);
+    CHECK(robot["pgo"]["members"].size() == 3);
+  }
+  CHECK(team["optimized"]["joint"]["position_m"]["rmse"].as<double>() < kMaxError_m);
+  for (const char* file :
+       {"trajectories.svg", "robot0/optimized.tum", "robot0/loop_closures.csv",
+        "robot0/traffic.csv", "robot0/robot.log", "robot0/config.yaml", "world_short/README.md"})
+    CHECK(std::filesystem::exists(folder.path() / file));
+}
+
+TEST_CASE("The demo refuses what it cannot use", "[demo]") {
+  const auto refusal = [](const std::string& arguments) {
+    const auto result = run_command("apps/demo " + arguments);
+    CHECK(result.exit_code != 0);
+    return result.output;
+  };
+  CHECK_THAT(refusal("/no/such/folder"), Catch::Contains("no such folder: /no/such/folder"));
+  CHECK_THAT(refusal("--robots none"), Catch::Contains("--robots none is not a number"));
+  CHECK_THAT(refusal("--output"), Catch::Contains("--output needs a value"));
+  CHECK_THAT(refusal("--fast"), Catch::Contains("unknown option --fast"));
+  CHECK_THAT(refusal("--short config"), Catch::Contains("--short is for the simulated world"));
+  CHECK_THAT(refusal("config --programs " KM_BIN_DIR), Catch::Contains("cam0/data.csv is missing"));
+}
+
+}  // namespace km
