@@ -26,14 +26,19 @@ void add_play_mats(Scene& scene, float width, float depth, SeededRandom& random)
       scene.paint(SurfaceClass::kFloor, Recipe::kPlayMat, {1.5F, 1.45F, 1.5F}, 0.95F),
       scene.paint(SurfaceClass::kFloor, Recipe::kPlayMat, {0.8F, 0.75F, 0.8F}, 0.65F)};
   const MaterialId edge = scene.plain(SurfaceClass::kFloor, 0.12F, 0.12F, 0.12F);
-  // Away from each other: one in each of four fields of the right half and the middle.
-  constexpr std::array<std::array<float, 2>, 5> kPlaces = {
-      {{0.78F, 0.72F}, {0.74F, 0.47F}, {0.7F, 0.2F}, {0.48F, 0.3F}, {0.3F, 0.85F}}};
+  // Away from each other: most in the right half and the middle.
+  constexpr std::array<std::array<float, 2>, 7> kPlaces = {{{0.78F, 0.72F},
+                                                            {0.84F, 0.47F},
+                                                            {0.72F, 0.2F},
+                                                            {0.48F, 0.25F},
+                                                            {0.3F, 0.85F},
+                                                            {0.62F, 0.42F},
+                                                            {0.2F, 0.4F}}};
   for (std::size_t i = 0; i < kPlaces.size(); ++i) {
     const float x = kPlaces[i][0] * width + random.uniform(-0.25F, 0.25F);
     const float y = kPlaces[i][1] * depth + random.uniform(-0.25F, 0.25F);
-    const ScopedFrame scope(scene.mesh,
-                            standing_at({x, y, 0.0F}, random.uniform(0.0F, 2.0F * kPi)));
+    const ScopedFrame scope(scene.mesh, standing_at({x, y, 0.0004F * static_cast<float>(i)},
+                                                    random.uniform(0.0F, 2.0F * kPi)));
     const float length = random.uniform(1.3F, 1.9F);
     const Vector2f size(length, 0.66F * length);
     const float u = random.uniform(0.0F, 2.0F);
@@ -45,7 +50,7 @@ void add_play_mats(Scene& scene, float width, float depth, SeededRandom& random)
 }
 
 void add_tapes(Scene& scene, float width, float depth, SeededRandom& random) {
-  constexpr int kTapes = 11;
+  constexpr int kTapes = 16;
   constexpr float kStrip_m = 0.125F;  // one of the sixteen of the recipe's tile
   const MaterialId marks = scene.paint(SurfaceClass::kFloor, Recipe::kMarkerTape);
   const MaterialId grey = scene.plain(SurfaceClass::kFloor, 0.13F, 0.13F, 0.14F, 0.03F);
@@ -77,13 +82,13 @@ void add_scraps(Scene& scene, float width, float depth, SeededRandom& random) {
     const float y = depth * random.uniform(0.06F, 0.94F);
     return standing_at({x, y, 0.0F}, random.uniform(0.0F, kPi));
   };
-  for (int i = 0; i < 130; ++i) {
-    const ScopedFrame scope(scene.mesh, scattered(0.08F, 0.62F));
+  for (int i = 0; i < 190; ++i) {
+    const ScopedFrame scope(scene.mesh, scattered(0.05F, 0.8F));
     const float size = random.uniform(0.025F, 0.07F);
     add_flat(scene, {size, size * random.uniform(0.6F, 1.0F)}, 0.0035F,
              random.chance(0.85) ? white : black);
   }
-  for (int i = 0; i < 14; ++i) {  // sheets of paper
+  for (int i = 0; i < 18; ++i) {  // sheets of paper
     const ScopedFrame scope(scene.mesh, scattered(0.1F, 0.9F));
     const float u = random.uniform(0.0F, 1.0F);
     scene.mesh.set_uv_offset({u, random.uniform(0.0F, 1.0F)});
@@ -101,7 +106,7 @@ void add_scraps(Scene& scene, float width, float depth, SeededRandom& random) {
 
 void add_room_floor(Scene& scene, float width_m, float depth_m, SeededRandom& random) {
   const MaterialId carpet =
-      scene.paint(SurfaceClass::kFloor, Recipe::kCarpet, {0.36F, 0.37F, 0.39F});
+      scene.paint(SurfaceClass::kFloor, Recipe::kCarpet, {0.5F, 0.51F, 0.53F});
   scene.mesh.quad({0, 0, 0}, {width_m, 0, 0}, {width_m, depth_m, 0}, {0, depth_m, 0}, carpet);
   add_play_mats(scene, width_m, depth_m, random);
   add_tapes(scene, width_m, depth_m, random);

@@ -31,9 +31,8 @@ std::vector<Vector2f> rounded_rectangle(float width, float depth, float radius) 
   return outline;
 }
 
-/// Upright mattress centred on the origin's vertical axis.
-void add_mattress(Scene& scene, const Vector3f& size_m, SeededRandom& random) {
-  const float shade = random.uniform(0.36F, 0.46F);
+/// Upright mattress centred on the origin's vertical axis, its cover of this albedo.
+void add_mattress(Scene& scene, const Vector3f& size_m, float shade, SeededRandom& random) {
   const MaterialId cover = scene.paint(SurfaceClass::kFurniture, Recipe::kMattress,
                                        {shade, 1.02F * shade, 1.1F * shade});
   const float u = random.uniform(0.0F, 2.0F);
@@ -90,7 +89,7 @@ void add_leaning_mattress(Scene& scene, const Vector3f& size_m, float lean_m,
   const Isometry3f frame = Eigen::Translation3f(0.0F, -lean_m, 0.0F) * leaning(angle) *
                            Eigen::Translation3f(0.0F, -0.5F * size_m.y(), 0.0F);
   const ScopedFrame scope(scene.mesh, frame);
-  add_mattress(scene, size_m, random);
+  add_mattress(scene, size_m, random.uniform(0.4F, 0.5F), random);
 }
 
 void add_mattress_stack(Scene& scene, int count, SeededRandom& random) {
@@ -105,7 +104,8 @@ void add_mattress_stack(Scene& scene, int count, SeededRandom& random) {
     frame.rotate(lying);
     frame.translate(Vector3f(0.0F, 0.0F, -1.0F));
     const ScopedFrame scope(scene.mesh, frame);
-    add_mattress(scene, {1.3F, kThickness_m, 2.0F}, random);
+    const bool top = i + 1 == count;
+    add_mattress(scene, {1.3F, kThickness_m, 2.0F}, top ? 0.75F : 0.5F, random);
   }
 }
 
@@ -247,7 +247,7 @@ void add_carton(Scene& scene, const Vector3f& size_m, SeededRandom& random) {
   const MaterialId board = scene.plain(SurfaceClass::kObject, tint.x(), tint.y(), tint.z());
   const MaterialId print =
       scene.paint(SurfaceClass::kObject, Recipe::kPosters,
-                  white ? Vector3f(1.0F, 1.0F, 1.0F) : Vector3f(0.8F * tint), 0.3F);
+                  white ? Vector3f(1.0F, 1.0F, 1.0F) : Vector3f(1.3F * tint), 0.3F);
   const Vector2f half = 0.5F * size_m.head<2>();
   scene.mesh.box({-half.x(), -half.y(), 0.0F}, {half.x(), half.y(), size_m.z()}, board, kSideTop);
   const float u = 0.3F * static_cast<float>(random.below(4));

@@ -13,7 +13,7 @@ constexpr float kPi = 3.14159265F;
 // Irradiance that would make a white surface in the room as bright as the outside is, and as the
 // day makes the thin curtains.
 constexpr float kOutside = 4.0F;
-constexpr float kBacklit = 0.55F;
+constexpr float kBacklit = 0.28F;
 constexpr float kBehind_m = 0.16F;  // depth of the window's niche
 
 /// Cloth in folds from z_low to z_high, from x = 0 to `width`, its mean at y = `depth`.

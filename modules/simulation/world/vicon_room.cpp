@@ -166,7 +166,7 @@ World make_vicon_room(std::uint64_t seed) {
     const ScopedFrame room(scene.mesh, T_world_room);
     add_room_floor(scene, kEdge_m, kEdge_m, random);
     for (const Vector3f& lamp : add_ceiling(scene, kEdge_m, kEdge_m, kHeight_m, random)) {
-      world.lighting.lamps.push_back({T_world_room * lamp, 1.2F});
+      world.lighting.lamps.push_back({T_world_room * lamp, 1.3F});
     }
     furnish_middle(scene, random);
   }
@@ -183,7 +183,7 @@ World make_vicon_room(std::uint64_t seed) {
     const ScopedFrame scope(scene.mesh, wall);
     kWalls[i](scene, random);
     if (kHasWindow[i]) {
-      world.lighting.lamps.push_back({wall * Vector3f(1.4F, -0.55F, 2.2F), 1.6F});
+      world.lighting.lamps.push_back({wall * Vector3f(1.4F, -1.3F, 2.3F), 1.6F});
     }
   }
   world.lighting.ambient = 0.25F;
