@@ -89,11 +89,16 @@ std::optional<TimedLine> Process::wait_for(const std::string& line, std::size_t 
 }
 
 std::optional<TimedLine> Process::wait_for_prefix(const std::string& prefix) {
+  return wait_until([&](const std::string& line) { return line.starts_with(prefix); });
+}
+
+std::optional<TimedLine> Process::wait_until(
+    const std::function<bool(const std::string&)>& accepts) {
   std::optional<TimedLine> found;
   std::unique_lock lock(mutex_);
   changed_.wait_for(lock, kPatience, [&] {
-    const auto line = std::ranges::find_if(
-        lines_, [&](const TimedLine& l) { return l.text.starts_with(prefix); });
+    const auto line =
+        std::ranges::find_if(lines_, [&](const TimedLine& l) { return accepts(l.text); });
     if (line != lines_.end()) found = *line;
     return found.has_value() || ended_;
   });

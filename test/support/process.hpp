@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -44,6 +45,9 @@ class Process {
 
   /// Waits for a line that begins so.
   std::optional<TimedLine> wait_for_prefix(const std::string& prefix);
+
+  /// Waits for a line of which `accepts` is true.
+  std::optional<TimedLine> wait_until(const std::function<bool(const std::string&)>& accepts);
 
   /// Lines so far that begin so.
   [[nodiscard]] std::vector<TimedLine> lines(const std::string& prefix = {}) const;

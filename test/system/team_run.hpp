@@ -24,7 +24,8 @@ inline TeamRun run_team(const std::string& team, const std::filesystem::path& da
   TeamRun run;
   run.result = run_command(std::string(KM_BIN_DIR) + "/kimera_multi_team --config config/teams/" +
                            team + " --dataset " + dataset.string() + " --rate max --output " +
-                           folder.path().string() + " --json " + json);
+                           folder.path().string() + " --json " + json +
+                           " -- --serve-limit 1000");  // sanitizers are slow
   if (run.result.exit_code == 0) run.json = YAML::LoadFile(json);
   return run;
 }
