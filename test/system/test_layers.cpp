@@ -27,10 +27,13 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"pose_graph", {"outlier_rejection"}},
     {"evaluation", {"mesh"}},
     {"simulation", {"mesh"}},
+    {"semantic_mapping", {"mesh"}},
 };
 
 // Files whose job is a format on disk that is YAML: the calibration of EuRoC recordings.
-const std::set<std::string> kReadsYaml = {"modules/sensors/euroc_rig.cpp"};
+const std::set<std::string> kReadsYaml = {"modules/sensors/euroc_rig.cpp",
+                                          "modules/sensors/sensor_yaml.cpp",
+                                          "modules/sensors/sensor_yaml.hpp"};
 
 std::vector<std::string> includes_of(const fs::path& file) {
   static const std::regex pattern(R"(^\s*#\s*include\s*[<"]([^>"]+)[>"])");
