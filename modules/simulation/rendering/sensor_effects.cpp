@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "modules/simulation/rendering/lens_blur.hpp"
 #include "modules/simulation/rendering/motion_blur.hpp"
 
 namespace km {
@@ -131,11 +132,13 @@ void SensorEffects::require_complete(const RenderedView& view, std::size_t value
 }
 
 template <typename Value>
-std::vector<Value> SensorEffects::smeared(const std::vector<Value>& image, const RenderedView& view,
-                                          const Shot& shot) const {
+std::vector<Value> SensorEffects::on_sensor(const std::vector<Value>& image,
+                                            const RenderedView& view, const Shot& shot) const {
+  const std::vector<Value> seen =
+      lens_blurred(image, view.width, view.height, config_.lens_blur_px);
   if (!config_.motion_blur || shot.body_velocity.isZero() || !(shot.exposure.time_s > 0.0))
-    return image;
-  return blurred(image, view.width, view.height,
+    return seen;
+  return blurred(seen, view.width, view.height,
                  image_motion(rays_, view.depth_m, shot.body_velocity, shot.exposure.time_s));
 }
 
@@ -174,7 +177,7 @@ void SensorEffects::expose(const float* linear, std::size_t stride, const Shot& 
 
 GrayImage SensorEffects::gray(const RenderedView& view, const Shot& shot) const {
   require_complete(view, view.radiance.size());
-  const std::vector<float> linear = smeared(view.radiance, view, shot);
+  const std::vector<float> linear = on_sensor(view.radiance, view, shot);
   std::mt19937 random = generator(shot.noise_seed);
   GrayImage image{view.width, view.height, std::vector<std::uint8_t>(linear.size())};
   expose(linear.data(), 1, shot, random, image.pixels.data());
@@ -183,7 +186,7 @@ GrayImage SensorEffects::gray(const RenderedView& view, const Shot& shot) const 
 
 ColorImage SensorEffects::color(const RenderedView& view, const Shot& shot) const {
   require_complete(view, view.rgb.size());
-  const std::vector<Eigen::Vector3f> linear = smeared(view.rgb, view, shot);
+  const std::vector<Eigen::Vector3f> linear = on_sensor(view.rgb, view, shot);
   std::mt19937 random = generator(shot.noise_seed);
   ColorImage image{view.width, view.height, std::vector<std::uint8_t>(3 * linear.size())};
   for (std::size_t channel = 0; channel < 3; ++channel)

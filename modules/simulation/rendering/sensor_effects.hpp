@@ -27,8 +27,8 @@ struct Shot {
   std::uint64_t noise_seed = 0;             ///< One per image: left and right differ.
 };
 
-/// From what the lens throws on the sensor to grey levels: motion blur, vignetting, exposure,
-/// noise, response, quantisation. Immutable; one per camera, shared by threads.
+/// From what the lens throws on the sensor to grey levels: blur of lens and motion, vignetting,
+/// exposure, noise, response, quantisation. Immutable; one per camera, shared by threads.
 class SensorEffects {
  public:
   /// Throws ConfigError.
@@ -47,8 +47,8 @@ class SensorEffects {
 
   void require_complete(const RenderedView& view, std::size_t values) const;
   template <typename Value>
-  [[nodiscard]] std::vector<Value> smeared(const std::vector<Value>& image,
-                                           const RenderedView& view, const Shot& shot) const;
+  [[nodiscard]] std::vector<Value> on_sensor(const std::vector<Value>& image,
+                                             const RenderedView& view, const Shot& shot) const;
   [[nodiscard]] std::uint8_t quantized(float signal) const;
   void expose(const float* linear, std::size_t stride, const Shot& shot, std::mt19937& random,
               std::uint8_t* levels) const;

@@ -12,6 +12,10 @@ struct SensorEffectsConfig {
   /// power of a cosine.
   double vignetting = 0.2;
 
+  /// Blur of the lens: standard deviation of its point spread [px]. With 0.6 the images of the
+  /// Vicon room have the variance of the Laplacian that recorded ones have.
+  double lens_blur_px = 0.6;
+
   /// Standard deviation of the noise in the dark, in grey levels.
   double read_noise = 1.0;
 
@@ -43,6 +47,7 @@ struct SensorEffectsConfig {
 
   void visit_fields(auto& visitor) {
     visitor.field("vignetting", vignetting, {0.0, 0.9}, "share of light lost in the corners");
+    visitor.field("lens_blur_px", lens_blur_px, {0.0, 5.0}, "px, standard deviation");
     visitor.field("read_noise", read_noise, {0.0, 50.0}, "grey levels");
     visitor.field("photon_noise", photon_noise, {0.0, 50.0}, "grey levels near saturation");
     visitor.field("noise_correlation_px", noise_correlation_px, {0.0, 4.0}, "px");

@@ -3,6 +3,7 @@
 #include <numeric>
 
 #include "modules/core/lie.hpp"
+#include "modules/simulation/rendering/lens_blur.hpp"
 #include "modules/simulation/rendering/motion_blur.hpp"
 #include "modules/simulation/rendering/sensor_effects.hpp"
 #include "test/modules/simulation/rendering/small_world.hpp"
@@ -27,6 +28,7 @@ RenderedView flat_view(const PinholeCamera& camera, float radiance) {
 SensorEffectsConfig clean() {
   SensorEffectsConfig config;
   config.vignetting = 0.0;
+  config.lens_blur_px = 0.0;
   config.read_noise = 0.0;
   config.photon_noise = 0.0;
   return config;
@@ -137,6 +139,37 @@ TEST_CASE("Colour is developed channel by channel", "[simulation][sensor]") {
     CHECK(image.pixels[i + 1] == 102);
     CHECK(image.pixels[i + 2] == 51);
   }
+}
+
+TEST_CASE("The lens spreads a point as it is configured and keeps its light",
+          "[simulation][sensor]") {
+  const double sigma_px = GENERATE(0.6, 1.0, 2.5);
+  CAPTURE(sigma_px);
+  constexpr int kWidth = 31;
+  constexpr int kHeight = 25;
+  std::vector<float> point(kWidth * kHeight, 0.0F);
+  point[12 * kWidth + 15] = 4.0F;
+  const std::vector<float> spread = lens_blurred(point, kWidth, kHeight, sigma_px);
+  double light = 0.0;
+  double variance_x = 0.0;
+  double variance_y = 0.0;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const double share = spread[static_cast<std::size_t>(y * kWidth + x)] / 4.0;
+      light += share;
+      variance_x += share * (x - 15) * (x - 15);
+      variance_y += share * (y - 12) * (y - 12);
+    }
+  }
+  CHECK(light == Approx(1.0).epsilon(1e-5));
+  // The kernel ends at three deviations: its variance is up to 3 % short.
+  CHECK(variance_x == Approx(sigma_px * sigma_px).epsilon(0.03));
+  CHECK(variance_y == Approx(variance_x).epsilon(1e-4));
+
+  const std::vector<float> flat(kWidth * kHeight, 0.75F);
+  for (const float value : lens_blurred(flat, kWidth, kHeight, sigma_px))
+    CHECK(value == Approx(0.75F).epsilon(1e-5));
+  CHECK(lens_blurred(point, kWidth, kHeight, 0.0) == point);
 }
 
 TEST_CASE("Image motion is that of projected points", "[simulation][sensor]") {
