@@ -10,6 +10,7 @@
 #include "modules/core/ids.hpp"
 #include "modules/core/label_palette.hpp"
 #include "modules/mesh/map_mesh.hpp"
+#include "modules/semantic_mapping/incremental_mesh.hpp"
 #include "modules/semantic_mapping/semantic_mapping_config.hpp"
 
 namespace km {
@@ -25,7 +26,7 @@ enum class IntegrationStatus {
 [[nodiscard]] const char* to_string(IntegrationStatus status);
 
 /// What integrate() did. All zero but status for a frame that was skipped.
-struct IntegrationReport {
+struct [[nodiscard]] IntegrationReport {
   IntegrationStatus status = IntegrationStatus::kIntegrated;
   std::size_t pixels = 0;            ///< With a depth within range.
   std::size_t labels_outside = 0;    ///< Of these, with a label that the palette lacks: unknown.
@@ -36,13 +37,6 @@ struct IntegrationReport {
   std::size_t blocks_refused = 0;    ///< Would be new, but the frame alone fills max_blocks.
   std::size_t blocks_removed = 0;    ///< Empty after carving.
   std::size_t blocks_finalised = 0;  ///< Left the window; now final mesh.
-};
-
-/// What update_mesh() did.
-struct MeshUpdateReport {
-  std::size_t blocks = 0;  ///< Meshed anew.
-  std::size_t vertices_added = 0;
-  std::size_t vertices_removed = 0;
 };
 
 /// Sizes of the map.

@@ -56,7 +56,7 @@ struct SemanticMappingConfig {
     visitor.field("depth_sigma_m", depth_sigma_m, {1e-4, 1.0}, "[m] constant part");
     visitor.field("depth_sigma_per_m", depth_sigma_per_m, {0.0, 1.0}, "[1/m] times squared depth");
     visitor.field("max_weight", max_weight, {1.0, 10000.0}, "of a voxel");
-    visitor.field("label_confidence", label_confidence, {0.01, 0.9999}, "that a label is right");
+    visitor.field("label_confidence", label_confidence, {0.5, 0.9999}, "that a label is right");
     visitor.field("min_label_probability", min_label_probability, {0.0, 1.0}, "less is unknown");
     visitor.field("window_keyframes", window_keyframes, {1, 1000000}, "unseen so long: final");
     visitor.field("max_blocks", max_blocks, {64, 4000000}, "of 8 x 8 x 8 voxels");

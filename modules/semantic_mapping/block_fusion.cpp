@@ -1,0 +1,201 @@
+#include "modules/semantic_mapping/block_fusion.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace km {
+
+// Eight voxels along x. Written as plain loops over arrays: the compiler makes vectors of them.
+struct BlockFusion::Row {
+  alignas(32) std::array<float, kBlockSide> z;                // [m]
+  alignas(32) std::array<std::int32_t, kBlockSide> index;     // of the pixel
+  alignas(32) std::array<std::uint32_t, kBlockSide> pixel;    // DepthView::pixels
+  alignas(32) std::array<float, kBlockSide> observed_weight;  // 0: not observed
+  bool moved = false;                                         // some distance changed
+  unsigned near_bits = 0;                                     // observed near the surface
+};
+
+BlockFusion::BlockFusion(const SemanticMappingConfig& config, const DepthView& view,
+                         const SE3& T_odom_cam, KeyframeIndex keyframe)
+    : view_(view), keyframe_(keyframe) {
+  const SE3 T_cam_odom = T_odom_cam.inverse();
+  Eigen::Matrix3d K = Eigen::Matrix3d::Identity();
+  // Half a pixel more, so that cutting off the fraction rounds to the nearest pixel.
+  K << static_cast<double>(view.fx), 0.0, static_cast<double>(view.cx) + 0.5,  //
+      0.0, static_cast<double>(view.fy), static_cast<double>(view.cy) + 0.5,   //
+      0.0, 0.0, 1.0;
+  M_ = K * T_cam_odom.linear();
+  offset_ = K * T_cam_odom.translation();
+  step_ = (config.voxel_size_m * M_).cast<float>();
+  block_m_ = kBlockSide * config.voxel_size_m;
+
+  voxel_ = static_cast<float>(config.voxel_size_m);
+  truncation_ = static_cast<float>(config.truncation_voxels) * voxel_;
+  near_ = kNearVoxels * voxel_;
+  limit_ = config.carving ? std::numeric_limits<float>::max() : truncation_;
+  closest_ = 0.5F * static_cast<float>(std::max(config.min_range_m, 0.01));
+  max_weight_ = static_cast<float>(config.max_weight);
+  variance_ = static_cast<float>(config.depth_sigma_m * config.depth_sigma_m);
+  quadratic_variance_ = static_cast<float>(config.depth_sigma_per_m * config.depth_sigma_per_m);
+}
+
+Eigen::Vector3f BlockFusion::corner_of(const VoxelBlock& block) const {
+  return (M_ * (block_m_ * block.position.cast<double>()) + offset_).cast<float>();
+}
+
+float BlockFusion::weight_of(float depth) const {
+  const float squared = depth * depth;
+  return variance_ / (variance_ + quadratic_variance_ * squared * squared);
+}
+
+BlockFusion::Relation BlockFusion::relation_to(const VoxelBlock& block) const {
+  const Eigen::Vector3f corner = corner_of(block);
+  Eigen::Array2f low = Eigen::Array2f::Constant(std::numeric_limits<float>::max());
+  Eigen::Array2f high = -low;
+  float z_low = std::numeric_limits<float>::max(), z_high = -z_low;
+  for (int i = 0; i < 8; ++i) {
+    constexpr float kLast = kBlockSide - 1;
+    const Eigen::Vector3f p =
+        corner + step_ * Eigen::Vector3f((i & 1) != 0 ? kLast : 0.0F, (i & 2) != 0 ? kLast : 0.0F,
+                                         (i & 4) != 0 ? kLast : 0.0F);
+    z_low = std::min(z_low, p.z());
+    z_high = std::max(z_high, p.z());
+    const Eigen::Array2f px = p.head<2>().array() / std::max(p.z(), closest_);
+    low = low.min(px);
+    high = high.max(px);
+  }
+  if (z_high < closest_) return Relation::kNotSeen;
+  const Eigen::Array2f size(static_cast<float>(view_.width), static_cast<float>(view_.height));
+  if (z_low < closest_) return Relation::kMixed;  // beside the camera: its image has no bounds
+  if ((high < 0.0F).any() || (low >= size).any()) return Relation::kNotSeen;
+
+  const bool whole = (low >= 0.0F).all() && (high < size).all();
+  constexpr float kTile = DepthView::kTileSide;
+  const Eigen::Array2i first = (low.max(0.0F) / kTile).cast<int>();
+  const Eigen::Array2i last = (high.min(size - 1.0F) / kTile).cast<int>();
+  std::uint16_t nearest = std::numeric_limits<std::uint16_t>::max(), farthest = 0;
+  for (int row = first.y(); row <= last.y(); ++row)
+    for (int column = first.x(); column <= last.x(); ++column) {
+      const auto tile = static_cast<std::size_t>(row * view_.tile_columns + column);
+      nearest = std::min(nearest, view_.nearest[tile]);
+      farthest = std::max(farthest, view_.farthest[tile]);
+    }
+  if (farthest == 0 || z_low >= DepthView::depth_m(farthest) + truncation_)
+    return Relation::kNotSeen;
+  return whole && z_high <= DepthView::depth_m(nearest) - truncation_ ? Relation::kFree
+                                                                      : Relation::kMixed;
+}
+
+void BlockFusion::project(const Eigen::Vector3f& start, Row& row) const {
+  const float x0 = start.x(), y0 = start.y(), z0 = start.z();
+  const float dx = step_(0, 0), dy = step_(1, 0), dz = step_(2, 0);
+  const float width = static_cast<float>(view_.width), height = static_cast<float>(view_.height);
+  const float closest = closest_;
+  const auto outside = static_cast<std::int32_t>(view_.outside());
+  for (int i = 0; i < kBlockSide; ++i) {
+    const auto n = static_cast<float>(i);
+    const float z = z0 + n * dz;
+    const float inverse = 1.0F / (z > closest ? z : closest);
+    const float u = (x0 + n * dx) * inverse, v = (y0 + n * dy) * inverse;
+    const bool inside = (z > closest) & (u >= 0.0F) & (v >= 0.0F) & (u < width) & (v < height);
+    // Whole numbers below 2^24 are exact in float, and SSE2 cannot multiply integers.
+    const auto column = static_cast<float>(static_cast<std::int32_t>(inside ? u : 0.0F));
+    const auto line = static_cast<float>(static_cast<std::int32_t>(inside ? v : 0.0F));
+    const auto index = static_cast<std::int32_t>(line * width + column);
+    const auto place = static_cast<std::size_t>(i);
+    row.z[place] = z;
+    row.index[place] = inside ? index : outside;
+  }
+  for (std::size_t i = 0; i < kBlockSide; ++i)
+    row.pixel[i] = view_.pixels[static_cast<std::size_t>(row.index[i])];
+}
+
+void BlockFusion::update(Row& row, float* distance, float* weight) const {
+  const float truncation = truncation_, limit = limit_, near = near_, max_weight = max_weight_;
+  const float ramp = 1.0F / (truncation_ - voxel_);
+  const float variance = variance_, quadratic = quadratic_variance_;
+  std::uint32_t moved = 0, near_bits = 0;
+  for (std::size_t i = 0; i < kBlockSide; ++i) {
+    const auto mm = static_cast<std::int32_t>(row.pixel[i] & 0xFFFFU);
+    const float depth = 0.001F * static_cast<float>(mm);
+    const float s = depth - row.z[i];
+    const bool observed = (mm > 0) & (s > -truncation) & (s < limit);
+    const float squared = depth * depth;
+    float w = variance / (variance + quadratic * squared * squared);
+    const float fade = (truncation + s) * ramp;
+    w *= fade < 1.0F ? fade : 1.0F;
+    w = observed ? w : 0.0F;
+    const float sum = weight[i] + w;
+    const float mean = w > 0.0F ? distance[i] + ((s < truncation ? s : truncation) - distance[i]) *
+                                                    (w / (sum > 0.0F ? sum : 1.0F))
+                                : distance[i];
+    moved |= mean != distance[i] ? 1U : 0U;
+    near_bits |= observed & (s > -near) & (s < near) ? 1U << i : 0U;
+    distance[i] = mean;
+    weight[i] = sum < max_weight ? sum : max_weight;
+    row.observed_weight[i] = w;
+  }
+  row.moved = moved != 0;
+  row.near_bits = near_bits;
+}
+
+void BlockFusion::vote(const Row& row, VoxelLabels* labels) const {
+  for (std::size_t i = 0; i < kBlockSide; ++i) {
+    const LabelId label = DepthView::label(row.pixel[i]);
+    if ((row.near_bits >> i & 1U) != 0 && label != 0)
+      labels[i].observe(label, VoxelLabels::votes_of(row.observed_weight[i]));
+  }
+}
+
+void BlockFusion::fuse(VoxelBlock& block) const {
+  const Eigen::Vector3f corner = corner_of(block);
+  const bool labelled = view_.labelled && block.labels != nullptr;
+  bool moved = false, near = false;
+  Row row;
+  for (std::size_t r = 0; r < kBlockRows; ++r) {
+    const auto y = static_cast<float>(r % kBlockSide), z = static_cast<float>(r / kBlockSide);
+    project(corner + y * step_.col(1) + z * step_.col(2), row);
+    const std::size_t first = r * kBlockSide;
+    update(row, &block.distance[first], &block.weight[first]);
+    moved |= row.moved;
+    if (row.near_bits == 0) continue;
+    near = true;
+    block.near_rows[r] = static_cast<std::uint8_t>(block.near_rows[r] | row.near_bits);
+    if (labelled) vote(row, &(*block.labels)[first]);
+  }
+  if (near) block.last_seen = keyframe_;
+  if ((moved || near) && !block.changed) {
+    block.changed = true;
+    block.changed_since = keyframe_;
+  }
+}
+
+void BlockFusion::fuse_free(VoxelBlock& block) const {
+  const Eigen::Vector3f middle = corner_of(block) + step_ * Eigen::Vector3f::Constant(3.5F);
+  const float w = weight_of(middle.z());
+  const float truncation = truncation_, max_weight = max_weight_;
+  std::uint32_t moved = 0;
+  for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+    const float sum = block.weight[i] + w;
+    const float mean = block.distance[i] + (truncation - block.distance[i]) * (w / sum);
+    moved |= mean != block.distance[i] ? 1U : 0U;
+    block.distance[i] = mean;
+    block.weight[i] = sum < max_weight ? sum : max_weight;
+  }
+  if (moved != 0 && !block.changed) {
+    block.changed = true;
+    block.changed_since = keyframe_;
+  }
+}
+
+bool BlockFusion::is_empty(const VoxelBlock& block) const {
+  const float threshold = 0.75F * truncation_;
+  std::uint32_t surface = 0;
+  for (std::size_t i = 0; i < kBlockVoxels; ++i)
+    surface |= (block.weight[i] > 0.0F) & (block.distance[i] < threshold) ? 1U : 0U;
+  return surface == 0;
+}
+
+}  // namespace km

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "modules/core/geometry.hpp"
+#include "modules/core/ids.hpp"
+#include "modules/semantic_mapping/depth_view.hpp"
+#include "modules/semantic_mapping/semantic_mapping_config.hpp"
+#include "modules/semantic_mapping/voxel_block.hpp"
+
+namespace km {
+
+/// Fuses one depth view, taken from one pose, into blocks. fuse() changes nothing but its block: it
+/// may run on several blocks at once.
+///
+/// A voxel at depth z that projects to a pixel of depth d has the signed distance s = d - z along
+/// the optical axis. Where s > -truncation, the voxel's distance becomes the weighted mean of what
+/// it was and min(s, truncation) (Curless and Levoy 1996, eqs. 3 and 4). The weight is
+/// sigma_0^2 / sigma(d)^2 (see SemanticMappingConfig), falling linearly to zero from one voxel
+/// behind the surface to the truncation, since what is farther behind may belong to another
+/// surface.
+class BlockFusion {
+ public:
+  BlockFusion(const SemanticMappingConfig& config, const DepthView& view, const SE3& T_odom_cam,
+              KeyframeIndex keyframe);
+
+  /// How the view and a block lie to each other.
+  enum class Relation {
+    kNotSeen,  ///< Outside the image, behind every surface, or no depth there.
+    kMixed,    ///< Voxel by voxel.
+    kFree,     ///< In front of every surface by more than the truncation.
+  };
+  [[nodiscard]] Relation relation_to(const VoxelBlock& block) const;
+
+  /// Updates every voxel of the block. Its labels take part if it has an array for them and the
+  /// view has labels.
+  void fuse(VoxelBlock& block) const;
+
+  /// The same for a block with Relation::kFree, faster.
+  void fuse_free(VoxelBlock& block) const;
+
+  /// True if no voxel of the block is near a surface: every observed one is at least three quarters
+  /// of the truncation in front of it.
+  [[nodiscard]] bool is_empty(const VoxelBlock& block) const;
+
+ private:
+  struct Row;
+
+  [[nodiscard]] Eigen::Vector3f corner_of(const VoxelBlock& block) const;
+  void project(const Eigen::Vector3f& start, Row& row) const;
+  void update(Row& row, float* distance, float* weight) const;
+  void vote(const Row& row, VoxelLabels* labels) const;
+  [[nodiscard]] float weight_of(float depth) const;
+
+  const DepthView& view_;
+  KeyframeIndex keyframe_;
+  Eigen::Matrix3d M_;       // of a point in the odometry frame: (u z, v z, z) = M p + K t
+  Eigen::Vector3d offset_;  // K t
+  Eigen::Matrix3f step_;    // columns: M times one voxel along x, y, z
+  double block_m_;
+  float truncation_, voxel_, near_, limit_, closest_, max_weight_;
+  float variance_, quadratic_variance_;  // sigma_0^2, quadratic^2
+};
+
+}  // namespace km

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/frame.hpp"
+#include "modules/core/label_palette.hpp"
+
+namespace km {
+
+/// A depth image with labels, laid out for voxels to be projected into: seen by a camera without
+/// distortion, depths out of range taken away, unknown labels 0.
+struct DepthView {
+  static constexpr int kTileSide = 16;  ///< [px]
+
+  int width = 0, height = 0;                         ///< [px]
+  float fx = 0.0F, fy = 0.0F, cx = 0.0F, cy = 0.0F;  ///< [px]
+
+  /// Depth [mm] in the low 16 bits (0: none), label in the 8 above; row-major, and one more that is
+  /// 0, for what lies outside.
+  std::vector<std::uint32_t> pixels;
+
+  /// Least and greatest depth [mm] of the tiles of 16 x 16 pixels, row-major. Least 0: some pixel
+  /// has none; greatest 0: all.
+  std::vector<std::uint16_t> nearest, farthest;
+  int tile_columns = 0, tile_rows = 0;
+
+  std::size_t with_depth = 0;      ///< Pixels of the view with a depth.
+  std::size_t labels_outside = 0;  ///< Of all pixels: with a label that the palette lacks.
+  bool labelled = false;
+
+  [[nodiscard]] std::size_t outside() const { return pixels.size() - 1; }
+  static float depth_m(std::uint32_t pixel) { return 0.001F * static_cast<float>(pixel & 0xFFFFU); }
+  static LabelId label(std::uint32_t pixel) { return static_cast<LabelId>(pixel >> 16U); }
+};
+
+/// Makes depth views of one camera's images. If it has distortion, a table says which of its pixels
+/// each pixel of an ideal camera of the same focal lengths takes; the ideal image is as large as
+/// the view, but at most twice as wide and high as the real one.
+class DepthViewMaker {
+ public:
+  /// Throws std::invalid_argument for a camera without pixels or focal length.
+  DepthViewMaker(const PinholeCamera& camera, double min_range_m, double max_range_m,
+                 const LabelPalette& palette);
+
+  /// The view of these images, valid until the next call. Precondition: both have the camera's
+  /// size; labels may be null.
+  const DepthView& make(const DepthImage& depth, const LabelImage* labels);
+
+ private:
+  void plan_rectification(const PinholeCamera& camera);
+  void fill_plain(const DepthImage& depth, const LabelImage* labels);
+  void fill_rectified(const DepthImage& depth, const LabelImage* labels);
+  void summarise_tiles();
+  [[nodiscard]] std::uint32_t pack(std::uint16_t millimetres, LabelId label) const;
+
+  DepthView view_;
+  std::uint32_t min_mm_ = 0, max_mm_ = 0;
+  std::array<LabelId, 256> known_ = {};         // the label itself, or 0
+  std::array<std::uint8_t, 256> outside_ = {};  // 1: the palette lacks it
+  std::vector<std::uint32_t> source_;           // of each ideal pixel; empty: the same
+};
+
+}  // namespace km

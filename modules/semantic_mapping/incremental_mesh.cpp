@@ -1,0 +1,274 @@
+#include "modules/semantic_mapping/incremental_mesh.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+namespace km {
+namespace {
+
+// Vertices stay off the ends of their edges, where those of several edges would coincide and faces
+// have no area; this moves them by at most a thousandth of a voxel.
+constexpr float kMargin = 1e-3F;
+
+// The blocks whose cells reach into `block`, with the offset to it in bits x + 2 y + 4 z.
+template <typename Visit>
+void visit_lower_neighbours(const VoxelBlock& block, BlockMap& map, const Visit& visit) {
+  for (int offset = 1; offset < 8; ++offset) {
+    const Eigen::Vector3i step(offset & 1, offset >> 1 & 1, offset >> 2 & 1);
+    if (VoxelBlock* lower = map.find(block.position - step)) visit(*lower, offset);
+  }
+}
+
+// True if the cell reaches into the block at `offset`.
+bool reaches(std::uint16_t cell, int offset) {
+  const int last =
+      ((cell & 7) == 7 ? 1 : 0) | ((cell >> 3 & 7) == 7 ? 2 : 0) | ((cell >> 6 & 7) == 7 ? 4 : 0);
+  return (last & offset) == offset;
+}
+
+void mark_changed(VoxelBlock& block, KeyframeIndex since) {
+  block.changed_since = block.changed ? std::min(block.changed_since, since) : since;
+  block.changed = true;
+}
+
+}  // namespace
+
+IncrementalMesh::IncrementalMesh(double voxel_size_m, const LabelModel& labels,
+                                 double min_label_probability)
+    : voxel_m_(voxel_size_m), label_model_(labels), min_label_probability_(min_label_probability) {}
+
+MeshUpdateReport IncrementalMesh::update(BlockMap& map) {
+  ++update_;
+  MeshUpdateReport report;
+  for (const Face& face : forgotten_faces_) release(face);
+  faces_ -= forgotten_faces_.size();
+  forgotten_faces_.clear();
+
+  const std::vector<VoxelBlock*> blocks = blocks_to_mesh(map);
+  report.blocks = blocks.size();
+  for (VoxelBlock* block : blocks) release_faces(*block);
+  for (VoxelBlock* block : blocks) mesh_block(*block, map, report);
+  for (VoxelBlock* block : blocks) {
+    block->changed = false;
+    block->near_rows.fill(0);
+  }
+  report.vertices_removed = remove_unused();
+  return report;
+}
+
+std::vector<VoxelBlock*> IncrementalMesh::blocks_to_mesh(BlockMap& map) const {
+  std::vector<VoxelBlock*> blocks;
+  for (const auto& block : map.blocks())
+    if (block->changed) blocks.push_back(block.get());
+  const std::size_t changed = blocks.size();
+  for (std::size_t i = 0; i < changed; ++i)
+    visit_lower_neighbours(*blocks[i], map, [&](VoxelBlock& lower, int) {
+      if (lower.changed) return;
+      mark_changed(lower, blocks[i]->changed_since);
+      blocks.push_back(&lower);
+    });
+  return blocks;
+}
+
+void IncrementalMesh::release(const Face& face) {
+  for (const std::uint32_t v : face)
+    if (--vertices_[v].uses == 0) maybe_unused_.push_back(v);
+}
+
+void IncrementalMesh::release_faces(VoxelBlock& block) {
+  if (block.mesh == nullptr) return;
+  for (const Face& face : block.mesh->faces) release(face);
+  faces_ -= block.mesh->faces.size();
+  block.mesh->faces.clear();
+  block.mesh->cell_of_face.clear();
+}
+
+void IncrementalMesh::mesh_block(VoxelBlock& block, BlockMap& map, MeshUpdateReport& report) {
+  const BlockCells cells(block, map);
+  if (!cells.any()) return;
+  std::array<std::uint32_t, MarchingCubes::kEdges> vertices;
+  for (int z = 0; z < kBlockSide; ++z)
+    for (int y = 0; y < kBlockSide; ++y) {
+      const unsigned crossed = cells.crossed(y, z);
+      for (int x = 0; x < kBlockSide; ++x) {
+        if ((crossed >> x & 1U) == 0) continue;
+        vertices.fill(BlockMesh::kNone);
+        for (const auto& triangle : table_.triangles(cells.negative_corners(x, y, z))) {
+          Face face;
+          for (std::size_t i = 0; i < 3; ++i) {
+            std::uint32_t& vertex = vertices[triangle[i]];
+            const int corner = MarchingCubes::first_corner_of_edge(triangle[i]);
+            if (vertex == BlockMesh::kNone)
+              vertex =
+                  vertex_on(cells, {x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2 & 1)},
+                            MarchingCubes::axis_of_edge(triangle[i]), block, report);
+            face[i] = vertex;
+            ++vertices_[vertex].uses;
+          }
+          if (block.mesh == nullptr) block.mesh = std::make_unique<BlockMesh>();
+          block.mesh->faces.push_back(face);
+          block.mesh->cell_of_face.push_back(static_cast<std::uint16_t>(voxel_index(x, y, z)));
+          ++faces_;
+        }
+      }
+    }
+}
+
+std::uint32_t IncrementalMesh::vertex_on(const BlockCells& cells, const Eigen::Vector3i& voxel,
+                                         int axis, const VoxelBlock& meshed,
+                                         MeshUpdateReport& report) {
+  VoxelBlock& owner = cells.block_of(voxel.x(), voxel.y(), voxel.z());
+  if (owner.mesh == nullptr) owner.mesh = std::make_unique<BlockMesh>();
+  const std::size_t edge =
+      3 * voxel_index(voxel.x() & 7, voxel.y() & 7, voxel.z() & 7) + static_cast<std::size_t>(axis);
+  std::uint32_t& place = owner.mesh->vertex_of_edge[edge];
+  if (place == BlockMesh::kNone) {
+    place = new_vertex(meshed.changed_since);
+    vertices_[place].owner = owner.mesh.get();
+    vertices_[place].edge = static_cast<std::uint16_t>(edge);
+    ++report.vertices_added;
+  }
+  Vertex& vertex = vertices_[place];
+  if (vertex.computed != update_) {
+    vertex.computed = update_;
+    compute(vertex, cells, voxel, axis);
+  }
+  return place;
+}
+
+std::uint32_t IncrementalMesh::new_vertex(KeyframeIndex keyframe) {
+  if (free_.empty()) {
+    free_.push_back(static_cast<std::uint32_t>(vertices_.size()));
+    vertices_.emplace_back();
+  }
+  const std::uint32_t place = free_.back();
+  free_.pop_back();
+  Vertex& vertex = vertices_[place];
+  vertex = {};
+  vertex.id = next_id_++;
+  vertex.first = vertex.last = keyframe;
+  return place;
+}
+
+void IncrementalMesh::compute(Vertex& vertex, const BlockCells& cells, const Eigen::Vector3i& voxel,
+                              int axis) const {
+  const Eigen::Vector3i far = voxel + Eigen::Vector3i::Unit(axis);
+  const float a = cells.value(voxel.x(), voxel.y(), voxel.z());
+  const float b = cells.value(far.x(), far.y(), far.z());
+  const float t = std::clamp(a / (a - b), kMargin, 1.0F - kMargin);
+  const VoxelBlock& near_block = cells.block_of(voxel.x(), voxel.y(), voxel.z());
+  const VoxelBlock& far_block = cells.block_of(far.x(), far.y(), far.z());
+  const auto index_of = [](const Eigen::Vector3i& at) {
+    return voxel_index(at.x() & 7, at.y() & 7, at.z() & 7);
+  };
+  const std::size_t near_voxel = index_of(voxel), far_voxel = index_of(far);
+
+  const Eigen::Vector3i local(voxel.x() & 7, voxel.y() & 7, voxel.z() & 7);
+  Eigen::Vector3d grid = (kBlockSide * near_block.position + local).cast<double>();
+  grid[axis] += static_cast<double>(t);
+  vertex.position = (voxel_m_ * grid).cast<float>();
+
+  const LabelId nearer =
+      t < 0.5F ? label_of(near_block, near_voxel) : label_of(far_block, far_voxel);
+  vertex.label = nearer != 0 ? nearer
+                 : t < 0.5F  ? label_of(far_block, far_voxel)
+                             : label_of(near_block, near_voxel);
+
+  const auto seen = [](const VoxelBlock& block, std::size_t v) {
+    return (block.near_rows[v / kBlockSide] >> v % kBlockSide & 1U) != 0;
+  };
+  if (seen(near_block, near_voxel)) vertex.last = std::max(vertex.last, near_block.last_seen);
+  if (seen(far_block, far_voxel)) vertex.last = std::max(vertex.last, far_block.last_seen);
+}
+
+LabelId IncrementalMesh::label_of(const VoxelBlock& block, std::size_t voxel) const {
+  if (block.labels == nullptr) return 0;
+  const VoxelLabels& labels = (*block.labels)[voxel];
+  const LabelId best = labels.best();
+  if (best == 0 || min_label_probability_ <= 0.0) return best;
+  return labels.probability(best, label_model_) >= min_label_probability_ ? best : LabelId{0};
+}
+
+std::size_t IncrementalMesh::remove_unused() {
+  std::size_t removed = 0;
+  for (const std::uint32_t place : maybe_unused_) {
+    Vertex& vertex = vertices_[place];
+    if (vertex.uses > 0 || vertex.id == kRemoved) continue;
+    if (vertex.owner != nullptr) vertex.owner->vertex_of_edge[vertex.edge] = BlockMesh::kNone;
+    vertex.owner = nullptr;
+    vertex.id = kRemoved;
+    free_.push_back(place);
+    ++removed;
+  }
+  maybe_unused_.clear();
+  return removed;
+}
+
+void IncrementalMesh::disown(VoxelBlock& block) {
+  if (block.mesh == nullptr) return;
+  for (const std::uint32_t place : block.mesh->vertex_of_edge)
+    if (place != BlockMesh::kNone) vertices_[place].owner = nullptr;
+}
+
+void IncrementalMesh::forget(VoxelBlock& block, BlockMap& map, KeyframeIndex keyframe) {
+  visit_lower_neighbours(block, map,
+                         [&](VoxelBlock& lower, int) { mark_changed(lower, keyframe); });
+  if (block.mesh == nullptr) return;
+  forgotten_faces_.insert(forgotten_faces_.end(), block.mesh->faces.begin(),
+                          block.mesh->faces.end());
+  disown(block);
+}
+
+void IncrementalMesh::finalise(VoxelBlock& block, BlockMap& map) {
+  if (block.mesh != nullptr)
+    final_faces_.insert(final_faces_.end(), block.mesh->faces.begin(), block.mesh->faces.end());
+  visit_lower_neighbours(block, map, [&](VoxelBlock& lower, int offset) {
+    if (lower.mesh == nullptr) return;
+    auto& faces = lower.mesh->faces;
+    auto& cells = lower.mesh->cell_of_face;
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      if (reaches(cells[i], offset)) {
+        final_faces_.push_back(faces[i]);
+        continue;
+      }
+      faces[kept] = faces[i];
+      cells[kept++] = cells[i];
+    }
+    faces.resize(kept);
+    cells.resize(kept);
+  });
+  disown(block);
+}
+
+MapMesh IncrementalMesh::snapshot(const BlockMap& map, bool labelled) const {
+  std::vector<std::uint32_t> order;
+  order.reserve(vertex_count());
+  for (std::size_t i = 0; i < vertices_.size(); ++i)
+    if (vertices_[i].uses > 0) order.push_back(static_cast<std::uint32_t>(i));
+  std::sort(order.begin(), order.end(),
+            [&](auto a, auto b) { return vertices_[a].id < vertices_[b].id; });
+
+  MapMesh map_mesh;
+  LabelledMesh& mesh = map_mesh.mesh;
+  std::vector<std::uint32_t> index(vertices_.size());
+  for (const std::uint32_t place : order) {
+    const Vertex& vertex = vertices_[place];
+    index[place] = static_cast<std::uint32_t>(mesh.vertices.size());
+    mesh.vertices.push_back(vertex.position);
+    if (labelled) mesh.labels.push_back(vertex.label);
+    map_mesh.seen_by.push_back({vertex.first, vertex.last});
+    map_mesh.ids.push_back(vertex.id);
+  }
+  mesh.faces.reserve(faces_);
+  const auto add = [&](const std::vector<Face>& faces) {
+    for (const Face& face : faces)
+      mesh.faces.push_back({index[face[0]], index[face[1]], index[face[2]]});
+  };
+  add(final_faces_);
+  for (const auto& block : map.blocks())
+    if (block->mesh != nullptr) add(block->mesh->faces);
+  return map_mesh;
+}
+
+}  // namespace km

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "modules/mesh/map_mesh.hpp"
+#include "modules/semantic_mapping/block_cells.hpp"
+#include "modules/semantic_mapping/block_map.hpp"
+#include "modules/semantic_mapping/marching_cubes.hpp"
+#include "modules/semantic_mapping/voxel_labels.hpp"
+
+namespace km {
+
+/// What IncrementalMesh::update() did.
+struct MeshUpdateReport {
+  std::size_t blocks = 0;  ///< Meshed anew.
+  std::size_t vertices_added = 0;
+  std::size_t vertices_removed = 0;
+};
+
+/// The zero level of a map as triangles, kept up to date block by block.
+///
+/// A vertex belongs to the grid edge it lies on, and that edge to the block of its lower voxel;
+/// cells of all blocks around share it. Vertices live while a face refers to them: so do those at
+/// the rim of final faces, which move on with the blocks that are still in the map.
+class IncrementalMesh {
+ public:
+  IncrementalMesh(double voxel_size_m, const LabelModel& labels, double min_label_probability);
+
+  /// Meshes the blocks that changed, and those below them whose cells reach into them.
+  MeshUpdateReport update(BlockMap& map);
+
+  /// To be called before a block without surface is erased, as `keyframe` showed: its faces go with
+  /// the next update().
+  void forget(VoxelBlock& block, BlockMap& map, KeyframeIndex keyframe);
+
+  /// To be called before a block is erased whose mesh is to stay: the faces of its cells, and of
+  /// others' that reach into it, become final. Precondition: nothing changed since update().
+  void finalise(VoxelBlock& block, BlockMap& map);
+
+  /// All faces and the vertices they use. Without labels if `labelled` is false.
+  [[nodiscard]] MapMesh snapshot(const BlockMap& map, bool labelled) const;
+
+  [[nodiscard]] std::size_t vertex_count() const { return vertices_.size() - free_.size(); }
+  [[nodiscard]] std::size_t face_count() const { return faces_; }
+  [[nodiscard]] std::size_t final_face_count() const { return final_faces_.size(); }
+
+ private:
+  using Face = LabelledMesh::Face;
+
+  static constexpr std::uint64_t kRemoved = ~std::uint64_t{0};
+
+  struct Vertex {
+    Eigen::Vector3f position = Eigen::Vector3f::Zero();
+    std::uint32_t uses = 0;       // by corners of faces
+    std::uint64_t id = kRemoved;  // see MapMesh::ids; kRemoved: the place is free
+    std::uint64_t computed = 0;   // update in which position and label were computed
+    KeyframeIndex first = 0, last = 0;
+    BlockMesh* owner = nullptr;  // null: its block is gone
+    std::uint16_t edge = 0;      // of the owner
+    LabelId label = 0;
+  };
+
+  [[nodiscard]] std::vector<VoxelBlock*> blocks_to_mesh(BlockMap& map) const;
+  void release(const Face& face);
+  void release_faces(VoxelBlock& block);
+  void mesh_block(VoxelBlock& block, BlockMap& map, MeshUpdateReport& report);
+  std::uint32_t vertex_on(const BlockCells& cells, const Eigen::Vector3i& voxel, int axis,
+                          const VoxelBlock& meshed, MeshUpdateReport& report);
+  std::uint32_t new_vertex(KeyframeIndex keyframe);
+  void compute(Vertex& vertex, const BlockCells& cells, const Eigen::Vector3i& voxel,
+               int axis) const;
+  [[nodiscard]] LabelId label_of(const VoxelBlock& block, std::size_t voxel) const;
+  std::size_t remove_unused();
+  void disown(VoxelBlock& block);
+
+  MarchingCubes table_;
+  double voxel_m_;
+  LabelModel label_model_;
+  double min_label_probability_;
+
+  std::vector<Vertex> vertices_;
+  std::vector<std::uint32_t> free_;          // places in vertices_
+  std::vector<std::uint32_t> maybe_unused_;  // lost a face since the last update
+  std::vector<Face> final_faces_;
+  std::vector<Face> forgotten_faces_;
+  std::size_t faces_ = 0;
+  std::uint64_t next_id_ = 0, update_ = 0;
+};
+
+}  // namespace km

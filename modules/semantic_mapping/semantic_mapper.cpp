@@ -1,0 +1,241 @@
+#include "modules/semantic_mapping/semantic_mapper.hpp"
+
+#include <algorithm>
+#include <opencv2/core/utility.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "modules/semantic_mapping/block_fusion.hpp"
+#include "modules/semantic_mapping/block_map.hpp"
+#include "modules/semantic_mapping/block_selection.hpp"
+#include "modules/semantic_mapping/depth_view.hpp"
+
+namespace km {
+namespace {
+
+// At the end of a frame so many eighths of max_blocks are left at most: room for the next frame.
+constexpr std::size_t kFullEighths = 7;
+
+LabelModel model_of(const SemanticMappingConfig& config, const LabelPalette& palette) {
+  std::size_t known = 0;
+  for (const LabelClass& entry : palette.classes()) known += entry.id != 0 ? 1 : 0;
+  return {std::max<std::size_t>(known, 1), config.label_confidence};
+}
+
+bool usable(const SE3& T) {
+  constexpr double kTolerance = 1e-3;
+  const Eigen::Matrix3d R = T.linear();
+  return T.matrix().allFinite() &&
+         (R.transpose() * R - Eigen::Matrix3d::Identity()).norm() < kTolerance &&
+         R.determinant() > 0.0;
+}
+
+template <typename Image, typename Pixels>
+bool fits(const Image& image, const Pixels& pixels, const PinholeCamera& camera) {
+  return image.width == camera.width && image.height == camera.height &&
+         pixels.size() ==
+             static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+}
+
+}  // namespace
+
+const char* to_string(IntegrationStatus status) {
+  switch (status) {
+    case IntegrationStatus::kIntegrated:
+      return "integrated";
+    case IntegrationStatus::kDepthSizeDiffers:
+      return "depth image of another size than the camera's";
+    case IntegrationStatus::kPoseUnusable:
+      return "pose not finite or not a rotation";
+  }
+  return "unknown";
+}
+
+struct SemanticMapper::State {
+  // A block in view, and how it is updated.
+  struct Update {
+    VoxelBlock* block = nullptr;
+    bool near = false;  // surface is seen in it or beside it
+    bool free = false;  // all of it is looked through
+  };
+
+  State(const SemanticMappingConfig& settings, const PinholeCamera& its_camera,
+        const LabelPalette& palette)
+      : config(checked(settings)),
+        camera(its_camera),
+        views(camera, config.min_range_m, config.max_range_m, palette),
+        mesh(config.voxel_size_m, model_of(config, palette), config.min_label_probability) {}
+
+  std::vector<Update> select(const DepthView& view, const BlockFusion& fusion,
+                             const SE3& T_odom_cam, IntegrationReport& report);
+  static void fuse(const BlockFusion& fusion, const std::vector<Update>& updates);
+  void remove_empty(const BlockFusion& fusion, const std::vector<Update>& updates,
+                    IntegrationReport& report);
+  void leave_window(IntegrationReport& report);
+  void make_room(IntegrationReport& report);
+  void finalise(const std::vector<VoxelBlock*>& blocks);
+  MeshUpdateReport update_mesh();
+
+  SemanticMappingConfig config;
+  PinholeCamera camera;
+  DepthViewMaker views;
+  BlockMap map;
+  IncrementalMesh mesh;
+  MeshUpdateReport unreported;  // of updates that had to come before blocks became final
+  std::uint64_t frame = 0;
+  KeyframeIndex keyframe = 0;
+  bool labelled = false;
+};
+
+std::vector<SemanticMapper::State::Update> SemanticMapper::State::select(
+    const DepthView& view, const BlockFusion& fusion, const SE3& T_odom_cam,
+    IntegrationReport& report) {
+  std::vector<Update> updates;
+  const NearBlocks near =
+      select_near_blocks(view, T_odom_cam, config.voxel_size_m,
+                         static_cast<std::size_t>(config.max_blocks), frame, keyframe, map);
+  report.blocks_allocated = near.allocated;
+  report.blocks_refused = near.refused;
+  report.blocks_updated = near.blocks.size();
+  for (VoxelBlock* block : near.blocks) {
+    if (view.labelled && block->labels == nullptr)
+      block->labels = std::make_unique<std::array<VoxelLabels, kBlockVoxels>>();
+    updates.push_back({block, true, false});
+  }
+  if (!config.carving) return updates;
+  for (const auto& block : map.blocks()) {
+    if (block->selected_in == frame) continue;
+    const BlockFusion::Relation relation = fusion.relation_to(*block);
+    if (relation == BlockFusion::Relation::kNotSeen) continue;
+    updates.push_back({block.get(), false, relation == BlockFusion::Relation::kFree});
+    ++report.blocks_seen_free;
+  }
+  return updates;
+}
+
+void SemanticMapper::State::fuse(const BlockFusion& fusion, const std::vector<Update>& updates) {
+  cv::parallel_for_(cv::Range(0, static_cast<int>(updates.size())), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) {
+      const Update& update = updates[static_cast<std::size_t>(i)];
+      if (update.free) {
+        fusion.fuse_free(*update.block);
+      } else {
+        fusion.fuse(*update.block);
+      }
+    }
+  });
+}
+
+void SemanticMapper::State::remove_empty(const BlockFusion& fusion,
+                                         const std::vector<Update>& updates,
+                                         IntegrationReport& report) {
+  for (const Update& update : updates) {
+    if (update.near || !fusion.is_empty(*update.block)) continue;
+    mesh.forget(*update.block, map, keyframe);
+    map.erase(Eigen::Vector3i(update.block->position));
+    ++report.blocks_removed;
+  }
+}
+
+void SemanticMapper::State::finalise(const std::vector<VoxelBlock*>& blocks) {
+  if (blocks.empty()) return;
+  const MeshUpdateReport done = mesh.update(map);
+  unreported.blocks += done.blocks;
+  unreported.vertices_added += done.vertices_added;
+  unreported.vertices_removed += done.vertices_removed;
+  for (VoxelBlock* block : blocks) {
+    mesh.finalise(*block, map);
+    map.erase(Eigen::Vector3i(block->position));
+  }
+}
+
+void SemanticMapper::State::leave_window(IntegrationReport& report) {
+  const auto window = static_cast<KeyframeIndex>(config.window_keyframes);
+  std::vector<VoxelBlock*> old;
+  for (const auto& block : map.blocks())
+    if (keyframe - block->last_seen > window) old.push_back(block.get());
+  report.blocks_finalised += old.size();
+  finalise(old);
+}
+
+void SemanticMapper::State::make_room(IntegrationReport& report) {
+  const std::size_t most = static_cast<std::size_t>(config.max_blocks) * kFullEighths / 8;
+  if (map.size() <= most) return;
+  std::vector<VoxelBlock*> others;  // than those of this frame
+  for (const auto& block : map.blocks())
+    if (block->selected_in != frame) others.push_back(block.get());
+  std::stable_sort(others.begin(), others.end(), [](const VoxelBlock* a, const VoxelBlock* b) {
+    return a->last_seen != b->last_seen ? a->last_seen < b->last_seen
+                                        : a->selected_in < b->selected_in;
+  });
+  others.resize(std::min(others.size(), map.size() - most));
+  report.blocks_finalised += others.size();
+  finalise(others);
+}
+
+MeshUpdateReport SemanticMapper::State::update_mesh() {
+  MeshUpdateReport report = mesh.update(map);
+  report.blocks += unreported.blocks;
+  report.vertices_added += unreported.vertices_added;
+  report.vertices_removed += unreported.vertices_removed;
+  unreported = {};
+  return report;
+}
+
+SemanticMapper::SemanticMapper(const SemanticMappingConfig& config, const PinholeCamera& camera,
+                               const LabelPalette& palette)
+    : state_(std::make_unique<State>(config, camera, palette)) {}
+SemanticMapper::~SemanticMapper() = default;
+SemanticMapper::SemanticMapper(SemanticMapper&&) noexcept = default;
+SemanticMapper& SemanticMapper::operator=(SemanticMapper&&) noexcept = default;
+
+IntegrationReport SemanticMapper::integrate(const DepthImage& depth, const LabelImage* labels,
+                                            const SE3& T_odom_cam, KeyframeIndex keyframe) {
+  State& state = *state_;
+  if (keyframe < state.keyframe)
+    throw std::invalid_argument("mapping: keyframe " + std::to_string(keyframe) + " after " +
+                                std::to_string(state.keyframe));
+  IntegrationReport report;
+  if (!fits(depth, depth.millimetres, state.camera)) {
+    report.status = IntegrationStatus::kDepthSizeDiffers;
+    return report;
+  }
+  if (!usable(T_odom_cam)) {
+    report.status = IntegrationStatus::kPoseUnusable;
+    return report;
+  }
+  report.label_size_differs = labels != nullptr && !fits(*labels, labels->ids, state.camera);
+  if (report.label_size_differs) labels = nullptr;
+
+  const bool new_keyframe = keyframe != state.keyframe;
+  state.keyframe = keyframe;
+  state.labelled |= labels != nullptr;
+  ++state.frame;
+  const DepthView& view = state.views.make(depth, labels);
+  report.pixels = view.with_depth;
+  report.labels_outside = view.labels_outside;
+
+  const BlockFusion fusion(state.config, view, T_odom_cam, keyframe);
+  const auto updates = state.select(view, fusion, T_odom_cam, report);
+  State::fuse(fusion, updates);
+  state.remove_empty(fusion, updates, report);
+  if (new_keyframe) state.leave_window(report);
+  state.make_room(report);
+  return report;
+}
+
+MeshUpdateReport SemanticMapper::update_mesh() {
+  return state_->update_mesh();
+}
+
+MapMesh SemanticMapper::mesh() const {
+  return state_->mesh.snapshot(state_->map, state_->labelled);
+}
+
+MapSize SemanticMapper::size() const {
+  return {state_->map.size(), state_->mesh.vertex_count(), state_->mesh.face_count(),
+          state_->mesh.final_face_count()};
+}
+
+}  // namespace km

@@ -1,0 +1,59 @@
+#include "modules/semantic_mapping/voxel_labels.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace km {
+
+double LabelModel::log_odds() const {
+  if (classes < 2) return std::numeric_limits<double>::infinity();
+  return std::log(confidence * static_cast<double>(classes - 1) / (1.0 - confidence));
+}
+
+void VoxelLabels::observe_other(LabelId label, unsigned votes) {
+  std::size_t place = 0;
+  while (place < kPlaces && ids_[place] != label && votes_[place] > 0) ++place;
+  if (place == kPlaces) {  // a fifth label
+    const unsigned paid = std::min<unsigned>(votes, votes_.back());
+    for (std::size_t i = 0; i < kPlaces; ++i) {
+      votes_[i] = static_cast<std::uint8_t>(votes_[i] - paid);
+      if (votes_[i] == 0) ids_[i] = 0;
+    }
+    if (votes > paid) observe_other(label, votes - paid);
+    return;
+  }
+  if (votes_[place] + votes > 255)
+    for (std::size_t i = 0; i < kPlaces; ++i) {
+      votes_[i] = static_cast<std::uint8_t>(votes_[i] / 2);
+      if (votes_[i] == 0) ids_[i] = 0;
+    }
+  ids_[place] = label;
+  votes_[place] = static_cast<std::uint8_t>(votes_[place] + votes);
+  for (; place > 0 && votes_[place] > votes_[place - 1]; --place) {
+    std::swap(votes_[place], votes_[place - 1]);
+    std::swap(ids_[place], ids_[place - 1]);
+  }
+}
+
+double VoxelLabels::weight_of(LabelId label) const {
+  for (std::size_t i = 0; i < kPlaces; ++i)
+    if (ids_[i] == label && label != 0)
+      return static_cast<double>(votes_[i]) / static_cast<double>(kVotesPerWeight);
+  return 0.0;
+}
+
+double VoxelLabels::probability(LabelId label, const LabelModel& model) const {
+  if (model.classes < 2) return 1.0;
+  const double delta = model.log_odds();
+  const double top = weight_of(best());
+  double sum = 0.0;  // of exp(delta (n - top)) over all classes
+  std::size_t unseen = model.classes;
+  for (std::size_t i = 0; i < kPlaces && votes_[i] > 0 && unseen > 0; ++i, --unseen)
+    sum += std::exp(delta * (weight_of(ids_[i]) - top));
+  sum += static_cast<double>(unseen) * std::exp(-delta * top);
+  return std::exp(delta * (weight_of(label) - top)) / sum;
+}
+
+}  // namespace km

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "modules/core/label_palette.hpp"
+
+namespace km {
+
+/// How sure one observed label is.
+///
+/// An observation of label m has the likelihood P(m | label l) = c for l = m and (1 - c) / (L - 1)
+/// for each other of the L classes: it sums to one over m. (Kimera-Semantics gives every other
+/// class 1 - c, so that five labels at 0.8 have the posterior 0.5 after one observation; here it is
+/// 0.8.) From a uniform prior, observations of weights w_m, likelihoods to the power of w, give
+///   P(l | all) ~ exp(delta n_l),  n_l = sum of w_m over observations of l,  delta = log(c (L-1) /
+///   (1-c)),
+/// so that the sums n_l are all a voxel has to keep.
+struct LabelModel {
+  std::size_t classes = 1;  ///< L, unknown not counted.
+  double confidence = 0.8;  ///< c, at least 0.5.
+
+  /// delta; infinite for a single class, which is certain.
+  [[nodiscard]] double log_odds() const;
+};
+
+/// The sums n_l of one voxel in 8 bytes: of the four labels with most votes, in eighths of weight.
+/// Exact while no more than four labels were seen. A fifth takes as many votes from each of the
+/// four as it brings, and a place that falls free (Misra and Gries, "Finding Repeated Elements",
+/// 1982): a label with more than a fifth of all votes is never lost. Beyond 255 votes, all are
+/// halved: old ones fade.
+class VoxelLabels {
+ public:
+  static constexpr unsigned kVotesPerWeight = 8;
+
+  /// Votes of an observation of weight in [0, 1]: rounded, at least one.
+  [[nodiscard]] static unsigned votes_of(float weight) {
+    const auto votes = static_cast<unsigned>(weight * static_cast<float>(kVotesPerWeight) + 0.5F);
+    return votes > 0 ? votes : 1;
+  }
+
+  /// Preconditions: a known label (not 0), 1 to kVotesPerWeight votes.
+  void observe(LabelId label, unsigned votes) {
+    if (ids_[0] == label && votes_[0] + votes <= 255) {
+      votes_[0] = static_cast<std::uint8_t>(votes_[0] + votes);
+    } else {
+      observe_other(label, votes);
+    }
+  }
+
+  /// The label with most votes, the earlier of equals; 0 without any.
+  [[nodiscard]] LabelId best() const { return ids_[0]; }
+
+  /// Sum of the weights n_l kept for a label.
+  [[nodiscard]] double weight_of(LabelId label) const;
+
+  /// Posterior of a known label.
+  [[nodiscard]] double probability(LabelId label, const LabelModel& model) const;
+
+ private:
+  static constexpr std::size_t kPlaces = 4;
+
+  void observe_other(LabelId label, unsigned votes);
+
+  std::array<LabelId, kPlaces> ids_ = {};         // by falling votes; 0: free
+  std::array<std::uint8_t, kPlaces> votes_ = {};  // 0 exactly where ids_ is
+};
+
+}  // namespace km

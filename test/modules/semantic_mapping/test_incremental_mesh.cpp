@@ -1,0 +1,265 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <random>
+
+#include "modules/semantic_mapping/incremental_mesh.hpp"
+#include "test/modules/semantic_mapping/mesh_checks.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kVoxel_m = 0.1;
+
+Eigen::Vector3d point_of(const VoxelBlock& block, int x, int y, int z) {
+  return kVoxel_m * (kBlockSide * block.position + Eigen::Vector3i(x, y, z)).cast<double>();
+}
+
+// Sets all voxels of a block from a distance function, as observed.
+template <typename Distance>
+void fill(VoxelBlock& block, const Distance& distance) {
+  for (int z = 0; z < kBlockSide; ++z)
+    for (int y = 0; y < kBlockSide; ++y)
+      for (int x = 0; x < kBlockSide; ++x) {
+        const std::size_t voxel = voxel_index(x, y, z);
+        block.distance[voxel] = static_cast<float>(distance(point_of(block, x, y, z)));
+        block.weight[voxel] = 1.0F;
+      }
+  block.changed = true;
+}
+
+// Blocks from -n to n - 1 along each axis: many borders run through what is in the middle.
+template <typename Distance>
+void fill(BlockMap& map, int n, const Distance& distance) {
+  for (int z = -n; z < n; ++z)
+    for (int y = -n; y < n; ++y)
+      for (int x = -n; x < n; ++x) fill(map.insert({x, y, z}), distance);
+}
+
+IncrementalMesh new_mesh() {
+  return {kVoxel_m, LabelModel{}, 0.0};
+}
+
+const Eigen::Vector3d kCentre(0.013, -0.021, 0.037);  // on no grid line
+
+struct Errors {
+  double mean = 0.0, largest = 0.0;
+};
+
+// Distances of the vertices from the surface [voxels].
+template <typename Distance>
+Errors errors_of(const LabelledMesh& mesh, const Distance& distance) {
+  Errors errors;
+  for (const Eigen::Vector3f& p : mesh.vertices) {
+    const double error = std::abs(distance(p.cast<double>())) / kVoxel_m;
+    errors.mean += error / static_cast<double>(mesh.vertices.size());
+    errors.largest = std::max(errors.largest, error);
+  }
+  return errors;
+}
+
+TEST_CASE("The mesh of a sphere is closed across blocks and near the sphere",
+          "[semantic_mapping]") {
+  constexpr double kRadius_m = 1.0;
+  const auto sphere = [](const Eigen::Vector3d& p) { return (p - kCentre).norm() - kRadius_m; };
+  BlockMap map;
+  fill(map, 2, sphere);
+  IncrementalMesh mesh = new_mesh();
+  const MeshUpdateReport report = mesh.update(map);
+  const LabelledMesh result = mesh.snapshot(map, false).mesh;
+  CHECK(report.vertices_added == result.vertices.size());
+  CHECK(result.labels.empty());
+  REQUIRE(result.vertices.size() > 1000);
+  CHECK(rim_of(result).empty());
+  // A closed surface of genus 0 without doubled vertices: V - E + F = 2, E = 3 F / 2.
+  CHECK(2 * result.vertices.size() == result.faces.size() + 4);
+  const Errors errors = errors_of(result, sphere);
+  CHECK(errors.mean < 0.1);
+  CHECK(errors.largest < 0.1);
+  // A polyhedron with its corners on the sphere lies inside: smaller, by curvature times voxel.
+  const double volume = 4.0 / 3.0 * std::numbers::pi * std::pow(kRadius_m, 3);
+  CHECK(volume_of(result) < volume);
+  CHECK(volume_of(result) > 0.98 * volume);
+}
+
+TEST_CASE("The mesh of a box is closed across blocks and near the box", "[semantic_mapping]") {
+  const Eigen::Vector3d half(0.93, 0.61, 1.17);
+  // Exact outside and inside (Euclidean).
+  const auto box = [&](const Eigen::Vector3d& p) {
+    const Eigen::Vector3d q = (p - kCentre).cwiseAbs() - half;
+    return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
+  };
+  BlockMap map;
+  fill(map, 2, box);
+  IncrementalMesh mesh = new_mesh();
+  mesh.update(map);
+  const LabelledMesh result = mesh.snapshot(map, false).mesh;
+  CHECK(rim_of(result).empty());
+  CHECK(2 * result.vertices.size() == result.faces.size() + 4);
+  const Errors errors = errors_of(result, box);
+  CHECK(errors.mean < 0.05);     // exact on the faces; beside edges and corners, which are cut
+  CHECK(errors.largest < 0.25);  // off, interpolation errs by up to a quarter
+  CHECK(volume_of(result) == Approx(8.0 * half.prod()).epsilon(0.01));
+}
+
+TEST_CASE("Whatever the signs, the surface has no cracks", "[semantic_mapping]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<double> draw(-1.0, 1.0);
+  BlockMap map;
+  // Noise in the middle, free space around it.
+  fill(map, 2, [&](const Eigen::Vector3d& p) {
+    const double value = draw(rng);
+    return p.cwiseAbs().maxCoeff() < 11.5 * kVoxel_m ? value : 1.0;
+  });
+  IncrementalMesh mesh = new_mesh();
+  mesh.update(map);
+  const LabelledMesh result = mesh.snapshot(map, false).mesh;
+  CHECK(result.faces.size() > 10000);  // all 256 kinds of cells
+  CHECK(rim_of(result).empty());
+  CHECK(volume_of(result) > 0.0);
+}
+
+TEST_CASE("Marching cubes uses each edge that changes sign, and no other", "[semantic_mapping]") {
+  const MarchingCubes table;
+  for (unsigned negative = 0; negative < 256; ++negative) {
+    CAPTURE(negative);
+    unsigned used = 0, expected = 0;
+    for (const auto& triangle : table.triangles(negative))
+      for (const std::uint8_t edge : triangle) used |= 1U << edge;
+    for (int edge = 0; edge < MarchingCubes::kEdges; ++edge) {
+      const int first = MarchingCubes::first_corner_of_edge(edge);
+      const int second = first | 1 << MarchingCubes::axis_of_edge(edge);
+      CHECK(first != second);
+      if ((negative >> first & 1U) != (negative >> second & 1U)) expected |= 1U << edge;
+    }
+    CHECK(used == expected);
+    CHECK(table.triangles(negative).size() <= 5);
+  }
+}
+
+TEST_CASE("Only changed blocks are meshed again, and vertices keep their identity",
+          "[semantic_mapping]") {
+  double radius_m = 1.0;
+  const auto sphere = [&](const Eigen::Vector3d& p) { return (p - kCentre).norm() - radius_m; };
+  BlockMap map;
+  fill(map, 2, sphere);
+  IncrementalMesh mesh = new_mesh();
+  CHECK(mesh.update(map).blocks == 64);
+  const MapMesh before = mesh.snapshot(map, false);
+  CHECK(std::is_sorted(before.ids.begin(), before.ids.end()));
+
+  SECTION("without a change nothing happens") {
+    CHECK(mesh.update(map).blocks == 0);
+    const MapMesh after = mesh.snapshot(map, false);
+    CHECK(after.ids == before.ids);
+    CHECK(after.mesh.faces == before.mesh.faces);
+  }
+  SECTION("the same values again give the same vertices") {
+    for (const auto& block : map.blocks()) fill(*block, sphere);
+    const MeshUpdateReport report = mesh.update(map);
+    CHECK(report.vertices_added == 0);
+    CHECK(report.vertices_removed == 0);
+    const MapMesh after = mesh.snapshot(map, false);
+    CHECK(after.ids == before.ids);
+    CHECK(after.mesh.vertices == before.mesh.vertices);
+    CHECK(after.mesh.faces == before.mesh.faces);
+  }
+  SECTION("one block changes: it and the seven below are meshed") {
+    VoxelBlock* block = map.find({0, 0, 0});
+    REQUIRE(block != nullptr);
+    fill(*block, sphere);
+    CHECK(mesh.update(map).blocks == 8);
+    CHECK(mesh.snapshot(map, false).ids == before.ids);
+  }
+  SECTION("a sphere that grows a little keeps most of its vertices, and stays closed") {
+    radius_m = 1.01;
+    for (const auto& block : map.blocks()) fill(*block, sphere);
+    mesh.update(map);
+    const MapMesh after = mesh.snapshot(map, false);
+    CHECK(rim_of(after.mesh).empty());
+    std::vector<std::uint64_t> kept;
+    std::set_intersection(before.ids.begin(), before.ids.end(), after.ids.begin(), after.ids.end(),
+                          std::back_inserter(kept));
+    // A tenth of a voxel: about that share of the grid edges is passed.
+    CHECK(kept.size() > before.ids.size() * 8 / 10);
+    CHECK(kept.size() < before.ids.size());
+  }
+}
+
+TEST_CASE("Final mesh stays when its blocks go, and hangs together with the rest",
+          "[semantic_mapping]") {
+  double radius_m = 1.0;
+  const auto sphere = [&](const Eigen::Vector3d& p) { return (p - kCentre).norm() - radius_m; };
+  BlockMap map;
+  fill(map, 2, sphere);
+  IncrementalMesh mesh = new_mesh();
+  mesh.update(map);
+  const MapMesh before = mesh.snapshot(map, false);
+  for (const auto& block : std::vector<Eigen::Vector3i>{{0, 0, 0}, {1, 0, 0}, {0, -1, 1}}) {
+    mesh.finalise(*map.find(block), map);
+    map.erase(block);
+  }
+  CHECK(mesh.final_face_count() > 0);
+
+  const MapMesh same = mesh.snapshot(map, false);
+  CHECK(same.ids == before.ids);
+  CHECK(same.mesh.vertices == before.mesh.vertices);
+  CHECK(same.mesh.faces.size() == before.mesh.faces.size());
+  CHECK(rim_of(same.mesh).empty());
+
+  // The rest meshed again: the same surface, the seam closed.
+  for (const auto& block : map.blocks()) fill(*block, sphere);
+  mesh.update(map);
+  const MapMesh again = mesh.snapshot(map, false);
+  CHECK(again.ids == before.ids);
+  CHECK(rim_of(again.mesh).empty());
+
+  // One of them comes back, seen anew: what it adds are new vertices.
+  fill(map.insert({0, 0, 0}), sphere);
+  mesh.update(map);
+  const MapMesh revisited = mesh.snapshot(map, false);
+  CHECK(revisited.ids.size() > before.ids.size());
+  CHECK(std::includes(revisited.ids.begin(), revisited.ids.end(), before.ids.begin(),
+                      before.ids.end()));
+}
+
+TEST_CASE("What a forgotten block showed goes with it", "[semantic_mapping]") {
+  const auto sphere = [](const Eigen::Vector3d& p) {
+    return (p - Eigen::Vector3d::Constant(0.4)).norm() - 0.25;
+  };
+  BlockMap map;
+  fill(map, 2, sphere);  // all of it in block (0, 0, 0)
+  IncrementalMesh mesh = new_mesh();
+  mesh.update(map);
+  CHECK(mesh.face_count() > 0);
+  mesh.forget(*map.find({0, 0, 0}), map, 1);
+  map.erase({0, 0, 0});
+  mesh.update(map);
+  CHECK(mesh.face_count() == 0);
+  CHECK(mesh.vertex_count() == 0);
+  CHECK(mesh.snapshot(map, false).mesh.vertices.empty());
+}
+
+TEST_CASE("Unobserved voxels leave a hole, not a wall", "[semantic_mapping]") {
+  const auto plane = [](const Eigen::Vector3d& p) { return p.z() - 0.05; };
+  BlockMap map;
+  fill(map, 1, plane);
+  map.find({0, 0, 0})->weight[voxel_index(4, 4, 0)] = 0.0F;
+  IncrementalMesh mesh = new_mesh();
+  mesh.update(map);
+  const LabelledMesh result = mesh.snapshot(map, false).mesh;
+  // 15 x 15 cells of two triangles, without the four around the voxel.
+  CHECK(result.faces.size() == 2 * (15 * 15 - 4));
+  // Counter-clockwise from free space, above.
+  for (const auto& face : result.faces) {
+    const Eigen::Vector3f a = result.vertices[face[0]], b = result.vertices[face[1]];
+    CHECK((b - a).cross(result.vertices[face[2]] - a).z() > 0.0F);
+  }
+}
+
+}  // namespace
+}  // namespace km

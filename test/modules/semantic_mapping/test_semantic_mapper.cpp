@@ -1,0 +1,431 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+#include <opencv2/core/utility.hpp>
+#include <set>
+#include <stdexcept>
+
+#include "modules/semantic_mapping/semantic_mapper.hpp"
+#include "test/modules/semantic_mapping/box_room.hpp"
+#include "test/modules/semantic_mapping/mesh_checks.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// A quarter of the benchmark's camera: 160 x 120.
+PinholeCamera small_camera() {
+  PinholeCamera camera = BoxRoom::camera();
+  camera.width /= 4;
+  camera.height /= 4;
+  camera.fx = camera.fy = camera.fx / 4.0;
+  camera.cx = 79.5;
+  camera.cy = 59.5;
+  return camera;
+}
+
+SemanticMappingConfig settings(double voxel_m = 0.1) {
+  SemanticMappingConfig config;
+  config.voxel_size_m = voxel_m;
+  return config;
+}
+
+// A wall at z = `wall_m`, and before it, if `ball`, a ball of radius 0.4 m at z = 1.5 m. Labels
+// 1, 2.
+auto wall_and_ball(double wall_m, bool ball) {
+  return [=](const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, LabelId& label) {
+    const Eigen::Vector3d to_origin = origin - Eigen::Vector3d(0.0, 0.0, 1.5);
+    const double a = direction.squaredNorm(), b = direction.dot(to_origin);
+    const double root = b * b - a * (to_origin.squaredNorm() - 0.4 * 0.4);
+    if (ball && root > 0.0) {
+      label = 2;
+      return (-b - std::sqrt(root)) / a;
+    }
+    label = 1;
+    return direction.z() > 0.0 ? (wall_m - origin.z()) / direction.z() : kInfinity;
+  };
+}
+
+DepthAndLabels wall(double wall_m, bool ball = false, const SE3& T_odom_cam = SE3::Identity()) {
+  return render(small_camera(), T_odom_cam, wall_and_ball(wall_m, ball));
+}
+
+SE3 at(double x, double y = 0.0, double z = 0.0) {
+  return make_pose(Eigen::Matrix3d::Identity(), {x, y, z});
+}
+
+bool integrate(SemanticMapper& mapper, const DepthAndLabels& images, const SE3& T_odom_cam,
+               KeyframeIndex keyframe) {
+  return mapper.integrate(images.depth, &images.labels, T_odom_cam, keyframe).status ==
+         IntegrationStatus::kIntegrated;
+}
+
+LabelPalette two_classes() {
+  return LabelPalette({{1, "wall", {200, 0, 0}}, {2, "ball", {0, 200, 0}}});
+}
+
+std::size_t vertices_before(const MapMesh& map, double z_m) {
+  return static_cast<std::size_t>(
+      std::count_if(map.mesh.vertices.begin(), map.mesh.vertices.end(),
+                    [&](const Eigen::Vector3f& p) { return static_cast<double>(p.z()) < z_m; }));
+}
+
+TEST_CASE("A room is mapped where it is, with its labels", "[semantic_mapping]") {
+  const double voxel_m = GENERATE(0.05, 0.1);
+  const bool distorted = GENERATE(false, true);
+  CAPTURE(voxel_m, distorted);
+  PinholeCamera camera = small_camera();
+  if (distorted) camera.distortion = {-0.28, 0.07, 2e-4, -1e-4};  // as of EuRoC's cameras
+  SemanticMapper mapper(settings(voxel_m), camera, BoxRoom::palette());
+  // Shifted and turned against the grid.
+  const SE3 T_odom_room = make_pose(
+      Eigen::AngleAxisd(0.5, Eigen::Vector3d(0.1, 0.2, 1.0).normalized()).toRotationMatrix(),
+      {20.3, -7.1, 0.4});
+  for (int i = 0; i < 20; ++i)
+    REQUIRE(integrate(mapper, render(camera, BoxRoom::T_room_cam(2 * i), cast_room),
+                      T_odom_room * BoxRoom::T_room_cam(2 * i), static_cast<KeyframeIndex>(i)));
+  mapper.update_mesh();
+  const MapMesh map = mapper.mesh();
+  REQUIRE(map.mesh.vertices.size() > 5000);
+  REQUIRE(map.mesh.labels.size() == map.mesh.vertices.size());
+  REQUIRE(map.seen_by.size() == map.mesh.vertices.size());
+  double error_m = 0.0;
+  std::size_t right = 0;
+  for (std::size_t i = 0; i < map.mesh.vertices.size(); ++i) {
+    const Eigen::Vector3d p = T_odom_room.inverse() * map.mesh.vertices[i].cast<double>();
+    error_m += BoxRoom::distance(p);
+    right += map.mesh.labels[i] == BoxRoom::label_at(p) ? 1 : 0;
+    CHECK(map.seen_by[i][0] <= map.seen_by[i][1]);
+  }
+  const auto count = static_cast<double>(map.mesh.vertices.size());
+  // Half a pixel at 5 m is 19 mm of a wall, and so much of depth where it is seen at 45 degrees:
+  // means over many frames are far below that.
+  CHECK(error_m / count < 0.003);
+  CHECK(static_cast<double>(right) / count > 0.97);  // not where walls meet
+}
+
+TEST_CASE("Two depths are averaged by their weights", "[semantic_mapping]") {
+  // Seen from z = 0 as 2.00 m and, with the camera at -2 m, 4.04 m: surface at 2.00 and 2.04 m.
+  SemanticMappingConfig config = settings();
+  config.depth_sigma_m = 0.01;
+  config.depth_sigma_per_m = 0.005;
+  SemanticMapper mapper(config, small_camera());
+  const auto flat = [](double depth) { return wall(depth).depth; };
+  (void)mapper.integrate(flat(2.00), nullptr, at(0, 0, 0), 0);
+  (void)mapper.integrate(flat(4.04), nullptr, at(0, 0, -2), 0);
+  mapper.update_mesh();
+  // Variances: 1e-4 + (0.005 z^2)^2.
+  const double near = 1.0 / (1e-4 + std::pow(0.005 * 4.0, 2));
+  const double far = 1.0 / (1e-4 + std::pow(0.005 * 4.04 * 4.04, 2));
+  const double expected_m = (near * 2.00 + far * 2.04) / (near + far);
+  const MapMesh map = mapper.mesh();
+  CHECK(map.mesh.labels.empty());
+  std::size_t seen_twice = 0;
+  for (const Eigen::Vector3f& p : map.mesh.vertices) {
+    if (std::abs(p.x()) > 0.8F || std::abs(p.y()) > 0.6F) continue;  // in the first image only
+    ++seen_twice;
+    CHECK(static_cast<double>(p.z()) == Approx(expected_m).margin(2e-4));  // clamped to the edge
+  }
+  CHECK(seen_twice > 100);
+}
+
+TEST_CASE("Pixels without depth change nothing", "[semantic_mapping]") {
+  SemanticMappingConfig config = settings();
+  config.max_range_m = 65.0;
+  SemanticMapper mapper(config, small_camera(), two_classes());
+  DepthAndLabels images = wall(2.0);
+  const std::uint16_t none = GENERATE(std::uint16_t{0}, std::uint16_t{65535}, std::uint16_t{100});
+  CAPTURE(none);
+  std::fill(images.depth.millimetres.begin(), images.depth.millimetres.end(), none);
+  const IntegrationReport report = mapper.integrate(images.depth, &images.labels, at(0), 0);
+  CHECK(report.status == IntegrationStatus::kIntegrated);
+  CHECK(report.pixels == 0);
+  CHECK(report.blocks_updated == 0);
+  mapper.update_mesh();
+  CHECK(mapper.mesh().mesh.empty());
+  CHECK(mapper.size().blocks == 0);
+
+  // Half of an image: the other half is mapped.
+  images = wall(2.0);
+  for (std::size_t i = 0; i < images.depth.millimetres.size() / 2; ++i)
+    images.depth.millimetres[i] = none;
+  CHECK(mapper.integrate(images.depth, &images.labels, at(0), 0).pixels == 160 * 60);
+  mapper.update_mesh();
+  const MapMesh map = mapper.mesh();
+  CHECK(map.mesh.vertices.size() > 100);
+  for (const Eigen::Vector3f& p : map.mesh.vertices) {
+    CHECK(p.y() > -0.11F);  // a voxel beyond the middle
+    CHECK(p.z() == Approx(2.0F).margin(1e-3));
+  }
+}
+
+TEST_CASE("Frames that cannot be used are refused and leave the map as it is",
+          "[semantic_mapping]") {
+  SemanticMapper mapper(settings(), small_camera(), two_classes());
+  const DepthAndLabels good = wall(2.0);
+  REQUIRE(integrate(mapper, good, at(0), 3));
+  mapper.update_mesh();
+  const MapMesh before = mapper.mesh();
+  const std::size_t blocks = mapper.size().blocks;
+
+  SECTION("a depth image of another size") {
+    DepthImage depth = good.depth;
+    depth.width = 80;
+    CHECK(mapper.integrate(depth, nullptr, at(0), 3).status ==
+          IntegrationStatus::kDepthSizeDiffers);
+    depth = good.depth;
+    depth.millimetres.pop_back();
+    CHECK(mapper.integrate(depth, nullptr, at(0), 3).status ==
+          IntegrationStatus::kDepthSizeDiffers);
+  }
+  SECTION("a pose that is none") {
+    SE3 T = at(0);
+    T.translation().x() = std::numeric_limits<double>::quiet_NaN();
+    CHECK(mapper.integrate(good.depth, nullptr, T, 3).status == IntegrationStatus::kPoseUnusable);
+    T = at(0);
+    T.linear() *= 1.1;
+    CHECK(mapper.integrate(good.depth, nullptr, T, 3).status == IntegrationStatus::kPoseUnusable);
+    T = at(0);
+    T.linear().col(0) *= -1.0;
+    CHECK(mapper.integrate(good.depth, nullptr, T, 3).status == IntegrationStatus::kPoseUnusable);
+  }
+  SECTION("a keyframe before the last") {
+    CHECK_THROWS_AS(mapper.integrate(good.depth, nullptr, at(0), 2), std::invalid_argument);
+  }
+  CHECK(mapper.update_mesh().blocks == 0);
+  CHECK(mapper.mesh().mesh.vertices == before.mesh.vertices);
+  CHECK(mapper.size().blocks == blocks);
+}
+
+TEST_CASE("A pose out of the map's reach maps nothing", "[semantic_mapping]") {
+  SemanticMapper mapper(settings(), small_camera(), two_classes());
+  const double far_m = GENERATE(1e7, -1e12, 1e300);
+  CAPTURE(far_m);
+  const IntegrationReport report = mapper.integrate(wall(2.0).depth, nullptr, at(far_m), 0);
+  CHECK(report.blocks_refused > 0);
+  CHECK(mapper.size().blocks == 0);
+}
+
+TEST_CASE("Labels of another size or outside the palette are left out and counted",
+          "[semantic_mapping]") {
+  SemanticMapper mapper(settings(), small_camera(), two_classes());
+  DepthAndLabels images = wall(2.0);
+  SECTION("another size") {
+    images.labels.ids.resize(100);
+    const IntegrationReport report = mapper.integrate(images.depth, &images.labels, at(0), 0);
+    CHECK(report.status == IntegrationStatus::kIntegrated);
+    CHECK(report.label_size_differs);
+    mapper.update_mesh();
+    CHECK(mapper.mesh().mesh.labels.empty());
+    CHECK(mapper.mesh().mesh.vertices.size() > 100);
+  }
+  SECTION("outside the palette") {
+    const std::size_t columns = 160, half = columns / 2;
+    for (std::size_t i = 0; i < images.labels.ids.size(); ++i)
+      if (i % columns < half) images.labels.ids[i] = 77;
+    const IntegrationReport report = mapper.integrate(images.depth, &images.labels, at(0), 0);
+    CHECK(report.labels_outside == images.labels.ids.size() / 2);
+    CHECK_FALSE(report.label_size_differs);
+    mapper.update_mesh();
+    const MapMesh map = mapper.mesh();
+    for (std::size_t i = 0; i < map.mesh.vertices.size(); ++i) {
+      const float x = map.mesh.vertices[i].x();
+      if (x < -0.11F) CHECK(map.mesh.labels[i] == 0);
+      if (x > 0.11F) CHECK(map.mesh.labels[i] == 1);
+    }
+  }
+}
+
+TEST_CASE("The label seen more often wins, and a doubtful one is unknown", "[semantic_mapping]") {
+  SemanticMappingConfig config = settings();
+  config.label_confidence = 0.8;
+  config.min_label_probability = GENERATE(0.0, 0.7, 0.85);
+  config.depth_sigma_per_m = 0.0;  // all weights are 1
+  CAPTURE(config.min_label_probability);
+  SemanticMapper mapper(config, small_camera(), two_classes());
+  DepthAndLabels wrong = wall(2.0);
+  std::fill(wrong.labels.ids.begin(), wrong.labels.ids.end(), LabelId{2});
+  REQUIRE(integrate(mapper, wrong, at(0), 0));
+  REQUIRE(integrate(mapper, wall(2.0), at(0), 0));
+  REQUIRE(integrate(mapper, wall(2.0), at(0), 0));
+  mapper.update_mesh();
+  // Two against one of two classes: posterior 0.8.
+  const LabelId expected = config.min_label_probability < 0.8 ? LabelId{1} : LabelId{0};
+  const MapMesh map = mapper.mesh();
+  REQUIRE(map.mesh.labels.size() > 100);
+  std::size_t inside = 0;
+  for (std::size_t i = 0; i < map.mesh.vertices.size(); ++i) {
+    const Eigen::Vector3f& p = map.mesh.vertices[i];
+    if (std::abs(p.x()) > 1.0F || std::abs(p.y()) > 0.7F) continue;  // the image's border
+    ++inside;
+    CHECK(map.mesh.labels[i] == expected);
+  }
+  CHECK(inside > 100);
+}
+
+TEST_CASE("Carving removes what went away", "[semantic_mapping]") {
+  SemanticMappingConfig config = settings(0.05);
+  config.carving = GENERATE(true, false);
+  CAPTURE(config.carving);
+  SemanticMapper mapper(config, small_camera(), two_classes());
+  for (KeyframeIndex i = 0; i < 5; ++i) REQUIRE(integrate(mapper, wall(3.0, true), at(0), i));
+  mapper.update_mesh();
+  const std::size_t with_ball = vertices_before(mapper.mesh(), 2.0);
+  CHECK(with_ball > 200);
+
+  std::size_t removed = 0;
+  for (KeyframeIndex i = 5; i < 25; ++i) {
+    const DepthAndLabels images = wall(3.0);
+    removed += mapper.integrate(images.depth, &images.labels, at(0), i).blocks_removed;
+    if (i % 3 == 0) mapper.update_mesh();
+  }
+  mapper.update_mesh();
+  const MapMesh map = mapper.mesh();
+  CHECK(vertices_before(map, 2.0) == (config.carving ? 0 : with_ball));
+  CHECK((removed > 0) == config.carving);
+  CHECK(map.mesh.vertices.size() > vertices_before(map, 2.0) + 500);  // the wall
+}
+
+TEST_CASE("A frame seen again keeps every vertex and its first keyframe", "[semantic_mapping]") {
+  SemanticMapper mapper(settings(0.05), small_camera(), two_classes());
+  REQUIRE(integrate(mapper, wall(2.51, true), at(0), 4));
+  CHECK(mapper.update_mesh().vertices_added > 500);
+  const MapMesh before = mapper.mesh();
+  CHECK(mapper.update_mesh().blocks == 0);
+  REQUIRE(integrate(mapper, wall(2.51, true), at(0), 7));
+  const MeshUpdateReport report = mapper.update_mesh();
+  CHECK(report.vertices_added == 0);
+  CHECK(report.vertices_removed == 0);
+  const MapMesh after = mapper.mesh();
+  CHECK(after.ids == before.ids);
+  CHECK(after.mesh.labels == before.mesh.labels);
+  CHECK(after.mesh.faces.size() == before.mesh.faces.size());
+  std::size_t seen_again = 0;
+  for (std::size_t i = 0; i < after.ids.size(); ++i) {
+    CHECK(before.seen_by[i] == std::array<KeyframeIndex, 2>{4, 4});
+    CHECK(after.seen_by[i][0] == 4);
+    CHECK((after.seen_by[i][1] == 4 || after.seen_by[i][1] == 7));
+    seen_again += after.seen_by[i][1] == 7 ? 1 : 0;
+    CHECK((after.mesh.vertices[i] - before.mesh.vertices[i]).norm() < 1e-5F);
+  }
+  // Not those at the ball's rim, where the surface runs along the line of sight.
+  CHECK(seen_again > after.ids.size() * 9 / 10);
+}
+
+TEST_CASE("What left the window is final, and a revisit makes vertices of its own",
+          "[semantic_mapping]") {
+  SemanticMappingConfig config = settings();
+  config.window_keyframes = 5;
+  SemanticMapper mapper(config, small_camera(), two_classes());
+  for (KeyframeIndex i = 0; i < 3; ++i) REQUIRE(integrate(mapper, wall(2.03), at(0), i));
+  mapper.update_mesh();
+  const MapMesh first = mapper.mesh();
+  std::size_t finalised = 0;
+  for (KeyframeIndex i = 3; i < 10; ++i) {
+    const DepthAndLabels images = wall(2.03);
+    finalised += mapper.integrate(images.depth, &images.labels, at(20), i).blocks_finalised;
+  }
+  CHECK(finalised > 0);
+  for (KeyframeIndex i = 10; i < 12; ++i) REQUIRE(integrate(mapper, wall(2.08), at(0), i));
+  mapper.update_mesh();
+  const MapMesh last = mapper.mesh();
+  CHECK(mapper.size().final_faces == first.mesh.faces.size());
+  REQUIRE(std::includes(last.ids.begin(), last.ids.end(), first.ids.begin(), first.ids.end()));
+  std::size_t anew = 0;
+  for (std::size_t i = 0, old = 0; i < last.ids.size(); ++i) {
+    if (old < first.ids.size() && last.ids[i] == first.ids[old]) {
+      CHECK(last.seen_by[i] == first.seen_by[old]);
+      CHECK(last.mesh.vertices[i] == first.mesh.vertices[old]);
+      CHECK(last.mesh.labels[i] == first.mesh.labels[old++]);
+    } else if (last.mesh.vertices[i].x() < 5.0F) {
+      ++anew;
+      CHECK(last.seen_by[i][0] >= 10);
+      CHECK(last.mesh.vertices[i].z() == Approx(2.08F).margin(1e-3));
+    }
+  }
+  CHECK(anew > 100);
+}
+
+// Along a wall with a window shorter than the way: rim edges away from the wall's own border.
+TEST_CASE("Mesh that became final on the way has no cracks", "[semantic_mapping]") {
+  SemanticMappingConfig config = settings();
+  config.window_keyframes = 4;
+  SemanticMapper mapper(config, small_camera(), two_classes());
+  for (KeyframeIndex i = 0; i < 60; ++i) {
+    const SE3 T_odom_cam = at(0.15 * i, 0.02 * i);
+    REQUIRE(integrate(mapper, wall(2.03, false, T_odom_cam), T_odom_cam, i));
+    mapper.update_mesh();
+  }
+  const MapSize size = mapper.size();
+  CHECK(size.final_faces > size.faces / 2);
+  const LabelledMesh mesh = mapper.mesh().mesh;
+  std::size_t cracks = 0;
+  for (const auto& [a, b] : rim_of(mesh)) {
+    const Eigen::Vector3f p = 0.5F * (mesh.vertices[a] + mesh.vertices[b]);
+    const float middle = p.x() * 0.02F / 0.15F;  // height of the camera when it was there
+    if (p.x() > -0.8F && p.x() < 9.6F && std::abs(p.y() - middle) < 0.6F) ++cracks;
+  }
+  CHECK(cracks == 0);
+}
+
+TEST_CASE("Blocks never exceed their bound, and their mesh is not lost", "[semantic_mapping]") {
+  SemanticMappingConfig config = settings();
+  config.max_blocks = 64;
+  SemanticMapper mapper(config, small_camera(), two_classes());
+  std::size_t finalised = 0, refused = 0;
+  for (KeyframeIndex i = 0; i < 80; ++i) {
+    const SE3 T_odom_cam = at(0.25 * i);
+    const DepthAndLabels images = wall(2.03, false, T_odom_cam);
+    const IntegrationReport report = mapper.integrate(images.depth, &images.labels, T_odom_cam, i);
+    finalised += report.blocks_finalised;
+    refused += report.blocks_refused;
+    CHECK(mapper.size().blocks <= 64);
+  }
+  CHECK(finalised > 0);
+  CHECK(refused == 0);
+  mapper.update_mesh();
+  // 20 m of wall, 1.8 m high.
+  std::set<int> columns;
+  for (const Eigen::Vector3f& p : mapper.mesh().mesh.vertices)
+    columns.insert(static_cast<int>(std::floor(p.x() + 0.5F)));
+  for (int x = 0; x < 20; ++x) CHECK(columns.contains(x));
+
+  // A frame that alone needs more: counted, within the bound.
+  config.voxel_size_m = 0.02;
+  SemanticMapper full(config, small_camera(), two_classes());
+  CHECK(full.integrate(wall(2.03).depth, nullptr, at(0), 0).blocks_refused > 0);
+  CHECK(full.size().blocks == 64);
+}
+
+TEST_CASE("Two threads give the same mesh as one, bit by bit", "[semantic_mapping]") {
+  const auto map_with = [](int threads) {
+    cv::setNumThreads(threads);
+    SemanticMapper mapper(settings(), small_camera(), BoxRoom::palette());
+    for (int i = 0; i < 10; ++i) {
+      const SE3 T_room_cam = BoxRoom::T_room_cam(3 * i);
+      REQUIRE(integrate(mapper, render(small_camera(), T_room_cam, cast_room), T_room_cam,
+                        static_cast<KeyframeIndex>(i)));
+      mapper.update_mesh();
+    }
+    return mapper.mesh();
+  };
+  const MapMesh one = map_with(1), two = map_with(2);
+  cv::setNumThreads(-1);
+  CHECK(one.ids == two.ids);
+  CHECK(one.seen_by == two.seen_by);
+  CHECK(one.mesh.vertices == two.mesh.vertices);
+  CHECK(one.mesh.labels == two.mesh.labels);
+  CHECK(one.mesh.faces == two.mesh.faces);
+}
+
+TEST_CASE("Unusable settings and cameras are refused", "[semantic_mapping]") {
+  SemanticMappingConfig config = settings();
+  config.voxel_size_m = 0.0;
+  CHECK_THROWS_AS(SemanticMapper(config, small_camera()), ConfigError);
+  CHECK_THROWS_AS(SemanticMapper(settings(), PinholeCamera{}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace km
