@@ -33,13 +33,13 @@ World make_world(const SimulationOptions& options) {
   return make_vicon_room(options.seed);
 }
 
-// Bytes of one frame's images, from what city and room take at several resolutions.
+// Bytes of one frame's images: a little above what pixels took in city, camp and room.
 double frame_bytes(const SimulationOptions& options) {
   const double pixels = static_cast<double>(options.width) * options.height;
-  const double gray = options.format == ImageFormat::kJpeg ? 0.55 : 0.8;
+  const double gray = options.format == ImageFormat::kJpeg ? 0.5 : 0.7;
   double bytes = gray * (options.cameras == CameraKind::kStereo ? 2.0 : 1.0);
-  if (options.depth) bytes += 1.0 * options.depth_rate_hz / options.rate_hz;
-  if (options.labels) bytes += 0.02;
+  if (options.depth) bytes += 0.45 * options.depth_rate_hz / options.rate_hz;
+  if (options.labels) bytes += 0.05;
   if (options.color) bytes += 1.3 * gray;
   return bytes * pixels;
 }

@@ -108,6 +108,8 @@ void define_images(CLI::App& app, SimulationOptions& options) {
 }  // namespace
 
 void define(CLI::App& app, SimulationOptions& options) {
+  app.set_config("--config", "", "File of options, see config/simulation/");
+  app.allow_config_extras(CLI::config_extras_mode::error);
   choice(app, "--world", options.world, kWorlds, "What there is to see")->required();
   app.add_option("--robots", options.robots, "How many robots move through it")
       ->check(CLI::Range(1, 99))

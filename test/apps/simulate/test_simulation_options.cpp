@@ -87,6 +87,29 @@ TEST_CASE("Recorded motion needs a pair of files for each robot", "[simulate]") 
   CHECK(options.robots == 2);
 }
 
+TEST_CASE("Options may come from a file, and the command line has the last word", "[simulate]") {
+  const TemporaryFolder folder;
+  const std::string file =
+      folder
+          .write("a.toml",
+                 "world = \"camp\"  # tents\nlabels = true\nresolution = \"64x48\"\n"
+                 "duration = 12.5\n")
+          .string();
+  const auto options = parse({"--config", file, "--duration", "7", "--output", "x"});
+  CHECK(options.world == WorldKind::kCamp);
+  CHECK(options.labels);
+  CHECK(options.width == 64);
+  CHECK(options.duration_s == 7.0);
+  CHECK_THAT(refusal({"--config", folder.write("b.toml", "colour = true\n").string()}),
+             Catch::Contains("colour"));
+}
+
+TEST_CASE("The files of options that come with the program can be used", "[simulate]") {
+  const std::string name = GENERATE("city", "camp", "demo");
+  const auto options = parse({"--config", "config/simulation/" + name + ".toml", "--output", "x"});
+  CHECK(options.robots == 3);
+}
+
 TEST_CASE("Threads and the place of the output are no parameters of the bytes", "[simulate]") {
   const auto a = parse({"--world", "city", "--output", "a", "--threads", "1"});
   const auto b = parse({"--world", "city", "--output", "b", "--threads", "7"});
