@@ -168,11 +168,12 @@ void IncrementalMesh::compute(Vertex& vertex, const BlockCells& cells, const Eig
   grid[axis] += static_cast<double>(t);
   vertex.position = (voxel_m_ * grid).cast<float>();
 
-  const LabelId nearer =
-      t < 0.5F ? label_of(near_block, near_voxel) : label_of(far_block, far_voxel);
-  vertex.label = nearer != 0 ? nearer
-                 : t < 0.5F  ? label_of(far_block, far_voxel)
-                             : label_of(near_block, near_voxel);
+  // First the voxel behind the surface: the ray to it went through the surface right here, while
+  // that to the one in front goes on to where it meets some surface, maybe another.
+  const LabelId near_label = label_of(near_block, near_voxel);
+  const LabelId far_label = label_of(far_block, far_voxel);
+  vertex.label = a < 0.0F ? near_label : far_label;
+  if (vertex.label == 0) vertex.label = a < 0.0F ? far_label : near_label;
 
   const auto seen = [](const VoxelBlock& block, std::size_t v) {
     return (block.near_rows[v / kBlockSide] >> v % kBlockSide & 1U) != 0;
