@@ -111,18 +111,19 @@ class Simulation {
       --*remaining_[frames_[i].robot];
       ++done_;
     });
-    while (!workers.is_finished()) {
-      if (signals.wait(kPoll_s)) {
-        workers.stop();
-        signals.give_up();  // a second one ends at once
-        interrupted = true;
+    try {
+      while (!workers.is_finished()) {
+        interrupted |= stop_if_asked(workers, signals);
+        progress.update(done_, steady_now_s());
+        finish_robots();
       }
-      progress.update(done_, steady_now_s());
+      workers.join();
       finish_robots();
+    } catch (...) {
+      progress.finish(done_, steady_now_s());  // the message gets a line of its own
+      throw;
     }
-    workers.join();
     progress.finish(done_, steady_now_s());
-    finish_robots();
     return interrupted && done_ < frames_.size() ? SimulationOutcome::kInterrupted
                                                  : SimulationOutcome::kComplete;
   }
@@ -139,6 +140,13 @@ class Simulation {
     std::size_t robot;
     std::size_t index;
   };
+
+  static bool stop_if_asked(FrameWorkers& workers, SignalWatch& signals) {
+    if (!signals.wait(kPoll_s)) return false;
+    workers.stop();
+    signals.give_up();  // a second one ends at once
+    return true;
+  }
 
   void write_calibration(std::size_t r) const {
     const RecordingLayout& layout = cameras_[r]->layout();
