@@ -38,25 +38,6 @@ IncrementalMesh::IncrementalMesh(double voxel_size_m, const LabelModel& labels,
     : voxel_m_(voxel_size_m), label_model_(labels), min_label_probability_(min_label_probability) {}
 
 MeshUpdateReport IncrementalMesh::update(BlockMap& map) {
-  ++update_;
-  MeshUpdateReport report;
-  for (const Face& face : forgotten_faces_) release(face);
-  faces_ -= forgotten_faces_.size();
-  forgotten_faces_.clear();
-
-  const std::vector<VoxelBlock*> blocks = blocks_to_mesh(map);
-  report.blocks = blocks.size();
-  for (VoxelBlock* block : blocks) release_faces(*block);
-  for (VoxelBlock* block : blocks) mesh_block(*block, map, report);
-  for (VoxelBlock* block : blocks) {
-    block->changed = false;
-    block->near_rows.fill(0);
-  }
-  report.vertices_removed = remove_unused();
-  return report;
-}
-
-std::vector<VoxelBlock*> IncrementalMesh::blocks_to_mesh(BlockMap& map) const {
   std::vector<VoxelBlock*> blocks;
   for (const auto& block : map.blocks())
     if (block->changed) blocks.push_back(block.get());
@@ -67,7 +48,25 @@ std::vector<VoxelBlock*> IncrementalMesh::blocks_to_mesh(BlockMap& map) const {
       mark_changed(lower, blocks[i]->changed_since);
       blocks.push_back(&lower);
     });
-  return blocks;
+  return mesh_blocks(blocks, map);
+}
+
+MeshUpdateReport IncrementalMesh::mesh_blocks(const std::vector<VoxelBlock*>& blocks,
+                                              BlockMap& map) {
+  ++update_;
+  MeshUpdateReport report;
+  report.blocks = blocks.size();
+  for (const Face& face : forgotten_faces_) release(face);
+  faces_ -= forgotten_faces_.size();
+  forgotten_faces_.clear();
+  for (VoxelBlock* block : blocks) release_faces(*block);
+  for (VoxelBlock* block : blocks) mesh_block(*block, map, report);
+  for (VoxelBlock* block : blocks) {
+    block->changed = false;
+    block->near_rows.fill(0);
+  }
+  report.vertices_removed = remove_unused();
+  return report;
 }
 
 void IncrementalMesh::release(const Face& face) {
@@ -220,9 +219,35 @@ void IncrementalMesh::forget(VoxelBlock& block, BlockMap& map, KeyframeIndex key
   disown(block);
 }
 
+MeshUpdateReport IncrementalMesh::finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map) {
+  // With those below, whose cells reach into them: this is the last time that they can be meshed.
+  std::vector<VoxelBlock*> last_time;
+  const auto add = [&](VoxelBlock& block) {
+    if (!block.changed) return;
+    block.changed = false;  // once only
+    last_time.push_back(&block);
+  };
+  for (VoxelBlock* block : blocks) {
+    add(*block);
+    visit_lower_neighbours(*block, map, [&](VoxelBlock& lower, int) { add(lower); });
+  }
+  for (VoxelBlock* block : last_time) block->changed = true;
+  for (VoxelBlock* block : last_time)  // and below these: with the next update
+    visit_lower_neighbours(*block, map, [&](VoxelBlock& lower, int) {
+      if (!lower.changed) mark_changed(lower, block->changed_since);
+    });
+  const MeshUpdateReport report = mesh_blocks(last_time, map);
+  for (VoxelBlock* block : blocks) finalise(*block, map);
+  return report;
+}
+
 void IncrementalMesh::finalise(VoxelBlock& block, BlockMap& map) {
-  if (block.mesh != nullptr)
-    final_faces_.insert(final_faces_.end(), block.mesh->faces.begin(), block.mesh->faces.end());
+  if (block.mesh != nullptr) {
+    auto& faces = block.mesh->faces;
+    final_faces_.insert(final_faces_.end(), faces.begin(), faces.end());
+    faces.clear();
+    block.mesh->cell_of_face.clear();
+  }
   visit_lower_neighbours(block, map, [&](VoxelBlock& lower, int offset) {
     if (lower.mesh == nullptr) return;
     auto& faces = lower.mesh->faces;

@@ -35,9 +35,9 @@ class IncrementalMesh {
   /// the next update().
   void forget(VoxelBlock& block, BlockMap& map, KeyframeIndex keyframe);
 
-  /// To be called before a block is erased whose mesh is to stay: the faces of its cells, and of
-  /// others' that reach into it, become final. Precondition: nothing changed since update().
-  void finalise(VoxelBlock& block, BlockMap& map);
+  /// To be called before blocks are erased whose mesh is to stay: meshes them once more, where they
+  /// changed, and makes the faces of their cells, and of others' that reach into them, final.
+  MeshUpdateReport finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map);
 
   /// All faces and the vertices they use. Without labels if `labelled` is false.
   [[nodiscard]] MapMesh snapshot(const BlockMap& map, bool labelled) const;
@@ -62,7 +62,8 @@ class IncrementalMesh {
     LabelId label = 0;
   };
 
-  [[nodiscard]] std::vector<VoxelBlock*> blocks_to_mesh(BlockMap& map) const;
+  MeshUpdateReport mesh_blocks(const std::vector<VoxelBlock*>& blocks, BlockMap& map);
+  void finalise(VoxelBlock& block, BlockMap& map);
   void release(const Face& face);
   void release_faces(VoxelBlock& block);
   void mesh_block(VoxelBlock& block, BlockMap& map, MeshUpdateReport& report);

@@ -82,7 +82,7 @@ struct SemanticMapper::State {
   DepthViewMaker views;
   BlockMap map;
   IncrementalMesh mesh;
-  MeshUpdateReport unreported;  // of updates that had to come before blocks became final
+  MeshUpdateReport unreported;  // of blocks that became final
   std::uint64_t frame = 0;
   KeyframeIndex keyframe = 0;
   bool labelled = false;
@@ -139,15 +139,11 @@ void SemanticMapper::State::remove_empty(const BlockFusion& fusion,
 }
 
 void SemanticMapper::State::finalise(const std::vector<VoxelBlock*>& blocks) {
-  if (blocks.empty()) return;
-  const MeshUpdateReport done = mesh.update(map);
+  const MeshUpdateReport done = mesh.finalise(blocks, map);
   unreported.blocks += done.blocks;
   unreported.vertices_added += done.vertices_added;
   unreported.vertices_removed += done.vertices_removed;
-  for (VoxelBlock* block : blocks) {
-    mesh.finalise(*block, map);
-    map.erase(Eigen::Vector3i(block->position));
-  }
+  for (VoxelBlock* block : blocks) map.erase(Eigen::Vector3i(block->position));
 }
 
 void SemanticMapper::State::leave_window(IntegrationReport& report) {
@@ -156,7 +152,7 @@ void SemanticMapper::State::leave_window(IntegrationReport& report) {
   for (const auto& block : map.blocks())
     if (keyframe - block->last_seen > window) old.push_back(block.get());
   report.blocks_finalised += old.size();
-  finalise(old);
+  if (!old.empty()) finalise(old);
 }
 
 void SemanticMapper::State::make_room(IntegrationReport& report) {

@@ -199,10 +199,11 @@ TEST_CASE("Final mesh stays when its blocks go, and hangs together with the rest
   IncrementalMesh mesh = new_mesh();
   mesh.update(map);
   const MapMesh before = mesh.snapshot(map, false);
-  for (const auto& block : std::vector<Eigen::Vector3i>{{0, 0, 0}, {1, 0, 0}, {0, -1, 1}}) {
-    mesh.finalise(*map.find(block), map);
-    map.erase(block);
-  }
+  const std::vector<Eigen::Vector3i> leaving{{0, 0, 0}, {1, 0, 0}, {0, -1, 1}};
+  std::vector<VoxelBlock*> blocks;
+  for (const Eigen::Vector3i& position : leaving) blocks.push_back(map.find(position));
+  CHECK(mesh.finalise(blocks, map).blocks == 0);  // nothing changed since
+  for (const Eigen::Vector3i& position : leaving) map.erase(position);
   CHECK(mesh.final_face_count() > 0);
 
   const MapMesh same = mesh.snapshot(map, false);

@@ -352,12 +352,15 @@ TEST_CASE("What left the window is final, and a revisit makes vertices of its ow
 TEST_CASE("Mesh that became final on the way has no cracks", "[semantic_mapping]") {
   SemanticMappingConfig config = settings();
   config.window_keyframes = 4;
+  const KeyframeIndex meshed_every = GENERATE(1U, 7U, 100U);
+  CAPTURE(meshed_every);
   SemanticMapper mapper(config, small_camera(), two_classes());
   for (KeyframeIndex i = 0; i < 60; ++i) {
     const SE3 T_odom_cam = at(0.15 * i, 0.02 * i);
     REQUIRE(integrate(mapper, wall(2.03, false, T_odom_cam), T_odom_cam, i));
-    mapper.update_mesh();
+    if (i % meshed_every == 0) mapper.update_mesh();
   }
+  mapper.update_mesh();
   const MapSize size = mapper.size();
   CHECK(size.final_faces > size.faces / 2);
   const LabelledMesh mesh = mapper.mesh().mesh;
