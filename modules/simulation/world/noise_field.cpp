@@ -66,6 +66,58 @@ void add_octave(int cells_u, int cells_v, float deviation, SeededRandom& random,
   }
 }
 
+struct CellPoint {
+  float x, y;  // in cells, from the corner of the cell looked at
+  std::uint32_t id;
+};
+
+/// The points of a cell and of the eight around it.
+std::array<CellPoint, 9> neighbours(const std::vector<CellPoint>& points, int cells, int column,
+                                    int row) {
+  std::array<CellPoint, 9> around{};
+  std::size_t i = 0;
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      const int x = (column + dx + cells) % cells;
+      const int y = (row + dy + cells) % cells;
+      CellPoint point = points[static_cast<std::size_t>(y * cells + x)];
+      point.x += static_cast<float>(dx);
+      point.y += static_cast<float>(dy);
+      around[i++] = point;
+    }
+  }
+  return around;
+}
+
+/// Distances of the texels of one cell, whose first is (x0, y0).
+void measure_cell(const std::array<CellPoint, 9>& around, int x0, int y0, int stride,
+                  CellNoise& noise) {
+  const float texel = 1.0F / static_cast<float>(stride);
+  for (int dy = 0; dy < stride; ++dy) {
+    const float y = (static_cast<float>(dy) + 0.5F) * texel;
+    for (int dx = 0; dx < stride; ++dx) {
+      const float x = (static_cast<float>(dx) + 0.5F) * texel;
+      float first = 1e9F;  // squared distances
+      float second = 1e9F;
+      std::uint32_t id = 0;
+      for (const CellPoint& point : around) {
+        const float to_x = point.x - x;
+        const float to_y = point.y - y;
+        const float distance = to_x * to_x + to_y * to_y;
+        if (distance < first) id = point.id;
+        second = std::min(second, std::max(first, distance));
+        first = std::min(first, distance);
+      }
+      const auto i =
+          static_cast<std::size_t>(y0 + dy) * static_cast<std::size_t>(noise.nearest.size()) +
+          static_cast<std::size_t>(x0 + dx);
+      noise.id[i] = id;
+      noise.nearest.values()[i] = std::sqrt(first);
+      noise.edge.values()[i] = std::sqrt(second) - std::sqrt(first);
+    }
+  }
+}
+
 }  // namespace
 
 void NoiseField::standardize() {
@@ -99,43 +151,20 @@ NoiseField fractal_noise(int size, const FractalNoise& noise, SeededRandom& rand
 }
 
 CellNoise cell_noise(int size, int cells, SeededRandom& random) {
-  struct Point {
-    float x, y;
-  };
-  std::vector<Point> points(static_cast<std::size_t>(cells) * static_cast<std::size_t>(cells));
-  for (Point& point : points) {
-    point.x = random.uniform(0.0F, 1.0F);
-    point.y = random.uniform(0.0F, 1.0F);
+  const auto count = static_cast<std::size_t>(cells) * static_cast<std::size_t>(cells);
+  std::vector<CellPoint> points;
+  points.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const float x = random.uniform(0.0F, 1.0F);
+    points.push_back({x, random.uniform(0.0F, 1.0F), static_cast<std::uint32_t>(i)});
   }
   CellNoise noise{NoiseField(size), NoiseField(size), {}};
   noise.id.resize(noise.nearest.values().size());
-  const float texel = static_cast<float>(cells) / static_cast<float>(size);
-  std::size_t i = 0;
-  for (int row = 0; row < size; ++row) {
-    const float y = (static_cast<float>(row) + 0.5F) * texel;
-    for (int column = 0; column < size; ++column, ++i) {
-      const float x = (static_cast<float>(column) + 0.5F) * texel;
-      const int cx = static_cast<int>(x);
-      const int cy = static_cast<int>(y);
-      float first = 1e9F;  // squared distances
-      float second = 1e9F;
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) {
-          const int px = cx + dx;
-          const int py = cy + dy;
-          const int wrapped_x = px < 0 ? cells - 1 : (px == cells ? 0 : px);
-          const int wrapped_y = py < 0 ? cells - 1 : (py == cells ? 0 : py);
-          const auto id = static_cast<std::uint32_t>(wrapped_y * cells + wrapped_x);
-          const float to_x = static_cast<float>(px) + points[id].x - x;
-          const float to_y = static_cast<float>(py) + points[id].y - y;
-          const float distance = to_x * to_x + to_y * to_y;
-          if (distance < first) noise.id[i] = id;
-          second = std::min(second, std::max(first, distance));
-          first = std::min(first, distance);
-        }
-      }
-      noise.nearest.values()[i] = std::sqrt(first);
-      noise.edge.values()[i] = std::sqrt(second) - std::sqrt(first);
+  const int stride = size / cells;
+  for (int row = 0; row < cells; ++row) {
+    for (int column = 0; column < cells; ++column) {
+      const std::array<CellPoint, 9> around = neighbours(points, cells, column, row);
+      measure_cell(around, column * stride, row * stride, stride, noise);
     }
   }
   return noise;

@@ -50,7 +50,7 @@ struct FractalNoise {
 /// Mean 0, standard deviation 1.
 [[nodiscard]] NoiseField fractal_noise(int size, const FractalNoise& noise, SeededRandom& random);
 
-/// Distances to scattered points, one in each of cells x cells squares.
+/// Distances to scattered points, one in each of cells x cells squares; `cells` divides the size.
 struct CellNoise {
   NoiseField nearest;             ///< Distance to the nearest point, in cells.
   NoiseField edge;                ///< Distance to the second nearest less that to the nearest.

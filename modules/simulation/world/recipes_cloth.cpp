@@ -150,7 +150,7 @@ Canvas carpet(int size, SeededRandom& random) {
       fractal_noise(size, {.cells_u = 32, .cells_v = 32, .gain = 1.15F}, random);
   const NoiseField wear = fractal_noise(size, {.gain = 0.9F}, random);
   Canvas canvas = Canvas::painted(size, [&](int x, int y) -> Vector3f {
-    return Vector3f::Constant(0.7F * (1.0F + 0.05F * pile(x, y) + 0.03F * wear(x, y)));
+    return Vector3f::Constant(0.7F * (1.0F + 0.055F * pile(x, y) + 0.03F * wear(x, y)));
   });
   for (int i = 0; i < 500; ++i) {  // fluff and flecks
     const Vector2f at(random.uniform(0.0F, 1.0F), random.uniform(0.0F, 1.0F));
@@ -177,22 +177,18 @@ Canvas curtain(int size, SeededRandom& random) {
 Canvas mattress(int size, SeededRandom& random) {
   const NoiseField bend = fractal_noise(size, {.gain = 0.5F, .finest = 32}, random);
   const NoiseField tension =
-      fractal_noise(size, {.cells_u = 2, .cells_v = 16, .gain = 0.5F, .finest = 32}, random);
+      fractal_noise(size, {.cells_u = 2, .cells_v = 16, .gain = 0.75F, .finest = 128}, random);
   const NoiseField place = fractal_noise(size, {.gain = 0.5F, .finest = 16}, random);
   const NoiseField threads =
       fractal_noise(size, {.cells_u = 16, .cells_v = 64, .gain = 1.0F}, random);
   const auto n = static_cast<float>(size);
   return Canvas::painted(size, [&](int x, int y) -> Vector3f {
-    // A crease runs where the tension changes its sign: dark, and lit on the side above.
-    const float pull = tension(x, y + static_cast<int>(0.015F * n * bend(x, y)));
-    const auto ridge = [pull](float at) {
-      const float off = (pull - at) / 0.16F;
-      return std::exp(-off * off);
-    };
-    const float amount = smooth_step(0.0F, 1.5F, place(x, y));
-    float shade = 0.72F * (1.0F + 0.024F * threads(x, y) + 0.04F * bend(x, y));
-    shade *= 1.0F + amount * (0.1F * ridge(0.3F) - 0.2F * ridge(0.0F));
-    shade *= 1.0F + 0.015F * weave(x, y, 2);
+    // Creases run along u and hang through a little: lit above, dark below.
+    const int sag = static_cast<int>(0.012F * n * bend(x, y));
+    const float crease = std::clamp(tension(x, y + sag) - tension(x, y + sag - 4), -0.8F, 0.8F);
+    const float amount = smooth_step(-0.5F, 1.5F, place(x, y));
+    float shade = 0.72F * (1.0F + 0.35F * amount * crease + 0.025F * threads(x, y));
+    shade *= 1.0F + 0.02F * weave(x, y, 2);
     return Vector3f::Constant(shade);
   });
 }

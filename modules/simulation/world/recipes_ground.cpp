@@ -31,7 +31,8 @@ Canvas asphalt(int size, SeededRandom& random) {
     if (stones.nearest.values()[i] < 0.38F) shade *= stone_shade[stones.id[i]];
     // Cracks run between plates, bent by the noise, where the road is worn.
     const auto bent = static_cast<int>(14.0F * place(x, y));
-    if (plates.edge(x + bent, y - bent) < 0.012F && place(y, x) > 0.3F) shade *= 0.35F;
+    if (plates.edge(x + bent, y - bent) < 0.012F && place(x + size / 2, y + size / 3) > 0.3F)
+      shade *= 0.35F;
     return shade * Vector3f(1.0F, 0.99F, 0.96F);
   });
   for (int i = 0; i < 40; ++i) {  // drops of oil

@@ -38,7 +38,8 @@ Canvas brick(int size, SeededRandom& random) {
     const float v = kCourses * (static_cast<float>(y) + 0.6F * bend(x, y)) / n;
     const int course = static_cast<int>(std::floor(v)) & (kCourses - 1);
     const float offset = course % 2 == 0 ? 0.0F : 0.5F;
-    const float u = kBricks * (static_cast<float>(x) + 0.6F * bend(y, x)) / n + offset;
+    const float u =
+        kBricks * (static_cast<float>(x) + 0.6F * bend(x + size / 2, y + size / 3)) / n + offset;
     const auto brick = static_cast<int>(std::floor(u) + kBricks) % kBricks;
     const float in_v = v - std::floor(v);
     const float in_u = u - std::floor(u);
@@ -74,7 +75,7 @@ Canvas stone_blocks(int size, SeededRandom& random) {
   return Canvas::painted(size, [&](int x, int y) -> Vector3f {
     const float v = kCourses * (static_cast<float>(y) + 1.0F * bend(x, y)) / n;
     const Course& course = courses[static_cast<std::size_t>(std::floor(v)) & (kCourses - 1)];
-    float u = (static_cast<float>(x) + 1.0F * bend(y, x)) / n + course.shift;
+    float u = (static_cast<float>(x) + 1.0F * bend(x + size / 2, y + size / 3)) / n + course.shift;
     u -= std::floor(u);
     std::size_t block = 0;
     while (u > course.end[block] && block + 1 < kMaxBlocks) ++block;

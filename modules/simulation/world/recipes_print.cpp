@@ -117,7 +117,7 @@ Canvas play_mat(int size, SeededRandom& random) {
         random.chance(0.3) ? Vector3f(0.25F, 0.4F, 0.6F) : Vector3f(0.75F, 0.7F, 0.45F);
     canvas.ellipse(anywhere(random), half, random.uniform(0.0F, kPi), color);
   }
-  for (int i = 0; i < 30; ++i) {  // houses with roofs of two halves, windows and a door
+  for (int i = 0; i < 55; ++i) {  // houses with roofs of two halves, windows and a door
     const Vector2f at = anywhere(random);
     const Vector2f half(random.uniform(0.018F, 0.035F), random.uniform(0.015F, 0.028F));
     const float angle = random.chance(0.5) ? 0.0F : random.uniform(-0.5F, 0.5F);
@@ -126,7 +126,7 @@ Canvas play_mat(int size, SeededRandom& random) {
     const Vector2f ridge(half.x() * std::cos(angle), half.x() * std::sin(angle));
     canvas.line(at - ridge, at + ridge, 0.006F, Vector3f::Constant(0.06F));
   }
-  for (int i = 0; i < 70; ++i) {  // trees
+  for (int i = 0; i < 150; ++i) {  // trees
     const Vector2f at = anywhere(random);
     const float radius = random.uniform(0.006F, 0.014F);
     canvas.ellipse(at, {radius, radius}, 0.0F, {0.05F, 0.16F, 0.05F});
@@ -134,7 +134,7 @@ Canvas play_mat(int size, SeededRandom& random) {
                    0.0F, {0.2F, 0.45F, 0.15F});
   }
   const auto street = [&](auto curve) {  // kerb, tarmac, dashes: each over the whole way at once
-    constexpr int kSteps = 240;
+    constexpr int kSteps = 96;
     const std::array<std::pair<float, Vector3f>, 2> layers = {
         {{0.062F, Vector3f::Constant(0.85F)}, {0.05F, Vector3f::Constant(0.2F)}}};
     for (const auto& [width, color] : layers) {
@@ -143,9 +143,10 @@ Canvas play_mat(int size, SeededRandom& random) {
                     curve(static_cast<float>(i + 1) / kSteps), width, color);
       }
     }
-    for (int i = 0; i < kSteps; i += 6) {
-      canvas.line(curve(static_cast<float>(i) / kSteps), curve(static_cast<float>(i + 2) / kSteps),
-                  0.005F, Vector3f::Constant(0.85F));
+    for (int i = 0; i < kSteps; i += 3) {
+      canvas.line(curve(static_cast<float>(i) / kSteps),
+                  curve((static_cast<float>(i) + 1.2F) / kSteps), 0.005F,
+                  Vector3f::Constant(0.85F));
     }
   };
   for (const float v : {0.2F, 0.7F}) {

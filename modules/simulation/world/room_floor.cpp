@@ -50,7 +50,7 @@ void add_play_mats(Scene& scene, float width, float depth, SeededRandom& random)
 }
 
 void add_tapes(Scene& scene, float width, float depth, SeededRandom& random) {
-  constexpr int kTapes = 16;
+  constexpr int kTapes = 18;
   constexpr float kStrip_m = 0.125F;  // one of the sixteen of the recipe's tile
   const MaterialId marks = scene.paint(SurfaceClass::kFloor, Recipe::kMarkerTape);
   const MaterialId grey = scene.plain(SurfaceClass::kFloor, 0.13F, 0.13F, 0.14F, 0.03F);
@@ -82,13 +82,13 @@ void add_scraps(Scene& scene, float width, float depth, SeededRandom& random) {
     const float y = depth * random.uniform(0.06F, 0.94F);
     return standing_at({x, y, 0.0F}, random.uniform(0.0F, kPi));
   };
-  for (int i = 0; i < 190; ++i) {
+  for (int i = 0; i < 300; ++i) {
     const ScopedFrame scope(scene.mesh, scattered(0.05F, 0.8F));
     const float size = random.uniform(0.025F, 0.07F);
     add_flat(scene, {size, size * random.uniform(0.6F, 1.0F)}, 0.0035F,
              random.chance(0.85) ? white : black);
   }
-  for (int i = 0; i < 18; ++i) {  // sheets of paper
+  for (int i = 0; i < 26; ++i) {  // sheets of paper
     const ScopedFrame scope(scene.mesh, scattered(0.1F, 0.9F));
     const float u = random.uniform(0.0F, 1.0F);
     scene.mesh.set_uv_offset({u, random.uniform(0.0F, 1.0F)});

@@ -13,7 +13,7 @@ constexpr float kPi = 3.14159265F;
 // Irradiance that would make a white surface in the room as bright as the outside is, and as the
 // day makes the thin curtains.
 constexpr float kOutside = 4.0F;
-constexpr float kBacklit = 0.28F;
+constexpr float kBacklit = 0.2F;
 constexpr float kBehind_m = 0.16F;  // depth of the window's niche
 
 /// Cloth in folds from z_low to z_high, from x = 0 to `width`, its mean at y = `depth`.
@@ -118,11 +118,15 @@ void add_camera(Scene& scene, const Vector3f& position, float yaw) {
 
 void add_wall(Scene& scene, float length_m, float height_m, const WallWindow* window,
               SeededRandom& random) {
-  const MaterialId plaster = scene.plain(SurfaceClass::kWall, 0.92F, 0.91F, 0.88F);
+  // Window walls are freshly painted, the others have seen much use.
+  const MaterialId surface =
+      window != nullptr
+          ? scene.plain(SurfaceClass::kWall, 0.92F, 0.91F, 0.88F)
+          : scene.paint(SurfaceClass::kWall, Recipe::kPlaster, {1.04F, 1.03F, 1.0F}, 1.5F);
   const MaterialId skirting = scene.plain(SurfaceClass::kWall, 0.55F, 0.54F, 0.5F);
   const float half = 0.5F * length_m;
   const auto panel = [&](float x0, float x1, float z0, float z1) {
-    scene.mesh.quad({x0, 0, z0}, {x1, 0, z0}, {x1, 0, z1}, {x0, 0, z1}, plaster);
+    scene.mesh.quad({x0, 0, z0}, {x1, 0, z0}, {x1, 0, z1}, {x0, 0, z1}, surface);
   };
   scene.mesh.box({-half, -0.018F, 0.0F}, {half, 0.0F, 0.1F}, skirting, kSideFront | kSideTop);
   if (window == nullptr) {

@@ -15,7 +15,7 @@ struct WallWindow {
   float top_m = 2.9F;
 };
 
-/// A plastered wall with skirting and, if `window` is set, an opening with frame, a bright outside
+/// A wall with skirting and, if `window` is set, an opening with frame, a bright outside
 /// and curtains that let light through.
 void add_wall(Scene& scene, float length_m, float height_m, const WallWindow* window,
               SeededRandom& random);

@@ -69,6 +69,10 @@ void furnish_plank_wall(Scene& scene, SeededRandom& random) {
     const ScopedFrame scope(scene.mesh, at_wall(3.4F));
     add_shelf(scene, 0.8F, 1.75F, random);
   }
+  for (const float x : {-2.9F, -2.2F, 2.4F}) {
+    const ScopedFrame scope(scene.mesh, at_wall(x));
+    add_poster(scene, random.chance(0.5) ? 0.6F : 0.45F, random.uniform(1.6F, 2.0F), random);
+  }
   const ScopedFrame scope(scene.mesh, standing_at({-3.5F, -0.25F, 0.0F}, 0.0F));
   add_stand(scene, 2.1F, random);
 }
