@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "modules/simulation/rendering/luminance.hpp"
 #include "modules/simulation/rendering/view_pass.hpp"
 
 namespace km {
@@ -31,39 +32,54 @@ Value lit(const Shade<Value>& shade, bool dark) {
 
 }  // namespace
 
-Eigen::Vector3f ViewPass::position(int x, int y) const {
-  const Eigen::Vector2f& bearing =
-      rays_.bearings()[static_cast<std::size_t>(y) * static_cast<std::size_t>(rays_.stride()) +
-                       static_cast<std::size_t>(x)];
-  return origin_ + pixels_[index(x, y)].depth_m * (R_world_cam_ * bearing.homogeneous());
+Eigen::Vector3f ViewPass::position(std::size_t pixel) const {
+  const std::size_t y = pixel / static_cast<std::size_t>(width_);
+  // A row of bearings has one more than a row of pixels.
+  const Eigen::Vector2f& bearing = rays_.bearings()[pixel + y];
+  return origin_ + pixels_[pixel].depth_m * (R_world_cam_ * bearing.homogeneous());
 }
 
-// Two triangles hit side by side look like one surface: the same material, nearly one plane.
-bool ViewPass::same_surface(std::uint32_t a, const Eigen::Vector3f& at_a, std::uint32_t b,
-                            const Eigen::Vector3f& at_b) const {
-  if (a == b) return true;
-  if (a == kNoTriangle || b == kNoTriangle) return false;
-  const SurfaceRecord& surface_a = scene_.surfaces.record(a);
-  const SurfaceRecord& surface_b = scene_.surfaces.record(b);
-  if (surface_a.material != surface_b.material) return false;
+// The same material, nearly one plane.
+bool ViewPass::same_surface(std::size_t pixel, std::uint32_t triangle,
+                            const Eigen::Vector3f& point) const {
+  const Pixel& at = pixels_[pixel];
+  if (at.triangle == triangle) return true;
+  if (at.triangle == kNoTriangle || triangle == kNoTriangle) return false;
+  const SurfaceRecord& other = scene_.surfaces.record(triangle);
+  if (at.material != other.material) return false;
+  const SurfaceRecord& surface = scene_.surfaces.record(at.triangle);
   constexpr float kLeastCosine = 0.95F;  // 18 degrees
-  if (std::abs(surface_a.normal.dot(surface_b.normal)) < kLeastCosine) return false;
-  const float pixel_m =
-      (at_a - origin_).norm() / static_cast<float>(rays_.camera().fx);  // what a pixel covers
-  return std::abs(surface_a.normal.dot(at_b - at_a)) < pixel_m;
+  if (std::abs(surface.normal.dot(other.normal)) < kLeastCosine) return false;
+  // Off the plane by less than about what a pixel covers.
+  const float pixel_m = at.depth_m / static_cast<float>(rays_.camera().fx);
+  return std::abs(surface.normal.dot(point - position(pixel))) < pixel_m;
+}
+
+// The kind of edge between a pixel and another surface.
+ViewPass::Edge ViewPass::edge_towards(std::size_t pixel, std::uint32_t triangle) const {
+  if (pixels_[pixel].foliage) return kLeafEdge;
+  if (triangle == kNoTriangle) return kShapeEdge;
+  return scene_.surfaces.material(scene_.surfaces.record(triangle)).foliage ? kLeafEdge
+                                                                            : kShapeEdge;
+}
+
+// Whether the radiances of two pixels differ by so much that a mean of them is seen as such.
+bool ViewPass::contrast(std::size_t a, std::size_t b) const {
+  constexpr float kVisible = 0.03F;  // a grey level or two, at any exposure
+  const float at_a = request_.radiance ? view_.radiance[a] : luminance_of(view_.rgb[a]);
+  const float at_b = request_.radiance ? view_.radiance[b] : luminance_of(view_.rgb[b]);
+  return std::abs(at_a - at_b) > kVisible * std::max(at_a, at_b);
 }
 
 void ViewPass::compare(std::size_t a, std::size_t b) {
+  if (!contrast(a, b)) return;
   std::uint8_t edge = kNoEdge;
   if (pixels_[a].triangle != pixels_[b].triangle) {
-    const int width = width_;
-    const auto at = [this, width](std::size_t i) {
-      const int pixel = static_cast<int>(i);
-      return position(pixel % width, pixel / width);
-    };
-    if (!same_surface(pixels_[a].triangle, at(a), pixels_[b].triangle, at(b))) edge = kShapeEdge;
+    if (pixels_[a].material != pixels_[b].material ||
+        !same_surface(a, pixels_[b].triangle, position(b)))
+      edge = pixels_[a].foliage || pixels_[b].foliage ? kLeafEdge : kShapeEdge;
   }
-  if (edge == kNoEdge && dark_[a] != dark_[b]) edge = kShadowEdge;
+  if (edge == kNoEdge && pixels_[a].dark != pixels_[b].dark) edge = kShadowEdge;
   edge_[a] |= edge;
   edge_[b] |= edge;
 }
@@ -78,18 +94,26 @@ void ViewPass::compare_neighbours() {
 }
 
 // Poles and wires narrower than a pixel can pass between all centres of a row or column. One more
-// ray per pixel, elsewhere in each pixel of a block, finds most of them.
+// ray in every other pixel of 8 x 4, elsewhere in each, finds most of them. Where an edge is known
+// already there is no need.
 void ViewPass::find_thin_things(int x0, int y0) {
-  Aim aim = aim_at_block(x0, y0);
+  Aim aim;
+  LaneMask active = 0;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const int row = static_cast<int>(lane) / 4;
+    aim.x[lane] = x0 + 2 * (static_cast<int>(lane) % 4) + row % 2;
+    aim.y[lane] = y0 + row;
     const Eigen::Vector2f offset = sample_offset((5 * lane + 3) % kLanes, kLanes);
     aim.dx[lane] = offset.x();
     aim.dy[lane] = offset.y();
+    const bool inside = aim.x[lane] < width_ && aim.y[lane] < height_;
+    if (inside && edge_[index(aim.x[lane], aim.y[lane])] == kNoEdge) active |= 1U << lane;
   }
+  if (active == 0) return;
   SurfaceHits hits;
-  trace(aim, lanes_inside(aim), hits);
+  trace(aim, active, hits);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    if ((hits.active >> lane & 1U) == 0U) continue;
+    if ((active >> lane & 1U) == 0U) continue;
     const std::uint32_t triangle = hits.rays.hit.primID[lane];
     if (triangle == pixels_[index(aim.x[lane], aim.y[lane])].triangle) continue;
     const Eigen::Vector3f d(hits.rays.ray.dir_x[lane], hits.rays.ray.dir_y[lane],
@@ -103,16 +127,14 @@ void ViewPass::find_thin_things(int x0, int y0) {
 // A hit beside a pixel's centre that is another surface: an edge runs through the pixel. If no
 // neighbour shows that surface either, it is thin, and likely runs on unseen beside the pixel.
 void ViewPass::flag_unlike(int x, int y, std::uint32_t triangle, const Eigen::Vector3f& hit) {
-  const auto like = [&](int px, int py) {
-    const std::uint32_t other = pixels_[index(px, py)].triangle;
-    return other == triangle || same_surface(other, position(px, py), triangle, hit);
-  };
+  const auto like = [&](int px, int py) { return same_surface(index(px, py), triangle, hit); };
   if (like(x, y)) return;
-  edge_[index(x, y)] |= kShapeEdge;
+  const Edge edge = edge_towards(index(x, y), triangle);
+  edge_[index(x, y)] |= edge;
   const bool seen = (x > 0 && like(x - 1, y)) || (y > 0 && like(x, y - 1)) ||
                     (x + 1 < width_ && like(x + 1, y)) || (y + 1 < height_ && like(x, y + 1));
-  if (seen) return;
-  constexpr int kReach = 2;
+  if (seen || edge == kLeafEdge) return;
+  constexpr int kReach = 3;
   for (int dy = -kReach; dy <= kReach; ++dy) {
     const int side = kReach - std::abs(dy);
     if (y + dy < 0 || y + dy >= height_) continue;
@@ -121,36 +143,101 @@ void ViewPass::flag_unlike(int x, int y, std::uint32_t triangle, const Eigen::Ve
   }
 }
 
+// Leaves are seen by the thousand, each smaller than an edge is long: few samples will do.
+constexpr int kLeafSamples = 4;
+constexpr int kTile = 4;  // [px]
+
 void ViewPass::refine_edges() {
-  std::vector<std::size_t> pixels;
-  for (std::size_t i = 0; i < edge_.size(); ++i)
-    if (edge_[i] != kNoEdge) pixels.push_back(i);
-  const std::size_t per_packet = static_cast<std::size_t>(kLanes / samples_);
-  for (std::size_t begin = 0; begin < pixels.size(); begin += per_packet)
-    refine(std::span(pixels).subspan(begin, std::min(per_packet, pixels.size() - begin)));
+  std::vector<std::size_t> sharp;
+  std::vector<std::size_t> leaves;
+  // Tile by tile: pixels that are refined together lie together.
+  for (int y0 = 0; y0 < height_; y0 += kTile) {
+    for (int x0 = 0; x0 < width_; x0 += kTile) {
+      for (int y = y0; y < std::min(y0 + kTile, height_); ++y) {
+        for (int x = x0; x < std::min(x0 + kTile, width_); ++x) {
+          const std::size_t i = index(x, y);
+          if (edge_[i] == kNoEdge) continue;
+          (edge_[i] == kLeafEdge ? leaves : sharp).push_back(i);
+        }
+      }
+    }
+  }
+  const auto refine_all = [this](const std::vector<std::size_t>& pixels, int samples) {
+    const auto per_packet = static_cast<std::size_t>(kLanes / samples);
+    for (std::size_t begin = 0; begin < pixels.size(); begin += per_packet)
+      refine(std::span(pixels).subspan(begin, std::min(per_packet, pixels.size() - begin)),
+             samples);
+  };
+  refine_all(sharp, samples_);
+  refine_all(leaves, std::min(samples_, kLeafSamples));
 }
 
-// A pixel around `pixel` whose centre lies on `triangle`: its shade serves for a sample there.
-std::optional<std::size_t> ViewPass::shaded_nearby(std::size_t pixel,
-                                                   std::uint32_t triangle) const {
+// Whether the centre of a pixel shows a surface that looks like one at `depth_m`: the same material
+// at about the same distance and slope. Leaves count as alike whatever their slope.
+bool ViewPass::alike(const Pixel& pixel, const SurfaceRecord& surface, float depth_m) const {
+  if (pixel.material != surface.material) return false;
+  constexpr float kDepthShare = 0.03F;
+  if (std::abs(pixel.depth_m - depth_m) > kDepthShare * depth_m) return false;
+  constexpr float kLeastCosine = 0.95F;  // 18 degrees
+  return pixel.foliage ||
+         scene_.surfaces.record(pixel.triangle).normal.dot(surface.normal) > kLeastCosine;
+}
+
+// A pixel whose shade serves for a sample that hit `triangle`, (dx, dy) from the centre of `pixel`:
+// one on the same triangle, or a neighbour on that side, or the pixel itself, if they look alike.
+std::optional<std::size_t> ViewPass::shaded_nearby(std::size_t pixel, std::uint32_t triangle,
+                                                   float depth_m,
+                                                   const Eigen::Vector2f& offset) const {
   if (pixels_[pixel].triangle == triangle) return pixel;
   const int x = static_cast<int>(pixel) % width_;
   const int y = static_cast<int>(pixel) / width_;
+  const int left = std::max(x - 1, 0);
+  const int right = std::min(x + 1, width_ - 1);
   for (int ny = std::max(y - 1, 0); ny <= std::min(y + 1, height_ - 1); ++ny)
-    for (int nx = std::max(x - 1, 0); nx <= std::min(x + 1, width_ - 1); ++nx)
+    for (int nx = left; nx <= right; ++nx)
       if (pixels_[index(nx, ny)].triangle == triangle) return index(nx, ny);
+  if (triangle == kNoTriangle) return std::nullopt;
+  const int side_x = offset.x() < 0.0F ? left : right;
+  const int side_y = std::clamp(offset.y() < 0.0F ? y - 1 : y + 1, 0, height_ - 1);
+  const bool across = std::abs(offset.x()) > std::abs(offset.y());
+  const std::size_t nearer = across ? index(side_x, y) : index(x, side_y);
+  const std::size_t farther = across ? index(x, side_y) : index(side_x, y);
+  const SurfaceRecord& surface = scene_.surfaces.record(triangle);
+  for (const std::size_t other : {nearer, farther, pixel})
+    if (alike(pixels_[other], surface, depth_m)) return other;
   return std::nullopt;
 }
 
-// Replaces each pixel by the mean of its samples. A sample takes the shade of the nearest pixel on
-// its triangle, or is shaded itself; at shadows' edges each sample asks for the sun itself.
-void ViewPass::refine(std::span<const std::size_t> pixels) {
-  const auto samples = static_cast<std::size_t>(samples_);
+void ViewPass::find_sources(std::span<const std::size_t> pixels, const Aim& aim,
+                            const SurfaceHits& hits, Samples& samples) const {
+  const auto per_pixel = static_cast<std::size_t>(samples.per_pixel);
+  for (std::size_t lane = 0; lane < pixels.size() * per_pixel; ++lane) {
+    const std::size_t pixel = pixels[lane / per_pixel];
+    const LaneMask bit = 1U << lane;
+    const auto nearby = shaded_nearby(pixel, hits.rays.hit.primID[lane], hits.rays.ray.tfar[lane],
+                                      {aim.dx[lane], aim.dy[lane]});
+    if (nearby) {
+      samples.source[lane] = *nearby;
+      if (pixels_[*nearby].dark) samples.dark |= bit;
+      if ((edge_[pixel] & kShadowEdge) != 0) samples.ask_sun |= bit;
+    } else {
+      samples.fresh |= bit;
+      samples.ask_sun |= bit;
+    }
+  }
+  samples.ask_sun &= hits.surface;
+}
+
+// Replaces each pixel by the mean of its centre and its samples. A sample takes the shade of a
+// pixel nearby on its triangle, or is shaded itself; at shadows' edges each sample asks for the sun
+// itself.
+void ViewPass::refine(std::span<const std::size_t> pixels, int samples_per_pixel) {
+  const auto per_pixel = static_cast<std::size_t>(samples_per_pixel);
   Aim aim;
   LaneMask active = 0;
-  for (std::size_t lane = 0; lane < pixels.size() * samples; ++lane) {
-    const int pixel = static_cast<int>(pixels[lane / samples]);
-    const Eigen::Vector2f offset = sample_offset(lane % samples, samples);
+  for (std::size_t lane = 0; lane < pixels.size() * per_pixel; ++lane) {
+    const int pixel = static_cast<int>(pixels[lane / per_pixel]);
+    const Eigen::Vector2f offset = sample_offset(lane % per_pixel, per_pixel);
     aim.x[lane] = pixel % width_;
     aim.y[lane] = pixel / width_;
     aim.dx[lane] = offset.x();
@@ -159,48 +246,34 @@ void ViewPass::refine(std::span<const std::size_t> pixels) {
   }
   SurfaceHits hits;
   trace(aim, active, hits);
-
-  std::array<std::size_t, kLanes> source{};
-  LaneMask fresh = 0;
-  LaneMask dark = 0;
-  LaneMask ask_sun = 0;
-  for (std::size_t lane = 0; lane < pixels.size() * samples; ++lane) {
-    const std::size_t pixel = pixels[lane / samples];
-    const auto nearby = shaded_nearby(pixel, hits.rays.hit.primID[lane]);
-    if (nearby) source[lane] = *nearby;
-    if (!nearby) fresh |= 1U << lane;
-    if (nearby && dark_[*nearby] != 0) dark |= 1U << lane;
-    if (!nearby || (edge_[pixel] & kShadowEdge) != 0) ask_sun |= 1U << lane;
-  }
+  Samples samples;
+  samples.per_pixel = samples_per_pixel;
+  find_sources(pixels, aim, hits, samples);
   SurfacePoints points;
-  const LaneMask surface = hits.surface;
-  hits.surface &= fresh | ask_sun;
+  hits.surface &= samples.fresh | samples.ask_sun;
   locate(scene_.surfaces, hits, points);
-  if (options_.shadows && scene_.lighting.sun > 0.0F) {
-    ask_sun &= surface;
-    dark = (dark & ~ask_sun) | shadowed(scene_, ask_sun, points);
-  }
-  average<float>(pixels, hits, points, SampleLanes{fresh, dark}, source, gray_, view_.radiance);
-  average<Eigen::Vector3f>(pixels, hits, points, SampleLanes{fresh, dark}, source, color_,
-                           view_.rgb);
+  if (options_.shadows && scene_.lighting.sun > 0.0F)
+    samples.dark = (samples.dark & ~samples.ask_sun) | shadowed(scene_, samples.ask_sun, points);
+  average<float>(pixels, hits, points, samples, gray_, view_.radiance);
+  average<Eigen::Vector3f>(pixels, hits, points, samples, color_, view_.rgb);
 }
 
 template <typename Value>
 void ViewPass::average(std::span<const std::size_t> pixels, const SurfaceHits& hits,
-                       const SurfacePoints& points, const SampleLanes& lanes,
-                       const std::array<std::size_t, kLanes>& source,
+                       const SurfacePoints& points, const Samples& samples,
                        const std::vector<Shade<Value>>& shaded, std::vector<Value>& image) const {
   if (image.empty()) return;
   std::array<Shade<Value>, kLanes> shades;
-  shade(scene_, hits, points, lanes.fresh, shades);
-  const auto samples = static_cast<std::size_t>(samples_);
+  shade(scene_, hits, points, samples.fresh, shades);
+  const auto per_pixel = static_cast<std::size_t>(samples.per_pixel);
   for (std::size_t p = 0; p < pixels.size(); ++p) {
-    Value sum = 0.0F * image[pixels[p]];
-    for (std::size_t lane = p * samples; lane < (p + 1) * samples; ++lane) {
-      const bool fresh = (lanes.fresh >> lane & 1U) != 0U;
-      sum += lit(fresh ? shades[lane] : shaded[source[lane]], (lanes.dark >> lane & 1U) != 0U);
+    Value sum = image[pixels[p]];
+    for (std::size_t lane = p * per_pixel; lane < (p + 1) * per_pixel; ++lane) {
+      const bool fresh = (samples.fresh >> lane & 1U) != 0U;
+      sum += lit(fresh ? shades[lane] : shaded[samples.source[lane]],
+                 (samples.dark >> lane & 1U) != 0U);
     }
-    image[pixels[p]] = sum / static_cast<float>(samples);
+    image[pixels[p]] = sum / static_cast<float>(samples.per_pixel + 1);
   }
 }
 

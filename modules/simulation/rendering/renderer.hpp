@@ -31,7 +31,9 @@ struct RenderRequest {
 };
 
 struct RenderOptions {
-  int samples_per_pixel = 4;  ///< At least this many visibility samples where edges are.
+  /// Visibility samples, beside its centre, of a pixel in which surfaces or shadows meet: 1 (none),
+  /// 2, 4, 8 or 16; others are rounded up.
+  int samples_per_pixel = 4;
   bool shadows = true;
 };
 

@@ -74,11 +74,10 @@ Eigen::Vector3f sky_color(const Eigen::Vector3f& d, const Lighting& lighting) {
   const Eigen::Vector3f horizon(1.35F, 1.48F, 1.62F);
   const float fade = std::pow(1.0F - height, 4.0F);
   Eigen::Vector3f sky = zenith + fade * (horizon - zenith);
-  if (lighting.sun > 0.0F) {
-    const float toward_sun = std::max(0.0F, d.dot(lighting.to_sun));
-    const float glow = 0.7F * std::pow(toward_sun, 8.0F) + 4.0F * std::pow(toward_sun, 350.0F);
-    sky += glow * Eigen::Vector3f(1.0F, 0.93F, 0.8F);
-  }
+  if (!(lighting.sun > 0.0F)) return sky;  // indoors there is none to look at
+  const float toward_sun = std::max(0.0F, d.dot(lighting.to_sun));
+  const float glow = 0.7F * std::pow(toward_sun, 8.0F) + 4.0F * std::pow(toward_sun, 350.0F);
+  sky += glow * Eigen::Vector3f(1.0F, 0.93F, 0.8F);
   const Clouds layer = clouds(d);
   const Eigen::Vector3f cloud = layer.brightness * Eigen::Vector3f(1.0F, 1.0F, 1.03F);
   return sky + layer.cover * (cloud - sky);

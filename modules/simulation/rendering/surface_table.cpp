@@ -46,6 +46,7 @@ ShadingMaterial shading_material(const World& world, const Material& material) {
   result.mean_color = material.tint.cwiseProduct(result.base->color({0.5F, 0.5F}, 1.0F));
   result.mean_luminance = luminance_of(result.mean_color);
   result.label = static_cast<LabelId>(material.label);
+  result.foliage = material.label == SurfaceClass::kVegetation;
   return result;
 }
 

@@ -33,6 +33,7 @@ struct ShadingMaterial {
   float mean_luminance = 0.0F;  ///< Of the albedo.
   Eigen::Vector3f mean_color = Eigen::Vector3f::Zero();
   LabelId label = 0;
+  bool foliage = false;  ///< Many small leaves, alike.
 };
 
 /// All triangles and materials of a world, laid out for shading. Immutable.

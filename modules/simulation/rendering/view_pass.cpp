@@ -33,7 +33,6 @@ ViewPass::ViewPass(const RenderScene& scene, const RenderOptions& options, const
   view_.height = height_;
   const std::size_t n = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
   pixels_.resize(n);
-  dark_.resize(n);
   if (request.radiance) gray_.resize(n);
   if (request.rgb) color_.resize(n);
   if (request.radiance) view_.radiance.resize(n);
@@ -50,7 +49,7 @@ RenderedView ViewPass::run() {
     edge_.assign(pixels_.size(), kNoEdge);
     compare_neighbours();
     for (int y = 0; y < height_; y += kBlock)
-      for (int x = 0; x < width_; x += kBlock) find_thin_things(x, y);
+      for (int x = 0; x < width_; x += 2 * kBlock) find_thin_things(x, y);
     refine_edges();
   }
   return std::move(view_);
@@ -130,8 +129,12 @@ void ViewPass::store_block(const Aim& aim, const SurfaceHits& hits, const Surfac
     const bool surface = (hits.surface >> lane & 1U) != 0U;
     const float depth_m = surface ? hits.rays.ray.tfar[lane] : 0.0F;
     const bool is_dark = (dark >> lane & 1U) != 0U;
-    pixels_[i] = {hits.rays.hit.primID[lane], depth_m};
-    dark_[i] = static_cast<std::uint8_t>(is_dark);
+    pixels_[i] = {hits.rays.hit.primID[lane], depth_m, kSkyMaterial, false, is_dark};
+    if (surface) {
+      const SurfaceRecord& record = scene_.surfaces.record(pixels_[i].triangle);
+      pixels_[i].material = record.material;
+      pixels_[i].foliage = scene_.surfaces.material(record).foliage;
+    }
     if (request_.radiance) {
       gray_[i] = gray[lane];
       view_.radiance[i] = gray[lane].ambient + (is_dark ? 0.0F : gray[lane].sun);

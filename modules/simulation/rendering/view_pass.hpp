@@ -26,39 +26,52 @@ class ViewPass {
   struct Pixel {
     std::uint32_t triangle = kNoTriangle;
     float depth_m = 0.0F;
+    std::uint16_t material = kSkyMaterial;
+    bool foliage = false;
+    bool dark = false;  ///< The sun is hidden.
   };
+  static constexpr std::uint16_t kSkyMaterial = 0xFFFF;
   /// Pixel of each lane, and where in the pixel its ray goes, from the centre [px].
   struct Aim {
     std::array<int, kLanes> x{}, y{};
     Lanes dx, dy;
   };
 
-  enum Edge : std::uint8_t { kNoEdge = 0, kShapeEdge = 1, kShadowEdge = 2 };
+  enum Edge : std::uint8_t { kNoEdge = 0, kShapeEdge = 1, kShadowEdge = 2, kLeafEdge = 4 };
 
   void shade_block(int x0, int y0);
   void store_block(const Aim& aim, const SurfaceHits& hits, const SurfacePoints& points,
                    LaneMask dark);
   void compare_neighbours();
   void compare(std::size_t a, std::size_t b);
+  [[nodiscard]] bool contrast(std::size_t a, std::size_t b) const;
   void find_thin_things(int x0, int y0);
   void flag_unlike(int x, int y, std::uint32_t triangle, const Eigen::Vector3f& hit);
-  [[nodiscard]] bool same_surface(std::uint32_t a, const Eigen::Vector3f& at_a, std::uint32_t b,
-                                  const Eigen::Vector3f& at_b) const;
-  [[nodiscard]] Eigen::Vector3f position(int x, int y) const;
+  [[nodiscard]] Edge edge_towards(std::size_t pixel, std::uint32_t triangle) const;
+  /// Whether a point of another triangle looks like the same surface as the pixel's centre.
+  [[nodiscard]] bool same_surface(std::size_t pixel, std::uint32_t triangle,
+                                  const Eigen::Vector3f& point) const;
+  [[nodiscard]] Eigen::Vector3f position(std::size_t pixel) const;
   void refine_edges();
-  void refine(std::span<const std::size_t> pixels);
-  /// Samples that must be shaded, and those the sun does not reach.
-  struct SampleLanes {
-    LaneMask fresh = 0;
-    LaneMask dark = 0;
+  void refine(std::span<const std::size_t> pixels, int samples_per_pixel);
+  /// Where the shades of samples come from.
+  struct Samples {
+    int per_pixel = 1;
+    std::array<std::size_t, kLanes> source{};  ///< The pixel whose shade a sample takes,
+    LaneMask fresh = 0;                        ///< unless it must be shaded itself.
+    LaneMask dark = 0;                         ///< The sun does not reach it.
+    LaneMask ask_sun = 0;                      ///< That is to be found out.
   };
+  void find_sources(std::span<const std::size_t> pixels, const Aim& aim, const SurfaceHits& hits,
+                    Samples& samples) const;
   template <typename Value>
   void average(std::span<const std::size_t> pixels, const SurfaceHits& hits,
-               const SurfacePoints& points, const SampleLanes& lanes,
-               const std::array<std::size_t, kLanes>& source,
+               const SurfacePoints& points, const Samples& samples,
                const std::vector<Shade<Value>>& shaded, std::vector<Value>& image) const;
-  [[nodiscard]] std::optional<std::size_t> shaded_nearby(std::size_t pixel,
-                                                         std::uint32_t triangle) const;
+  [[nodiscard]] std::optional<std::size_t> shaded_nearby(std::size_t pixel, std::uint32_t triangle,
+                                                         float depth_m,
+                                                         const Eigen::Vector2f& offset) const;
+  [[nodiscard]] bool alike(const Pixel& pixel, const SurfaceRecord& surface, float depth_m) const;
 
   [[nodiscard]] static Aim aim_at_block(int x0, int y0);
   /// Lanes of a 4 x 4 block that lie in the image.
@@ -81,7 +94,6 @@ class ViewPass {
 
   RenderedView view_;
   std::vector<Pixel> pixels_;
-  std::vector<std::uint8_t> dark_;  ///< The sun is hidden.
   std::vector<std::uint8_t> edge_;  ///< Of Edge.
   std::vector<Shade<float>> gray_;
   std::vector<Shade<Eigen::Vector3f>> color_;

@@ -1,3 +1,173 @@
-int main() {
-  return 0;
+#include <algorithm>
+#include <array>
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <cstdio>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "modules/simulation/rendering/renderer.hpp"
+#include "modules/simulation/rendering/sensor_effects.hpp"
+
+// Stereo pairs per second of the whole chain but the encoding of files, on two threads, and where
+// the time goes. Poses: along the first route of a city, or turning in the middle of a room.
+
+namespace km {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
 }
+
+// EuRoC's left and right camera, 11 cm apart, on a body that looks along its x axis.
+StereoRig euroc_rig(int shrink) {
+  PinholeCamera camera;
+  camera.width = 752;
+  camera.height = 480;
+  camera.fx = 458.654;
+  camera.fy = 457.296;
+  camera.cx = 367.215;
+  camera.cy = 248.375;
+  camera.distortion = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05};
+  Eigen::Matrix3d R_body_cam;
+  R_body_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  StereoRig rig;
+  for (int side = 0; side < 2; ++side) {
+    camera.T_body_cam = make_pose(R_body_cam, {0.0, 0.055 - 0.11 * side, 0.0});
+    rig.cameras[static_cast<std::size_t>(side)] = shrunk(camera, shrink);
+  }
+  return rig;
+}
+
+SE3 pose_at(const Eigen::Vector3d& position, double heading) {
+  return make_pose(Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitZ()).toRotationMatrix(),
+                   position);
+}
+
+std::vector<SE3> poses_in(const World& world, int count) {
+  std::vector<SE3> poses;
+  if (world.routes.empty()) {
+    for (int i = 0; i < count; ++i)
+      poses.push_back(pose_at(world.flight_volume.center(), 6.2832 * i / count));
+    return poses;
+  }
+  const std::vector<Eigen::Vector2d>& route = world.routes[0].points;
+  double length = 0.0;
+  for (std::size_t i = 0; i < route.size(); ++i)
+    length += (route[(i + 1) % route.size()] - route[i]).norm();
+  for (int i = 0; i < count; ++i) {
+    double rest = length * (i + 0.5) / count;
+    std::size_t leg = 0;
+    const auto leg_vector = [&] {
+      return Eigen::Vector2d(route[(leg + 1) % route.size()] - route[leg]);
+    };
+    for (; rest > leg_vector().norm(); ++leg) rest -= leg_vector().norm();
+    const Eigen::Vector2d direction = leg_vector().normalized();
+    const Eigen::Vector2d at = route[leg] + rest * direction;
+    constexpr double kCameraHeight_m = 1.5;
+    poses.push_back(pose_at({at.x(), at.y(), world.ground_height(at.x(), at.y()) + kCameraHeight_m},
+                            std::atan2(direction.y(), direction.x())));
+  }
+  return poses;
+}
+
+struct Camera {
+  PixelRays rays;
+  SensorEffects effects;
+
+  explicit Camera(const PinholeCamera& camera) : rays(camera), effects(rays, {}) {}
+};
+
+std::size_t develop_pair(const Renderer& renderer, const std::array<Camera, 2>& cameras,
+                         const SE3& T_world_body) {
+  Shot shot;
+  shot.exposure = {1.0, 0.005};
+  shot.body_velocity << 0.0, 0.0, 0.2, 8.0, 0.0, 0.0;
+  std::size_t bytes = 0;
+  for (const Camera& camera : cameras) {
+    const RenderedView view =
+        renderer.render(camera.rays, T_world_body, camera.effects.request(false));
+    bytes += camera.effects.gray(view, shot).pixels.size();
+  }
+  return bytes;
+}
+
+// Threads take the poses in turns.
+double pairs_per_second(const Renderer& renderer, const std::array<Camera, 2>& cameras,
+                        const std::vector<SE3>& poses, std::size_t threads) {
+  const Clock::time_point start = Clock::now();
+  std::vector<std::thread> workers;
+  for (std::size_t t = 0; t < threads; ++t)
+    workers.emplace_back([&, t] {
+      for (std::size_t i = t; i < poses.size(); i += threads)
+        (void)develop_pair(renderer, cameras, poses[i]);
+    });
+  for (std::thread& worker : workers) worker.join();
+  return static_cast<double>(poses.size()) / seconds_since(start);
+}
+
+template <typename Function>
+double mean_ms(const std::vector<SE3>& poses, const Function& function) {
+  const Clock::time_point start = Clock::now();
+  for (const SE3& T_world_body : poses) function(T_world_body);
+  return 1e3 * seconds_since(start) / static_cast<double>(poses.size());
+}
+
+void print_stages(const World& world, const Renderer& renderer, const Camera& camera,
+                  const std::vector<SE3>& poses) {
+  const Renderer unshadowed(world, {1, false});
+  const Renderer coarse(world, {1, true});
+  const auto render = [&](const Renderer& with, const RenderRequest& request) {
+    return mean_ms(poses, [&](const SE3& T) { (void)with.render(camera.rays, T, request); });
+  };
+  const double rays = render(unshadowed, {false, false, true, false});
+  const double shading = render(unshadowed, {});
+  const double shadows = render(coarse, {});
+  const double edges = render(renderer, {});
+  const RenderedView view = renderer.render(camera.rays, poses[0], camera.effects.request(false));
+  Shot shot;
+  shot.exposure = {1.0, 0.005};
+  shot.body_velocity << 0.0, 0.0, 0.2, 8.0, 0.0, 0.0;
+  const double develop = mean_ms(poses, [&](const SE3&) { (void)camera.effects.gray(view, shot); });
+  const double pixels = static_cast<double>(view.radiance.size());
+  std::printf(
+      "  one view, one thread [ms]: primary rays %.1f (%.0f million/s), shading %.1f, "
+      "shadows %.1f, edges %.1f, development %.1f\n",
+      rays, 1e-3 * pixels / rays, shading - rays, shadows - shading, edges - shadows, develop);
+}
+
+void run(const World& world) {
+  const Clock::time_point start = Clock::now();
+  const Renderer renderer(world);
+  std::printf("%s: %zu triangles, %.1f s to prepare\n", world.name.c_str(),
+              world.mesh.triangles.size(), seconds_since(start));
+  for (const int shrink : {1, 2}) {
+    const StereoRig rig = euroc_rig(shrink);
+    const std::array<Camera, 2> cameras = {Camera(rig.cameras[0]), Camera(rig.cameras[1])};
+    const std::vector<SE3> poses = poses_in(world, 12);
+    std::vector<double> rates;
+    for (int i = 0; i < 5; ++i) rates.push_back(pairs_per_second(renderer, cameras, poses, 2));
+    std::sort(rates.begin(), rates.end());
+    std::printf("%d x %d: %.1f stereo pairs a second on two threads (%.1f to %.1f)\n",
+                rig.cameras[0].width, rig.cameras[0].height, rates[2], rates.front(), rates.back());
+    print_stages(world, renderer, cameras[0], poses);
+  }
+}
+
+TEST_CASE("Stereo pairs per second in the city", "[!benchmark]") {
+  run(make_city(1));
+}
+
+TEST_CASE("Stereo pairs per second in the camp", "[!benchmark]") {
+  run(make_camp(1));
+}
+
+TEST_CASE("Stereo pairs per second in the Vicon room", "[!benchmark]") {
+  run(make_vicon_room(1));
+}
+
+}  // namespace
+}  // namespace km

@@ -30,7 +30,7 @@ TEST_CASE("Depth of a plane is the analytic one in every pixel", "[simulation][r
   const bool distorted = GENERATE(false, true);
   CAPTURE(distorted);
   const PinholeCamera camera =
-      distorted ? distorted_camera(160, 120, 100.0) : forward_camera(160, 120, 100.0);
+      distorted ? distorted_camera(78, 58, 48.0) : forward_camera(78, 58, 48.0);
   Builder builder;
   builder.wall(5.0F, 50.0F, builder.material(SurfaceClass::kWall, 0.5F));
   const World world = builder.build();
@@ -52,7 +52,7 @@ TEST_CASE("Depth of a plane is the analytic one in every pixel", "[simulation][r
 }
 
 TEST_CASE("A box hides what is behind it, and only that", "[simulation][rendering]") {
-  const PinholeCamera camera = distorted_camera(120, 90, 80.0);
+  const PinholeCamera camera = distorted_camera(62, 46, 40.0);
   Builder builder;
   builder.wall(8.0F, 3.0F, builder.material(SurfaceClass::kWall, 0.5F));
   builder.mesh.box({4.0F, -0.5F, -0.25F}, {5.0F, 0.5F, 0.75F},
