@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <opencv2/core/utility.hpp>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -11,6 +12,8 @@ namespace km {
 namespace {
 
 constexpr std::uint32_t kNoSource = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint32_t kOutside = 1U << 31U;  // code of a label that the palette lacks
+constexpr std::uint32_t kLabelBits = 0xFF0000U;
 constexpr std::uint32_t kNoDepth = 65535;  // beside 0, by some sensors
 constexpr double kMaxGrowth = 2.0;         // of the ideal image against the real one
 
@@ -68,12 +71,10 @@ DepthViewMaker::DepthViewMaker(const PinholeCamera& camera, double min_range_m, 
                                 " px");
   min_mm_ = static_cast<std::uint32_t>(std::max(1.0, std::ceil(1000.0 * min_range_m)));
   max_mm_ = std::min(kNoDepth - 1, static_cast<std::uint32_t>(1000.0 * max_range_m));
-  for (std::size_t id = 0; id < known_.size(); ++id) {
-    const auto label = static_cast<LabelId>(id);
-    const bool known = palette.find(label) != nullptr;
-    known_[id] = known ? label : LabelId{0};
-    outside_[id] = known || label == 0 ? 0 : 1;
-  }
+  for (std::size_t id = 1; id < codes_.size(); ++id)
+    codes_[id] = palette.find(static_cast<LabelId>(id)) != nullptr
+                     ? static_cast<std::uint32_t>(id) << 16U
+                     : kOutside;
 
   view_.width = camera.width;
   view_.height = camera.height;
@@ -90,6 +91,7 @@ DepthViewMaker::DepthViewMaker(const PinholeCamera& camera, double min_range_m, 
       static_cast<std::size_t>(view_.tile_columns) * static_cast<std::size_t>(view_.tile_rows);
   view_.nearest.assign(tiles, 0);
   view_.farthest.assign(tiles, 0);
+  strips_.resize(static_cast<std::size_t>(view_.tile_rows));
 }
 
 void DepthViewMaker::plan_rectification(const PinholeCamera& camera) {
@@ -114,70 +116,80 @@ void DepthViewMaker::plan_rectification(const PinholeCamera& camera) {
           source_of(camera, Eigen::Vector2d(u - before.x(), v - before.y()).cwiseQuotient(focal)));
 }
 
-std::uint32_t DepthViewMaker::pack(std::uint16_t millimetres, LabelId label) const {
-  const std::uint32_t mm = millimetres;
-  return (mm >= min_mm_ && mm <= max_mm_ ? mm : 0U) | static_cast<std::uint32_t>(known_[label])
-                                                          << 16U;
-}
-
-void DepthViewMaker::fill_plain(const DepthImage& depth, const LabelImage* labels) {
-  const std::size_t n = depth.millimetres.size();
-  const std::uint16_t* mm = depth.millimetres.data();
-  std::uint32_t* pixel = view_.pixels.data();
-  if (labels == nullptr) {
-    const std::uint32_t low = min_mm_, high = max_mm_;
-    for (std::size_t i = 0; i < n; ++i) pixel[i] = mm[i] >= low && mm[i] <= high ? mm[i] : 0U;
-    return;
+std::size_t DepthViewMaker::fill(std::size_t begin, std::size_t end, const DepthImage& depth,
+                                 const LabelImage* labels) {
+  const std::uint16_t* millimetres = depth.millimetres.data();
+  const LabelId* ids = labels != nullptr ? labels->ids.data() : nullptr;
+  const std::uint32_t low = min_mm_, high = max_mm_;
+  const auto in_range = [=](std::uint32_t mm) { return mm >= low && mm <= high ? mm : 0U; };
+  std::uint32_t* pixels = view_.pixels.data();
+  std::size_t outside = 0;
+  if (source_.empty() && ids == nullptr) {
+    for (std::size_t i = begin; i < end; ++i) pixels[i] = in_range(millimetres[i]);
+    return outside;
   }
-  const LabelId* label = labels->ids.data();
-  for (std::size_t i = 0; i < n; ++i) pixel[i] = pack(mm[i], label[i]);
-}
-
-void DepthViewMaker::fill_rectified(const DepthImage& depth, const LabelImage* labels) {
-  for (std::size_t i = 0; i < source_.size(); ++i) {
-    const std::uint32_t from = source_[i];
-    view_.pixels[i] = from == kNoSource ? 0U
-                                        : pack(depth.millimetres[from],
-                                               labels != nullptr ? labels->ids[from] : LabelId{0});
+  for (std::size_t i = begin; i < end; ++i) {
+    const std::size_t from = source_.empty() ? i : source_[i];
+    const std::uint32_t code = from != kNoSource && ids != nullptr ? codes_[ids[from]] : 0U;
+    const std::uint32_t mm = from != kNoSource ? in_range(millimetres[from]) : 0U;
+    pixels[i] = mm | (code & kLabelBits);
+    outside += code >> 31U;
   }
+  return outside;
 }
 
-void DepthViewMaker::summarise_tiles() {
-  constexpr int kSide = DepthView::kTileSide;
+// Least and greatest by columns first: whole lines at a time.
+std::size_t DepthViewMaker::summarise(int row) {
   const auto width = static_cast<std::size_t>(view_.width);
-  view_.with_depth = 0;
-  for (int row = 0; row < view_.tile_rows; ++row)
-    for (int column = 0; column < view_.tile_columns; ++column) {
-      const int u_end = std::min(view_.width, (column + 1) * kSide);
-      const int v_end = std::min(view_.height, (row + 1) * kSide);
-      std::uint32_t nearest = kNoDepth, farthest = 0, count = 0;
-      for (int v = row * kSide; v < v_end; ++v) {
-        const std::uint32_t* line = &view_.pixels[static_cast<std::size_t>(v) * width];
-        for (int u = column * kSide; u < u_end; ++u) {
-          const std::uint32_t mm = line[u] & 0xFFFFU;
-          nearest = mm < nearest ? mm : nearest;
-          farthest = mm > farthest ? mm : farthest;
-          count += mm > 0 ? 1 : 0;
-        }
-      }
-      const auto tile = static_cast<std::size_t>(row * view_.tile_columns + column);
-      view_.nearest[tile] = static_cast<std::uint16_t>(nearest);
-      view_.farthest[tile] = static_cast<std::uint16_t>(farthest);
-      view_.with_depth += count;
+  const int first = row * DepthView::kTileSide;
+  const int last = std::min(view_.height, first + DepthView::kTileSide);
+  std::vector<std::int32_t> nearest(width, kNoDepth), farthest(width, 0), count(width, 0);
+  for (int v = first; v < last; ++v) {
+    const std::uint32_t* line = &view_.pixels[static_cast<std::size_t>(v) * width];
+    for (std::size_t u = 0; u < width; ++u) {
+      const auto mm = static_cast<std::int32_t>(line[u] & 0xFFFFU);
+      nearest[u] = mm < nearest[u] ? mm : nearest[u];
+      farthest[u] = mm > farthest[u] ? mm : farthest[u];
+      count[u] += mm > 0 ? 1 : 0;
     }
+  }
+  std::size_t with_depth = 0;
+  for (int column = 0; column < view_.tile_columns; ++column) {
+    const auto begin = static_cast<std::ptrdiff_t>(column) * DepthView::kTileSide;
+    const auto end = std::min<std::ptrdiff_t>(view_.width, begin + DepthView::kTileSide);
+    const auto tile = static_cast<std::size_t>(row * view_.tile_columns + column);
+    view_.nearest[tile] = static_cast<std::uint16_t>(
+        *std::min_element(nearest.begin() + begin, nearest.begin() + end));
+    view_.farthest[tile] = static_cast<std::uint16_t>(
+        *std::max_element(farthest.begin() + begin, farthest.begin() + end));
+  }
+  for (const std::int32_t n : count) with_depth += static_cast<std::size_t>(n);
+  return with_depth;
+}
+
+DepthViewMaker::StripSums DepthViewMaker::make_strip(int row, const DepthImage& depth,
+                                                     const LabelImage* labels) {
+  const auto width = static_cast<std::size_t>(view_.width);
+  const auto begin = static_cast<std::size_t>(row * DepthView::kTileSide);
+  const std::size_t end = std::min(static_cast<std::size_t>(view_.height),
+                                   begin + static_cast<std::size_t>(DepthView::kTileSide));
+  StripSums sums;
+  sums.labels_outside = fill(begin * width, end * width, depth, labels);
+  sums.with_depth = summarise(row);
+  return sums;
 }
 
 const DepthView& DepthViewMaker::make(const DepthImage& depth, const LabelImage* labels) {
-  if (source_.empty()) {
-    fill_plain(depth, labels);
-  } else {
-    fill_rectified(depth, labels);
-  }
+  cv::parallel_for_(cv::Range(0, view_.tile_rows), [&](const cv::Range& range) {
+    for (int row = range.start; row < range.end; ++row)
+      strips_[static_cast<std::size_t>(row)] = make_strip(row, depth, labels);
+  });
   view_.labelled = labels != nullptr;
-  view_.labels_outside = 0;
-  if (labels != nullptr)
-    for (const LabelId label : labels->ids) view_.labels_outside += outside_[label];
-  summarise_tiles();
+  view_.with_depth = view_.labels_outside = 0;
+  for (const StripSums& sums : strips_) {
+    view_.with_depth += sums.with_depth;
+    view_.labels_outside += sums.labels_outside;
+  }
   return view_;
 }
 

@@ -29,8 +29,8 @@ struct DepthView {
   std::vector<std::uint16_t> nearest, farthest;
   int tile_columns = 0, tile_rows = 0;
 
-  std::size_t with_depth = 0;      ///< Pixels of the view with a depth.
-  std::size_t labels_outside = 0;  ///< Of all pixels: with a label that the palette lacks.
+  std::size_t with_depth = 0;      ///< Pixels with a depth.
+  std::size_t labels_outside = 0;  ///< Pixels whose label the palette lacks.
   bool labelled = false;
 
   [[nodiscard]] std::size_t outside() const { return pixels.size() - 1; }
@@ -52,17 +52,22 @@ class DepthViewMaker {
   const DepthView& make(const DepthImage& depth, const LabelImage* labels);
 
  private:
+  // What a strip of tiles adds to the sums of a view.
+  struct StripSums {
+    std::size_t with_depth = 0, labels_outside = 0;
+  };
+
   void plan_rectification(const PinholeCamera& camera);
-  void fill_plain(const DepthImage& depth, const LabelImage* labels);
-  void fill_rectified(const DepthImage& depth, const LabelImage* labels);
-  void summarise_tiles();
-  [[nodiscard]] std::uint32_t pack(std::uint16_t millimetres, LabelId label) const;
+  StripSums make_strip(int row, const DepthImage& depth, const LabelImage* labels);
+  std::size_t fill(std::size_t begin, std::size_t end, const DepthImage& depth,
+                   const LabelImage* labels);
+  std::size_t summarise(int row);
 
   DepthView view_;
   std::uint32_t min_mm_ = 0, max_mm_ = 0;
-  std::array<LabelId, 256> known_ = {};         // the label itself, or 0
-  std::array<std::uint8_t, 256> outside_ = {};  // 1: the palette lacks it
-  std::vector<std::uint32_t> source_;           // of each ideal pixel; empty: the same
+  std::array<std::uint32_t, 256> codes_ = {};  // of labels: known ones << 16, others kOutside
+  std::vector<std::uint32_t> source_;          // of each ideal pixel; empty: the same
+  std::vector<StripSums> strips_;
 };
 
 }  // namespace km

@@ -28,8 +28,8 @@ enum class IntegrationStatus {
 /// What integrate() did. All zero but status for a frame that was skipped.
 struct [[nodiscard]] IntegrationReport {
   IntegrationStatus status = IntegrationStatus::kIntegrated;
-  std::size_t pixels = 0;            ///< With a depth within range.
-  std::size_t labels_outside = 0;    ///< Of these, with a label that the palette lacks: unknown.
+  std::size_t pixels = 0;            ///< With a depth within range, after rectification.
+  std::size_t labels_outside = 0;    ///< Pixels whose label the palette lacks: unknown.
   bool label_size_differs = false;   ///< Labels not of the camera's size: integrated without.
   std::size_t blocks_updated = 0;    ///< Near a surface that was seen.
   std::size_t blocks_seen_free = 0;  ///< Others that were looked through.
@@ -66,7 +66,7 @@ struct MapSize {
 /// Memory: max_blocks bounds the voxels; the mesh grows with the surface seen.
 ///
 /// Deterministic: the same calls give the same mesh, bit by bit, however many threads OpenCV's pool
-/// has (cv::setNumThreads(); blocks are fused in parallel). Not thread-safe.
+/// has (cv::setNumThreads(); images and blocks are worked on in parallel). Not thread-safe.
 class SemanticMapper {
  public:
   /// `camera` takes the depth and label images; its T_body_cam is not used. Labels that `palette`
