@@ -28,6 +28,7 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"evaluation", {"mesh"}},
     {"simulation", {"mesh"}},
     {"semantic_mapping", {"mesh"}},
+    {"mesh_deformation", {"mesh"}},
 };
 
 // Files whose job is a format on disk that is YAML: the calibration of EuRoC recordings.

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "modules/core/geometry.hpp"
+#include "modules/core/ids.hpp"
+#include "modules/mesh_deformation/mesh_node.hpp"
+
+namespace km {
+
+/// A keyframe that saw a mesh node.
+struct KeyframeTie {
+  KeyframeIndex keyframe = 0;
+  std::uint32_t node = 0;
+};
+
+/// What the energy of Kimera-Multi (TRO 2022), Sec. "Local Mesh Optimization", eq. (1) there, sums
+/// over, in the undeformed configuration: the robot's odometry frame.
+struct DeformationGraph {
+  std::vector<Eigen::Vector3d> nodes;               ///< g_k [m].
+  std::vector<SE3> T_odom_kf;                       ///< Keyframe i's pose when it saw the nodes.
+  std::vector<std::array<std::uint32_t, 2>> edges;  ///< Neighbouring nodes, each pair once.
+  std::vector<KeyframeTie> ties;                    ///< By node.
+
+  /// Both directions of every mesh edge; position and rotation of every tie.
+  [[nodiscard]] std::size_t term_count() const { return 2 * edges.size() + 2 * ties.size(); }
+};
+
+/// At most `keyframes_per_node` keyframes for each node, of those that saw it: the first, the last,
+/// and others spread over the time in between, where it is no longer than the window (over a longer
+/// time the surface was left and seen again, and nothing is known about the keyframes between).
+[[nodiscard]] std::vector<KeyframeTie> choose_ties(std::span<const MeshNode> nodes,
+                                                   std::size_t keyframes_per_node,
+                                                   KeyframeIndex window_keyframes);
+
+/// Standard deviations of the terms.
+struct DeformationNoise {
+  double anchor_rotation_rad = 0.001;
+  double anchor_translation_m = 0.005;
+  double mesh_edge_m = 0.05;
+  double keyframe_tie_m = 0.02;
+};
+
+/// Poses of all vertices of the graph.
+struct DeformationPoses {
+  std::vector<SE3> T_world_kf;    ///< X_i.
+  std::vector<SE3> T_world_node;  ///< M_k; undeformed: identity rotation and g_k.
+};
+
+enum class DeformationStatus {
+  kConverged,
+  kIterationLimit,  ///< Poses are the best found.
+  kFailed,          ///< The solver gave up: poses are the initial ones.
+};
+
+/// "converged", "iteration limit", "failed"
+[[nodiscard]] const char* to_string(DeformationStatus status);
+
+struct [[nodiscard]] DeformationSolution {
+  DeformationPoses poses;
+  DeformationStatus status = DeformationStatus::kConverged;
+  int iterations = 0;
+  double initial_cost = 0.0;  ///< Half the sum of squares.
+  double final_cost = 0.0;
+};
+
+/// First guess without an earlier solution: keyframes at their anchors, each node where the
+/// keyframes that are tied to it put it on average, turned like the first of them. `T_world_kf` are
+/// the optimised poses, as many as graph.T_odom_kf. Exact for every motion that is rigid.
+[[nodiscard]] DeformationPoses initial_poses(const DeformationGraph& graph,
+                                             std::span<const SE3> T_world_kf);
+
+/// First guess from the solution `last` for the anchors `T_world_kf_last`: every vertex moves like
+/// its (first) keyframe's anchor moved since. Vertices that `last` lacks are as in initial_poses();
+/// those it has must be the graph's first ones.
+[[nodiscard]] DeformationPoses carried_over_poses(const DeformationGraph& graph,
+                                                  const DeformationPoses& last,
+                                                  std::span<const SE3> T_world_kf_last,
+                                                  std::span<const SE3> T_world_kf);
+
+/// Minimises eq. (1): anchors of the keyframes, rigidity between neighbouring nodes in both
+/// directions, rigidity between keyframes and the nodes they saw; Levenberg-Marquardt on SE(3) with
+/// analytic Jacobians and sparse Cholesky factors (Ceres), one thread. To the paper's terms a weak
+/// one is added that turns each node with its keyframes (see kRotationNoise_rad in the source): it
+/// makes the minimum unique where a node has few neighbours, or all in one line. Keyframes without
+/// a tie stay at their anchors.
+[[nodiscard]] DeformationSolution solve(const DeformationGraph& graph,
+                                        std::span<const SE3> T_world_kf,
+                                        const DeformationNoise& noise, int max_iterations,
+                                        DeformationPoses initial);
+
+}  // namespace km

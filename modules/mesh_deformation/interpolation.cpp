@@ -1,0 +1,150 @@
+#include "modules/mesh_deformation/interpolation.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "modules/mesh_deformation/node_tree.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kMaxNeighbours = 8;
+constexpr double kNoWeight = 1e-12;  // of a sum whose terms are at most one
+
+// Nodes of one vertex and how far a node that would change them may be away.
+struct Binding {
+  std::array<std::uint32_t, kMaxNeighbours> nodes;
+  std::array<double, kMaxNeighbours> weights;
+  float reach_m = std::numeric_limits<float>::infinity();
+};
+
+// Eq. (3) for the nearest nodes, the last of which gives d_max.
+Binding weigh(std::span<const NearNode> nearest, bool all_found) {
+  Binding binding;
+  binding.nodes.fill(kNoIndex);
+  binding.weights.fill(0.0);
+  if (nearest.empty()) return binding;
+  const double d_max = std::sqrt(nearest.back().distance2);
+  const std::size_t used = std::max<std::size_t>(nearest.size() - 1, 1);
+  double sum = 0.0;
+  for (std::size_t j = 0; j < used; ++j) {
+    const double root = d_max > 0.0 ? 1.0 - std::sqrt(nearest[j].distance2) / d_max : 0.0;
+    binding.nodes[j] = nearest[j].node;
+    binding.weights[j] = root * root;
+    sum += root * root;
+  }
+  for (std::size_t j = 0; j < used; ++j)  // all equally far: equal weights
+    binding.weights[j] =
+        sum > kNoWeight ? binding.weights[j] / sum : 1.0 / static_cast<double>(used);
+  if (all_found)
+    binding.reach_m = std::nextafter(static_cast<float>(d_max), std::numeric_limits<float>::max());
+  return binding;
+}
+
+Binding bind_vertex(const NodeTree& tree, const Eigen::Vector3f& vertex, const SeenBy& seen_by,
+                    std::size_t neighbours) {
+  std::array<NearNode, kMaxNeighbours + 1> found;
+  const std::size_t count =
+      tree.nearest(vertex.cast<double>(), seen_by, std::span(found).first(neighbours + 1));
+  return weigh(std::span(found).first(count), count == neighbours + 1);
+}
+
+// What moves the surroundings of a node: v' - v = turn (v - g) + shift. Zero for a node that stays.
+struct NodeMotion {
+  Eigen::Matrix3d turn;
+  Eigen::Vector3d shift;
+  Eigen::Vector3d g;
+};
+
+}  // namespace
+
+Interpolation::Interpolation(std::size_t neighbours, KeyframeIndex window_keyframes)
+    : neighbours_(std::clamp<std::size_t>(neighbours, 1, kMaxNeighbours)),
+      window_keyframes_(window_keyframes) {}
+
+void Interpolation::bind(std::span<const Eigen::Vector3f> vertices, std::span<const SeenBy> seen_by,
+                         std::span<const MeshNode> nodes) {
+  const std::vector<std::uint32_t> all_new(vertices.size(), kNoIndex);
+  update(vertices, seen_by, nodes, all_new, {});
+}
+
+void Interpolation::update(std::span<const Eigen::Vector3f> vertices,
+                           std::span<const SeenBy> seen_by, std::span<const MeshNode> nodes,
+                           std::span<const std::uint32_t> before,
+                           std::span<const std::uint32_t> changed) {
+  const NodeTree tree(nodes, window_keyframes_);
+  const NodeTree changed_tree(nodes, changed, window_keyframes_);
+  Interpolation next(neighbours_, window_keyframes_);
+  next.nodes_.resize(vertices.size() * neighbours_);
+  next.weights_.resize(vertices.size() * neighbours_);
+  next.reach_m_.resize(vertices.size());
+  for (std::size_t v = 0; v < vertices.size(); ++v) {
+    const std::size_t to = v * neighbours_;
+    const std::uint32_t old = before[v];
+    if (old != kNoIndex) {
+      const double reach_m = reach_m_[old];
+      if (!changed_tree.any_within(vertices[v].cast<double>(), seen_by[v], reach_m * reach_m)) {
+        std::ranges::copy(nodes_of(old), next.nodes_.begin() + static_cast<std::ptrdiff_t>(to));
+        std::ranges::copy(weights_of(old), next.weights_.begin() + static_cast<std::ptrdiff_t>(to));
+        next.reach_m_[v] = reach_m_[old];
+        continue;
+      }
+    }
+    const Binding binding = bind_vertex(tree, vertices[v], seen_by[v], neighbours_);
+    std::copy_n(binding.nodes.begin(), neighbours_, &next.nodes_[to]);
+    std::copy_n(binding.weights.begin(), neighbours_, &next.weights_[to]);
+    next.reach_m_[v] = binding.reach_m;
+  }
+  *this = std::move(next);
+}
+
+std::vector<Eigen::Vector3f> Interpolation::deform(std::span<const Eigen::Vector3f> vertices,
+                                                   std::span<const SeenBy> seen_by,
+                                                   std::span<const MeshNode> nodes,
+                                                   std::span<const SE3> T_world_node,
+                                                   std::span<const SE3> T_world_odom_of_kf) const {
+  std::vector<NodeMotion> motions;
+  motions.reserve(nodes.size());
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    const Eigen::Vector3d& g = nodes[n].position;
+    motions.push_back({T_world_node[n].linear() - Eigen::Matrix3d::Identity(),
+                       T_world_node[n].translation() - g, g});
+  }
+  std::vector<Eigen::Vector3f> deformed;
+  deformed.reserve(vertices.size());
+  for (std::size_t v = 0; v < vertices.size(); ++v) {
+    const Eigen::Vector3d vertex = vertices[v].cast<double>();
+    const auto nodes_here = nodes_of(v);
+    const auto weights = weights_of(v);
+    if (nodes_here.front() == kNoIndex) {
+      deformed.push_back((T_world_odom_of_kf[seen_by[v][0]] * vertex).cast<float>());
+      continue;
+    }
+    Eigen::Vector3d displacement = Eigen::Vector3d::Zero();  // Eq. (2), less the vertex
+    for (std::size_t j = 0; j < neighbours_ && nodes_here[j] != kNoIndex; ++j) {
+      const NodeMotion& motion = motions[nodes_here[j]];
+      displacement += weights[j] * (motion.turn * (vertex - motion.g) + motion.shift);
+    }
+    deformed.push_back((vertex + displacement).cast<float>());
+  }
+  return deformed;
+}
+
+std::size_t Interpolation::unbound_count() const {
+  std::size_t count = 0;
+  for (std::size_t v = 0; v < vertex_count(); ++v)
+    if (nodes_of(v).front() == kNoIndex) ++count;
+  return count;
+}
+
+std::span<const std::uint32_t> Interpolation::nodes_of(std::size_t vertex) const {
+  return std::span(nodes_).subspan(vertex * neighbours_, neighbours_);
+}
+
+std::span<const double> Interpolation::weights_of(std::size_t vertex) const {
+  return std::span(weights_).subspan(vertex * neighbours_, neighbours_);
+}
+
+}  // namespace km

@@ -1,0 +1,223 @@
+#include "modules/mesh_deformation/local_mesh_optimizer.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "modules/mesh_deformation/decimation.hpp"
+#include "modules/mesh_deformation/interpolation.hpp"
+#include "modules/mesh_deformation/map_mesh_check.hpp"
+
+namespace km {
+namespace {
+
+// How vertices of two versions of a mesh correspond.
+struct VertexMatch {
+  std::vector<std::uint32_t> before;     // of each new vertex the old index, or kNoIndex
+  std::vector<std::uint32_t> unchanged;  // the same, kNoIndex too if position or time differ
+  std::vector<std::uint32_t> after;      // of each old vertex the new index, or kNoIndex
+};
+
+// What is kept of the last mesh.
+struct KnownVertices {
+  std::vector<Eigen::Vector3f> positions;
+  std::vector<SeenBy> seen_by;
+  std::vector<std::uint64_t> ids;
+};
+
+// By ids: one walk through two ascending lists.
+std::vector<std::uint32_t> match_ids(const std::vector<std::uint64_t>& old_ids,
+                                     const std::vector<std::uint64_t>& new_ids) {
+  std::vector<std::uint32_t> before(new_ids.size(), kNoIndex);
+  std::uint32_t old = 0;
+  for (std::size_t v = 0; v < new_ids.size(); ++v) {
+    while (old < old_ids.size() && old_ids[old] < new_ids[v]) ++old;
+    if (old < old_ids.size() && old_ids[old] == new_ids[v]) before[v] = old;
+  }
+  return before;
+}
+
+std::vector<std::uint32_t> match_positions(const std::vector<Eigen::Vector3f>& old_positions,
+                                           const std::vector<Eigen::Vector3f>& new_positions) {
+  std::vector<std::uint32_t> before(new_positions.size(), kNoIndex);
+  for (std::uint32_t v = 0; v < std::min(old_positions.size(), new_positions.size()); ++v)
+    if (old_positions[v] == new_positions[v]) before[v] = v;
+  return before;
+}
+
+VertexMatch match(const KnownVertices& known, const MapMesh& map) {
+  VertexMatch match;
+  const bool by_ids = !known.ids.empty() && !map.ids.empty();
+  match.before =
+      by_ids ? match_ids(known.ids, map.ids) : match_positions(known.positions, map.mesh.vertices);
+  match.unchanged = match.before;
+  match.after.assign(known.positions.size(), kNoIndex);
+  for (std::uint32_t v = 0; v < match.before.size(); ++v) {
+    const std::uint32_t old = match.before[v];
+    if (old == kNoIndex) continue;
+    match.after[old] = v;
+    if (known.positions[old] != map.mesh.vertices[v] || known.seen_by[old] != map.seen_by[v])
+      match.unchanged[v] = kNoIndex;
+  }
+  return match;
+}
+
+// Optimised poses of all keyframes: those at the end that have none follow the last that has one.
+std::vector<SE3> complete(std::span<const SE3> T_odom_kf, std::span<const SE3> T_world_kf) {
+  std::vector<SE3> result(T_world_kf.begin(), T_world_kf.end());
+  if (T_odom_kf.empty()) return result;
+  const std::size_t last = T_world_kf.size() - 1;
+  const SE3 T_world_odom = T_world_kf[last] * T_odom_kf[last].inverse();
+  for (std::size_t i = T_world_kf.size(); i < T_odom_kf.size(); ++i)
+    result.push_back(T_world_odom * T_odom_kf[i]);
+  return result;
+}
+
+void check_trajectories(std::span<const SE3> T_odom_kf, std::span<const SE3> T_world_kf) {
+  check_poses(T_odom_kf, "odometry");
+  check_poses(T_world_kf, "optimised");
+  if (T_world_kf.size() > T_odom_kf.size() || (T_world_kf.empty() && !T_odom_kf.empty()))
+    throw std::invalid_argument("mesh deformation: " + std::to_string(T_world_kf.size()) +
+                                " optimised poses for " + std::to_string(T_odom_kf.size()) +
+                                " keyframes");
+}
+
+}  // namespace
+
+struct LocalMeshOptimizer::State {
+  explicit State(const MeshDeformationConfig& c)
+      : config(checked(c)),
+        window(static_cast<KeyframeIndex>(config.time_window_keyframes)),
+        interpolation(static_cast<std::size_t>(config.interpolation_nodes), window) {}
+
+  // Nodes whose vertex was seen again; indices of their vertices in the new mesh.
+  std::vector<std::uint32_t> follow_vertices(const VertexMatch& matched, const MapMesh& map);
+
+  // Brings nodes, regions and bindings up to date with `map`. Returns the number of new nodes.
+  std::size_t take_over(const MapMesh& map);
+
+  [[nodiscard]] DeformationGraph make_graph(const MapMesh& map,
+                                            std::span<const SE3> T_odom_kf) const;
+  [[nodiscard]] DeformationNoise noise() const {
+    return {config.anchor_rotation_rad, config.anchor_translation_m, config.mesh_edge_m,
+            config.keyframe_tie_m};
+  }
+
+  MeshDeformationConfig config;
+  KeyframeIndex window;
+  Interpolation interpolation;
+  KnownVertices known;
+  SimplifiedMesh simplified;
+  bool solved = false;
+  DeformationPoses last;             // for
+  std::vector<SE3> T_world_kf_last;  // these anchors
+};
+
+std::vector<std::uint32_t> LocalMeshOptimizer::State::follow_vertices(const VertexMatch& matched,
+                                                                      const MapMesh& map) {
+  std::vector<std::uint32_t> seen_again;
+  for (std::uint32_t n = 0; n < simplified.nodes.size(); ++n) {
+    MeshNode& node = simplified.nodes[n];
+    if (node.vertex == kNoIndex) continue;
+    node.vertex = matched.after[node.vertex];
+    if (node.vertex == kNoIndex) continue;
+    const auto [first, last_seen] = map.seen_by[node.vertex];
+    const SeenBy joined = {std::min(first, node.seen_by[0]), std::max(last_seen, node.seen_by[1])};
+    if (joined != node.seen_by) seen_again.push_back(n);
+    node.seen_by = joined;
+  }
+  return seen_again;
+}
+
+std::size_t LocalMeshOptimizer::State::take_over(const MapMesh& map) {
+  const VertexMatch matched = match(known, map);
+  std::vector<std::uint32_t> changed = follow_vertices(matched, map);
+
+  std::vector<std::uint32_t> node_of_vertex(map.mesh.vertices.size(), kNoIndex);
+  for (std::size_t v = 0; v < node_of_vertex.size(); ++v)
+    if (matched.before[v] != kNoIndex)
+      node_of_vertex[v] = simplified.node_of_vertex[matched.before[v]];
+  simplified.node_of_vertex = std::move(node_of_vertex);
+
+  const std::size_t old_nodes = simplified.nodes.size();
+  extend(simplified, map, {config.node_spacing_m, window});
+  for (std::size_t n = old_nodes; n < simplified.nodes.size(); ++n)
+    changed.push_back(static_cast<std::uint32_t>(n));
+
+  interpolation.update(map.mesh.vertices, map.seen_by, simplified.nodes, matched.unchanged,
+                       changed);
+  known = {map.mesh.vertices, map.seen_by, map.ids};
+  return simplified.nodes.size() - old_nodes;
+}
+
+DeformationGraph LocalMeshOptimizer::State::make_graph(const MapMesh& map,
+                                                       std::span<const SE3> T_odom_kf) const {
+  DeformationGraph graph;
+  graph.nodes.reserve(simplified.nodes.size());
+  for (const MeshNode& node : simplified.nodes) graph.nodes.push_back(node.position);
+  graph.T_odom_kf.assign(T_odom_kf.begin(), T_odom_kf.end());
+  graph.edges = region_edges(simplified, map.mesh.faces, window);
+  graph.ties =
+      choose_ties(simplified.nodes, static_cast<std::size_t>(config.keyframes_per_node), window);
+  return graph;
+}
+
+LocalMeshOptimizer::LocalMeshOptimizer(const MeshDeformationConfig& config)
+    : state_(std::make_unique<State>(config)) {}
+LocalMeshOptimizer::~LocalMeshOptimizer() = default;
+LocalMeshOptimizer::LocalMeshOptimizer(LocalMeshOptimizer&&) noexcept = default;
+LocalMeshOptimizer& LocalMeshOptimizer::operator=(LocalMeshOptimizer&&) noexcept = default;
+
+DeformedMesh LocalMeshOptimizer::optimize(const MapMesh& map, std::span<const SE3> T_odom_kf,
+                                          std::span<const SE3> T_world_kf) {
+  check_trajectories(T_odom_kf, T_world_kf);
+  check_map_mesh(map, T_odom_kf.size());
+  State& state = *state_;
+  if (T_odom_kf.size() < state.T_world_kf_last.size())
+    throw std::invalid_argument("mesh deformation: " + std::to_string(T_odom_kf.size()) +
+                                " keyframes, fewer than the " +
+                                std::to_string(state.T_world_kf_last.size()) + " before");
+  DeformedMesh result;
+  MeshDeformationReport& report = result.report;
+
+  report.new_nodes = state.take_over(map);
+  const DeformationGraph graph = state.make_graph(map, T_odom_kf);
+  const std::vector<SE3> anchors = complete(T_odom_kf, T_world_kf);
+  report.warm = state.solved;
+  DeformationPoses initial =
+      state.solved ? carried_over_poses(graph, state.last, state.T_world_kf_last, anchors)
+                   : initial_poses(graph, anchors);
+  DeformationSolution solution =
+      solve(graph, anchors, state.noise(), state.config.max_iterations, std::move(initial));
+
+  std::vector<SE3> T_world_odom;  // as each keyframe sees it: moves what no node moves
+  for (std::size_t i = 0; i < anchors.size(); ++i)
+    T_world_odom.push_back(anchors[i] * T_odom_kf[i].inverse());
+  result.mesh = map.mesh;
+  result.mesh.vertices =
+      state.interpolation.deform(map.mesh.vertices, map.seen_by, state.simplified.nodes,
+                                 solution.poses.T_world_node, T_world_odom);
+
+  report.vertices = map.mesh.vertices.size();
+  report.unbound_vertices = state.interpolation.unbound_count();
+  report.nodes = graph.nodes.size();
+  report.keyframes = T_odom_kf.size();
+  report.edges = graph.edges.size();
+  report.ties = graph.ties.size();
+  report.status = solution.status;
+  report.iterations = solution.iterations;
+  report.initial_cost = solution.initial_cost;
+  report.final_cost = solution.final_cost;
+  state.last = std::move(solution.poses);
+  state.T_world_kf_last = anchors;
+  state.solved = true;
+  return result;
+}
+
+void LocalMeshOptimizer::reset() {
+  state_ = std::make_unique<State>(state_->config);
+}
+
+}  // namespace km

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+
+#include "modules/core/geometry.hpp"
+#include "modules/mesh/map_mesh.hpp"
+#include "modules/mesh_deformation/deformation_graph.hpp"
+#include "modules/mesh_deformation/mesh_deformation_config.hpp"
+
+namespace km {
+
+/// Sizes and outcome of one call of LocalMeshOptimizer::optimize().
+struct MeshDeformationReport {
+  std::size_t vertices = 0;
+  std::size_t unbound_vertices = 0;  ///< No node was near in time: moved with their keyframe.
+  std::size_t nodes = 0;
+  std::size_t new_nodes = 0;
+  std::size_t keyframes = 0;
+  std::size_t edges = 0;
+  std::size_t ties = 0;
+  bool warm = false;  ///< Started from an earlier solution.
+  DeformationStatus status = DeformationStatus::kConverged;
+  int iterations = 0;
+  double initial_cost = 0.0;
+  double final_cost = 0.0;
+};
+
+struct [[nodiscard]] DeformedMesh {
+  LabelledMesh mesh;  ///< In the frame of the optimised poses.
+  MeshDeformationReport report;
+};
+
+/// Local Mesh Optimization (Chang, Tian, How, Carlone, "Kimera-Multi", TRO 2022, Sec. "Local Mesh
+/// Optimization"): bends the mesh that a robot's mapper built on odometry so that it agrees with
+/// the optimised poses of the keyframes. The mesh is simplified to the nodes of a deformation
+/// graph, the graph solved, and every vertex moved with the nodes around it. Faces, labels and
+/// colours are untouched.
+///
+/// Incremental: the graph is kept from call to call. Surface that is new extends it, known vertices
+/// keep their nodes, and the last solution starts the next. Vertices are known again by their ids,
+/// else by index and position. reset() forgets all.
+///
+/// Deviations from the paper: surfaces seen at distant times (see MeshDeformationConfig) neither
+/// share an edge of the graph nor move each other's vertices, for drift lies between them; and the
+/// weak term of solve().
+///
+/// Not thread-safe.
+class LocalMeshOptimizer {
+ public:
+  /// Throws ConfigError if `config` is out of bounds.
+  explicit LocalMeshOptimizer(const MeshDeformationConfig& config = {});
+  ~LocalMeshOptimizer();
+  LocalMeshOptimizer(LocalMeshOptimizer&&) noexcept;
+  LocalMeshOptimizer& operator=(LocalMeshOptimizer&&) noexcept;
+
+  /// The mesh corrected. `T_odom_kf` are the keyframes' poses the mesh was built with, index i
+  /// being keyframe i; `T_world_kf` their optimised poses. Keyframes at the end that have no
+  /// optimised pose yet follow the last one that has. Throws std::invalid_argument, the state
+  /// unchanged, for a mesh that check_map_mesh() refuses, poses that are not finite or not rigid,
+  /// more optimised poses than keyframes, or none though there are some, and fewer keyframes than
+  /// in the call before.
+  DeformedMesh optimize(const MapMesh& map, std::span<const SE3> T_odom_kf,
+                        std::span<const SE3> T_world_kf);
+
+  void reset();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace km

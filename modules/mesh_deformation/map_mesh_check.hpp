@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string_view>
+
+#include "modules/core/geometry.hpp"
+#include "modules/mesh/map_mesh.hpp"
+
+namespace km {
+
+/// Throws std::invalid_argument that names the first problem: `seen_by` not as long as the
+/// vertices, first after last keyframe, a keyframe from `keyframes` on, a vertex that is not finite
+/// or beyond 10,000 km, a face that names a vertex which does not exist, ids not as long as the
+/// vertices or not ascending.
+void check_map_mesh(const MapMesh& map, std::size_t keyframes);
+
+/// Throws std::invalid_argument that names the first pose that is not finite or not rigid; `what`
+/// says which poses these are.
+void check_poses(std::span<const SE3> poses, std::string_view what);
+
+}  // namespace km

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "modules/core/geometry.hpp"
+#include "modules/mesh/map_mesh.hpp"
+
+namespace km {
+
+/// A flat grid of (columns + 1) x (rows + 1) vertices with this step [m], in the plane of x and y
+/// from the origin, two triangles per cell; ids ascend from 0. Vertices at x are seen by the
+/// keyframes within two steps of x / keyframe_step_m.
+struct SheetSize {
+  std::size_t columns = 40;
+  std::size_t rows = 8;
+  double step_m = 0.25;
+  double keyframe_step_m = 0.5;
+};
+
+inline std::size_t keyframe_count(const SheetSize& size) {
+  const double length_m = static_cast<double>(size.columns) * size.step_m;
+  return static_cast<std::size_t>(length_m / size.keyframe_step_m) + 1;
+}
+
+inline MapMesh sheet(const SheetSize& size) {
+  MapMesh map;
+  const auto width = static_cast<std::uint32_t>(size.rows + 1);
+  const auto last = static_cast<KeyframeIndex>(keyframe_count(size) - 1);
+  for (std::size_t i = 0; i <= size.columns; ++i)
+    for (std::size_t j = 0; j <= size.rows; ++j) {
+      const double x = static_cast<double>(i) * size.step_m;
+      const double y = static_cast<double>(j) * size.step_m;
+      const auto near = static_cast<KeyframeIndex>(x / size.keyframe_step_m);
+      map.mesh.vertices.push_back(Eigen::Vector3d(x, y, 0.0).cast<float>());
+      map.mesh.labels.push_back(static_cast<LabelId>(i % 7));
+      map.seen_by.push_back({near < 2 ? 0 : near - 2, std::min(near + 2, last)});
+      map.ids.push_back(map.ids.size());
+    }
+  for (std::uint32_t i = 0; i < size.columns; ++i)
+    for (std::uint32_t j = 0; j < size.rows; ++j) {
+      const std::uint32_t a = i * width + j;
+      const std::uint32_t b = a + width;
+      map.mesh.faces.push_back({a, b, b + 1});
+      map.mesh.faces.push_back({a, b + 1, a + 1});
+    }
+  return map;
+}
+
+/// Keyframes in a straight line above the middle of the sheet.
+inline std::vector<SE3> keyframes_above(const SheetSize& size) {
+  std::vector<SE3> keyframes;
+  const double middle_m = 0.5 * static_cast<double>(size.rows) * size.step_m;
+  for (std::size_t i = 0; i < keyframe_count(size); ++i)
+    keyframes.push_back(make_pose(Eigen::Matrix3d::Identity(),
+                                  {static_cast<double>(i) * size.keyframe_step_m, middle_m, 1.5}));
+  return keyframes;
+}
+
+/// Bends the line x to a circle of this radius in the plane of x and z (up): what is at (x, y, z)
+/// goes to angle x / radius, z above the circle.
+inline SE3 bend(const SE3& T, double radius_m) {
+  const double angle = T.translation().x() / radius_m;
+  const Eigen::Matrix3d R = Eigen::AngleAxisd(-angle, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  const Eigen::Vector3d center(0.0, T.translation().y(), radius_m);
+  const Eigen::Vector3d spoke(0.0, 0.0, T.translation().z() - radius_m);
+  return make_pose(R * T.linear(), center + R * spoke);
+}
+
+}  // namespace km

@@ -1,0 +1,228 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "modules/core/lie.hpp"
+#include "modules/mesh_deformation/deformation_graph.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+constexpr int kIterations = 50;
+constexpr double kSolved = 1e-6;  // [m] and [rad]
+
+// A patch of nodes in the plane z = 0 with a keyframe above each of its corners.
+DeformationGraph patch(std::uint32_t width) {
+  DeformationGraph graph;
+  for (std::uint32_t i = 0; i < width; ++i)
+    for (std::uint32_t j = 0; j < width; ++j) {
+      const std::uint32_t n = i * width + j;
+      graph.nodes.emplace_back(i, j, 0.1 * ((i + 2 * j) % 3));
+      if (j > 0) graph.edges.push_back({n - 1, n});
+      if (i > 0) graph.edges.push_back({n - width, n});
+      graph.ties.push_back({2 * i / width + 2 * (2 * j / width), n});
+    }
+  for (const double y : {0.0, width - 1.0})
+    for (const double x : {0.0, width - 1.0})
+      graph.T_odom_kf.push_back(make_pose(Eigen::Matrix3d::Identity(), {x, y, 2.0}));
+  return graph;
+}
+
+double distance(const DeformationPoses& a, const DeformationPoses& b) {
+  double largest = 0.0;
+  REQUIRE(a.T_world_node.size() == b.T_world_node.size());
+  for (std::size_t n = 0; n < a.T_world_node.size(); ++n)
+    largest = std::max(
+        largest, (a.T_world_node[n].matrix() - b.T_world_node[n].matrix()).cwiseAbs().maxCoeff());
+  for (std::size_t i = 0; i < a.T_world_kf.size(); ++i)
+    largest = std::max(largest,
+                       (a.T_world_kf[i].matrix() - b.T_world_kf[i].matrix()).cwiseAbs().maxCoeff());
+  return largest;
+}
+
+std::vector<SE3> disturbed(std::vector<SE3> poses, unsigned seed, double rotation_rad,
+                           double translation_m) {
+  std::mt19937 rng(seed);
+  for (SE3& T : poses) {
+    Vector6 xi;
+    xi.head<3>() = rotation_rad * random_vector<3>(rng);
+    xi.tail<3>() = translation_m * random_vector<3>(rng);
+    T = T * se3_exp(xi);
+  }
+  return poses;
+}
+
+}  // namespace
+
+TEST_CASE("A triangle has six directed edges and every tie two terms", "[mesh_deformation]") {
+  DeformationGraph graph;
+  graph.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  graph.edges = {{0, 1}, {0, 2}, {1, 2}};
+  CHECK(graph.term_count() == 6);
+  graph.ties = {{0, 0}};
+  CHECK(graph.term_count() == 8);
+  graph.ties.push_back({0, 2});
+  CHECK(graph.term_count() == 10);
+}
+
+TEST_CASE("A node is tied to keyframes spread over its time of sight", "[mesh_deformation]") {
+  const auto keyframes = [](SeenBy seen, std::size_t count) {
+    std::vector<KeyframeIndex> result;
+    const MeshNode node{Eigen::Vector3d::Zero(), seen};
+    for (const KeyframeTie& tie : choose_ties(std::span(&node, 1), count, 20))
+      result.push_back(tie.keyframe);
+    return result;
+  };
+  using List = std::vector<KeyframeIndex>;
+  CHECK(keyframes({7, 7}, 4) == List{7});
+  CHECK(keyframes({7, 9}, 4) == List{7, 8, 9});
+  CHECK(keyframes({10, 19}, 4) == List{10, 13, 16, 19});
+  CHECK(keyframes({10, 19}, 1) == List{10});
+  // Left and seen again: only the ends are known.
+  CHECK(keyframes({10, 100}, 4) == List{10, 100});
+}
+
+TEST_CASE("Without corrections nothing moves", "[mesh_deformation]") {
+  const DeformationGraph graph = patch(5);
+  const DeformationPoses still = initial_poses(graph, graph.T_odom_kf);
+  const auto solution = solve(graph, graph.T_odom_kf, {}, kIterations, still);
+  CHECK(solution.status == DeformationStatus::kConverged);
+  for (std::size_t n = 0; n < graph.nodes.size(); ++n) {
+    CHECK((solution.poses.T_world_node[n].translation() - graph.nodes[n]).norm() < kSolved);
+    CHECK(angle_of(solution.poses.T_world_node[n].linear()) < kSolved);
+  }
+}
+
+TEST_CASE("One tied node drags the graph along, whatever the rest is tied to",
+          "[mesh_deformation]") {
+  // A triangle whose vertex 1 is held at (1.5, 0, 0): all of it moves by (0.5, 0, 0).
+  DeformationGraph graph;
+  graph.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  graph.edges = {{0, 1}, {0, 2}, {1, 2}};
+  graph.T_odom_kf = {make_pose(Eigen::Matrix3d::Identity(), {1, 0, 0})};
+  graph.ties = {{0, 1}};
+  const std::vector<SE3> anchors = {make_pose(Eigen::Matrix3d::Identity(), {1.5, 0, 0})};
+  const auto solution =
+      solve(graph, anchors, {}, kIterations, initial_poses(graph, graph.T_odom_kf));
+  CHECK(solution.status == DeformationStatus::kConverged);
+  for (std::size_t n = 0; n < 3; ++n)
+    CHECK(
+        (solution.poses.T_world_node[n].translation() - graph.nodes[n] - Eigen::Vector3d(0.5, 0, 0))
+            .norm() < kSolved);
+}
+
+TEST_CASE("A cube pulled at one corner moves, pulled at two it stretches", "[mesh_deformation]") {
+  DeformationGraph graph;
+  for (int i = 0; i < 8; ++i) graph.nodes.emplace_back(i % 2, i / 2 % 2, i / 4);
+  for (std::uint32_t i = 0; i < 8; ++i)
+    for (const std::uint32_t bit : {1U, 2U, 4U})
+      if ((i & bit) == 0) graph.edges.push_back({i, i | bit});
+  graph.T_odom_kf = {make_pose(Eigen::Matrix3d::Identity(), {0, 0, 0})};
+  graph.ties = {{0, 0}};
+  std::vector<SE3> anchors = {make_pose(Eigen::Matrix3d::Identity(), {-0.5, 0, 0})};
+  // Held stiffly against the edges.
+  const DeformationNoise noise{.anchor_rotation_rad = 1e-5,
+                               .anchor_translation_m = 1e-5,
+                               .mesh_edge_m = 0.1,
+                               .keyframe_tie_m = 1e-5};
+  SECTION("one corner") {
+    const auto solution =
+        solve(graph, anchors, noise, kIterations, initial_poses(graph, graph.T_odom_kf));
+    for (std::size_t n = 0; n < 8; ++n)
+      CHECK((solution.poses.T_world_node[n].translation() - graph.nodes[n] -
+             Eigen::Vector3d(-0.5, 0, 0))
+                .norm() < kSolved);
+  }
+  SECTION("two corners") {
+    graph.T_odom_kf.push_back(make_pose(Eigen::Matrix3d::Identity(), {1, 0, 0}));
+    graph.ties.push_back({1, 1});
+    anchors.push_back(make_pose(Eigen::Matrix3d::Identity(), {1.5, 0, 0}));
+    const auto solution =
+        solve(graph, anchors, noise, kIterations, initial_poses(graph, graph.T_odom_kf));
+    const auto& nodes = solution.poses.T_world_node;
+    CHECK(nodes[0].translation().x() == Approx(-0.5).margin(1e-3));
+    CHECK(nodes[1].translation().x() == Approx(1.5).margin(1e-3));
+    // The far edge is longer than it was, not as long as the one that is pulled; all symmetric.
+    const double far = nodes[7].translation().x() - nodes[6].translation().x();
+    CHECK(far > 1.0);
+    CHECK(far < 2.0);
+    CHECK(nodes[7].translation().x() + nodes[6].translation().x() == Approx(1.0).margin(1e-3));
+  }
+}
+
+TEST_CASE("Rigid motion of the keyframes is the motion of the nodes", "[mesh_deformation]") {
+  const auto seed = GENERATE(range(0U, 3U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const DeformationGraph graph = patch(5);
+  const SE3 T_world_odom = random_pose(rng);
+  std::vector<SE3> anchors;
+  for (const SE3& T_odom_kf : graph.T_odom_kf) anchors.push_back(T_world_odom * T_odom_kf);
+  const auto solution = solve(graph, anchors, {}, kIterations, initial_poses(graph, anchors));
+  CHECK(solution.final_cost < 1e-12);
+  for (std::size_t n = 0; n < graph.nodes.size(); ++n) {
+    const SE3 expected = T_world_odom * make_pose(Eigen::Matrix3d::Identity(), graph.nodes[n]);
+    CHECK((solution.poses.T_world_node[n].matrix() - expected.matrix()).norm() < kSolved);
+  }
+}
+
+TEST_CASE("The solution does not depend on where it starts", "[mesh_deformation]") {
+  const auto seed = GENERATE(range(0U, 4U));
+  CAPTURE(seed);
+  const DeformationGraph graph = patch(6);
+  const std::vector<SE3> earlier = disturbed(graph.T_odom_kf, seed, 0.05, 0.3);
+  const std::vector<SE3> anchors = disturbed(graph.T_odom_kf, seed + 100, 0.1, 0.3);
+  const auto cold = solve(graph, anchors, {}, kIterations, initial_poses(graph, anchors));
+  const auto before = solve(graph, earlier, {}, kIterations, initial_poses(graph, earlier));
+  const auto warm = solve(graph, anchors, {}, kIterations,
+                          carried_over_poses(graph, before.poses, earlier, anchors));
+  CHECK(cold.status == DeformationStatus::kConverged);
+  CHECK(warm.status == DeformationStatus::kConverged);
+  CHECK(distance(cold.poses, warm.poses) < kSolved);
+  CHECK(warm.final_cost < cold.initial_cost);
+}
+
+TEST_CASE("Starting from the solution itself ends at once", "[mesh_deformation]") {
+  const DeformationGraph graph = patch(6);
+  const std::vector<SE3> anchors = disturbed(graph.T_odom_kf, 7, 0.1, 0.3);
+  const auto cold = solve(graph, anchors, {}, kIterations, initial_poses(graph, anchors));
+  const auto again = solve(graph, anchors, {}, kIterations,
+                           carried_over_poses(graph, cold.poses, anchors, anchors));
+  CHECK(again.iterations <= 2);
+  CHECK(distance(cold.poses, again.poses) < kSolved);
+}
+
+TEST_CASE("Pieces without ties to each other are solved side by side", "[mesh_deformation]") {
+  DeformationGraph graph = patch(4);
+  const auto count = static_cast<std::uint32_t>(graph.nodes.size());
+  const DeformationGraph one = graph;
+  for (const auto& node : one.nodes) graph.nodes.push_back(node + Eigen::Vector3d(100, 0, 0));
+  for (const auto& [a, b] : one.edges) graph.edges.push_back({a + count, b + count});
+  const SE3 shift = make_pose(Eigen::Matrix3d::Identity(), {100, 0, 0});
+  for (const SE3& T : one.T_odom_kf) graph.T_odom_kf.push_back(shift * T);
+  for (const KeyframeTie& tie : one.ties)
+    graph.ties.push_back({tie.keyframe + 4, tie.node + count});
+  std::vector<SE3> anchors = disturbed(one.T_odom_kf, 3, 0.05, 0.2);
+  const auto alone = solve(one, anchors, {}, kIterations, initial_poses(one, anchors));
+  for (const SE3& T : one.T_odom_kf) anchors.push_back(shift * T);
+  const auto both = solve(graph, anchors, {}, kIterations, initial_poses(graph, anchors));
+  for (std::size_t n = 0; n < count; ++n) {
+    CHECK((both.poses.T_world_node[n].translation() - alone.poses.T_world_node[n].translation())
+              .norm() < kSolved);
+    CHECK((both.poses.T_world_node[n + count].translation() - graph.nodes[n + count]).norm() <
+          kSolved);
+  }
+}
+
+TEST_CASE("Keyframes that saw nothing stay at their anchors", "[mesh_deformation]") {
+  DeformationGraph graph = patch(3);
+  std::mt19937 rng(1);
+  graph.T_odom_kf.push_back(random_pose(rng));
+  const std::vector<SE3> anchors = disturbed(graph.T_odom_kf, 5, 0.1, 0.1);
+  const auto solution = solve(graph, anchors, {}, kIterations, initial_poses(graph, anchors));
+  CHECK((solution.poses.T_world_kf.back().matrix() - anchors.back().matrix()).norm() < 1e-12);
+}
+
+}  // namespace km

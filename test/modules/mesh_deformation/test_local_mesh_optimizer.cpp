@@ -1,0 +1,281 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <limits>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "modules/core/lie.hpp"
+#include "modules/mesh_deformation/local_mesh_optimizer.hpp"
+#include "test/modules/mesh_deformation/corridor.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+using Catch::Matchers::Contains;
+
+constexpr double kSame = 1e-6;  // [m]: a few roundings of floats below 10 m
+
+const SheetSize kSheet{.columns = 32, .rows = 8, .step_m = 0.25, .keyframe_step_m = 0.5};
+
+double largest_distance(const LabelledMesh& a, const LabelledMesh& b) {
+  REQUIRE(a.vertices.size() == b.vertices.size());
+  double largest = 0.0;
+  for (std::size_t v = 0; v < a.vertices.size(); ++v)
+    largest = std::max(largest, static_cast<double>((a.vertices[v] - b.vertices[v]).norm()));
+  return largest;
+}
+
+std::vector<SE3> moved(const std::vector<SE3>& poses, const SE3& T) {
+  std::vector<SE3> result;
+  for (const SE3& pose : poses) result.push_back(T * pose);
+  return result;
+}
+
+std::vector<SE3> bent(const std::vector<SE3>& poses, double radius_m) {
+  std::vector<SE3> result;
+  for (const SE3& pose : poses) result.push_back(bend(pose, radius_m));
+  return result;
+}
+
+std::string refusal(const MapMesh& map, const std::vector<SE3>& odometry,
+                    const std::vector<SE3>& optimised) {
+  LocalMeshOptimizer optimizer;
+  try {
+    (void)optimizer.optimize(map, odometry, optimised);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return {};
+}
+
+}  // namespace
+
+TEST_CASE("Poses that did not change leave the mesh as it is", "[mesh_deformation]") {
+  const MapMesh map = sheet(kSheet);
+  const std::vector<SE3> keyframes = keyframes_above(kSheet);
+  LocalMeshOptimizer optimizer;
+  const DeformedMesh result = optimizer.optimize(map, keyframes, keyframes);
+  CHECK(result.report.status == DeformationStatus::kConverged);
+  CHECK(result.report.nodes > 20);
+  CHECK(result.report.unbound_vertices == 0);
+  CHECK(largest_distance(result.mesh, map.mesh) < kSame);
+  CHECK(result.mesh.faces == map.mesh.faces);
+  CHECK(result.mesh.labels == map.mesh.labels);
+}
+
+TEST_CASE("Keyframes that move rigidly move the mesh rigidly", "[mesh_deformation]") {
+  const auto seed = GENERATE(range(0U, 3U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const SE3 T_world_odom = random_pose(rng, 1.0);
+  const MapMesh map = sheet(kSheet);
+  const std::vector<SE3> keyframes = keyframes_above(kSheet);
+  LocalMeshOptimizer optimizer;
+  const DeformedMesh result = optimizer.optimize(map, keyframes, moved(keyframes, T_world_odom));
+  double largest = 0.0;
+  for (std::size_t v = 0; v < map.mesh.vertices.size(); ++v) {
+    const Eigen::Vector3d expected = T_world_odom * map.mesh.vertices[v].cast<double>();
+    largest = std::max(largest, (result.mesh.vertices[v].cast<double>() - expected).norm());
+  }
+  CHECK(largest < 2 * kSame);  // up to 10 m as float
+}
+
+TEST_CASE("A straight corridor follows bent keyframes and stays locally rigid",
+          "[mesh_deformation]") {
+  // 20 m on a circle of 15 m: the end rises by 11 m and turns by 76 degrees.
+  const double radius_m = 15.0;
+  const SheetSize size{.columns = 80, .rows = 8, .step_m = 0.25, .keyframe_step_m = 0.5};
+  const MapMesh map = sheet(size);
+  const std::vector<SE3> keyframes = keyframes_above(size);
+  LocalMeshOptimizer optimizer;
+  const DeformedMesh result = optimizer.optimize(map, keyframes, bent(keyframes, radius_m));
+  CHECK(result.report.status == DeformationStatus::kConverged);
+  double largest_m = 0.0;
+  for (std::size_t v = 0; v < map.mesh.vertices.size(); ++v) {
+    const SE3 vertex = make_pose(Eigen::Matrix3d::Identity(), map.mesh.vertices[v].cast<double>());
+    const Eigen::Vector3d expected = bend(vertex, radius_m).translation();
+    largest_m = std::max(largest_m, (result.mesh.vertices[v].cast<double>() - expected).norm());
+  }
+  // Keyframes 1 m ahead see the surface bent away from where odometry saw it straight:
+  // 1 m^2 / (2 * 15 m) = 3.3 cm at the most.
+  CHECK(largest_m < 0.035);
+  double largest_stretch = 0.0;
+  for (const auto& [a, b, c] : map.mesh.faces) {
+    const double before = (map.mesh.vertices[b] - map.mesh.vertices[a]).norm();
+    const double after = (result.mesh.vertices[b] - result.mesh.vertices[a]).norm();
+    largest_stretch = std::max(largest_stretch, std::abs(after / before - 1.0));
+  }
+  // The surface lies 1.5 m below the keyframes' arc: it is 15 / 15 as long there, itself neutral.
+  CHECK(largest_stretch < 0.1);
+}
+
+TEST_CASE("A warm start ends where a cold one does", "[mesh_deformation]") {
+  const MapMesh map = sheet(kSheet);
+  const std::vector<SE3> keyframes = keyframes_above(kSheet);
+  LocalMeshOptimizer optimizer;
+  for (const double radius_m : {60.0, 20.0, -30.0, 10.0}) {
+    CAPTURE(radius_m);
+    const DeformedMesh warm = optimizer.optimize(map, keyframes, bent(keyframes, radius_m));
+    LocalMeshOptimizer fresh;
+    const DeformedMesh cold = fresh.optimize(map, keyframes, bent(keyframes, radius_m));
+    CHECK(warm.report.warm == (radius_m != 60.0));
+    CHECK_FALSE(cold.report.warm);
+    CHECK(largest_distance(warm.mesh, cold.mesh) < 2 * kSame);
+  }
+}
+
+TEST_CASE("A mesh that grows extends the graph", "[mesh_deformation]") {
+  SheetSize size{.columns = 16, .rows = 8, .step_m = 0.25, .keyframe_step_m = 0.5};
+  LocalMeshOptimizer growing;
+  std::size_t nodes = 0;
+  for (; size.columns <= 64; size.columns += 16) {
+    CAPTURE(size.columns);
+    const MapMesh map = sheet(size);
+    const std::vector<SE3> keyframes = keyframes_above(size);
+    const std::vector<SE3> corrected = bent(keyframes, 15.0);
+    const DeformedMesh result = growing.optimize(map, keyframes, corrected);
+    CHECK(result.report.new_nodes > 0);
+    CHECK(result.report.nodes == nodes + result.report.new_nodes);
+    nodes = result.report.nodes;
+    LocalMeshOptimizer fresh;
+    const DeformedMesh anew = fresh.optimize(map, keyframes, corrected);
+    // Other nodes, the same surface: as near as either is to the truth (see the bent corridor).
+    CHECK(largest_distance(result.mesh, anew.mesh) < 0.035);
+  }
+}
+
+TEST_CASE("Vertices that vanish and others that move keep the rest in place",
+          "[mesh_deformation]") {
+  MapMesh map = sheet(kSheet);
+  const std::vector<SE3> keyframes = keyframes_above(kSheet);
+  LocalMeshOptimizer optimizer;
+  const std::size_t nodes = optimizer.optimize(map, keyframes, keyframes).report.nodes;
+  map.mesh.faces.clear();
+  const auto last = [](auto& list) { list.resize(list.size() - 20); };
+  last(map.mesh.vertices);
+  last(map.mesh.labels);
+  last(map.seen_by);
+  last(map.ids);
+  map.mesh.vertices.erase(map.mesh.vertices.begin());
+  map.mesh.labels.erase(map.mesh.labels.begin());
+  map.seen_by.erase(map.seen_by.begin());
+  map.ids.erase(map.ids.begin());
+  map.mesh.vertices[5] += Eigen::Vector3f(0, 0, 0.01F);
+  const DeformedMesh result = optimizer.optimize(map, keyframes, keyframes);
+  CHECK(result.report.nodes == nodes);
+  CHECK(largest_distance(result.mesh, map.mesh) < kSame);
+}
+
+TEST_CASE("Keyframes without an optimised pose follow the last that has one",
+          "[mesh_deformation]") {
+  std::mt19937 rng(4);
+  const SE3 T_world_odom = random_pose(rng, 1.0);
+  const MapMesh map = sheet(kSheet);
+  const std::vector<SE3> keyframes = keyframes_above(kSheet);
+  std::vector<SE3> optimised = moved(keyframes, T_world_odom);
+  LocalMeshOptimizer complete;
+  const DeformedMesh expected = complete.optimize(map, keyframes, optimised);
+  optimised.resize(3);
+  LocalMeshOptimizer early;
+  CHECK(largest_distance(early.optimize(map, keyframes, optimised).mesh, expected.mesh) <
+        2 * kSame);
+}
+
+TEST_CASE("The same calls give the same mesh, bit by bit", "[mesh_deformation]") {
+  const MapMesh map = sheet(kSheet);
+  const std::vector<SE3> keyframes = keyframes_above(kSheet);
+  LocalMeshOptimizer a;
+  LocalMeshOptimizer b;
+  for (const double radius_m : {40.0, 15.0}) {
+    const auto corrected = bent(keyframes, radius_m);
+    CHECK(a.optimize(map, keyframes, corrected).mesh.vertices ==
+          b.optimize(map, keyframes, corrected).mesh.vertices);
+  }
+}
+
+TEST_CASE("An empty mesh is deformed to an empty mesh", "[mesh_deformation]") {
+  LocalMeshOptimizer optimizer;
+  CHECK(optimizer.optimize({}, {}, {}).mesh.empty());
+  const std::vector<SE3> keyframes = keyframes_above(kSheet);
+  CHECK(optimizer.optimize({}, keyframes, keyframes).mesh.empty());
+  // And grows from there.
+  CHECK(optimizer.optimize(sheet(kSheet), keyframes, keyframes).report.new_nodes > 0);
+}
+
+TEST_CASE("Input that cannot be used is refused by name", "[mesh_deformation]") {
+  MapMesh map = sheet(kSheet);
+  std::vector<SE3> keyframes = keyframes_above(kSheet);
+  std::vector<SE3> optimised = keyframes;
+  SECTION("an optimised pose that is not finite") {
+    optimised[3].translation().y() = std::numeric_limits<double>::quiet_NaN();
+    CHECK_THAT(refusal(map, keyframes, optimised), Contains("optimised pose of keyframe 3"));
+  }
+  SECTION("odometry that is not rigid") {
+    keyframes[2].linear() *= 1.01;
+    CHECK_THAT(refusal(map, keyframes, optimised), Contains("odometry pose of keyframe 2"));
+  }
+  SECTION("a reflection") {
+    keyframes[2].linear() *= -1.0;
+    CHECK_THAT(refusal(map, keyframes, optimised), Contains("odometry pose of keyframe 2"));
+  }
+  SECTION("more optimised poses than keyframes") {
+    optimised.push_back(SE3::Identity());
+    CHECK_THAT(refusal(map, keyframes, optimised), Contains("optimised poses for"));
+  }
+  SECTION("no optimised poses") {
+    CHECK_THAT(refusal(map, keyframes, {}), Contains("0 optimised poses"));
+  }
+  SECTION("a vertex that is not finite") {
+    map.mesh.vertices[4].x() = std::numeric_limits<float>::quiet_NaN();
+    CHECK_THAT(refusal(map, keyframes, optimised), Contains("vertex 4"));
+  }
+  SECTION("a vertex far outside the world") {
+    map.mesh.vertices[4].x() = 1e30F;
+    CHECK_THAT(refusal(map, keyframes, optimised), Contains("vertex 4"));
+  }
+  SECTION("a vertex seen by a keyframe that does not exist") {
+    map.seen_by[5][1] = 1000;
+    CHECK_THAT(refusal(map, keyframes, optimised), Contains("vertex 5 was seen by keyframes"));
+  }
+  SECTION("a vertex last seen before it was first seen") {
+    map.seen_by[5] = {3, 2};
+    CHECK_THAT(refusal(map, keyframes, optimised), Contains("vertex 5 was seen by keyframes"));
+  }
+  SECTION("vertices without a time of sight") {
+    map.seen_by.pop_back();
+    CHECK_THAT(refusal(map, keyframes, optimised), Contains("seen_by has"));
+  }
+  SECTION("a face that names a vertex which does not exist") {
+    map.mesh.faces[1][2] = 1U << 30U;
+    CHECK_THAT(refusal(map, keyframes, optimised), Contains("face 1 names vertex"));
+  }
+  SECTION("ids that do not ascend") {
+    std::swap(map.ids[1], map.ids[2]);
+    CHECK_THAT(refusal(map, keyframes, optimised), Contains("ids do not ascend at vertex 2"));
+  }
+}
+
+TEST_CASE("A refused call leaves the optimizer as it was", "[mesh_deformation]") {
+  const MapMesh map = sheet(kSheet);
+  const std::vector<SE3> keyframes = keyframes_above(kSheet);
+  LocalMeshOptimizer optimizer;
+  (void)optimizer.optimize(map, keyframes, keyframes);
+  const std::vector<SE3> fewer(keyframes.begin(), keyframes.end() - 1);
+  CHECK_THROWS_AS(optimizer.optimize({}, fewer, fewer), std::invalid_argument);
+  const DeformedMesh result = optimizer.optimize(map, keyframes, keyframes);
+  CHECK(result.report.warm);
+  CHECK(result.report.new_nodes == 0);
+  optimizer.reset();
+  CHECK(optimizer.optimize({}, fewer, fewer).mesh.empty());
+}
+
+TEST_CASE("A configuration out of bounds is refused", "[mesh_deformation]") {
+  MeshDeformationConfig config;
+  config.interpolation_nodes = 9;
+  CHECK_THROWS_WITH(LocalMeshOptimizer(config), Contains("interpolation_nodes"));
+}
+
+}  // namespace km
