@@ -55,58 +55,57 @@ RenderedView ViewPass::run() {
   return std::move(view_);
 }
 
-LaneMask ViewPass::lanes_inside(const Aim& aim) const {
-  LaneMask inside = 0;
-  for (std::size_t lane = 0; lane < kLanes; ++lane)
-    if (aim.x[lane] < width_ && aim.y[lane] < height_) inside |= 1U << lane;
-  return inside;
-}
-
-ViewPass::Aim ViewPass::aim_at_block(int x0, int y0) {
-  Aim aim;
-  for (int i = 0; i < kLanes; ++i) {
-    const auto lane = static_cast<std::size_t>(i);
-    aim.x[lane] = x0 + i % kBlock;
-    aim.y[lane] = y0 + i / kBlock;
-    aim.dx[lane] = 0.0F;
-    aim.dy[lane] = 0.0F;
-  }
-  return aim;
-}
-
-void ViewPass::trace(const Aim& aim, LaneMask active, SurfaceHits& hits) const {
+void ViewPass::trace(const Aim& aim, SurfaceHits& hits) const {
+  // Bearing of each pixel, and its change to the right and down. Lanes that are not active repeat
+  // some pixel: without branches the loops run several lanes at a time.
+  Lanes x, y, right_x, right_y, down_x, down_y;
   const Eigen::Vector2f* bearings = rays_.bearings().data();
   const std::ptrdiff_t stride = rays_.stride();
-  const Eigen::Vector3f x_axis = R_world_cam_.col(0);
-  const Eigen::Vector3f y_axis = R_world_cam_.col(1);
-  const Eigen::Vector3f z_axis = R_world_cam_.col(2);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    if ((active >> lane & 1U) == 0U) continue;
     const Eigen::Vector2f* bearing = bearings + aim.y[lane] * stride + aim.x[lane];
-    const Eigen::Vector2f right = bearing[1] - bearing[0];
-    const Eigen::Vector2f down = bearing[stride] - bearing[0];
-    const Eigen::Vector2f at = bearing[0] + aim.dx[lane] * right + aim.dy[lane] * down;
-    set_ray(hits.rays, static_cast<int>(lane), origin_, at.x() * x_axis + at.y() * y_axis + z_axis,
-            0.0F, std::numeric_limits<float>::infinity());
-    hits.right_x[lane] = x_axis.x() * right.x() + y_axis.x() * right.y();
-    hits.right_y[lane] = x_axis.y() * right.x() + y_axis.y() * right.y();
-    hits.right_z[lane] = x_axis.z() * right.x() + y_axis.z() * right.y();
-    hits.down_x[lane] = x_axis.x() * down.x() + y_axis.x() * down.y();
-    hits.down_y[lane] = x_axis.y() * down.x() + y_axis.y() * down.y();
-    hits.down_z[lane] = x_axis.z() * down.x() + y_axis.z() * down.y();
+    right_x[lane] = bearing[1].x() - bearing[0].x();
+    right_y[lane] = bearing[1].y() - bearing[0].y();
+    down_x[lane] = bearing[stride].x() - bearing[0].x();
+    down_y[lane] = bearing[stride].y() - bearing[0].y();
+    x[lane] = bearing[0].x();
+    y[lane] = bearing[0].y();
   }
-  hits.active = active;
-  scene_.tracer.intersect(active, RayKind::kCoherent, hits.rays);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    x[lane] += aim.dx[lane] * right_x[lane] + aim.dy[lane] * down_x[lane];
+    y[lane] += aim.dx[lane] * right_y[lane] + aim.dy[lane] * down_y[lane];
+  }
+  const auto rotate = [&](int row, float* direction, Lanes& right, Lanes& down, float* origin) {
+    const float a = R_world_cam_(row, 0);
+    const float b = R_world_cam_(row, 1);
+    const float c = R_world_cam_(row, 2);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      direction[lane] = a * x[lane] + b * y[lane] + c;
+      right[lane] = a * right_x[lane] + b * right_y[lane];
+      down[lane] = a * down_x[lane] + b * down_y[lane];
+      origin[lane] = origin_[row];
+    }
+  };
+  rotate(0, hits.rays.ray.dir_x, hits.right_x, hits.down_x, hits.rays.ray.org_x);
+  rotate(1, hits.rays.ray.dir_y, hits.right_y, hits.down_y, hits.rays.ray.org_y);
+  rotate(2, hits.rays.ray.dir_z, hits.right_z, hits.down_z, hits.rays.ray.org_z);
+  std::fill_n(hits.rays.ray.tnear, kLanes, 0.0F);
+  std::fill_n(hits.rays.ray.tfar, kLanes, std::numeric_limits<float>::infinity());
+
+  hits.active = aim.active;
+  scene_.tracer.intersect(aim.active, RayKind::kCoherent, hits.rays);
   hits.surface = 0;
   for (std::size_t lane = 0; lane < kLanes; ++lane)
     hits.surface |= static_cast<LaneMask>(hits.rays.hit.primID[lane] != kNoTriangle) << lane;
-  hits.surface &= active;
+  hits.surface &= aim.active;
 }
 
 void ViewPass::shade_block(int x0, int y0) {
-  const Aim aim = aim_at_block(x0, y0);
+  Aim aim;
+  for (int y = y0; y < std::min(y0 + kBlock, height_); ++y)
+    for (int x = x0; x < std::min(x0 + kBlock, width_); ++x)
+      aim.set(static_cast<std::size_t>((y - y0) * kBlock + x - x0), x, y, {0.0F, 0.0F});
   SurfaceHits hits;
-  trace(aim, lanes_inside(aim), hits);
+  trace(aim, hits);
   SurfacePoints points;
   LaneMask dark = 0;
   if (request_.radiance || request_.rgb) {

@@ -33,50 +33,70 @@ class ViewPass {
   static constexpr std::uint16_t kSkyMaterial = 0xFFFF;
   /// Pixel of each lane, and where in the pixel its ray goes, from the centre [px].
   struct Aim {
+    LaneMask active = 0;
     std::array<int, kLanes> x{}, y{};
-    Lanes dx, dy;
+    std::array<float, kLanes> dx{}, dy{};
+
+    void set(std::size_t lane, int px, int py, const Eigen::Vector2f& offset) {
+      active |= 1U << lane;
+      x[lane] = px;
+      y[lane] = py;
+      dx[lane] = offset.x();
+      dy[lane] = offset.y();
+    }
   };
 
-  enum Edge : std::uint8_t { kNoEdge = 0, kShapeEdge = 1, kShadowEdge = 2, kLeafEdge = 4 };
+  /// Where in a pixel there is an edge: on the way to a neighbour, or anywhere; and whether it may
+  /// be one of a shadow.
+  enum Edge : std::uint8_t {
+    kNoEdge = 0,
+    kLeft = 1,
+    kRight = 2,
+    kUp = 4,
+    kDown = 8,
+    kInside = 16,
+    kShadow = 32,
+  };
 
   void shade_block(int x0, int y0);
   void store_block(const Aim& aim, const SurfaceHits& hits, const SurfacePoints& points,
                    LaneMask dark);
   void compare_neighbours();
-  void compare(std::size_t a, std::size_t b);
+  void compare(std::size_t a, Edge towards_b, std::size_t b, Edge towards_a);
   [[nodiscard]] bool contrast(std::size_t a, std::size_t b) const;
   void find_thin_things(int x0, int y0);
   void flag_unlike(int x, int y, std::uint32_t triangle, const Eigen::Vector3f& hit);
-  [[nodiscard]] Edge edge_towards(std::size_t pixel, std::uint32_t triangle) const;
   /// Whether a point of another triangle looks like the same surface as the pixel's centre.
   [[nodiscard]] bool same_surface(std::size_t pixel, std::uint32_t triangle,
                                   const Eigen::Vector3f& point) const;
   [[nodiscard]] Eigen::Vector3f position(std::size_t pixel) const;
-  void refine_edges();
-  void refine(std::span<const std::size_t> pixels, int samples_per_pixel);
-  /// Where the shades of samples come from.
-  struct Samples {
-    int per_pixel = 1;
-    std::array<std::size_t, kLanes> source{};  ///< The pixel whose shade a sample takes,
-    LaneMask fresh = 0;                        ///< unless it must be shaded itself.
-    LaneMask dark = 0;                         ///< The sun does not reach it.
-    LaneMask ask_sun = 0;                      ///< That is to be found out.
-  };
-  void find_sources(std::span<const std::size_t> pixels, const Aim& aim, const SurfaceHits& hits,
-                    Samples& samples) const;
-  template <typename Value>
-  void average(std::span<const std::size_t> pixels, const SurfaceHits& hits,
-               const SurfacePoints& points, const Samples& samples,
-               const std::vector<Shade<Value>>& shaded, std::vector<Value>& image) const;
-  [[nodiscard]] std::optional<std::size_t> shaded_nearby(std::size_t pixel, std::uint32_t triangle,
-                                                         float depth_m,
-                                                         const Eigen::Vector2f& offset) const;
-  [[nodiscard]] bool alike(const Pixel& pixel, const SurfaceRecord& surface, float depth_m) const;
 
-  [[nodiscard]] static Aim aim_at_block(int x0, int y0);
-  /// Lanes of a 4 x 4 block that lie in the image.
-  [[nodiscard]] LaneMask lanes_inside(const Aim& aim) const;
-  void trace(const Aim& aim, LaneMask active, SurfaceHits& hits) const;
+  struct Sample {
+    int x = 0, y = 0;
+    Eigen::Vector2f offset = Eigen::Vector2f::Zero();  ///< From the pixel's centre [px].
+  };
+  /// Where the shades of a batch of samples come from.
+  struct Sources {
+    std::array<std::size_t, kLanes> pixel{};  ///< The pixel whose shade a sample takes,
+    LaneMask fresh = 0;                       ///< unless it must be shaded itself.
+    LaneMask dark = 0;                        ///< The sun does not reach it.
+    LaneMask ask_sun = 0;                     ///< That is to be found out.
+  };
+  [[nodiscard]] static bool beyond_edge(std::uint8_t edge, const Eigen::Vector2f& offset);
+  void refine_edges();
+  void refine(std::span<const Sample> batch);
+  void find_sources(std::span<const Sample> batch, const SurfaceHits& hits, Sources& sources) const;
+  [[nodiscard]] std::optional<std::size_t> shaded_nearby(const Sample& sample,
+                                                         std::uint32_t triangle,
+                                                         float depth_m) const;
+  [[nodiscard]] bool alike(const Pixel& pixel, const SurfaceRecord& surface, float depth_m) const;
+  template <typename Value>
+  void mix(std::span<const Sample> batch, const SurfaceHits& hits, const SurfacePoints& points,
+           const Sources& sources, const std::vector<Shade<Value>>& shaded,
+           std::vector<Value>& image) const;
+
+  /// Casts the rays; the direction has z = 1 in the camera frame.
+  void trace(const Aim& aim, SurfaceHits& hits) const;
   [[nodiscard]] std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
            static_cast<std::size_t>(x);
