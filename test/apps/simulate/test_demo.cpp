@@ -46,6 +46,10 @@ TEST_CASE("The demo refuses what it cannot use", "[demo]") {
   CHECK_THAT(refusal("--robots none"), Catch::Contains("--robots none is not a number"));
   CHECK_THAT(refusal("--output"), Catch::Contains("--output needs a value"));
   CHECK_THAT(refusal("--fast"), Catch::Contains("unknown option --fast"));
+  CHECK_THAT(refusal("--programs /nope"),
+             Catch::StartsWith("demo: --programs: no such folder: /nope"));
+  CHECK_THAT(refusal("--programs config"),
+             Catch::StartsWith("demo: --programs: no kimera_multi_robot in "));
   CHECK_THAT(refusal("--short config"), Catch::Contains("--short is for the simulated world"));
   CHECK_THAT(refusal("config --programs " KM_BIN_DIR), Catch::Contains("cam0/data.csv is missing"));
 }
