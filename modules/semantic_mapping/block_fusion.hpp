@@ -15,7 +15,7 @@ namespace km {
 ///
 /// A voxel at depth z that projects to a pixel of depth d has the signed distance s = d - z along
 /// the optical axis. Where s > -truncation, the voxel's distance becomes the weighted mean of what
-/// it was and min(s, truncation) (Curless and Levoy 1996, eqs. 3 and 4). The weight is
+/// it was and min(s, truncation) (Curless and Levoy, 1996). The weight is
 /// sigma_0^2 / sigma(d)^2 (see SemanticMappingConfig), falling linearly to zero from one voxel
 /// behind the surface to the truncation, since what is farther behind may belong to another
 /// surface.

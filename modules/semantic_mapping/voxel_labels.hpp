@@ -11,12 +11,12 @@ namespace km {
 /// How sure one observed label is.
 ///
 /// An observation of label m has the likelihood P(m | label l) = c for l = m and (1 - c) / (L - 1)
-/// for each other of the L classes: it sums to one over m. (Kimera-Semantics gives every other
-/// class 1 - c, so that five labels at 0.8 have the posterior 0.5 after one observation; here it is
-/// 0.8.) From a uniform prior, observations of weights w_m, likelihoods to the power of w, give
-///   P(l | all) ~ exp(delta n_l),  n_l = sum of w_m over observations of l,  delta = log(c (L-1) /
-///   (1-c)),
-/// so that the sums n_l are all a voxel has to keep.
+/// for each other of the L classes: it sums to one over m, so that of five labels one seen at 0.8
+/// has the posterior 0.8. (With 1 - c for every other class, as some mappers have it, it would be
+/// 0.5.) From a uniform prior, observations of weights w_m, likelihoods to the power of w_m, give
+///   P(l | all) ~ exp(delta n_l),  delta = log(c (L - 1) / (1 - c)),
+/// with n_l the sum of the weights of the observations of l: these sums are all a voxel has to
+/// keep.
 struct LabelModel {
   std::size_t classes = 1;  ///< L, unknown not counted.
   double confidence = 0.8;  ///< c, at least 0.5.
