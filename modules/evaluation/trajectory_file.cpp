@@ -94,12 +94,18 @@ std::vector<StampedPose> parse_trajectory(std::string_view text, const std::stri
   return poses;
 }
 
-std::vector<StampedPose> read_trajectory(const std::filesystem::path& file) {
-  if (!std::filesystem::is_regular_file(file))
-    throw TrajectoryFileError(file.string() + ": no such file");
-  std::ifstream stream(file, std::ios::binary);
+std::optional<std::filesystem::path> find_trajectory(const std::filesystem::path& place) {
+  for (const auto& file : {place, place / "data.csv", place / "groundtruth_tum.txt"})
+    if (std::filesystem::is_regular_file(file)) return file;
+  return std::nullopt;
+}
+
+std::vector<StampedPose> read_trajectory(const std::filesystem::path& place) {
+  const auto file = find_trajectory(place);
+  if (!file) throw TrajectoryFileError(place.string() + ": no such file");
+  std::ifstream stream(*file, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  return parse_trajectory(text, file.string());
+  return parse_trajectory(text, file->string());
 }
 
 }  // namespace km

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iomanip>
+#include <limits>
 #include <sstream>
 
 namespace km {
@@ -11,6 +12,10 @@ void write_row(std::ostream& out, int name_width, const TrajectoryError& e) {
   const auto number = [&](int width, int decimals, double value) {
     out << ' ' << std::setw(width) << std::setprecision(decimals) << value;
   };
+  const auto rmse_or_dash = [&](int width, int decimals, const Statistics& errors) {
+    if (errors.count > 0) return number(width, decimals, errors.rmse);
+    out << ' ' << std::setw(width) << '-';
+  };
   out << std::left << std::setw(name_width) << e.name << std::right << ' ' << std::setw(6)
       << e.position_m.count;
   number(9, 4, e.position_m.rmse);
@@ -18,19 +23,27 @@ void write_row(std::ostream& out, int name_width, const TrajectoryError& e) {
   number(8, 4, e.position_m.median);
   number(8, 4, e.position_m.max);
   number(9, 3, e.rotation_deg.rmse);
-  number(9, 4, e.rpe_translation_m.rmse);
-  number(9, 3, e.rpe_rotation_deg.rmse);
+  rmse_or_dash(9, 4, e.rpe_translation_m);
+  rmse_or_dash(9, 3, e.rpe_rotation_deg);
   number(8, 1, 100.0 * e.completeness);
   out << "%\n";
 }
 
+bool lacks_relative(const TrajectoryError& error) {
+  return error.rpe_translation_m.count == 0;
+}
+
+// Null for what an empty sample does not have: zeros would be perfect scores.
 void write_statistics(JsonWriter& json, const char* name, const Statistics& statistics) {
+  const auto number = [&](const char* key, double value) {
+    json.field(key, statistics.count > 0 ? value : std::numeric_limits<double>::quiet_NaN());
+  };
   json.key(name);
   json.begin_object();
-  json.field("rmse", statistics.rmse);
-  json.field("mean", statistics.mean);
-  json.field("median", statistics.median);
-  json.field("max", statistics.max);
+  number("rmse", statistics.rmse);
+  number("mean", statistics.mean);
+  number("median", statistics.median);
+  number("max", statistics.max);
   json.field("count", statistics.count);
   json.end_object();
 }
@@ -57,6 +70,8 @@ std::string to_table(const TeamError& team) {
       << "  pairs      rmse     mean   median      max rmse[deg]  rmse[m] rmse[deg]  covered\n";
   for (const TrajectoryError& robot : team.robots) write_row(out, name_width, robot);
   if (team.robots.size() > 1) write_row(out, name_width, team.joint);
+  if (std::any_of(team.robots.begin(), team.robots.end(), lacks_relative))
+    out << "-: no two compared poses lie one delta apart, so there is no relative error\n";
   return out.str();
 }
 

@@ -41,6 +41,22 @@ TEST_CASE("The JSON holds every robot and the team", "[evaluation]") {
                              Catch::Contains("\"pairs\": 200"));
 }
 
+TEST_CASE("Relative errors of which there are none are not perfect", "[evaluation]") {
+  TrajectoryErrorOptions options;
+  options.rpe_delta_s = 100.0;  // the poses span 20 s
+  const TeamError none = trajectory_error(kInputs, options);
+  CHECK(none.joint.rpe_translation_m.count == 0);
+  const std::string table = to_table(none);
+  CHECK(count(table, "        -         -    100.0%\n") == 3);
+  CHECK(count(table, "\n-: no two compared poses lie one delta apart") == 1);
+  CHECK(count(to_table(trajectory_error(kInputs)), "no two compared poses") == 0);
+  std::ostringstream text;
+  JsonWriter json(text);
+  write_json(json, none.joint);
+  CHECK(count(text.str(), ": null") == 8);  // four figures of translation, four of rotation
+  CHECK_THAT(text.str(), !Catch::Contains("nan"));
+}
+
 TEST_CASE("The plot draws a shared truth once and every estimate", "[evaluation]") {
   const std::string svg = plot_from_above(kInputs, trajectory_error(kInputs));
   CHECK_THAT(svg, Catch::StartsWith("<svg ") && Catch::EndsWith("</svg>\n"));
