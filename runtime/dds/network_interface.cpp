@@ -3,6 +3,8 @@
 #include <arpa/inet.h>
 #include <ifaddrs.h>
 #include <net/if.h>
+#include <netdb.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
@@ -13,6 +15,25 @@
 #include "modules/core/config.hpp"
 
 namespace km {
+namespace {
+
+// Empty if the host is known.
+std::string why_unknown(const std::string& host) {
+  const std::size_t colon = host.find(':');
+  const std::string name = host.substr(0, colon);
+  const std::string port = colon != host.npos ? host.substr(colon + 1) : "0";
+  addrinfo hints{};
+  hints.ai_family = AF_INET;
+  hints.ai_socktype = SOCK_DGRAM;
+  hints.ai_flags = AI_NUMERICSERV;
+  addrinfo* found = nullptr;
+  const int error = getaddrinfo(name.c_str(), port.c_str(), &hints, &found);
+  if (error != 0) return gai_strerror(error);
+  freeaddrinfo(found);
+  return {};
+}
+
+}  // namespace
 
 std::vector<NetworkInterface> network_interfaces() {
   ifaddrs* first = nullptr;
@@ -51,6 +72,14 @@ NetworkInterface select_interface(const std::vector<NetworkInterface>& interface
   throw ConfigError(
       "dds.interface = " + (name.empty() ? "(any)" : name) +
       ": no such IPv4 interface is up; those up: " + (known.empty() ? "none" : known));
+}
+
+void check_hosts(const std::vector<std::string>& hosts) {
+  std::string problems;
+  for (const std::string& host : hosts)
+    if (const std::string why = why_unknown(host); !why.empty())
+      problems += (problems.empty() ? "" : "; ") + host + ": " + why;
+  if (!problems.empty()) throw ConfigError("dds.peers: unknown host: " + problems);
 }
 
 }  // namespace km

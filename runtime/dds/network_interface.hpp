@@ -21,4 +21,8 @@ std::vector<NetworkInterface> network_interfaces();
 NetworkInterface select_interface(const std::vector<NetworkInterface>& interfaces,
                                   const std::string& name);
 
+/// Looks up addresses or names of hosts, each with or without ":port". Throws ConfigError naming
+/// all those that are unknown. May ask a name server, and wait for it.
+void check_hosts(const std::vector<std::string>& hosts);
+
 }  // namespace km

@@ -41,6 +41,7 @@ dds_entity_t create_participant(const DdsConfig& config, const RobotIdentity& id
 
 DdsDomain::DdsDomain(const DdsConfig& config)
     : config_(checked(config)), interface_(choose_interface(config_)) {
+  check_hosts(config_.peers);
   dds_set_log_mask(DDS_LC_FATAL | DDS_LC_ERROR | DDS_LC_WARNING);
   dds_set_log_sink(&log_line, nullptr);
   domain_ = DdsEntity(

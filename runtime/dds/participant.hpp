@@ -36,6 +36,7 @@ class DdsParticipant {
 
   [[nodiscard]] const RobotIdentity& identity() const { return identity_; }
   [[nodiscard]] const DdsConfig& config() const { return domain_->config(); }
+  [[nodiscard]] const NetworkInterface& interface() const { return domain_->interface(); }
   [[nodiscard]] dds_entity_t handle() const { return participant_.handle(); }
 
  private:

@@ -88,6 +88,14 @@ TEST_CASE("The interface is the one named, else the likeliest", "[profiles]") {
   CHECK_THROWS_AS(select_interface({}, ""), ConfigError);
 }
 
+TEST_CASE("Hosts that are unknown are all named", "[dds]") {
+  CHECK_NOTHROW(check_hosts({}));
+  CHECK_NOTHROW(check_hosts({"10.0.0.2", "127.0.0.1:7410", "localhost"}));
+  CHECK_THROWS_WITH(check_hosts({"10.0.0.2", "not an address", "10.0.0.300:7", "10.0.0.3:port"}),
+                    Catch::Contains("not an address: ") && Catch::Contains("10.0.0.300:7: ") &&
+                        Catch::Contains("10.0.0.3:port: ") && !Catch::Contains("10.0.0.2"));
+}
+
 TEST_CASE("A configuration out of bounds makes no domain", "[profiles]") {
   DdsConfig config = loopback_config();
   config.domain = 231;
