@@ -80,14 +80,21 @@ std::optional<RecordingWindow> still_window(const ImagesCommand& command) {
   return window;
 }
 
-std::vector<ImageFigure> figures_of_other(const ImagesCommand& command) {
-  const bool has_own_window = command.compare_from_s || command.compare_to_s;
-  if (!has_own_window)
-    return figures_of(command.compare, command.window, still_window(command), command.options);
+bool has_own_window(const ImagesCommand& command) {
+  return command.compare_from_s || command.compare_to_s;
+}
+
+RecordingWindow window_of_other(const ImagesCommand& command) {
+  if (!has_own_window(command)) return command.window;
   RecordingWindow window;
   window.from_s = command.compare_from_s.value_or(window.from_s);
   window.to_s = command.compare_to_s.value_or(window.to_s);
-  return figures_of(command.compare, window, std::nullopt, command.options);
+  return window;
+}
+
+std::vector<ImageFigure> figures_of_other(const ImagesCommand& command) {
+  const auto still = has_own_window(command) ? std::nullopt : still_window(command);
+  return figures_of(command.compare, window_of_other(command), still, command.options);
 }
 
 void write_file(const fs::path& file, const fs::path& dataset,
@@ -111,6 +118,8 @@ void write_file(const fs::path& file, const fs::path& dataset,
 }  // namespace
 
 void evaluate_images(const ImagesCommand& command) {
+  // Opened for its errors alone: they come now, not after the minutes the first one takes.
+  if (!command.compare.empty()) EurocReader(command.compare, options_of(window_of_other(command)));
   const auto figures =
       figures_of(command.dataset, command.window, still_window(command), command.options);
   std::vector<ImageFigure> other;

@@ -136,6 +136,11 @@ int main(int argc, char** argv) try {
   define(*app.add_subcommand("images", kImages), images);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::RequiredError& error) {
+    // A word that is not understood is why something is missing more often than not.
+    const auto unknown = app.remaining(true);
+    unknown.empty() ? app.exit(error) : app.exit(CLI::ExtrasError(app.get_name(), unknown));
+    return 1;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 1;
   }

@@ -1,5 +1,6 @@
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <filesystem>
 #include <sstream>
 #include <string>
 
@@ -115,6 +116,11 @@ TEST_CASE("images refuses what it cannot read", "[evaluate]") {
   CHECK_THAT(missing.output, Catch::StartsWith("kimera_multi_evaluate: /none"));
   const EurocFolder recording;
   const std::string command = kTool + "images --dataset " + recording.root().string();
+  // Before the first recording is gone through, and this fault of it found.
+  std::filesystem::remove(recording.image("cam1", 3));
+  const auto other = run_command(command + " --compare /none");
+  CHECK(other.exit_code == 1);
+  CHECK_THAT(other.output, Catch::StartsWith("kimera_multi_evaluate: /none: no such folder"));
   CHECK(run_command(command + " --stride 0").exit_code == 1);
   CHECK(run_command(command + " --from 5").exit_code == 1);
   CHECK(run_command(command + " --json /none/out.json").exit_code == 1);
@@ -160,6 +166,13 @@ TEST_CASE("Bad input ends with code 1 and one line that names it", "[evaluate]")
   CHECK_THAT(broken.output, Catch::Contains("bad.tum line 2: 1 fields, expected 8"));
   CHECK(run_command(kTool).exit_code == 1);
   CHECK(run_command(kTool + "trajectory --truth " + files.truth).exit_code == 1);
+  for (const char* word : {"bogus", "trajectory --bogus", "images --dataset /none --bogus"}) {
+    const auto unknown = run_command(kTool + word);
+    CAPTURE(unknown.output);
+    CHECK(unknown.exit_code == 1);
+    CHECK_THAT(unknown.output, Catch::Contains("not expected") && Catch::Contains("bogus"));
+  }
+  CHECK_THAT(run_command(kTool).output, Catch::Contains("subcommand is required"));
   const auto help = run_command(kTool + "trajectory --help");
   CHECK(help.exit_code == 0);
   CHECK_THAT(help.output, Catch::Contains("Examples:"));
