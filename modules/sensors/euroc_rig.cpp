@@ -102,6 +102,8 @@ DepthRange read_depth_range(const SensorYaml& yaml) {
 
 StereoRig read_stereo(const std::filesystem::path& mav0, const PinholeCamera& left) {
   const std::filesystem::path file = mav0 / "cam1" / "sensor.yaml";
+  if (!std::filesystem::exists(mav0 / "cam1"))
+    throw DatasetError(file.string() + ": no such file (nor depth0, which RGB-D has instead)");
   const StereoRig stereo{{left, read_camera(file)}};
   if (stereo.baseline_m() < kMinBaseline_m)
     throw DatasetError(file.string() + ": T_BS puts the right camera where the left one is");

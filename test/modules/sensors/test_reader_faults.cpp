@@ -48,6 +48,9 @@ TEST_CASE("Missing files and folders are refused by name", "[sensors]") {
     CHECK_THROWS_WITH(EurocReader(spoilt.root()),
                       (spoilt.mav0() / file).string() + ": no such file");
   }
+  fs::remove_all(folder.mav0() / "cam1");
+  CHECK_THROWS_WITH(EurocReader(folder.root()), Catch::Contains("cam1/sensor.yaml: no such file") &&
+                                                    Catch::Contains("nor depth0"));
   fs::remove_all(folder.mav0());
   CHECK_THROWS_WITH(EurocReader(folder.root()), Catch::Contains("not a EuRoC recording"));
 }
