@@ -24,7 +24,8 @@ Examples
 Files written to --output: odometry.tum, optimized.tum, pose_graph.g2o, keyframes.csv, loop_closures.csv,
 optimizer.csv, traffic.csv, timing.csv, config.yaml, summary.json.
 Ctrl-C ends the run in order with everything written; a second Ctrl-C ends it at once.
-Exit codes: 0 done, 1 bad input or configuration, 2 bad command line, 3 a module failed while running.)";
+Exit codes: 0 done; 1 bad input or configuration, or a recording that gave no pose; 2 bad command line;
+3 a module failed while running, or another robot claimed this robot's id.)";
 
 double parse_rate(const std::string& text) {
   if (text == "max") return std::numeric_limits<double>::infinity();

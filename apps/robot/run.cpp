@@ -4,8 +4,10 @@
 #include <optional>
 #include <stdexcept>
 
+#include "apps/result_files.hpp"
 #include "apps/robot/departure.hpp"
 #include "apps/robot/results.hpp"
+#include "apps/robot/run_end.hpp"
 #include "apps/robot/status_text.hpp"
 #include "apps/robot/wiring.hpp"
 #include "modules/sensors/euroc_reader.hpp"
@@ -18,7 +20,6 @@ namespace km {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr int kModuleFailed = 3;
 
 RobotInput open_input(const RobotOptions& options, const RobotConfig& config) {
   if (!options.dataset.empty())
@@ -41,6 +42,14 @@ void make_output_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw std::runtime_error(folder.string() + ": " + error.message());
+}
+
+void log_network(const RobotConfig& config, const NetworkInterface& interface) {
+  const char* const discovery =
+      config.dds.discovery == Discovery::kMulticast ? "multicast" : "address";
+  log::info("dds") << "domain " << config.dds.domain << " on " << interface.name << " ("
+                   << interface.address << "), link " << config.run.link << ", peers by "
+                   << discovery;
 }
 
 std::ofstream open_result(const fs::path& file) {
@@ -135,22 +144,34 @@ void write_timings(const fs::path& file, const Robot& robot) {
   }
 }
 
-std::string exit_reason(const RunResult& result, const Watch& watch) {
-  if (result.failure) return result.failure->node + ": " + result.failure->message;
-  if (result.interrupted) return "interrupted";
-  return watch.reason() != nullptr ? watch.reason() : "unknown";
+// Call when the robot has stopped.
+RunEnd end_of(const RobotOptions& options, Robot& robot, const RunResult& result,
+              const char* departure) {
+  RunEnd end{options.robot, result, robot.id_taken(), departure, {}};
+  if (const SensorsNode* sensors = robot.sensors())
+    end.images = ImageCounts{
+        sensors->listed(), sensors->published(), sensors->skipped(),
+        robot.recorder().with_record([](const auto& record) { return record.odometry().size(); })};
+  return end;
 }
 
-RunSummary summarize(const RobotOptions& options, Robot& robot, double seconds,
-                     const std::string& reason) {
+// The last line of a run.
+void say(const RobotOptions& options, const RunEnd& end, const Verdict& verdict) {
+  const std::string images = end.images ? ", " + to_string(*end.images) : "";
+  if (verdict.exit_code != 0)
+    log::error("robot") << verdict.reason;
+  else
+    log::info("robot") << "done (" << verdict.reason << ')' << images << ", results in "
+                       << options.output.string();
+}
+
+RunSummary summarize(const RobotOptions& options, Robot& robot, double seconds, const RunEnd& end) {
   RunSummary summary;
   summary.name = options.name;
   summary.seconds = seconds;
-  summary.exit_reason = reason;
-  if (robot.sensors() != nullptr) {
-    summary.frames = robot.sensors()->published();
-    summary.frames_skipped = robot.sensors()->skipped();
-  }
+  summary.exit_reason = verdict_of(end).reason;
+  summary.frames = end.images.value_or(ImageCounts{}).read;
+  summary.frames_skipped = end.images.value_or(ImageCounts{}).skipped;
   const TrafficSnapshot traffic = robot.bridge().traffic();
   for (const auto category :
        {TrafficCategory::kPlaceRecognition, TrafficCategory::kGeometricVerification,
@@ -164,28 +185,27 @@ RunSummary summarize(const RobotOptions& options, Robot& robot, double seconds,
 int run_robot(const RobotOptions& options, SignalWatch& signals) {
   const RobotConfig config = load_robot_config(options);
   RobotInput input = open_input(options, config);
+  Robot robot(options, config, std::move(input), signals);
+  log_network(config, robot.interface());
   make_output_folder(options.output);
+  remove_results(options.output);
   open_result(options.output / "config.yaml") << config.effective;
 
-  Robot robot(options, config, std::move(input), signals);
   std::optional<Watch> watch;
   watch.emplace(options, config, robot);
   const RunResult result = robot.run([&watch] { return watch->poll(); });
   watch->finish();
-  const std::string reason = exit_reason(result, *watch);
+  const RunEnd end = end_of(options, robot, result, watch->reason());
   const double seconds = watch->seconds();
   watch.reset();  // the status line ends before the last log lines
 
   robot.recorder().with_record([&](const RunRecord& record) {
-    write_results(options.output, record, summarize(options, robot, seconds, reason));
+    write_results(options.output, record, summarize(options, robot, seconds, end));
   });
   write_timings(options.output / "timing.csv", robot);
-  if (result.failure) {
-    log::error(result.failure->node) << result.failure->message;
-    return kModuleFailed;
-  }
-  log::info("robot") << "done (" << reason << "), results in " << options.output.string();
-  return 0;
+  const Verdict verdict = verdict_of(end);
+  say(options, end, verdict);
+  return verdict.exit_code;
 }
 
 }  // namespace km

@@ -110,6 +110,10 @@ void Robot::add_network() {
   dds.receive(t.peer_poses, kState, kPoseGraphOptimization);
   dds.send(t.own_status, kStatus, kOther);
   dds.receive(t.peer_status, kStatus, kOther);
+  dds.peers().events().subscribe([this](const auto& event) {
+    if (event->kind == PeerEventKind::kConflict && event->identity.robot == identity_.robot)
+      id_taken_ = true;
+  });
 }
 
 void Robot::add_records() {

@@ -74,6 +74,9 @@ class Robot {
   [[nodiscard]] DdsBridge& bridge() { return *bridge_; }
   [[nodiscard]] const RobotStatusNode& status_node() const { return *status_; }
   [[nodiscard]] const SensorsNode* sensors() const { return sensors_; }  ///< Null without sensors.
+  /// True if another living robot has claimed this robot's id.
+  [[nodiscard]] bool id_taken() const { return id_taken_; }
+  [[nodiscard]] const NetworkInterface& interface() const { return participant_.interface(); }
   void set_phase(RobotPhase phase) { phase_ = phase; }
   /// Nothing is recorded from now on.
   void freeze_record() { recorder_->freeze(); }
@@ -96,6 +99,7 @@ class Robot {
   DdsParticipant participant_;
   Topics topics_;
   std::atomic<bool> source_ended_ = false;
+  std::atomic<bool> id_taken_ = false;
   std::atomic<double> dataset_time_s_ = 0.0;
   std::atomic<std::uint32_t> keyframes_ = 0;
   std::atomic<RobotPhase> phase_ = RobotPhase::kRunning;

@@ -12,6 +12,7 @@ SensorsNode::SensorsNode(const SensorsConfig& config, double rate,
                          std::unique_ptr<DatasetReader> reader, const Topic<SensorPacket>& packets,
                          const Topic<SensorsEnd>& end)
     : reader_(std::move(reader)),
+      listed_(reader_->pair_count()),
       filter_(checked(config).max_lag_s),
       clock_(rate),
       packets_(packets),
@@ -61,7 +62,7 @@ void SensorsNode::step(const Packet& packet) {
   } else {
     ++skipped_;
     log::limited(log::Level::kWarn, name(), "lag")
-        << "frame skipped, consumers lag behind: " << skipped_ << " of " << reader_->pair_count();
+        << "frame skipped, consumers lag behind: " << skipped_ << " of " << listed_;
   }
 }
 

@@ -49,6 +49,8 @@ class SensorsNode final : public Node {
   /// Packets published and pairs skipped so far. Thread-safe.
   std::size_t published() const { return published_; }
   std::size_t skipped() const { return skipped_; }
+  /// Pairs of the recording. Thread-safe.
+  std::size_t listed() const { return listed_; }
 
  private:
   struct EndOfData {
@@ -63,6 +65,7 @@ class SensorsNode final : public Node {
   void step(const std::exception_ptr& failure) { std::rethrow_exception(failure); }
 
   std::unique_ptr<DatasetReader> reader_;
+  const std::size_t listed_;
   LagFilter filter_;
   ReplayClock clock_;
   const Topic<SensorPacket>& packets_;

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+
+namespace km {
+
+/// What a robot leaves in its output folder.
+inline constexpr std::array kResultFiles = {
+    "odometry.tum",  "optimized.tum", "pose_graph.g2o", "keyframes.csv", "loop_closures.csv",
+    "optimizer.csv", "traffic.csv",   "timing.csv",     "config.yaml",   "summary.json"};
+
+/// Removes a robot's results from `folder`, so that those of an earlier run cannot be taken for
+/// those of one that fails. Throws std::filesystem::filesystem_error naming the file.
+inline void remove_results(const std::filesystem::path& folder) {
+  for (const char* file : kResultFiles) std::filesystem::remove(folder / file);
+}
+
+}  // namespace km
