@@ -100,6 +100,12 @@ void DatasetFolder::mark_complete() {
   write_record();
 }
 
+void DatasetFolder::mark_incomplete() {
+  record_.complete = false;
+  record_.finished_robots.clear();
+  write_record();
+}
+
 std::uintmax_t DatasetFolder::free_space() const {
   return fs::space(path_).available;
 }

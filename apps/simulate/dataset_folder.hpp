@@ -26,6 +26,8 @@ class DatasetFolder {
 
   void mark_finished(const std::string& robot);
   void mark_complete();
+  /// It turned out not to be complete.
+  void mark_incomplete();
 
   /// Room on the disk [bytes].
   [[nodiscard]] std::uintmax_t free_space() const;

@@ -126,6 +126,41 @@ TEST_CASE("A run that is stopped goes on to the same bytes", "[simulate]") {
   check_equal(contents(folder, "stopped"), contents(folder, "whole"));
 }
 
+TEST_CASE("A signal ends the preparation, and a second one at once", "[simulate]") {
+  const TemporaryFolder folder;
+  Process program({kProgram, "--world", "city", "--robots", "1", "--duration", "60", "--output",
+                   (folder.path() / "city").string()});
+  REQUIRE(program.wait_for_prefix("Preparing world city ..."));
+  program.kill(SIGINT);
+  REQUIRE(program.wait_for_prefix("Stopping after this step"));
+  SECTION("one signal") {
+    CHECK(program.wait() == 130);
+    CHECK(program.lines("Stopped; the same command goes on").size() == 1);
+    CHECK(program.lines("0 of ").empty());
+  }
+  SECTION("two signals") {
+    program.kill(SIGINT);
+    CHECK(program.wait() == -SIGINT);  // which shells call 130
+    CHECK(program.lines("Stopped").empty());
+  }
+}
+
+TEST_CASE("Files that went missing from complete recordings are made again", "[simulate]") {
+  const TemporaryFolder folder;
+  const fs::path output = folder.path() / "r";
+  REQUIRE(simulate(kSmall, output).exit_code == 0);
+  const auto whole = contents(folder, "r");
+  CHECK_THAT(simulate(kSmall, output).output, Catch::Contains("complete already; nothing to do"));
+  fs::remove_all(output / "robot1/mav0/cam1/data");
+  fs::resize_file(output / "robot0/mav0/cam0/data/1001000000000.jpg", 100);
+  fs::remove(output / "team.yaml");
+  const auto again = simulate(kSmall, output);
+  CAPTURE(again.output);
+  CHECK(again.exit_code == 0);
+  CHECK_THAT(again.output, Catch::Contains(": 12 files are missing"));
+  check_equal(contents(folder, "r"), whole);
+}
+
 TEST_CASE("Foreign folders and other parameters are refused", "[simulate]") {
   const TemporaryFolder folder;
   folder.write("foreign/thesis.tex", "");
