@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <stdexcept>
 #include <string>
 
 namespace km {
@@ -31,6 +32,8 @@ std::deque<std::string> last_words(const fs::path& log) {
 }  // namespace
 
 std::vector<RobotRun> finished_runs(const TeamPlan& plan) {
+  if (!fs::is_directory(plan.output))
+    throw std::runtime_error(plan.output.string() + ": no such folder");
   std::vector<RobotRun> runs;
   for (const RobotPlan& robot : plan.robots) {
     const fs::path folder = plan.output / robot.name;

@@ -50,11 +50,15 @@ void define(CLI::App& app, TeamOptions& options) {
   options.robot_binary = km::program_folder() / "kimera_multi_robot";
   app.add_option("--config", options.config, "Team file")->required();
   app.add_option("--dataset", options.dataset, "What ${DATASET} stands for in the team file");
-  app.add_option("--rate", options.rate, "Times real time, or max (default: the file's, 1.0)");
+  app.add_option("--rate", options.rate, "Times real time, or max (default: the file's, 1.0)")
+      ->check([](const std::string& text) {
+        return km::is_rate(text) ? "" : text + " is neither a positive number nor max";
+      });
   app.add_option("--domain", options.domain, "DDS domain (default: the file's, or random)")
       ->check(CLI::Range(0, 230));
   app.add_option("--output", options.output, "Results, one folder per robot (default: the file's)");
-  app.add_option("--truth", options.truth, "True poses of all robots, instead of the file's");
+  app.add_option("--truth", options.truth, "True poses of all robots, instead of the file's")
+      ->check(CLI::ExistingPath);
   app.add_option("--time-limit", options.time_limit_s, "Ask the robots to end after this [s]")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--json", options.json, "Also write the results to this file, as JSON");
@@ -76,6 +80,7 @@ km::TeamPlan make_plan(const TeamOptions& options) {
     std::random_device device;  // teams of one host must not meet
     plan.domain = std::uniform_int_distribution<std::uint32_t>(1, 230)(device);
   }
+  if (!options.truth.empty()) plan.notes.clear();  // they are about the truths of the file
   for (km::RobotPlan& robot : plan.robots) {
     if (!options.truth.empty()) robot.truth = options.truth;
     robot.arguments.insert(robot.arguments.end(), options.arguments.begin(),

@@ -7,6 +7,7 @@
 #include <memory>
 #include <sstream>
 
+#include "apps/result_files.hpp"
 #include "runtime/clock.hpp"
 
 namespace km {
@@ -14,6 +15,17 @@ namespace {
 
 constexpr int kPoll_ms = 100;
 constexpr double kGrace_s = 30.0;
+
+// What robots, or those who started them elsewhere, left of an earlier run: --report would show it.
+void remove_earlier_run(const TeamPlan& plan) {
+  for (const RobotPlan& robot : plan.robots) {
+    const auto folder = plan.output / robot.name;
+    std::filesystem::create_directories(folder);
+    remove_results(folder);
+    std::filesystem::remove(folder / "exit_code");
+  }
+  std::filesystem::remove(plan.output / "trajectories.svg");
+}
 
 std::string number(double value) {
   std::ostringstream text;
@@ -28,11 +40,11 @@ class RunningTeam {
   RunningTeam(const std::filesystem::path& binary, const TeamPlan& plan, SignalWatch& signals,
               TeamDisplay& display)
       : plan_(plan), signals_(signals), display_(display) {
+    remove_earlier_run(plan);
     for (const RobotPlan& robot : plan.robots) {
-      const auto folder = plan.output / robot.name;
-      std::filesystem::create_directories(folder);
       robots_.push_back(std::make_unique<RobotProcess>(robot_command(binary, plan, robot),
-                                                       signals.previous(), folder / "robot.log"));
+                                                       signals.previous(),
+                                                       plan.output / robot.name / "robot.log"));
       display_.update(robots_.size() - 1, "started");
     }
   }

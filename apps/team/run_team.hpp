@@ -25,7 +25,8 @@ struct RobotRun {
 /// Starts a process per robot and waits for all of them; in the order of the plan, whose domain is
 /// set. Signals are passed on to the robots: the first asks them to end in order, as does the time
 /// limit, the second ends them at once. 30 s after the time limit they are killed. Output folders
-/// are made. Throws std::runtime_error if a process cannot be started; none is left then.
+/// are made, and results of an earlier run in them removed. Throws std::runtime_error if a process
+/// cannot be started; none is left then.
 [[nodiscard]] std::vector<RobotRun> run_team(const std::filesystem::path& binary,
                                              const TeamPlan& plan, SignalWatch& signals,
                                              TeamDisplay& display);

@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <cstdlib>
 #include <set>
+
+#include "modules/evaluation/trajectory_file.hpp"
 
 namespace km {
 namespace {
@@ -20,6 +23,7 @@ struct Source {
   fs::path file;
   fs::path dataset;
   std::string problems;
+  std::vector<std::string> notes;
 
   void problem(const YAML::Node& at, const std::string& text) {
     problems += file.string() + " line " + std::to_string(at.Mark().line + 1) + ": " + text + '\n';
@@ -61,6 +65,19 @@ class Keys {
   fs::path existing_path(const std::string& key) {
     const auto text = get<std::string>(key, "a path");
     return text ? existing(map_[key], *text) : fs::path();
+  }
+
+  // The file of true poses; empty, with a note, if there is none: a run is worth having without.
+  fs::path truth() {
+    const auto text = get<std::string>("truth", "a path");
+    if (!text) return {};
+    const fs::path place = source_.path(map_["truth"], *text);
+    const auto file = find_trajectory(place);
+    if (!file && !place.empty())
+      source_.notes.push_back("no true poses, so no errors: " + place.string() +
+                              " is neither a file nor a folder with data.csv or "
+                              "groundtruth_tum.txt");
+    return file.value_or(fs::path());
   }
 
   std::vector<fs::path> existing_paths(const std::string& key) {
@@ -128,7 +145,7 @@ RobotPlan read_robot(Source& source, const YAML::Node& node, const fs::path& tea
     source.problem(node, "robot " + robot.name + " needs either dataset or graph");
   robot.from_s = keys.get<double>("from", "a number of seconds");
   robot.to_s = keys.get<double>("to", "a number of seconds");
-  robot.truth = keys.existing_path("truth");
+  robot.truth = keys.truth();
   if (robot.truth.empty()) robot.truth = team_truth;
   robot.arguments = keys.texts("arguments");
   keys.finish();
@@ -182,19 +199,28 @@ YAML::Node load(const fs::path& file) {
 
 }  // namespace
 
+bool is_rate(const std::string& text) {
+  if (text == "max") return true;
+  char* end = nullptr;
+  const double rate = std::strtod(text.c_str(), &end);
+  return end != text.c_str() && *end == '\0' && rate > 0.0;
+}
+
 TeamPlan read_team_file(const fs::path& file, const fs::path& dataset) {
-  Source source{file, dataset, {}};
+  Source source{file, dataset, {}, {}};
   Keys keys(source, load(file));
   TeamPlan plan;
   plan.configs = keys.existing_paths("config");
   plan.rate = keys.get<std::string>("rate", "a number or max").value_or(plan.rate);
+  if (!is_rate(plan.rate))
+    source.problem(keys.child("rate"), "rate is neither a positive number nor max: " + plan.rate);
   plan.domain = keys.get<std::uint32_t>("domain", "a number");
   if (plan.domain && *plan.domain > kMaxDomain)
     source.problem(keys.child("domain"), "domain is not a number from 0 to 230");
   plan.output =
       keys.get<std::string>("output", "a path").value_or("results/" + file.stem().string());
   plan.time_limit_s = keys.get<double>("time_limit_s", "a number of seconds");
-  const fs::path truth = keys.existing_path("truth");
+  const fs::path truth = keys.truth();
   plan.closure_truth = read_closure_truth(source, keys.child("closure_truth"));
   const auto common = keys.texts("arguments");
   const YAML::Node robots = keys.child("robots");
@@ -204,6 +230,7 @@ TeamPlan read_team_file(const fs::path& file, const fs::path& dataset) {
     source.problems += file.string() + ": a team needs a list of robots\n";
   keys.finish();
   if (!source.problems.empty()) throw TeamFileError(source.problems);
+  plan.notes = source.notes;
   for (RobotPlan& robot : plan.robots)
     robot.arguments.insert(robot.arguments.begin(), common.begin(), common.end());
   return plan;

@@ -25,7 +25,8 @@ struct RobotPlan {
   std::filesystem::path graph;    ///< Recorded pose graph.
   std::optional<double> from_s;   ///< Part of the recording [s since its first image].
   std::optional<double> to_s;
-  std::filesystem::path truth;         ///< True poses; the team's by default, empty: unknown.
+  /// File of true poses, the team's by default; empty: unknown.
+  std::filesystem::path truth;
   std::vector<std::string> arguments;  ///< More arguments of its command line.
 };
 
@@ -38,10 +39,15 @@ struct TeamPlan {
   std::optional<double> time_limit_s;          ///< The team is asked to end after this.
   ClosureTruthOptions closure_truth;           ///< When a closure counts as true.
   std::vector<RobotPlan> robots;
+  std::vector<std::string> notes;  ///< What cannot be had, for the table.
 };
 
+/// True for what --rate of a robot takes: a positive number, or max.
+[[nodiscard]] bool is_rate(const std::string& text);
+
 /// Reads a team file. Relative paths of inputs are relative to the file's folder, `output` to the
-/// working directory; ${DATASET} in a path stands for `dataset`. Throws TeamFileError for unknown
+/// working directory; ${DATASET} in a path stands for `dataset`. A truth may be a folder that holds
+/// the file; one that does not exist is a note. Throws TeamFileError for unknown
 /// keys, wrong types, missing inputs, ids or names used twice, and ${DATASET} without `dataset`.
 [[nodiscard]] TeamPlan read_team_file(const std::filesystem::path& file,
                                       const std::filesystem::path& dataset);

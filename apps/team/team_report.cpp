@@ -14,6 +14,8 @@ namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
+constexpr double kManySkipped = 0.05;  // of the frames: beyond, odometry is not what it could be
+
 constexpr std::array kTraffic = {"place_recognition", "geometric_verification", "pgo", "other"};
 
 std::string ate(const TrajectoryError* error) {
@@ -141,12 +143,23 @@ std::string traffic_table(const TeamResult& team) {
   return align_columns(rows);
 }
 
+// Empty unless the robot was too slow for the rate.
+std::string skipped_remark(const RobotResult& robot) {
+  const RobotSummary summary = robot.summary.value_or(RobotSummary{});
+  const auto skipped = static_cast<double>(summary.frames_skipped);
+  const double share = skipped / std::max(1.0, skipped + static_cast<double>(summary.frames));
+  if (share <= kManySkipped) return "";
+  return "note: " + robot.plan.name + " skipped " + fixed(100.0 * share, 0) +
+         " % of its frames: use a lower --rate, or max\n";
+}
+
 std::string failures(const TeamResult& team) {
   std::string text;
   for (const std::string& note : team.notes) text.append("note: ").append(note).append("\n");
   for (const RobotResult& robot : team.robots) {
     for (const std::string& note : robot.notes)
       text.append("note: ").append(robot.plan.name).append(": ").append(note).append("\n");
+    text += skipped_remark(robot);
     if (robot.run.exit.ok()) continue;
     text += robot.plan.name + " failed, " + to_string(robot.run.exit) + "; its last words:\n";
     for (const std::string& line : robot.run.last_words)

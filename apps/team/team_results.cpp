@@ -130,6 +130,7 @@ RobotSummary read_summary(const std::filesystem::path& file) {
 
 TeamResult collect_results(const TeamPlan& plan, std::vector<RobotRun> runs) {
   TeamResult result;
+  result.notes = plan.notes;
   Trajectories trajectories(plan);
   std::vector<TrajectoryInput> optimized;
   for (std::size_t i = 0; i < plan.robots.size(); ++i) {

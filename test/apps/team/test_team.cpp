@@ -76,6 +76,22 @@ TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
                                 Catch::Contains("  out of luck"));
 }
 
+TEST_CASE("Results of an earlier run are not shown for a robot that fails", "[team]") {
+  const Team team("[ $name = bob ] && { rm \"$out/summary.json\"; exit 1; }; exit 0");
+  for (const char* file : {"summary.json", "optimized.tum", "exit_code"})
+    team.folder.write(std::string("out/bob/") + file, "{\"frames\": 4711}");
+  team.folder.write("out/trajectories.svg", "old");
+  team.folder.write("out/bob/notes.txt", "of the user");
+  const auto result = run_command(team.command);
+  CAPTURE(result.output);
+  CHECK(result.exit_code == 3);
+  CHECK_THAT(result.output, !Catch::Contains("4711"));
+  CHECK_FALSE(fs::exists(team.folder.path() / "out/bob/optimized.tum"));
+  CHECK_FALSE(fs::exists(team.folder.path() / "out/bob/exit_code"));
+  CHECK_FALSE(fs::exists(team.folder.path() / "out/trajectories.svg"));
+  CHECK(fs::exists(team.folder.path() / "out/bob/notes.txt"));
+}
+
 TEST_CASE("The domain is drawn once for the whole team", "[team]") {
   const Team team("exit 0");
   const std::string output = run_command(team.command).output;
@@ -134,6 +150,13 @@ TEST_CASE("A time limit asks the robots to end", "[team]") {
 TEST_CASE("What cannot be run is refused with code 1", "[team]") {
   const Team team("exit 0");
   CHECK(run_command(team.command + " --robot-binary /nowhere/robot").exit_code == 1);
+  const auto fast = run_command(team.command + " --rate fast");
+  CHECK(fast.exit_code == 1);
+  CHECK_THAT(fast.output, Catch::Contains("fast is neither a positive number nor max") &&
+                              !Catch::Contains("status of alice"));
+  const auto report = run_command(team.command + " --report");
+  CHECK(report.exit_code == 1);
+  CHECK_THAT(report.output, Catch::EndsWith("out: no such folder\n"));
   const std::string tool = std::string(KM_BIN_DIR) + "/kimera_multi_team";
   CHECK(run_command(tool).exit_code == 1);
   const auto missing = run_command(tool + " --config /nowhere.yaml");

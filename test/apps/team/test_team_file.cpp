@@ -87,6 +87,24 @@ TEST_CASE("A team file may say when a closure counts as true", "[team]") {
                            Catch::Contains("unknown key near"));
 }
 
+TEST_CASE("A truth may be a folder, and one that is missing is a note", "[team]") {
+  const Inputs inputs;
+  inputs.folder.write("truth/groundtruth_tum.txt", "");
+  const fs::path file = inputs.team(
+      "truth: none.csv\n"
+      "robots:\n"
+      "  - {id: 1, graph: recording/g.csv}\n"
+      "  - {id: 2, graph: recording/g.csv, truth: truth}\n");
+  const TeamPlan plan = read_team_file(file, {});
+  CHECK(plan.robots[0].truth.empty());
+  CHECK(plan.robots[1].truth == inputs.folder.path() / "truth/groundtruth_tum.txt");
+  REQUIRE(plan.notes.size() == 1);
+  CHECK_THAT(plan.notes[0], Catch::Contains("no true poses, so no errors: ") &&
+                                Catch::Contains("none.csv is neither"));
+  inputs.folder.write("truth/data.csv", "");
+  CHECK(read_team_file(file, {}).robots[1].truth == inputs.folder.path() / "truth/data.csv");
+}
+
 TEST_CASE("The command line of a robot says what its plan says", "[team]") {
   TeamPlan plan;
   plan.configs = {"/c.yaml", "/d.yaml"};
@@ -129,6 +147,8 @@ TEST_CASE("Every problem of a team file is told with its line", "[team]") {
 
 TEST_CASE("A team file without robots or dataset is refused", "[team]") {
   const Inputs inputs;
+  CHECK_THAT(problems_of(inputs.team("rate: fast\n"), {}),
+             Catch::Contains("line 1: rate is neither a positive number nor max: fast"));
   CHECK_THAT(problems_of(inputs.team("rate: 1\n"), {}),
              Catch::Contains("a team needs a list of robots"));
   CHECK_THAT(problems_of(inputs.team("robots:\n  - {id: 1, dataset: \"${DATASET}\"}\n"), {}),

@@ -98,6 +98,16 @@ TEST_CASE("The tables show results, failures and last words", "[team]") {
   }
 }
 
+TEST_CASE("A robot that skipped many frames is told of", "[team]") {
+  const TemporaryFolder folder;
+  TeamResult team = example(folder);
+  CHECK_THAT(to_table(team), !Catch::Contains("of its frames"));
+  team.robots[0].summary->frames = 20;
+  team.robots[0].summary->frames_skipped = 80;
+  CHECK_THAT(to_table(team), Catch::Contains("note: " + team.robots[0].plan.name +
+                                             " skipped 80 % of its frames: use a lower --rate"));
+}
+
 TEST_CASE("The JSON of a run holds every robot", "[team]") {
   const TemporaryFolder folder;
   std::ostringstream text;
