@@ -85,10 +85,11 @@ struct [[nodiscard]] DeformationSolution {
 
 /// Minimises eq. (1): anchors of the keyframes, rigidity between neighbouring nodes in both
 /// directions, rigidity between keyframes and the nodes they saw; Levenberg-Marquardt on SE(3) with
-/// analytic Jacobians and sparse Cholesky factors (Ceres), one thread. To the paper's terms a weak
+/// analytic, sparse Jacobians and conjugate gradients on the Schur complement of the keyframes
+/// (Ceres), one thread. To the paper's terms a weak
 /// one is added that turns each node with its keyframes (see kRotationNoise_rad in the source): it
 /// makes the minimum unique where a node has few neighbours, or all in one line. Keyframes without
-/// a tie stay at their anchors.
+/// a tie stay at their anchors; without any tie the result is `initial`.
 [[nodiscard]] DeformationSolution solve(const DeformationGraph& graph,
                                         std::span<const SE3> T_world_kf,
                                         const DeformationNoise& noise, int max_iterations,
