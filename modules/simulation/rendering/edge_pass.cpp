@@ -33,7 +33,7 @@ bool ViewPass::same_surface(std::size_t pixel, std::uint32_t triangle,
 
 // Whether the radiances of two pixels differ by so much that a mean of them is seen as such.
 bool ViewPass::contrast(std::size_t a, std::size_t b) const {
-  constexpr float kVisible = 0.03F;  // a grey level or two, at any exposure
+  constexpr float kVisible = 0.05F;  // steps of some grey levels; the lens blurs them away
   const float at_a = request_.radiance ? view_.radiance[a] : luminance_of(view_.rgb[a]);
   const float at_b = request_.radiance ? view_.radiance[b] : luminance_of(view_.rgb[b]);
   return std::abs(at_a - at_b) > kVisible * std::max(at_a, at_b);
@@ -64,12 +64,17 @@ void ViewPass::compare_neighbours() {
 // ray in every other pixel of 8 x 4, elsewhere in each, finds most of them. Where an edge is known
 // already there is no need.
 void ViewPass::find_thin_things(int x0, int y0) {
+  // In front of what is nearer than this, nothing is narrower than a pixel.
+  constexpr float kThinnest_m = 0.02F;
+  const float nearest_m = kThinnest_m * static_cast<float>(rays_.camera().fx);
   Aim aim;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const int row = static_cast<int>(lane) / 4;
     const int x = x0 + 2 * (static_cast<int>(lane) % 4) + row % 2;
     const int y = y0 + row;
     if (x >= width_ || y >= height_ || edge_[index(x, y)] != kNoEdge) continue;
+    const float depth_m = pixels_[index(x, y)].depth_m;
+    if (depth_m > 0.0F && depth_m < nearest_m) continue;
     aim.set(lane, x, y, sample_offset((5 * lane + 3) % kLanes, kLanes));
   }
   if (aim.active == 0) return;
