@@ -16,7 +16,7 @@ namespace {
 void bench(const std::string& size, std::size_t side, std::size_t keyframes, std::size_t lanes) {
   const Field scene = field(side, keyframes, lanes);
   MeshDeformationConfig config;
-  config.node_spacing_m = 0.85;
+  config.node_spacing_m = 0.72;
   config.time_window_keyframes = 1000000;  // one connected graph: the hardest to factorise
   const std::vector<SE3> a = drifted(scene.T_odom_kf, 1, 0.002, 0.01);
   const std::vector<SE3> b = drifted(a, 2, 0.0004, 0.002);
