@@ -120,7 +120,7 @@ TEST_CASE("What is asked for must be there", "[sensors]") {
   CHECK_THROWS_WITH(EurocReader(folder.root(), {.labels = true}),
                     Catch::EndsWith("label0/data.csv: no such file"));
   fs::remove_all(folder.mav0() / "cam1");
-  CHECK_THROWS_WITH(EurocReader(folder.root()), Catch::EndsWith("cam1/sensor.yaml: no such file"));
+  CHECK_THROWS_WITH(EurocReader(folder.root()), Catch::Contains("cam1/sensor.yaml: no such file"));
   folder.add_depth();
   fs::remove(folder.mav0() / "depth0/data.csv");
   CHECK_THROWS_WITH(EurocReader(folder.root()), Catch::EndsWith("depth0/data.csv: no such file"));
