@@ -36,8 +36,7 @@ void require_no_error(RTCDevice device) {
     throw std::runtime_error("Embree failed with error " + std::to_string(error));
 }
 
-// Embree keeps pointers into the mesh: nothing is copied but a padded copy of the vertices, since
-// it reads 16 bytes at the last one.
+// Copies the mesh: Embree pads its buffers, since it reads 16 bytes at the last vertex.
 void attach_mesh(RTCDevice device, RTCScene scene, const SurfaceMesh& mesh) {
   if (mesh.triangles.empty()) return;
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);

@@ -30,7 +30,7 @@ using RayPacket = RTCRayHit16;
 /// Embree's acceleration structure over a mesh. Immutable, safe to use from several threads.
 class RayTracer {
  public:
-  /// `mesh` must outlive the tracer. Throws std::runtime_error with Embree's message.
+  /// Copies `mesh`. Throws std::runtime_error with Embree's error code.
   explicit RayTracer(const SurfaceMesh& mesh);
 
   /// Nearest hits of the rays in `active` between tnear and tfar: primID, u, v, and tfar shrinks to
