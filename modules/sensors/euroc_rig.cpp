@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,29 +22,27 @@ void require_model(const SensorYaml& yaml, const char* key, const std::string& m
                    const std::string& alias) {
   const std::string found = yaml.word(key);
   if (found != model && found != alias)
-    yaml.fail(yaml.at(key), std::string(key) + " '" + found + "' is not supported, only " + model);
+    yaml.fail(key, std::string(key) + " '" + found + "' is not supported, only " + model);
 }
 
 void read_resolution(const SensorYaml& yaml, PinholeCamera& camera) {
-  const YAML::Node size = yaml.at("resolution");
-  const auto resolution = yaml.numbers(size, "resolution", 2, "width and height");
+  const auto resolution = yaml.numbers("resolution", 2, "width and height");
   for (const double side : resolution)
     if (side < 1.0 || side > 65536.0 || side != std::floor(side))
-      yaml.fail(size, "resolution: sides are whole numbers of pixels from 1 to 65536");
+      yaml.fail("resolution", "resolution: sides are whole numbers of pixels from 1 to 65536");
   camera.width = static_cast<int>(resolution[0]);
   camera.height = static_cast<int>(resolution[1]);
 }
 
 void read_intrinsics(const SensorYaml& yaml, PinholeCamera& camera) {
-  const YAML::Node pinhole = yaml.at("intrinsics");
-  const auto K = yaml.numbers(pinhole, "intrinsics", 4, "fu, fv, cu, cv");
-  if (K[0] <= 0.0 || K[1] <= 0.0) yaml.fail(pinhole, "intrinsics: a focal length is not positive");
+  const auto K = yaml.numbers("intrinsics", 4, "fu, fv, cu, cv");
+  if (K[0] <= 0.0 || K[1] <= 0.0)
+    yaml.fail("intrinsics", "intrinsics: a focal length is not positive");
   camera.fx = K[0], camera.fy = K[1], camera.cx = K[2], camera.cy = K[3];
 }
 
 void read_distortion(const SensorYaml& yaml, PinholeCamera& camera) {
-  const auto distortion = yaml.numbers(yaml.at("distortion_coefficients"),
-                                       "distortion_coefficients", 4, "k1, k2, p1, p2");
+  const auto distortion = yaml.numbers("distortion_coefficients", 4, "k1, k2, p1, p2");
   std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
 }
 
@@ -72,31 +71,31 @@ void check_alignment(const SensorYaml& yaml, const PinholeCamera& left) {
   PinholeCamera depth = left;
   read_resolution(yaml, depth);
   if (depth.width != left.width || depth.height != left.height)
-    yaml.fail(yaml.at("resolution"), "resolution: not that of cam0, " + std::to_string(left.width) +
-                                         " x " + std::to_string(left.height));
+    yaml.fail("resolution", "resolution: not that of cam0, " + std::to_string(left.width) + " x " +
+                                std::to_string(left.height));
   read_intrinsics(yaml, depth);
   const Eigen::Vector4d off(depth.fx - left.fx, depth.fy - left.fy, depth.cx - left.cx,
                             depth.cy - left.cy);
   if (off.cwiseAbs().maxCoeff() > kMaxMisalignment_px)
-    yaml.fail(yaml.at("intrinsics"), "intrinsics: not those of cam0, with which depth must align");
+    yaml.fail("intrinsics", "intrinsics: not those of cam0, with which depth must align");
   if (yaml.has("distortion_coefficients")) read_distortion(yaml, depth);
   if (depth.distortion != left.distortion)
-    yaml.fail(yaml.at("distortion_coefficients"),
+    yaml.fail("distortion_coefficients",
               "distortion_coefficients: not those of cam0, with which depth must align");
   const SE3 T = left.T_body_cam.inverse() * yaml.extrinsics();
   const double turn_px = left.fx * (T.linear() - Eigen::Matrix3d::Identity()).norm();
   if (T.translation().norm() > kMaxMisalignment_m || turn_px > kMaxMisalignment_px)
-    yaml.fail(yaml.at("T_BS"), "T_BS: not that of cam0, with which depth must align");
+    yaml.fail("T_BS", "T_BS: not that of cam0, with which depth must align");
 }
 
 DepthRange read_depth_range(const SensorYaml& yaml) {
   DepthRange range;
   range.max_m = yaml.positive("max_range_m", range.max_m);
   if (!yaml.has("min_range_m")) return range;
-  const YAML::Node min = yaml.at("min_range_m");
-  if (!YAML::convert<double>::decode(min, range.min_m) ||
-      !(range.min_m >= 0.0 && range.min_m < range.max_m))
-    yaml.fail(min, "min_range_m is not a number from 0 to below max_range_m");
+  const std::optional<double> min_m = yaml.number("min_range_m");
+  if (!min_m || *min_m < 0.0 || *min_m >= range.max_m)
+    yaml.fail("min_range_m", "min_range_m is not a number from 0 to below max_range_m");
+  range.min_m = *min_m;
   return range;
 }
 

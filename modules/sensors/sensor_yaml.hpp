@@ -1,8 +1,9 @@
 #pragma once
 
-#include <yaml-cpp/yaml.h>
-
+#include <cstddef>
 #include <filesystem>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,11 +16,13 @@ namespace km {
 class SensorYaml {
  public:
   explicit SensorYaml(std::filesystem::path file);
+  ~SensorYaml();
 
   [[nodiscard]] bool has(const char* key) const;
-  [[nodiscard]] YAML::Node at(const char* key) const { return child(root_, key); }
-  [[nodiscard]] YAML::Node child(const YAML::Node& map, const char* key) const;
   [[nodiscard]] std::string word(const char* key) const;
+
+  /// nullopt for what is not a number, infinite or not-a-number.
+  [[nodiscard]] std::optional<double> number(const char* key) const;
 
   /// Positive and finite.
   [[nodiscard]] double positive(const char* key) const;
@@ -28,17 +31,18 @@ class SensorYaml {
   [[nodiscard]] double positive(const char* key, double otherwise) const;
 
   /// `count` finite numbers. `meaning` is said where there are not as many.
-  [[nodiscard]] std::vector<double> numbers(const YAML::Node& node, const std::string& key,
-                                            std::size_t count, const char* meaning) const;
+  [[nodiscard]] std::vector<double> numbers(const char* key, std::size_t count,
+                                            const char* meaning) const;
 
   /// T_BS, its rotation made exact; see read_euroc_rig() for what is refused.
   [[nodiscard]] SE3 extrinsics() const;
 
-  [[noreturn]] void fail(const YAML::Node& node, const std::string& problem) const;
+  /// Refuses the value of a key that exists.
+  [[noreturn]] void fail(const char* key, const std::string& problem) const;
 
  private:
-  std::filesystem::path file_;
-  YAML::Node root_;
+  struct Document;
+  std::unique_ptr<const Document> document_;
 };
 
 }  // namespace km
