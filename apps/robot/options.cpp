@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <iostream>
 #include <limits>
+#include <sstream>
 
 #include "apps/robot/robot_config.hpp"
 
@@ -62,6 +63,14 @@ void add_input(CLI::App& app, RobotOptions& options) {
       ->default_str("1.0");
 }
 
+// Before the dataset is opened, in the words of the command line.
+void check_window(const RobotOptions& options) {
+  if (!options.from_s || !options.to_s || *options.from_s < *options.to_s) return;
+  std::ostringstream message;
+  message << "--from " << *options.from_s << " s is not before --to " << *options.to_s << " s";
+  throw CLI::ValidationError(message.str());
+}
+
 void add_network(CLI::App& app, RobotOptions& options) {
   app.add_option("--domain", options.domain, "DDS domain: robots of one team use the same")
       ->check(CLI::Range(0, 230));
@@ -99,6 +108,7 @@ RobotOptions parse_options(int argc, char** argv) {
       ->capture_default_str();
   try {
     app.parse(argc, argv);
+    check_window(options);
   } catch (const CLI::ParseError& error) {
     std::exit(app.exit(error) == 0 ? 0 : 2);
   }

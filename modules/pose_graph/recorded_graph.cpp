@@ -45,6 +45,8 @@ RelativePose read_row(TextFields& fields) {
   if (!(precision.kappa > 0.0 && precision.tau > 0.0))
     fields.fail("kappa and tau must be positive");
   row.covariance = covariance_of(precision);
+  // Columns after tau, such as weight, are not used; a row that broke there is not to be trusted.
+  while (!fields.at_end()) fields.number("column after tau");
   return row;
 }
 

@@ -31,8 +31,8 @@ struct RecordedGraph {
                                                 const std::string& file);
 
 /// Reads measurements as rows robot_src, pose_src, robot_dst, pose_dst, qx, qy, qz, qw, tx, ty, tz,
-/// kappa, tau [, ...] below one line of column names; further columns are ignored. kappa and tau
-/// weigh rotation and translation, see precision.hpp. Quaternions are normalised.
+/// kappa, tau [, ...] below one line of column names; further columns are not used, but numbers.
+/// kappa and tau weigh rotation and translation, see precision.hpp. Quaternions are normalised.
 /// Throws std::runtime_error "file:line: what".
 [[nodiscard]] std::vector<RelativePose> read_measurements_csv(std::istream& in,
                                                               const std::string& file);

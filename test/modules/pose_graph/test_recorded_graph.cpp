@@ -85,6 +85,7 @@ TEST_CASE("A bad row is refused with its line and the reason", "[recorded]") {
       {"0,0,0,1,0,0,0,2,0,0,0,1,1", "quaternion has length"},
       {"0,0,0,1,0,0,0,1,inf,0,0,1,1", "translation is not finite"},
       {"0,0,0,1,0,0,0,1,0,0,0,0,1", "kappa and tau must be positive"},
+      {"0,0,0,1,0,0,0,1,0,0,0,1,1,1,much", "column after tau is not a number: 'much'"},
   }));
   CAPTURE(row);
   CHECK_THROWS_WITH(read(kHeader + "0,0,0,1,0,0,0,1,0,0,0,1,1\n" + row + '\n'),
