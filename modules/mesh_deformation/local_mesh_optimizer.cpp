@@ -8,6 +8,7 @@
 
 #include "modules/mesh_deformation/decimation.hpp"
 #include "modules/mesh_deformation/interpolation.hpp"
+#include "modules/mesh_deformation/keyframe_motion.hpp"
 #include "modules/mesh_deformation/map_mesh_check.hpp"
 
 namespace km {
@@ -62,26 +63,6 @@ VertexMatch match(const KnownVertices& known, const MapMesh& map) {
       match.unchanged[v] = kNoIndex;
   }
   return match;
-}
-
-// Optimised poses of all keyframes: those at the end that have none follow the last that has one.
-std::vector<SE3> complete(std::span<const SE3> T_odom_kf, std::span<const SE3> T_world_kf) {
-  std::vector<SE3> result(T_world_kf.begin(), T_world_kf.end());
-  if (T_odom_kf.empty()) return result;
-  const std::size_t last = T_world_kf.size() - 1;
-  const SE3 T_world_odom = T_world_kf[last] * T_odom_kf[last].inverse();
-  for (std::size_t i = T_world_kf.size(); i < T_odom_kf.size(); ++i)
-    result.push_back(T_world_odom * T_odom_kf[i]);
-  return result;
-}
-
-void check_trajectories(std::span<const SE3> T_odom_kf, std::span<const SE3> T_world_kf) {
-  check_poses(T_odom_kf, "odometry");
-  check_poses(T_world_kf, "optimised");
-  if (T_world_kf.size() > T_odom_kf.size() || (T_world_kf.empty() && !T_odom_kf.empty()))
-    throw std::invalid_argument("mesh deformation: " + std::to_string(T_world_kf.size()) +
-                                " optimised poses for " + std::to_string(T_odom_kf.size()) +
-                                " keyframes");
 }
 
 }  // namespace

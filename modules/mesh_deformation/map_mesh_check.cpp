@@ -69,4 +69,12 @@ void check_poses(std::span<const SE3> poses, std::string_view what) {
              " is not finite or not rigid");
 }
 
+void check_trajectories(std::span<const SE3> T_odom_kf, std::span<const SE3> T_world_kf) {
+  check_poses(T_odom_kf, "odometry");
+  check_poses(T_world_kf, "optimised");
+  if (T_world_kf.size() > T_odom_kf.size() || (T_world_kf.empty() && !T_odom_kf.empty()))
+    refuse(std::to_string(T_world_kf.size()) + " optimised poses for " +
+           std::to_string(T_odom_kf.size()) + " keyframes");
+}
+
 }  // namespace km

@@ -19,4 +19,8 @@ void check_map_mesh(const MapMesh& map, std::size_t keyframes);
 /// says which poses these are.
 void check_poses(std::span<const SE3> poses, std::string_view what);
 
+/// Throws std::invalid_argument for poses that check_poses() refuses, more optimised poses than
+/// keyframes, and none though there are some.
+void check_trajectories(std::span<const SE3> T_odom_kf, std::span<const SE3> T_world_kf);
+
 }  // namespace km

@@ -32,6 +32,14 @@ struct MeshDeformationConfig {
   /// Bound on the iterations of one solution.
   int max_iterations = 30;
 
+  /// The mesh is bent anew when a keyframe moved this far against the others, and moved as a whole
+  /// when all moved that far alike [m], [rad].
+  double min_move_m = 0.01;
+  double min_rotation_rad = 0.005;
+
+  /// Rest between two corrections [s]: bounds the time that this takes from the robot.
+  double period_s = 2.0;
+
   void visit_fields(auto& visitor) {
     visitor.field("node_spacing_m", node_spacing_m, {0.001, 100.0}, "[m] between graph nodes");
     visitor.field("interpolation_nodes", interpolation_nodes, {1, 8}, "that move a vertex");
@@ -43,6 +51,9 @@ struct MeshDeformationConfig {
     visitor.field("mesh_edge_m", mesh_edge_m, {1e-9, 100.0}, "[m] std. dev. between nodes");
     visitor.field("keyframe_tie_m", keyframe_tie_m, {1e-9, 100.0}, "[m] std. dev. from a keyframe");
     visitor.field("max_iterations", max_iterations, {1, 1000}, "of one solution");
+    visitor.field("min_move_m", min_move_m, {1e-6, 100.0}, "[m] of a keyframe, to act");
+    visitor.field("min_rotation_rad", min_rotation_rad, {1e-6, 3.2}, "[rad] likewise");
+    visitor.field("period_s", period_s, {0.01, 86400.0}, "[s] between two corrections");
   }
 };
 

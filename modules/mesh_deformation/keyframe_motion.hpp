@@ -1,0 +1,39 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "modules/core/geometry.hpp"
+
+namespace km {
+
+/// Optimised poses of all keyframes of `T_odom_kf`: `T_world_kf`, and for those at the end that
+/// have none, the last that has one followed by odometry. Not more poses than odometry has, and at
+/// least one unless odometry has none.
+[[nodiscard]] std::vector<SE3> complete(std::span<const SE3> T_odom_kf,
+                                        std::span<const SE3> T_world_kf);
+
+/// What counts as a change of a pose.
+struct MotionScale {
+  double translation_m = 0.01;
+  double rotation_rad = 0.005;
+};
+
+/// How keyframes moved from one solution to the next.
+struct KeyframeMotion {
+  SE3 T_after_before = SE3::Identity();  ///< Of all together: of the gauge, mostly.
+  double bending = 0.0;  ///< Largest move of any keyframe beyond that, in units of the scale.
+};
+
+/// Compares two solutions of the same keyframes, as many as both have. The common motion minimises
+/// the sum of squared moves beyond it, in units of `scale`, with the chordal distance of rotations:
+/// the orthogonal Procrustes problem (Umeyama, PAMI 1991) with rotations as further observations,
+/// so that it is unique for any number of poses. Identity without poses.
+[[nodiscard]] KeyframeMotion keyframe_motion(std::span<const SE3> before,
+                                             std::span<const SE3> after, const MotionScale& scale);
+
+/// Largest difference between T_a * pose and T_b * pose of any of the poses, in units of the scale.
+[[nodiscard]] double largest_difference(std::span<const SE3> poses, const SE3& T_a, const SE3& T_b,
+                                        const MotionScale& scale);
+
+}  // namespace km

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "modules/core/geometry.hpp"
+#include "modules/mesh/map_mesh.hpp"
+#include "modules/mesh_deformation/keyframe_motion.hpp"
+#include "modules/mesh_deformation/local_mesh_optimizer.hpp"
+#include "modules/mesh_deformation/mesh_deformation_config.hpp"
+
+namespace km {
+
+/// What MeshCorrector::correct() corrects.
+struct CorrectionInput {
+  const MapMesh& map;
+  std::uint64_t map_version = 0;  ///< Differs when the map does.
+  std::span<const SE3> T_odom_kf;
+  std::span<const SE3> T_world_kf;  ///< May be shorter: see LocalMeshOptimizer::optimize().
+};
+
+struct [[nodiscard]] MeshCorrection {
+  LabelledMesh mesh;             ///< In the frame of the optimised poses.
+  MeshDeformationReport report;  ///< Of the last optimisation.
+  bool deformed = true;          ///< False: that result, moved as a whole.
+};
+
+/// Keeps a mesh up to date with map and trajectory, at the least cost: nothing while no keyframe
+/// moved by the configured threshold, one rigid motion where all of them moved alike, as they do
+/// when the origin of `world` changes, and Local Mesh Optimization otherwise.
+///
+/// Not thread-safe.
+class MeshCorrector {
+ public:
+  /// Throws ConfigError if `config` is out of bounds.
+  explicit MeshCorrector(const MeshDeformationConfig& config);
+
+  /// The mesh corrected anew, nullopt if the last one still holds. `exactly`: thresholds are zero.
+  /// Throws as LocalMeshOptimizer::optimize().
+  [[nodiscard]] std::optional<MeshCorrection> correct(const CorrectionInput& input, bool exactly);
+
+ private:
+  [[nodiscard]] MeshCorrection deform(const CorrectionInput& input, std::vector<SE3> anchors);
+
+  MotionScale scale_;
+  LocalMeshOptimizer optimizer_;
+  // Of the last optimisation.
+  std::optional<std::uint64_t> map_version_;
+  std::vector<SE3> anchors_;  // the trajectory, completed
+  std::vector<Eigen::Vector3f> optimized_vertices_;
+  MeshDeformationReport report_;
+  SE3 T_published_optimized_ = SE3::Identity();  // how its result has been moved since
+};
+
+}  // namespace km

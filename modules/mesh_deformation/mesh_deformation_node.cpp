@@ -1,0 +1,145 @@
+#include "modules/mesh_deformation/mesh_deformation_node.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "runtime/clock.hpp"
+#include "runtime/log.hpp"
+
+namespace km {
+namespace {
+
+// Longer than any correction takes to be through: publishers must not wait for it.
+constexpr std::size_t kQueue = 8192;
+
+// A correction starts at most this share of the period later than it might.
+constexpr double kTickShare = 0.125;
+
+// The keyframes that the vertices of a map refer to are these many.
+std::size_t keyframes_of(const MapMesh& map) {
+  KeyframeIndex last = 0;
+  for (const auto& seen : map.seen_by) last = std::max(last, seen[1]);
+  return map.seen_by.empty() ? 0 : std::size_t{last} + 1;
+}
+
+}  // namespace
+
+MeshDeformationNode::MeshDeformationNode(const MeshDeformationConfig& config, RobotId self,
+                                         const MeshDeformationTopics& topics)
+    : config_(checked(config)),
+      self_(self),
+      optimized_(topics.optimized),
+      corrector_(config),
+      worker_(
+          kQueue, Overflow::kBlock, [this](const Input& input) { step(input, steady_now_s()); },
+          MeshDeformationConfig::kSection),
+      ticks_(
+          steady_duration(kTickShare * config.period_s), [this] { worker_.post(Tick()); },
+          "mesh tick") {
+  const auto forward = [this](const auto& message) { worker_.post(message); };
+  topics.keyframes.subscribe(forward);
+  topics.maps.subscribe(forward);
+  topics.trajectory.subscribe(forward);
+}
+
+void MeshDeformationNode::start() {
+  worker_.start();
+  ticks_.start();
+}
+
+void MeshDeformationNode::finish() {
+  worker_.post(End());
+}
+
+void MeshDeformationNode::stop() noexcept {
+  worker_.post(End());  // refused if stopped before
+  worker_.stop();
+  ticks_.stop();
+}
+
+std::exception_ptr MeshDeformationNode::error() const {
+  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
+}
+
+void MeshDeformationNode::step(const Input& input, double now_s) {
+  if (ended_) return;
+  if (const auto* keyframe = std::get_if<Topic<KeyframeOdometry>::Message>(&input))
+    return take(**keyframe);
+  if (const auto* map = std::get_if<Topic<MapMesh>::Message>(&input)) return take(*map);
+  if (const auto* trajectory = std::get_if<Topic<Trajectory>::Message>(&input)) {
+    trajectory_ = *trajectory;
+    return;
+  }
+  ended_ = std::holds_alternative<End>(input);
+  if (ended_ || now_s >= next_s_) correct(ended_);
+}
+
+void MeshDeformationNode::take(const KeyframeOdometry& keyframe) {
+  if (keyframe.id.index != T_odom_kf_.size())
+    throw std::invalid_argument("mesh deformation: keyframe " + std::to_string(keyframe.id.index) +
+                                " after " + std::to_string(T_odom_kf_.size()) + " keyframes");
+  T_odom_kf_.push_back(keyframe.T_odom_kf);
+}
+
+void MeshDeformationNode::take(Topic<MapMesh>::Message map) {
+  keyframes_of_map_ = keyframes_of(*map);
+  map_ = std::move(map);
+  ++map_version_;
+}
+
+// A map may overtake the keyframes it was made with; a trajectory may be yet to come.
+bool MeshDeformationNode::can_correct() const {
+  return map_ != nullptr && trajectory_ != nullptr && !trajectory_->T_world_kf.empty() &&
+         !T_odom_kf_.empty() && keyframes_of_map_ <= T_odom_kf_.size();
+}
+
+void MeshDeformationNode::correct(bool exactly) {
+  if (!can_correct()) {
+    if (exactly && map_ != nullptr)
+      log::warn(name()) << "the last map is not corrected: it was made with " << keyframes_of_map_
+                        << " keyframes; " << T_odom_kf_.size() << " and "
+                        << (trajectory_ == nullptr ? 0 : trajectory_->T_world_kf.size())
+                        << " optimised ones are known";
+    return;
+  }
+  const auto& T_world_kf = trajectory_->T_world_kf;
+  const double start_s = steady_now_s();
+  std::optional<MeshCorrection> correction = corrector_.correct(
+      {*map_, map_version_, T_odom_kf_,
+       std::span(T_world_kf).first(std::min(T_world_kf.size(), T_odom_kf_.size()))},
+      exactly);
+  if (!correction) return;
+  const double end_s = steady_now_s();
+  next_s_ = end_s + config_.period_s;
+  timing_.add(end_s - start_s);
+  OptimizedMesh result{self_,
+                       trajectory_->anchor,
+                       std::move(correction->mesh),
+                       correction->report,
+                       correction->deformed,
+                       end_s - start_s};
+  report(result);
+  optimized_.publish(std::move(result));
+}
+
+void MeshDeformationNode::report(const OptimizedMesh& result) const {
+  const MeshDeformationReport& report = result.report;
+  if (!result.deformed) {
+    log::debug(name()) << "moved " << report.vertices << " vertices as a whole";
+    return;
+  }
+  log::debug(name()) << report.vertices << " vertices, " << report.nodes << " nodes ("
+                     << report.new_nodes << " new), " << report.keyframes
+                     << " keyframes: " << to_string(report.status) << " after " << report.iterations
+                     << " iterations, " << result.seconds << " s";
+  if (report.status == DeformationStatus::kFailed)
+    log::limited(log::Level::kWarn, name(), "failed")
+        << "the deformation graph of " << report.nodes
+        << " nodes could not be solved: the mesh follows its keyframes roughly";
+}
+
+}  // namespace km
