@@ -46,6 +46,12 @@ struct DeformationNoise {
   double keyframe_tie_m = 0.02;
 };
 
+/// When solve() ends.
+struct DeformationStop {
+  int max_iterations = 30;
+  double energy_tolerance = 1e-7;  ///< A step changed the energy by less than this share.
+};
+
 /// Poses of all vertices of the graph.
 struct DeformationPoses {
   std::vector<SE3> T_world_kf;    ///< X_i.
@@ -92,7 +98,7 @@ struct [[nodiscard]] DeformationSolution {
 /// a tie stay at their anchors; without any tie the result is `initial`.
 [[nodiscard]] DeformationSolution solve(const DeformationGraph& graph,
                                         std::span<const SE3> T_world_kf,
-                                        const DeformationNoise& noise, int max_iterations,
+                                        const DeformationNoise& noise, const DeformationStop& stop,
                                         DeformationPoses initial);
 
 }  // namespace km

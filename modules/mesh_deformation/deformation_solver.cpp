@@ -16,13 +16,9 @@ namespace {
 // away within 2 cm hold a node's rotation to 2 degrees each, this to 30.
 constexpr double kRotationNoise_rad = 0.5;
 
-// Ends when a step changes the energy by less than this share, or any pose by less than this share
-// of its own size. Tight enough for solutions from different first guesses to agree to 1e-6 m.
-constexpr double kFunctionTolerance = 1e-14;
+// Ends when a step changes the poses by less than this share of their own size: far below what a
+// mesh in floats can show.
 constexpr double kParameterTolerance = 1e-10;
-
-// Close to Gauss-Newton from the first step on: the first guess is good.
-constexpr double kInitialTrustRadius = 1e8;
 
 // The problem with its poses and costs, which Ceres only borrows.
 class GraphProblem {
@@ -114,7 +110,7 @@ class GraphProblem {
   ceres::Problem problem_;  // last: goes first
 };
 
-ceres::Solver::Options solver_options(int max_iterations) {
+ceres::Solver::Options solver_options(const DeformationStop& stop) {
   ceres::Solver::Options options;
   // Keyframes meet in nodes only: they are eliminated, the rest is solved by conjugate gradients to
   // the share of accuracy (eta) that a step can use. Sparse Cholesky factors take ten times as
@@ -122,9 +118,8 @@ ceres::Solver::Options solver_options(int max_iterations) {
   options.linear_solver_type = ceres::ITERATIVE_SCHUR;
   options.preconditioner_type = ceres::SCHUR_JACOBI;
   options.max_linear_solver_iterations = 200;
-  options.max_num_iterations = max_iterations;
-  options.initial_trust_region_radius = kInitialTrustRadius;
-  options.function_tolerance = kFunctionTolerance;
+  options.max_num_iterations = stop.max_iterations;
+  options.function_tolerance = stop.energy_tolerance;
   options.parameter_tolerance = kParameterTolerance;
   options.num_threads = 1;
   options.logging_type = ceres::SILENT;
@@ -145,7 +140,7 @@ DeformationStatus status_of(ceres::TerminationType termination) {
 }  // namespace
 
 DeformationSolution solve(const DeformationGraph& graph, std::span<const SE3> T_world_kf,
-                          const DeformationNoise& noise, int max_iterations,
+                          const DeformationNoise& noise, const DeformationStop& stop,
                           DeformationPoses initial) {
   DeformationSolution solution;
   if (graph.ties.empty()) {  // nothing pulls
@@ -154,7 +149,7 @@ DeformationSolution solve(const DeformationGraph& graph, std::span<const SE3> T_
     return solution;
   }
   GraphProblem graph_problem(graph, T_world_kf, noise, initial);
-  ceres::Solver::Options options = solver_options(max_iterations);
+  ceres::Solver::Options options = solver_options(stop);
   options.linear_solver_ordering = graph_problem.elimination_order();
   ceres::Solver::Summary summary;
   ceres::Solve(options, &graph_problem.problem(), &summary);

@@ -171,7 +171,8 @@ DeformedMesh LocalMeshOptimizer::optimize(const MapMesh& map, std::span<const SE
       state.solved ? carried_over_poses(graph, state.last, state.T_world_kf_last, anchors)
                    : initial_poses(graph, anchors);
   DeformationSolution solution =
-      solve(graph, anchors, state.noise(), state.config.max_iterations, std::move(initial));
+      solve(graph, anchors, state.noise(),
+            {state.config.max_iterations, state.config.energy_tolerance}, std::move(initial));
 
   std::vector<SE3> T_world_odom;  // as each keyframe sees it: moves what no node moves
   for (std::size_t i = 0; i < anchors.size(); ++i)

@@ -32,6 +32,10 @@ struct MeshDeformationConfig {
   /// Bound on the iterations of one solution.
   int max_iterations = 30;
 
+  /// A solution ends when a step changes the energy by less than this share. At 1e-7, vertices are
+  /// within a millimetre of the minimum.
+  double energy_tolerance = 1e-7;
+
   /// The mesh is bent anew when a keyframe moved this far against the others, and moved as a whole
   /// when all moved that far alike [m], [rad].
   double min_move_m = 0.01;
@@ -51,6 +55,7 @@ struct MeshDeformationConfig {
     visitor.field("mesh_edge_m", mesh_edge_m, {1e-9, 100.0}, "[m] std. dev. between nodes");
     visitor.field("keyframe_tie_m", keyframe_tie_m, {1e-9, 100.0}, "[m] std. dev. from a keyframe");
     visitor.field("max_iterations", max_iterations, {1, 1000}, "of one solution");
+    visitor.field("energy_tolerance", energy_tolerance, {1e-15, 0.1}, "smaller step: the last");
     visitor.field("min_move_m", min_move_m, {1e-6, 100.0}, "[m] of a keyframe, to act");
     visitor.field("min_rotation_rad", min_rotation_rad, {1e-6, 3.2}, "[rad] likewise");
     visitor.field("period_s", period_s, {0.01, 86400.0}, "[s] between two corrections");

@@ -10,7 +10,7 @@
 namespace km {
 namespace {
 
-constexpr int kIterations = 50;
+constexpr DeformationStop kStop{.max_iterations = 50, .energy_tolerance = 1e-14};
 constexpr double kSolved = 1e-6;  // [m] and [rad]
 
 // A patch of nodes in the plane z = 0 with a keyframe above each of its corners.
@@ -87,7 +87,7 @@ TEST_CASE("A node is tied to keyframes spread over its time of sight", "[mesh_de
 TEST_CASE("Without corrections nothing moves", "[mesh_deformation]") {
   const DeformationGraph graph = patch(5);
   const DeformationPoses still = initial_poses(graph, graph.T_odom_kf);
-  const auto solution = solve(graph, graph.T_odom_kf, {}, kIterations, still);
+  const auto solution = solve(graph, graph.T_odom_kf, {}, kStop, still);
   CHECK(solution.status == DeformationStatus::kConverged);
   for (std::size_t n = 0; n < graph.nodes.size(); ++n) {
     CHECK((solution.poses.T_world_node[n].translation() - graph.nodes[n]).norm() < kSolved);
@@ -104,8 +104,7 @@ TEST_CASE("One tied node drags the graph along, whatever the rest is tied to",
   graph.T_odom_kf = {make_pose(Eigen::Matrix3d::Identity(), {1, 0, 0})};
   graph.ties = {{0, 1}};
   const std::vector<SE3> anchors = {make_pose(Eigen::Matrix3d::Identity(), {1.5, 0, 0})};
-  const auto solution =
-      solve(graph, anchors, {}, kIterations, initial_poses(graph, graph.T_odom_kf));
+  const auto solution = solve(graph, anchors, {}, kStop, initial_poses(graph, graph.T_odom_kf));
   CHECK(solution.status == DeformationStatus::kConverged);
   for (std::size_t n = 0; n < 3; ++n)
     CHECK(
@@ -129,7 +128,7 @@ TEST_CASE("A cube pulled at one corner moves, pulled at two it stretches", "[mes
                                .keyframe_tie_m = 1e-5};
   SECTION("one corner") {
     const auto solution =
-        solve(graph, anchors, noise, kIterations, initial_poses(graph, graph.T_odom_kf));
+        solve(graph, anchors, noise, kStop, initial_poses(graph, graph.T_odom_kf));
     for (std::size_t n = 0; n < 8; ++n)
       CHECK((solution.poses.T_world_node[n].translation() - graph.nodes[n] -
              Eigen::Vector3d(-0.5, 0, 0))
@@ -140,7 +139,7 @@ TEST_CASE("A cube pulled at one corner moves, pulled at two it stretches", "[mes
     graph.ties.push_back({1, 1});
     anchors.push_back(make_pose(Eigen::Matrix3d::Identity(), {1.5, 0, 0}));
     const auto solution =
-        solve(graph, anchors, noise, kIterations, initial_poses(graph, graph.T_odom_kf));
+        solve(graph, anchors, noise, kStop, initial_poses(graph, graph.T_odom_kf));
     const auto& nodes = solution.poses.T_world_node;
     CHECK(nodes[0].translation().x() == Approx(-0.5).margin(1e-3));
     CHECK(nodes[1].translation().x() == Approx(1.5).margin(1e-3));
@@ -160,7 +159,7 @@ TEST_CASE("Rigid motion of the keyframes is the motion of the nodes", "[mesh_def
   const SE3 T_world_odom = random_pose(rng);
   std::vector<SE3> anchors;
   for (const SE3& T_odom_kf : graph.T_odom_kf) anchors.push_back(T_world_odom * T_odom_kf);
-  const auto solution = solve(graph, anchors, {}, kIterations, initial_poses(graph, anchors));
+  const auto solution = solve(graph, anchors, {}, kStop, initial_poses(graph, anchors));
   CHECK(solution.final_cost < 1e-12);
   for (std::size_t n = 0; n < graph.nodes.size(); ++n) {
     const SE3 expected = T_world_odom * make_pose(Eigen::Matrix3d::Identity(), graph.nodes[n]);
@@ -174,10 +173,10 @@ TEST_CASE("The solution does not depend on where it starts", "[mesh_deformation]
   const DeformationGraph graph = patch(6);
   const std::vector<SE3> earlier = disturbed(graph.T_odom_kf, seed, 0.05, 0.3);
   const std::vector<SE3> anchors = disturbed(graph.T_odom_kf, seed + 100, 0.1, 0.3);
-  const auto cold = solve(graph, anchors, {}, kIterations, initial_poses(graph, anchors));
-  const auto before = solve(graph, earlier, {}, kIterations, initial_poses(graph, earlier));
-  const auto warm = solve(graph, anchors, {}, kIterations,
-                          carried_over_poses(graph, before.poses, earlier, anchors));
+  const auto cold = solve(graph, anchors, {}, kStop, initial_poses(graph, anchors));
+  const auto before = solve(graph, earlier, {}, kStop, initial_poses(graph, earlier));
+  const auto warm =
+      solve(graph, anchors, {}, kStop, carried_over_poses(graph, before.poses, earlier, anchors));
   CHECK(cold.status == DeformationStatus::kConverged);
   CHECK(warm.status == DeformationStatus::kConverged);
   CHECK(distance(cold.poses, warm.poses) < kSolved);
@@ -187,9 +186,9 @@ TEST_CASE("The solution does not depend on where it starts", "[mesh_deformation]
 TEST_CASE("Starting from the solution itself ends at once", "[mesh_deformation]") {
   const DeformationGraph graph = patch(6);
   const std::vector<SE3> anchors = disturbed(graph.T_odom_kf, 7, 0.1, 0.3);
-  const auto cold = solve(graph, anchors, {}, kIterations, initial_poses(graph, anchors));
-  const auto again = solve(graph, anchors, {}, kIterations,
-                           carried_over_poses(graph, cold.poses, anchors, anchors));
+  const auto cold = solve(graph, anchors, {}, kStop, initial_poses(graph, anchors));
+  const auto again =
+      solve(graph, anchors, {}, kStop, carried_over_poses(graph, cold.poses, anchors, anchors));
   CHECK(again.iterations <= 2);
   CHECK(distance(cold.poses, again.poses) < kSolved);
 }
@@ -205,9 +204,9 @@ TEST_CASE("Pieces without ties to each other are solved side by side", "[mesh_de
   for (const KeyframeTie& tie : one.ties)
     graph.ties.push_back({tie.keyframe + 4, tie.node + count});
   std::vector<SE3> anchors = disturbed(one.T_odom_kf, 3, 0.05, 0.2);
-  const auto alone = solve(one, anchors, {}, kIterations, initial_poses(one, anchors));
+  const auto alone = solve(one, anchors, {}, kStop, initial_poses(one, anchors));
   for (const SE3& T : one.T_odom_kf) anchors.push_back(shift * T);
-  const auto both = solve(graph, anchors, {}, kIterations, initial_poses(graph, anchors));
+  const auto both = solve(graph, anchors, {}, kStop, initial_poses(graph, anchors));
   for (std::size_t n = 0; n < count; ++n) {
     CHECK((both.poses.T_world_node[n].translation() - alone.poses.T_world_node[n].translation())
               .norm() < kSolved);
@@ -221,7 +220,7 @@ TEST_CASE("Keyframes that saw nothing stay at their anchors", "[mesh_deformation
   std::mt19937 rng(1);
   graph.T_odom_kf.push_back(random_pose(rng));
   const std::vector<SE3> anchors = disturbed(graph.T_odom_kf, 5, 0.1, 0.1);
-  const auto solution = solve(graph, anchors, {}, kIterations, initial_poses(graph, anchors));
+  const auto solution = solve(graph, anchors, {}, kStop, initial_poses(graph, anchors));
   CHECK((solution.poses.T_world_kf.back().matrix() - anchors.back().matrix()).norm() < 1e-12);
 }
 
