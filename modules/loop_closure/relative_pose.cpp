@@ -24,11 +24,6 @@ constexpr double kQuantile3 = 11.345;
 constexpr int kSampleSteps = 2;
 constexpr int kPolishSteps = 3;
 
-TransferError error_of(const SE3& T_a_b, const SE3& T_b_a, const ImagePair& pair) {
-  return pair.a.has_depth ? transfer_error(T_b_a, pair.a, pair.b)
-                          : transfer_error(T_a_b, pair.b, pair.a);
-}
-
 double quantile(int dim) {
   return dim == 3 ? kQuantile3 : kQuantile2;
 }
@@ -54,15 +49,17 @@ NormalEquations linearise(const SE3& T_a_b, std::span<const ImagePair> pairs,
   const Matrix6 Ad = adjoint(T_a_b);
   for (const std::size_t i : indices) {
     const ImagePair& pair = pairs[i];
-    const TransferError error = error_of(T_a_b, T_b_a, pair);
+    const bool from_a = pair.a.has_depth;
+    const SE3& T = from_a ? T_b_a : T_a_b;
+    const ImagePoint& first = from_a ? pair.a : pair.b;
+    const ImagePoint& second = from_a ? pair.b : pair.a;
+    const TransferError measured = transfer_error(T, first, second);
+    if (!measured.in_front) continue;
+    const TransferError error = transfer_error(T, first, second, measured.likely);
     if (!error.in_front) continue;
     // Carried from b to a instead, the same xi acts on T_b_a as -Ad(T_a_b) xi.
-    Eigen::Matrix<double, 3, 6> J;
-    if (pair.a.has_depth) {
-      J = transfer_jacobian(T_b_a, pair.a);
-    } else {
-      J = -transfer_jacobian(T_a_b, pair.b) * Ad;
-    }
+    Eigen::Matrix<double, 3, 6> J = transfer_jacobian(T, measured.likely);
+    if (!from_a) J = -J * Ad;
     const double weight = 1.0 / (1.0 + error.chi2 / quantile(error.dim));
     const Eigen::Matrix<double, 6, 3> JtW = weight * J.transpose() * error.information;
     sum.H += JtW * J;
@@ -166,7 +163,8 @@ double PairError::relative() const {
 }
 
 PairError pair_error(const SE3& T_a_b, const ImagePair& pair) {
-  const TransferError error = error_of(T_a_b, T_a_b.inverse(), pair);
+  const TransferError error = pair.a.has_depth ? transfer_error(T_a_b.inverse(), pair.a, pair.b)
+                                               : transfer_error(T_a_b, pair.b, pair.a);
   return {error.chi2, error.in_front ? error.dim : 0};
 }
 

@@ -42,13 +42,23 @@ struct TransferError {
   Eigen::Vector3d r = Eigen::Vector3d::Zero();  ///< Predicted minus measured.
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   double chi2 = 0.0;
+  Eigen::Vector3d likely = Eigen::Vector3d::Zero();  ///< True m of a that fits both sides best.
 };
 
 /// Precondition: a.has_depth.
 [[nodiscard]] TransferError transfer_error(const SE3& T_b_a, const ImagePoint& a,
                                            const ImagePoint& b);
 
-/// Derivative of TransferError::r with respect to xi in T_a_b * exp(xi). Precondition: in front.
-[[nodiscard]] Eigen::Matrix<double, 3, 6> transfer_jacobian(const SE3& T_b_a, const ImagePoint& a);
+/// The same with the map linearised about `m` in place of a's measurement: what to minimise over
+/// the pose with m = transfer_error(T_b_a, a, b).likely. About the measurement itself, its noise is
+/// in the residual and in the derivative alike, and the pose is drawn towards no motion, by the
+/// relative variance of the disparities ("attenuation", Fuller, "Measurement Error Models", 1987).
+[[nodiscard]] TransferError transfer_error(const SE3& T_b_a, const ImagePoint& a,
+                                           const ImagePoint& b, const Eigen::Vector3d& m);
+
+/// Derivative of the point m = (x, y, rho) of a, carried into b, with respect to xi in
+/// T_a_b * exp(xi). Precondition: in front.
+[[nodiscard]] Eigen::Matrix<double, 3, 6> transfer_jacobian(const SE3& T_b_a,
+                                                            const Eigen::Vector3d& m);
 
 }  // namespace km
