@@ -1,0 +1,252 @@
+#include "modules/mesh/mesh_chunks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <unordered_map>
+#include <utility>
+
+namespace km {
+namespace {
+
+using GridPoint = std::array<std::int32_t, 3>;  // [steps]
+using Face = LabelledMesh::Face;
+
+constexpr double kFarthest_steps = 1U << 30U;  // so that the sum of three fits 64 bits by far
+constexpr std::int64_t kMaxOffset = std::numeric_limits<std::uint16_t>::max();
+
+std::vector<GridPoint> quantise(const std::vector<Eigen::Vector3f>& vertices, double step_m) {
+  std::vector<GridPoint> points;
+  points.reserve(vertices.size());
+  for (const Eigen::Vector3f& vertex : vertices) {
+    GridPoint point = {};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double steps =
+          std::round(static_cast<double>(vertex[static_cast<Eigen::Index>(axis)]) / step_m);
+      if (!(std::abs(steps) <= kFarthest_steps))
+        throw std::invalid_argument("mesh chunks: vertex " + std::to_string(points.size()) +
+                                    " is not finite or too far away");
+      point[axis] = static_cast<std::int32_t>(steps);
+    }
+    points.push_back(point);
+  }
+  return points;
+}
+
+std::int64_t floor_div(std::int64_t a, std::int64_t b) {
+  return a >= 0 ? a / b : -((b - 1 - a) / b);
+}
+
+// Cuts one mesh.
+class Splitter {
+ public:
+  Splitter(const LabelledMesh& mesh, const MeshChunk& blank, const ChunkGrid& grid)
+      : mesh_(mesh),
+        blank_(blank),
+        cell_steps_(static_cast<std::int64_t>(std::round(grid.cell_m / grid.step_m))),
+        points_(quantise(mesh.vertices, static_cast<double>(blank.step_m))),
+        part_of_vertex_(mesh.vertices.size(), 0),
+        local_index_(mesh.vertices.size(), 0) {}
+
+  MeshPieces split() {
+    sort_into_cells();
+    for (auto& [cell, faces] : faces_of_cell_) {
+      std::ranges::sort(faces);
+      add_cell(cell, faces);
+    }
+    return std::move(pieces_);
+  }
+
+ private:
+  [[nodiscard]] bool fits_offsets(const Face& face) const {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto [low, high] =
+          std::minmax({points_[face[0]][axis], points_[face[1]][axis], points_[face[2]][axis]});
+      // A third of the range: two such faces of one cell of at most that size fit together.
+      if (std::int64_t{high} - low > kMaxOffset / 3) return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] GridPoint cell_of(const Face& face) const {
+    GridPoint cell = {};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      std::int64_t sum = 0;
+      for (const std::uint32_t corner : face) sum += points_[corner][axis];
+      cell[axis] = static_cast<std::int32_t>(floor_div(sum, 3 * cell_steps_));
+    }
+    return cell;
+  }
+
+  void sort_into_cells() {
+    GridPoint last_cell = {};
+    std::vector<Face>* last = nullptr;  // neighbours in the list are mostly neighbours in space
+    for (Face face : mesh_.faces) {
+      if (!fits_offsets(face)) {
+        ++pieces_.oversized_faces;
+        continue;
+      }
+      const GridPoint cell = cell_of(face);
+      if (last == nullptr || cell != last_cell) {
+        last = &faces_of_cell_[cell];
+        last_cell = cell;
+      }
+      std::ranges::rotate(face, std::ranges::min_element(face));  // lowest first, same orientation
+      last->push_back(face);
+    }
+  }
+
+  void add_cell(const GridPoint& cell, const std::vector<Face>& faces) {
+    std::uint16_t part = 0;
+    for (std::size_t begin = 0; begin < faces.size();) {
+      std::vector<std::uint32_t> vertices;
+      const std::size_t end = take_faces(faces, begin, vertices);
+      add_chunk({blank_.key.robot, cell, part++}, std::span(faces).subspan(begin, end - begin),
+                std::move(vertices));
+      begin = end;
+    }
+  }
+
+  // Collects the vertices of as many faces as one chunk holds; the end of these.
+  std::size_t take_faces(const std::vector<Face>& faces, std::size_t begin,
+                         std::vector<std::uint32_t>& vertices) {
+    ++part_;
+    std::size_t end = begin;
+    for (; end < faces.size(); ++end) {
+      std::size_t fresh = 0;
+      for (const std::uint32_t v : faces[end]) fresh += part_of_vertex_[v] != part_ ? 1 : 0;
+      if (wire_bytes(vertices.size() + fresh, end + 1 - begin, !mesh_.labels.empty()) >
+          kMaxChunkBytes)
+        break;
+      for (const std::uint32_t v : faces[end])
+        if (std::exchange(part_of_vertex_[v], part_) != part_) vertices.push_back(v);
+    }
+    return end;
+  }
+
+  void add_chunk(const MeshChunkKey& key, std::span<const Face> faces,
+                 std::vector<std::uint32_t> vertices) {
+    std::ranges::sort(vertices);
+    MeshChunk chunk = blank_;
+    chunk.key = key;
+    chunk.origin = points_[vertices.front()];
+    for (const std::uint32_t v : vertices)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        chunk.origin[axis] = std::min(chunk.origin[axis], points_[v][axis]);
+    for (const std::uint32_t v : vertices) {
+      local_index_[v] = static_cast<std::uint16_t>(chunk.offsets.size());
+      MeshChunk::Triple offset = {};
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        offset[axis] = static_cast<std::uint16_t>(points_[v][axis] - chunk.origin[axis]);
+      chunk.offsets.push_back(offset);
+      if (!mesh_.labels.empty()) chunk.labels.push_back(mesh_.labels[v]);
+    }
+    for (const auto& [a, b, c] : faces)
+      chunk.faces.push_back({local_index_[a], local_index_[b], local_index_[c]});
+    pieces_.chunks.push_back(std::move(chunk));
+  }
+
+  const LabelledMesh& mesh_;
+  const MeshChunk& blank_;
+  std::int64_t cell_steps_;
+  std::vector<GridPoint> points_;
+  std::map<GridPoint, std::vector<Face>> faces_of_cell_;
+  std::vector<std::uint32_t> part_of_vertex_;  // the last part that has it
+  std::uint32_t part_ = 0;
+  std::vector<std::uint16_t> local_index_;  // there
+  MeshPieces pieces_;
+};
+
+void check(const LabelledMesh& mesh, const ChunkGrid& grid) {
+  // Faces reach up to a third of the range of offsets beyond their cell on both sides.
+  if (!(grid.step_m > 0.0) || !(grid.cell_m > grid.step_m) ||
+      !(grid.cell_m / grid.step_m <= static_cast<double>(kMaxOffset / 3)))
+    throw std::invalid_argument("mesh chunks: cells of " + std::to_string(grid.cell_m) +
+                                " m in steps of " + std::to_string(grid.step_m) + " m");
+  if (!mesh.labels.empty() && mesh.labels.size() != mesh.vertices.size())
+    throw std::invalid_argument("mesh chunks: " + std::to_string(mesh.labels.size()) +
+                                " labels for " + std::to_string(mesh.vertices.size()) +
+                                " vertices");
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f)
+    for (const std::uint32_t corner : mesh.faces[f])
+      if (corner >= mesh.vertices.size())
+        throw std::invalid_argument("mesh chunks: face " + std::to_string(f) + " names vertex " +
+                                    std::to_string(corner) + " of " +
+                                    std::to_string(mesh.vertices.size()));
+}
+
+// A vertex as all chunks see it.
+struct SharedVertex {
+  GridPoint point;
+  LabelId label;
+  bool operator==(const SharedVertex&) const = default;
+};
+
+struct SharedVertexHash {
+  std::size_t operator()(const SharedVertex& v) const noexcept {
+    std::uint64_t hash = v.label;
+    for (const std::int32_t c : v.point)
+      hash = (hash ^ static_cast<std::uint32_t>(c)) * 0x9E3779B97F4A7C15U;
+    return static_cast<std::size_t>(hash ^ (hash >> 32U));
+  }
+};
+
+std::int64_t position(const MeshChunk& chunk, std::size_t vertex, std::size_t axis) {
+  return std::int64_t{chunk.origin[axis]} + chunk.offsets[vertex][axis];
+}
+
+}  // namespace
+
+MeshPieces split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor,
+                      const ChunkGrid& grid) {
+  check(mesh, grid);
+  MeshChunk blank;
+  blank.key.robot = robot;
+  blank.anchor = anchor;
+  blank.step_m = static_cast<float>(grid.step_m);
+  return Splitter(mesh, blank, grid).split();
+}
+
+LabelledMesh assemble_mesh(std::span<const MeshChunk* const> chunks) {
+  LabelledMesh mesh;
+  const bool labelled =
+      std::ranges::any_of(chunks, [](const MeshChunk* chunk) { return !chunk->labels.empty(); });
+  std::unordered_map<SharedVertex, std::uint32_t, SharedVertexHash> index_of;
+  for (const MeshChunk* chunk : chunks) {
+    std::vector<std::uint32_t> index;
+    for (std::size_t v = 0; v < chunk->offsets.size(); ++v) {
+      SharedVertex shared{{}, chunk->labels.empty() ? LabelId{0} : chunk->labels[v]};
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        shared.point[axis] = static_cast<std::int32_t>(position(*chunk, v, axis));
+      const auto next = static_cast<std::uint32_t>(mesh.vertices.size());
+      const auto [entry, is_new] = index_of.try_emplace(shared, next);
+      index.push_back(entry->second);
+      if (!is_new) continue;
+      const auto [x, y, z] = shared.point;
+      mesh.vertices.push_back(
+          (static_cast<double>(chunk->step_m) * Eigen::Vector3d(x, y, z)).cast<float>());
+      if (labelled) mesh.labels.push_back(shared.label);
+    }
+    for (const auto& [a, b, c] : chunk->faces)
+      if (index[a] != index[b] && index[b] != index[c] && index[c] != index[a])
+        mesh.faces.push_back({index[a], index[b], index[c]});
+  }
+  return mesh;
+}
+
+bool differ(const MeshChunk& a, const MeshChunk& b, double min_move_m) {
+  if (a.anchor != b.anchor || a.step_m != b.step_m || a.labels != b.labels || a.faces != b.faces ||
+      a.offsets.size() != b.offsets.size())
+    return true;
+  const double limit_steps = min_move_m / static_cast<double>(a.step_m);
+  for (std::size_t v = 0; v < a.offsets.size(); ++v)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (static_cast<double>(std::abs(position(a, v, axis) - position(b, v, axis))) > limit_steps)
+        return true;
+  return false;
+}
+
+}  // namespace km

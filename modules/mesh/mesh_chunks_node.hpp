@@ -1,0 +1,64 @@
+#pragma once
+
+#include <atomic>
+#include <exception>
+#include <memory>
+#include <string_view>
+
+#include "modules/mesh/chunk_schedule.hpp"
+#include "modules/mesh/labelled_mesh.hpp"
+#include "modules/mesh/mesh_chunks_config.hpp"
+#include "runtime/node.hpp"
+#include "runtime/periodic.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+
+/// Sends the robot's mesh in chunks, at most max_bytes_per_s: cell by cell what changed since it
+/// was last sent, the newest state of each. The mesh comes by offer(), from whichever module has
+/// the robot's best.
+class MeshChunksNode final : public Node {
+ public:
+  /// A mesh in the frame `world` of the robot `anchor`; null for the passing of time.
+  struct Offer {
+    RobotId anchor = 0;
+    std::shared_ptr<const LabelledMesh> mesh;
+  };
+
+  /// Throws ConfigError if `config` is out of bounds. `chunks`, out, must outlive the node.
+  MeshChunksNode(const MeshChunksConfig& config, RobotId self, const Topic<MeshChunk>& chunks);
+  ~MeshChunksNode() override { stop(); }
+
+  /// The newest mesh counts. Thread-safe; returns at once.
+  void offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh);
+
+  std::string_view name() const override { return MeshChunksConfig::kSection; }
+  void start() override;
+  void stop() noexcept override;  ///< What has not been sent by then is not sent.
+  std::exception_ptr error() const override;
+  DurationHistogram timing() const override { return worker_.timing(); }
+
+  /// Chunks that wait for their turn. Thread-safe.
+  [[nodiscard]] std::size_t waiting() const { return waiting_; }
+
+  /// Handles one offer synchronously at time `now_s`. The thread calls only this; so can tests.
+  void step(const Offer& offer, double now_s);
+
+ private:
+  void take(const Offer& offer);
+  void send(double now_s);
+
+  const MeshChunksConfig config_;
+  const RobotId self_;
+  const Topic<MeshChunk>& chunks_;
+  ChunkSchedule schedule_;
+  double budget_bytes_ = 0.0;  // may be sent now
+  double budget_time_s_ = 0.0;
+  bool budget_started_ = false;
+  std::atomic<std::size_t> waiting_ = 0;
+  Worker<Offer> worker_;
+  Periodic ticks_;  // last member: stops before the worker it posts to
+};
+
+}  // namespace km

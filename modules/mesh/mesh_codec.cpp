@@ -1,0 +1,96 @@
+#include "modules/mesh/mesh_codec.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <limits>
+#include <utility>
+
+#include "runtime/dds/wire_pose.hpp"
+#include "runtime/dds/wire_sequence.hpp"
+
+namespace km {
+namespace {
+
+using Triple = MeshChunk::Triple;
+
+// Steps that a position can be away: more than split_mesh() makes, less than would overflow.
+constexpr std::int64_t kMaxOffset = std::numeric_limits<std::uint16_t>::max();
+constexpr std::int64_t kFarthest_steps = (std::int64_t{1} << 30U) + kMaxOffset;
+
+std::vector<std::uint16_t> flat(const std::vector<Triple>& triples) {
+  std::vector<std::uint16_t> numbers;
+  numbers.reserve(3 * triples.size());
+  for (const Triple& triple : triples) numbers.insert(numbers.end(), triple.begin(), triple.end());
+  return numbers;
+}
+
+// Precondition: a multiple of three.
+std::vector<Triple> triples(std::span<const std::uint16_t> numbers) {
+  std::vector<Triple> result;
+  result.reserve(numbers.size() / 3);
+  for (std::size_t i = 0; i < numbers.size(); i += 3)
+    result.push_back({numbers[i], numbers[i + 1], numbers[i + 2]});
+  return result;
+}
+
+bool are_positions_usable(float step_m, const km_wire_MeshCell& origin) {
+  if (!(step_m > 0.0F)) return false;
+  return std::ranges::all_of(std::array{origin.x, origin.y, origin.z}, [&](std::int32_t c) {
+    const std::int64_t farthest = std::abs(std::int64_t{c}) + kMaxOffset;
+    return farthest <= kFarthest_steps &&
+           static_cast<double>(farthest) * static_cast<double>(step_m) <= kMaxWireTranslation_m;
+  });
+}
+
+}  // namespace
+
+Codec<MeshChunk>::Encoded Codec<MeshChunk>::encode(const MeshChunk& chunk) {
+  Encoded encoded;
+  encoded.offsets = flat(chunk.offsets);
+  encoded.faces = flat(chunk.faces);
+  encoded.labels = chunk.labels;
+  Wire& wire = encoded.wire;
+  wire.robot = chunk.key.robot;
+  wire.cell = {.x = chunk.key.cell[0], .y = chunk.key.cell[1], .z = chunk.key.cell[2]};
+  wire.part = chunk.key.part;
+  wire.anchor = chunk.anchor;
+  wire.step_m = chunk.step_m;
+  wire.origin = {.x = chunk.origin[0], .y = chunk.origin[1], .z = chunk.origin[2]};
+  borrow(wire.offsets, encoded.offsets);
+  borrow(wire.labels, encoded.labels);
+  borrow(wire.faces, encoded.faces);
+  return encoded;
+}
+
+Decoded<MeshChunk> Codec<MeshChunk>::decode(const Wire& wire) {
+  using Result = Decoded<MeshChunk>;
+  if (wire.robot != wire.header.robot)
+    return Result::refuse("the mesh of another robot than the writer");
+  const auto offsets = elements_of(wire.offsets, kMaxChunkBytes);
+  const auto labels = elements_of(wire.labels, kMaxChunkBytes);
+  const auto faces = elements_of(wire.faces, kMaxChunkBytes);
+  if (!offsets || !labels || !faces) return Result::refuse("elements are missing or too many");
+  const std::size_t vertices = offsets->size() / 3;
+  if (offsets->size() % 3 != 0 || faces->size() % 3 != 0)
+    return Result::refuse("offsets or faces are not triples");
+  if (!labels->empty() && labels->size() != vertices)
+    return Result::refuse("labels do not fit the vertices");
+  if (wire_bytes(vertices, faces->size() / 3, !labels->empty()) > kMaxChunkBytes)
+    return Result::refuse("a chunk that is too large");
+  if (!std::ranges::all_of(*faces, [&](std::uint16_t corner) { return corner < vertices; }))
+    return Result::refuse("a face names a vertex which does not exist");
+  if (faces->empty() != offsets->empty()) return Result::refuse("vertices without faces");
+  if (!are_positions_usable(wire.step_m, wire.origin))
+    return Result::refuse("positions are not finite or too far away");
+  return Result::accept({.key = {wire.robot, {wire.cell.x, wire.cell.y, wire.cell.z}, wire.part},
+                         .boot = wire.header.boot,
+                         .anchor = wire.anchor,
+                         .step_m = wire.step_m,
+                         .origin = {wire.origin.x, wire.origin.y, wire.origin.z},
+                         .offsets = triples(*offsets),
+                         .labels = {labels->begin(), labels->end()},
+                         .faces = triples(*faces)});
+}
+
+}  // namespace km

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <mesh.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "modules/mesh/mesh_chunk.hpp"
+#include "runtime/dds/codec.hpp"
+
+namespace km {
+
+/// A robot sends its own mesh only. Refused are chunks above kMaxChunkBytes, offsets, labels and
+/// faces that do not fit each other, faces that name vertices which do not exist, and positions
+/// that are not finite or absurdly far away.
+template <>
+struct Codec<MeshChunk> {
+  using Wire = km_wire_MeshChunk;
+  static constexpr const char* kTopic = "mesh_chunks";
+  static constexpr std::uint16_t kVersion = 1;
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_MeshChunk_desc; }
+
+  struct Encoded {
+    Wire wire{};
+    std::vector<std::uint16_t> offsets, faces;
+    std::vector<std::uint8_t> labels;
+  };
+  static Encoded encode(const MeshChunk& chunk);
+  static Decoded<MeshChunk> decode(const Wire& wire);
+};
+
+}  // namespace km

@@ -1,0 +1,62 @@
+#include "modules/mesh/team_mesh.hpp"
+
+#include <utility>
+
+#include "modules/mesh/mesh_chunks.hpp"
+
+namespace km {
+
+const char* to_string(ChunkVerdict verdict) {
+  switch (verdict) {
+    case ChunkVerdict::kTaken:
+      return "taken";
+    case ChunkVerdict::kEarlierBoot:
+      return "of an earlier boot";
+    case ChunkVerdict::kNoRoom:
+      break;
+  }
+  return "no room";
+}
+
+ChunkVerdict TeamMesh::add(MeshChunk chunk) {
+  Robot& robot = robots_.try_emplace(chunk.key.robot, Robot{.boot = chunk.boot}).first->second;
+  if (robot.earlier_boots.contains(chunk.boot)) return ChunkVerdict::kEarlierBoot;
+  if (chunk.boot != robot.boot) {
+    auto earlier = std::move(robot.earlier_boots);
+    earlier.insert(robot.boot);
+    robot = {.boot = chunk.boot, .earlier_boots = std::move(earlier)};
+  }
+  const auto before = robot.chunks.find(chunk.key);
+  std::size_t bytes = robot.bytes;
+  if (before != robot.chunks.end()) bytes -= wire_bytes(before->second);
+  if (chunk.empty()) {
+    robot.bytes = bytes;
+    if (before != robot.chunks.end()) robot.chunks.erase(before);
+    return ChunkVerdict::kTaken;
+  }
+  bytes += wire_bytes(chunk);
+  if (bytes > max_bytes_per_robot_) return ChunkVerdict::kNoRoom;
+  robot.bytes = bytes;
+  robot.anchor = chunk.anchor;
+  robot.step_m = chunk.step_m;
+  const MeshChunkKey key = chunk.key;
+  robot.chunks.insert_or_assign(key, std::move(chunk));
+  return ChunkVerdict::kTaken;
+}
+
+std::vector<RobotMesh> TeamMesh::snapshot() const {
+  std::vector<RobotMesh> result;
+  for (const auto& [id, robot] : robots_) {
+    std::vector<const MeshChunk*> current;
+    for (const auto& [key, chunk] : robot.chunks)
+      if (chunk.anchor == robot.anchor && chunk.step_m == robot.step_m) current.push_back(&chunk);
+    result.push_back({.robot = id,
+                      .anchor = robot.anchor,
+                      .mesh = assemble_mesh(current),
+                      .chunks = current.size(),
+                      .outdated_chunks = robot.chunks.size() - current.size()});
+  }
+  return result;
+}
+
+}  // namespace km

@@ -1,0 +1,165 @@
+#include <catch2/catch.hpp>
+#include <memory>
+#include <vector>
+
+#include "modules/mesh/mesh_chunks.hpp"
+#include "modules/mesh/mesh_chunks_node.hpp"
+#include "modules/mesh/mesh_codec.hpp"
+#include "modules/mesh/team_mesh_node.hpp"
+#include "test/modules/mesh/wavy_sheet.hpp"
+#include "test/runtime/dds/dds_fixture.hpp"
+
+namespace km {
+namespace {
+
+constexpr RobotId kAnchor = 3;
+
+std::shared_ptr<const LabelledMesh> sheet(std::uint32_t side) {
+  return std::make_shared<const LabelledMesh>(wavy_sheet(side, 0.1));
+}
+
+std::shared_ptr<const LabelledMesh> raised(const LabelledMesh& mesh, float height_m) {
+  LabelledMesh result = mesh;
+  for (auto& vertex : result.vertices) vertex.z() += height_m;
+  return std::make_shared<const LabelledMesh>(std::move(result));
+}
+
+std::size_t bytes_of(const std::vector<MeshChunk>& chunks) {
+  std::size_t bytes = 0;
+  for (const MeshChunk& chunk : chunks) bytes += wire_bytes(chunk);
+  return bytes;
+}
+
+MeshChunksConfig slow() {
+  MeshChunksConfig config;
+  config.max_bytes_per_s = 20000.0;
+  return config;
+}
+
+TEST_CASE("Chunks leave no faster than configured", "[node]") {
+  Topic<MeshChunk> topic;
+  Inbox<MeshChunk> sent(topic);
+  MeshChunksNode node(slow(), 7, topic);
+  const auto mesh = sheet(150);
+  const std::size_t all = split_mesh(*mesh, 7, kAnchor, {}).chunks.size();
+  node.step({kAnchor, mesh}, 1000.0);
+  double now_s = 1000.0;
+  const auto within_bounds = [&] {
+    // Half a second's worth saved up, and one chunk of overdraft.
+    const double most = (now_s - 1000.0 + 0.5) * 20000.0 + static_cast<double>(kMaxChunkBytes);
+    return static_cast<double>(bytes_of(sent.messages())) <= most;
+  };
+  CHECK(within_bounds());
+  CHECK(node.waiting() > 0);
+  for (; node.waiting() > 0 && now_s < 2000.0; now_s += 0.1) {
+    node.step({}, now_s);
+    REQUIRE(within_bounds());
+  }
+  CHECK(sent.messages().size() == all);
+  const double least_s =
+      (static_cast<double>(bytes_of(sent.messages())) - kMaxChunkBytes) / 20000.0;
+  CHECK(now_s - 1000.0 > least_s - 0.5);
+  CHECK(now_s - 1000.0 < least_s + 3.0);  // and no slower
+}
+
+TEST_CASE("A mesh that changes while it is sent leaves in its newest state", "[node]") {
+  Topic<MeshChunk> topic;
+  Inbox<MeshChunk> sent(topic);
+  MeshChunksNode node(slow(), 7, topic);
+  const auto mesh = sheet(100);
+  node.step({kAnchor, mesh}, 0.0);
+  const std::size_t early = sent.messages().size();
+  node.step({kAnchor, raised(*mesh, 0.5F)}, 0.1);
+  for (double now_s = 0.2; node.waiting() > 0 && now_s < 1000.0; now_s += 0.1) node.step({}, now_s);
+  const std::size_t all = split_mesh(*raised(*mesh, 0.5F), 7, kAnchor, {}).chunks.size();
+  CHECK(sent.messages().size() <= all + 2 * early);  // what had left, again, or as no more
+
+  TeamMesh team;
+  for (const MeshChunk& chunk : sent.messages()) REQUIRE(team.add(chunk) == ChunkVerdict::kTaken);
+  const auto received = team.snapshot();
+  REQUIRE(received.size() == 1);
+  CHECK(received[0].mesh.vertices.size() == mesh->vertices.size());
+  float lowest = 10.0F;
+  for (const auto& vertex : received[0].mesh.vertices) lowest = std::min(lowest, vertex.z());
+  CHECK(lowest == Approx(-0.5F).margin(0.01));
+}
+
+// A robot with the mesh's part of the wiring.
+struct MeshRobot {
+  MeshRobot(std::shared_ptr<const DdsDomain> domain, RobotId id)
+      : basis(std::move(domain), id), sender(fast(), id, own), team(peers) {
+    basis.bridge.send(own, TopicKind::kState, TrafficCategory::kOther);
+    basis.bridge.receive(peers, TopicKind::kState, TrafficCategory::kOther);
+  }
+  ~MeshRobot() { stop(); }
+  static MeshChunksConfig fast() {
+    MeshChunksConfig config;
+    config.max_bytes_per_s = 2e6;
+    return config;
+  }
+  void start() {
+    team.start();
+    basis.start();
+    sender.start();
+  }
+  void stop() {
+    sender.stop();
+    basis.stop();
+    team.stop();
+  }
+  TopicTraffic traffic(Direction direction) {
+    for (const TopicTraffic& row : basis.bridge.traffic().topics)
+      if (row.topic == Codec<MeshChunk>::kTopic && row.direction == direction) return row;
+    return {};
+  }
+  // Of that robot, until it is whole.
+  bool receives(RobotId robot, const LabelledMesh& mesh) {
+    return eventually([&] {
+      for (const RobotMesh& received : team.snapshot())
+        if (received.robot == robot) return received.mesh.faces.size() == mesh.faces.size();
+      return false;
+    });
+  }
+
+  Topic<MeshChunk> own, peers;
+  TestRobot basis;
+  MeshChunksNode sender;
+  TeamMeshNode team;
+};
+
+TEST_CASE("A robot's mesh arrives at its peers in chunks, also at those that join later",
+          "[node][dds]") {
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  auto a = std::make_unique<MeshRobot>(domain, 3);
+  MeshRobot b(domain, 4);
+  a->start();
+  b.start();
+  REQUIRE(b.basis.hears(PeerEventKind::kJoined, 3));
+  const auto mesh = sheet(150);
+  a->sender.offer(kAnchor, mesh);
+  REQUIRE(b.receives(3, *mesh));
+  CHECK(b.team.snapshot()[0].mesh.vertices.size() == mesh->vertices.size());
+  CHECK(b.team.snapshot()[0].anchor == kAnchor);
+
+  const std::vector<MeshChunk> chunks = split_mesh(*mesh, 3, kAnchor, {}).chunks;
+  const TopicTraffic out = a->traffic(Direction::kOut);
+  CHECK(out.category == TrafficCategory::kOther);
+  CHECK(out.count.messages == chunks.size());
+  CHECK(b.traffic(Direction::kIn).count == out.count);
+  CHECK(b.traffic(Direction::kIn).refused.empty());
+  CHECK(out.count.bytes <= bytes_of(chunks));  // the bound that pacing and size go by
+  CHECK(out.count.bytes > bytes_of(chunks) - 40 * chunks.size());
+
+  const auto less = sheet(50);
+  a->sender.offer(kAnchor, less);
+  CHECK(b.receives(3, *less));
+  MeshRobot late(domain, 5);
+  late.start();
+  CHECK(late.receives(3, *less));
+  a.reset();
+  REQUIRE(b.basis.hears(PeerEventKind::kLeft, 3));
+  CHECK(b.receives(3, *less));  // kept
+}
+
+}  // namespace
+}  // namespace km
