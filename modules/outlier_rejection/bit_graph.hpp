@@ -42,6 +42,14 @@ class BitSet {
     words_.resize(x.words_.size());
     for (std::size_t w = 0; w < words_.size(); ++w) words_[w] = x.words_[w] & y.words_[w];
   }
+  void intersect(const BitSet& other) {
+    for (std::size_t w = 0; w < words_.size(); ++w) words_[w] &= other.words_[w];
+  }
+  [[nodiscard]] std::size_t count() const {
+    std::size_t count = 0;
+    for (const std::uint64_t word : words_) count += static_cast<std::size_t>(std::popcount(word));
+    return count;
+  }
   [[nodiscard]] std::size_t count_common(const BitSet& other) const {
     std::size_t count = 0;
     for (std::size_t w = 0; w < words_.size(); ++w)
@@ -62,16 +70,20 @@ class BitSet {
 class BitGraph {
  public:
   explicit BitGraph(std::size_t vertices = 0)
-      : capacity_(vertices), rows_(vertices, BitSet(vertices)) {}
+      : capacity_(vertices), rows_(vertices, BitSet(vertices)), degrees_(vertices, 0) {}
 
   [[nodiscard]] std::size_t size() const { return rows_.size(); }
   [[nodiscard]] std::size_t capacity() const { return capacity_; }  ///< Of every set of vertices.
   [[nodiscard]] const BitSet& neighbours(std::size_t v) const { return rows_[v]; }
+  [[nodiscard]] std::size_t degree(std::size_t v) const { return degrees_[v]; }
   [[nodiscard]] bool adjacent(std::size_t u, std::size_t v) const { return rows_[u].contains(v); }
 
+  /// Precondition: u and v differ and are not connected yet.
   void connect(std::size_t u, std::size_t v) {
     rows_[u].insert(v);
     rows_[v].insert(u);
+    ++degrees_[u];
+    ++degrees_[v];
   }
 
   /// Adds one vertex without edges and returns its number. Amortised: the rows double.
@@ -81,12 +93,14 @@ class BitGraph {
       for (BitSet& row : rows_) row.grow(capacity_);
     }
     rows_.emplace_back(capacity_);
+    degrees_.push_back(0);
     return size() - 1;
   }
 
  private:
   std::size_t capacity_;
   std::vector<BitSet> rows_;
+  std::vector<std::size_t> degrees_;
 };
 
 }  // namespace km

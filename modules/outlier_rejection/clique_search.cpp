@@ -50,14 +50,14 @@ BitGraph induced(const BitGraph& graph, const Vertices& vertices) {
 class BranchAndBound {
  public:
   BranchAndBound(const BitGraph& graph, const CliqueGoal& goal)
-      : graph_(graph), goal_(goal), best_size_(goal.more_than) {}
+      : graph_(graph), goal_(goal), best_size_(goal.more_than), root_bound_(graph.size()) {}
 
   CliqueSearch run() {
     levels_.emplace_back();
     levels_[0].candidates = BitSet(graph_.capacity());
     for (std::size_t v = 0; v < graph_.size(); ++v) levels_[0].candidates.insert(v);
     expand(0);
-    std::sort(result_.clique.begin(), result_.clique.end());
+    result_.bound = result_.proven ? best_size_ : std::max(best_size_, root_bound_);
     return std::move(result_);
   }
 
@@ -84,6 +84,7 @@ class BranchAndBound {
     colour_candidates(here, best_size_ - std::min(best_size_, clique_.size()));
     while (!here.order.empty() && !done_) {
       if (clique_.size() + here.bound.back() <= best_size_) return;
+      if (depth == 0) root_bound_ = here.bound.back();
       const std::size_t v = here.order.back();
       here.order.pop_back();
       here.bound.pop_back();
@@ -154,6 +155,7 @@ class BranchAndBound {
   const BitGraph& graph_;
   const CliqueGoal goal_;
   std::size_t best_size_;
+  std::size_t root_bound_;  // of the cliques with any vertex not yet done at the root
   Vertices clique_;
   std::deque<Level> levels_;
   CliqueSearch result_;
@@ -165,7 +167,8 @@ class BranchAndBound {
 CliqueSearch find_clique(const BitGraph& graph, std::span<const std::size_t> candidates,
                          const CliqueGoal& goal) {
   const Vertices vertices = core_in_degeneracy_order(graph, candidates, goal.more_than);
-  if (vertices.size() <= goal.more_than) return {};
+  if (vertices.size() <= goal.more_than)
+    return {.clique = {}, .proven = true, .bound = goal.more_than, .nodes = 0};
   const BitGraph subgraph = induced(graph, vertices);
   CliqueSearch result = BranchAndBound(subgraph, goal).run();
   for (std::size_t& v : result.clique) v = vertices[v];

@@ -19,6 +19,8 @@ struct CliqueGoal {
 struct [[nodiscard]] CliqueSearch {
   std::vector<std::size_t> clique;  ///< Ascending; empty if none larger than asked for was found.
   bool proven = true;               ///< False if the limit ended the search before its goal.
+  std::size_t bound = 0;            ///< No clique of the candidates is larger, unless the search
+                                    ///< stopped at one that was large enough.
   std::uint64_t nodes = 0;          ///< Nodes of the search tree visited.
 };
 

@@ -6,6 +6,7 @@
 
 #include "modules/core/lie.hpp"
 #include "modules/outlier_rejection/chi_squared.hpp"
+#include "modules/outlier_rejection/pair_cycle.hpp"
 
 namespace km {
 namespace {
@@ -28,8 +29,8 @@ std::int64_t steps(const OdometryPose& from, const OdometryPose& to) {
   return begin < end ? end - begin : begin - end;
 }
 
-bool before(const OrientedClosure& i, const OrientedClosure& k) {
-  return std::tie(i.a.id, i.b.id, i.id) < std::tie(k.a.id, k.b.id, k.id);
+bool before(const PreparedClosure& i, const PreparedClosure& k) {
+  return std::tie(i.a, i.b, i.id) < std::tie(k.a, k.b, k.id);
 }
 
 }  // namespace
@@ -68,21 +69,35 @@ OrientedClosure CycleTest::orient(const Closure& closure) const {
   return result;
 }
 
-bool CycleTest::consistent(const OrientedClosure& i, const OrientedClosure& k) const {
+bool CycleTest::consistent(const PreparedClosure& i, const PreparedClosure& k) const {
   // First-order covariances depend a little on where the cycle begins: begin always alike.
-  return before(i, k) ? closes(cycle_through(i, k)) : closes(cycle_through(k, i));
+  const PairCycle cycle = before(i, k) ? PairCycle(i, k) : PairCycle(k, i);
+  if (config_.criterion == CycleCriterion::kMahalanobis)
+    return cycle.within_distance(max_distance_squared_);
+  return within_bounds(cycle.translation_m(), cycle.rotation_rad(), cycle.transforms());
+}
+
+std::vector<std::size_t> CycleTest::consistent_with(const PreparedClosure& closure,
+                                                    std::span<const PreparedClosure> others) const {
+  std::vector<std::size_t> numbers;
+  for (std::size_t k = 0; k < others.size(); ++k)
+    if (consistent(closure, others[k])) numbers.push_back(k);
+  return numbers;
 }
 
 bool CycleTest::agrees_with_odometry(const OrientedClosure& closure) const {
-  return closes(cycle_along_odometry(closure));
-}
-
-bool CycleTest::closes(const Cycle& cycle) const {
+  const Cycle cycle = cycle_along_odometry(closure);
   if (config_.criterion == CycleCriterion::kMahalanobis)
     return distance_squared(cycle.T) <= max_distance_squared_;
-  const double factor = config_.bounds_per_transform ? static_cast<double>(cycle.transforms) : 1.0;
-  return cycle.T.T.translation().norm() <= factor * config_.max_cycle_translation_m &&
-         angle_of(cycle.T.T.linear()) <= factor * config_.max_cycle_rotation_rad;
+  return within_bounds(cycle.T.T.translation().norm(), angle_of(cycle.T.T.linear()),
+                       cycle.transforms);
+}
+
+bool CycleTest::within_bounds(double translation_m, double rotation_rad,
+                              std::int64_t transforms) const {
+  const double factor = config_.bounds_per_transform ? static_cast<double>(transforms) : 1.0;
+  return translation_m <= factor * config_.max_cycle_translation_m &&
+         rotation_rad <= factor * config_.max_cycle_rotation_rad;
 }
 
 }  // namespace km

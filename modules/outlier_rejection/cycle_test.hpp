@@ -1,21 +1,16 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"
+#include "modules/outlier_rejection/prepared_closure.hpp"
 
 namespace km {
-
-/// A closure turned so that a.id < b.id: the direction it was measured in does not matter to a
-/// cycle. Covariances are scaled to what the test assumes.
-struct OrientedClosure {
-  ClosureId id;  ///< As measured.
-  OdometryPose a;
-  OdometryPose b;
-  UncertainPose T_a_b;
-};
 
 /// A chain of transforms that returns to where it began.
 struct Cycle {
@@ -41,19 +36,25 @@ class CycleTest {
 
   /// Symmetric: it does not depend on which closure is named first. Precondition: both are between
   /// the same robots.
-  [[nodiscard]] bool consistent(const OrientedClosure& i, const OrientedClosure& k) const;
+  [[nodiscard]] bool consistent(const PreparedClosure& i, const PreparedClosure& k) const;
+
+  /// Numbers of the `others` that are consistent with `closure`, ascending.
+  [[nodiscard]] std::vector<std::size_t> consistent_with(
+      const PreparedClosure& closure, std::span<const PreparedClosure> others) const;
 
   /// True if the closure, inside one robot, agrees with the odometry between its ends.
   [[nodiscard]] bool agrees_with_odometry(const OrientedClosure& closure) const;
 
  private:
-  [[nodiscard]] bool closes(const Cycle& cycle) const;
+  [[nodiscard]] bool within_bounds(double translation_m, double rotation_rad,
+                                   std::int64_t transforms) const;
 
   PcmConfig config_;
   double max_distance_squared_;
 };
 
-/// The cycle through two closures between the same robots, from ai and back to it.
+/// The cycle through two closures between the same robots, from ai and back to it, composed link by
+/// link: the definition of what PairCycle computes.
 [[nodiscard]] Cycle cycle_through(const OrientedClosure& i, const OrientedClosure& k);
 
 /// The cycle of one closure inside a robot and the odometry between its ends.

@@ -1,10 +1,10 @@
 #include "modules/outlier_rejection/max_clique.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <stdexcept>
 #include <string>
 
+#include "modules/outlier_rejection/clique_heuristic.hpp"
 #include "modules/outlier_rejection/clique_search.hpp"
 
 namespace km {
@@ -34,32 +34,46 @@ bool MaxClique::add(std::span<const std::size_t> neighbours) {
   check_neighbours(neighbours, size());
   const std::size_t v = graph_.add_vertex();
   for (const std::size_t u : neighbours) graph_.connect(u, v);
-  if (neighbours.size() < clique_.size()) return false;
-
-  std::vector<std::size_t> larger = larger_clique_with(v, neighbours);
-  if (larger.empty()) return false;
-  verify(graph_, larger);
-  clique_ = std::move(larger);
-  return true;
+  const std::size_t before = clique_.size();
+  const std::size_t most = std::min(bound_, neighbours.size()) + 1;  // of any clique with v
+  if (method_ == CliqueMethod::kExact) {
+    if (neighbours.size() >= before) search_exactly(v, neighbours, most);
+  } else {
+    adopt(method_ == CliqueMethod::kBatch ? greedy_clique(graph_)
+                                          : greedy_clique_with(graph_, v, before));
+    bound_ = std::max(bound_, most);
+  }
+  return clique_.size() > before;
 }
 
-std::vector<std::size_t> MaxClique::larger_clique_with(std::size_t v,
-                                                       std::span<const std::size_t> neighbours) {
+void MaxClique::search_exactly(std::size_t v, std::span<const std::size_t> neighbours,
+                               std::size_t most) {
   const auto is_neighbour = [&](std::size_t u) { return graph_.adjacent(u, v); };
-  if (std::all_of(clique_.begin(), clique_.end(), is_neighbour)) {
-    std::vector<std::size_t> extended = clique_;
-    extended.push_back(v);
-    return extended;
-  }
-  const std::size_t no_limit = std::numeric_limits<std::size_t>::max();
-  CliqueSearch search = find_clique(graph_, neighbours,
-                                    {.more_than = clique_.size() - 1,
-                                     .enough = proven_ ? clique_.size() : no_limit,
-                                     .max_nodes = max_search_nodes_});
+  if (std::all_of(clique_.begin(), clique_.end(), is_neighbour)) clique_.push_back(v);
+  adopt(greedy_clique_with(graph_, v, clique_.size()));
+  if (clique_.size() < most)
+    search_tree(v, neighbours, most);
+  else
+    bound_ = std::max(bound_, most);
+}
+
+void MaxClique::search_tree(std::size_t v, std::span<const std::size_t> neighbours,
+                            std::size_t most) {
+  CliqueSearch search = find_clique(
+      graph_, neighbours,
+      {.more_than = clique_.size() - 1, .enough = most - 1, .max_nodes = max_search_nodes_});
   search_nodes_ += search.nodes;
-  proven_ = proven_ && search.proven;
-  if (!search.clique.empty()) search.clique.push_back(v);
-  return std::move(search.clique);
+  searches_ended_ += search.proven ? 0 : 1;
+  bound_ = std::max(bound_, std::min(most, search.bound + 1));
+  if (search.clique.empty()) return;
+  search.clique.push_back(v);
+  adopt(std::move(search.clique));
+}
+
+void MaxClique::adopt(std::vector<std::size_t> clique) {
+  if (clique.size() <= clique_.size()) return;
+  verify(graph_, clique);
+  clique_ = std::move(clique);
 }
 
 }  // namespace km

@@ -6,24 +6,30 @@
 #include <vector>
 
 #include "modules/outlier_rejection/bit_graph.hpp"
+#include "modules/outlier_rejection/clique_method.hpp"
 
 namespace km {
 
 /// Maximum clique of a graph that grows by one vertex at a time.
 ///
 /// A clique larger than the one known must contain the new vertex (Chang et al., "Kimera-Multi",
-/// ICRA 2021, Sec. III-B), so only its neighbours are searched, only for cliques larger than the
-/// known one, and, where that one is proven to be a maximum, only until one vertex is gained: no
-/// vertex can add more. Unlike the paper's, the search is exact. Of equally large cliques the
-/// older one is kept. Deterministic. Not thread-safe. Copyable.
+/// ICRA 2021, Sec. III-B), so only its neighbours are searched, and only for cliques larger than
+/// the known one; one vertex can add no more than one to the maximum, so that a proven maximum is
+/// searched only until it has gained one. Of equally large cliques the older one is kept.
+/// Deterministic. Not thread-safe. Copyable.
+///
+/// The exact method first tries what costs next to nothing: the known clique with the new vertex,
+/// and the greedy heuristic from it. The search tree then finds more, or proves that there is none;
+/// where its limit ends it, the better of both stands, and bound() says how much may be missing.
 class MaxClique {
  public:
-  /// `max_search_nodes` bounds the search tree of one add(); see proven().
-  explicit MaxClique(std::uint64_t max_search_nodes) : max_search_nodes_(max_search_nodes) {}
+  /// `max_search_nodes` bounds the search tree of one add() of the exact method.
+  explicit MaxClique(std::uint64_t max_search_nodes, CliqueMethod method = CliqueMethod::kExact)
+      : max_search_nodes_(max_search_nodes), method_(method) {}
 
   /// Adds vertex number size(), with edges to the `neighbours`, distinct and below size().
   /// Returns true if the clique grew. Throws std::invalid_argument for other neighbours; state is
-  /// unchanged then.
+  /// unchanged then. The batch method, too, keeps a clique that it would not find again.
   bool add(std::span<const std::size_t> neighbours);
 
   [[nodiscard]] std::size_t size() const { return graph_.size(); }
@@ -31,21 +37,30 @@ class MaxClique {
   /// The largest clique found, ascending. Valid until the next add().
   [[nodiscard]] std::span<const std::size_t> clique() const { return clique_; }
 
-  /// False if the bound ended a search: clique() may then be smaller than the maximum.
-  [[nodiscard]] bool proven() const { return proven_; }
+  /// No clique of the graph is larger than this. Of the heuristic methods: by degrees alone.
+  [[nodiscard]] std::size_t bound() const { return bound_; }
 
-  /// Nodes of all search trees so far.
+  /// True if clique() is a maximum for certain. False after a search that its limit ended, until a
+  /// clique as large as the bound is found.
+  [[nodiscard]] bool proven() const { return clique_.size() == bound_; }
+
+  /// Nodes of all search trees so far, and the additions whose tree the limit ended.
   [[nodiscard]] std::uint64_t search_nodes() const { return search_nodes_; }
+  [[nodiscard]] std::size_t searches_ended() const { return searches_ended_; }
 
  private:
-  [[nodiscard]] std::vector<std::size_t> larger_clique_with(
-      std::size_t v, std::span<const std::size_t> neighbours);
+  // With vertex v added, whose cliques have at most `most` vertices.
+  void search_exactly(std::size_t v, std::span<const std::size_t> neighbours, std::size_t most);
+  void search_tree(std::size_t v, std::span<const std::size_t> neighbours, std::size_t most);
+  void adopt(std::vector<std::size_t> clique);
 
   std::uint64_t max_search_nodes_;
+  CliqueMethod method_;
   BitGraph graph_;
   std::vector<std::size_t> clique_;
-  bool proven_ = true;
+  std::size_t bound_ = 0;
   std::uint64_t search_nodes_ = 0;
+  std::size_t searches_ended_ = 0;
 };
 
 }  // namespace km

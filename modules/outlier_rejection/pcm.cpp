@@ -29,7 +29,7 @@ Pcm::Pcm(RobotId a, RobotId b, const PcmConfig& config)
       b_(std::max(a, b)),
       config_(checked(config)),
       test_(config),
-      clique_(static_cast<std::uint64_t>(config.max_search_nodes)) {}
+      clique_(static_cast<std::uint64_t>(config.max_search_nodes), config.search) {}
 
 PcmVerdict Pcm::add(const Closure& closure) {
   const auto [low, high] = std::minmax(closure.from.id.robot, closure.to.id.robot);
@@ -41,12 +41,11 @@ PcmVerdict Pcm::add(const Closure& closure) {
   if (known_.size() >= kMaxClosures) return PcmVerdict::kFull;
   known_.insert(closure.id());
 
-  OrientedClosure added = test_.orient(closure);
-  if (config_.odometry_gate && a_ == b_ && !test_.agrees_with_odometry(added))
+  const OrientedClosure oriented = test_.orient(closure);
+  if (config_.odometry_gate && a_ == b_ && !test_.agrees_with_odometry(oriented))
     return PcmVerdict::kAgainstOdometry;
-  std::vector<std::size_t> consistent;
-  for (std::size_t k = 0; k < closures_.size(); ++k)
-    if (test_.consistent(added, closures_[k])) consistent.push_back(k);
+  PreparedClosure added(oriented);
+  const std::vector<std::size_t> consistent = test_.consistent_with(added, closures_);
   closures_.push_back(std::move(added));
   return clique_.add(consistent) ? PcmVerdict::kGrew : PcmVerdict::kAdded;
 }

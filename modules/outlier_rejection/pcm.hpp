@@ -33,7 +33,7 @@ enum class PcmVerdict {
 /// of equally large sets the older one is kept. Not thread-safe. Copyable.
 class Pcm {
  public:
-  /// Bounds the memory that a flood of closures can take: 25 MB.
+  /// Bounds the memory that a flood of closures can take: 30 MB.
   static constexpr std::size_t kMaxClosures = 10000;
 
   /// For the closures between robots `a` and `b`; equal: those inside one robot.
@@ -51,14 +51,14 @@ class Pcm {
   /// Closures stored, those of the consistent set included.
   [[nodiscard]] std::size_t size() const { return closures_.size(); }
 
-  /// False if PcmConfig::max_search_nodes ended a search: the set may not be the largest.
-  [[nodiscard]] bool proven() const { return clique_.proven(); }
+  /// The largest set found and its proof, whatever PcmConfig::min_inliers.
+  [[nodiscard]] const MaxClique& clique() const { return clique_; }
 
  private:
   RobotId a_, b_;
   PcmConfig config_;
   CycleTest test_;
-  std::vector<OrientedClosure> closures_;
+  std::vector<PreparedClosure> closures_;
   std::set<ClosureId> known_;  // the refused ones too
   MaxClique clique_;
 };

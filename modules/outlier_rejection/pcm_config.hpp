@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "modules/core/config.hpp"
+#include "modules/outlier_rejection/clique_method.hpp"
 
 namespace km {
 
@@ -41,7 +42,11 @@ struct PcmConfig {
   /// A smaller consistent set is not trusted and not published.
   int min_inliers = 3;
 
-  /// Bound on the search tree after one closure; beyond it the best set found so far is kept.
+  /// How the largest set is searched. The heuristics are those of the papers, for comparison.
+  CliqueMethod search = CliqueMethod::kExact;
+
+  /// Exact: bound on the search tree after one closure; beyond it the better of what the tree and
+  /// the heuristic found is kept.
   int max_search_nodes = 100000;
 
   /// Sets that changed are published together this often [s]: while closures pour in, not every
@@ -64,7 +69,12 @@ struct PcmConfig {
     visitor.field("bounds_per_transform", bounds_per_transform, "times transforms in the cycle");
     visitor.field("odometry_gate", odometry_gate, "closures inside one robot against its odometry");
     visitor.field("min_inliers", min_inliers, {1, 1000}, "smaller sets are not trusted");
-    visitor.field("max_search_nodes", max_search_nodes, {1, 1000000000}, "per closure");
+    visitor.field("search", search,
+                  {{"exact", CliqueMethod::kExact},
+                   {"incremental", CliqueMethod::kIncremental},
+                   {"batch", CliqueMethod::kBatch}},
+                  "largest set: exact, or a heuristic");
+    visitor.field("max_search_nodes", max_search_nodes, {1, 1000000000}, "exact: per closure");
     visitor.field("publish_period_s", publish_period_s, {0.01, 60.0}, "[s] of changed sets");
   }
 };

@@ -69,9 +69,11 @@ void PcmNode::report(const Closure& closure, PcmVerdict verdict, const Pcm& pcm)
   if (verdict == PcmVerdict::kAgainstOdometry)
     log::debug(name()) << pair << to_string(closure.from.id) << " -> " << to_string(closure.to.id)
                        << " disagrees with odometry";
-  if (!pcm.proven())
+  const MaxClique& clique = pcm.clique();
+  if (config_.search == CliqueMethod::kExact && !clique.proven())
     log::limited(log::Level::kInfo, name(), "unproven " + pair)
-        << pair << "a search ended at pcm.max_search_nodes; the set may not be the largest";
+        << pair << clique.clique().size() << " closures agree, but up to " << clique.bound()
+        << " may: a search ended at pcm.max_search_nodes, what the heuristic found stands";
 }
 
 void PcmNode::publish_changes() {

@@ -12,6 +12,8 @@
 #include <span>
 #include <stdexcept>
 
+#include "modules/core/covariance.hpp"
+#include "modules/core/lie.hpp"
 #include "modules/core/precision.hpp"
 #include "modules/pose_graph/g2o_io.hpp"
 #include "modules/pose_graph/text_fields.hpp"
@@ -86,6 +88,17 @@ std::size_t chain_length(const std::vector<RelativePose>& edges, RobotId robot,
 }
 
 }  // namespace
+
+std::vector<OdometryPose> odometry_poses(const RecordedGraph& graph) {
+  std::vector<OdometryPose> poses{{{graph.robot, 0}, SE3::Identity(), Matrix6::Zero()}};
+  UncertainPose T_odom_kf;
+  for (const RelativePose& step : graph.odometry) {
+    T_odom_kf = compose(T_odom_kf, {step.T_from_to, step.covariance});
+    T_odom_kf.T.linear() = nearest_rotation(T_odom_kf.T.linear());
+    poses.push_back({step.to, T_odom_kf.T, T_odom_kf.Sigma});
+  }
+  return poses;
+}
 
 RecordedGraph make_recorded_graph(const std::vector<RelativePose>& edges, const std::string& file) {
   RecordedGraph graph;

@@ -20,6 +20,10 @@ struct RecordedGraph {
   [[nodiscard]] std::size_t poses() const { return odometry.size() + 1; }
 };
 
+/// The keyframes of `graph` along its odometry from the identity, [i] being keyframe i, with the
+/// covariance accumulated since keyframe 0.
+[[nodiscard]] std::vector<OdometryPose> odometry_poses(const RecordedGraph& graph);
+
 /// Sorts the measurements of one robot's file: edges from keyframe i to i + 1 are its odometry (a
 /// second one for the same i is a closure), other edges inside the robot and edges to others are
 /// closures. The robot is the one that has edges inside itself. `file` names the source in errors.

@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "modules/outlier_rejection/bit_graph.hpp"
+
 namespace km {
 
 /// A graph by the earlier neighbours of each vertex, ascending.
@@ -42,6 +44,26 @@ inline std::pair<Rows, std::vector<std::size_t>> planted_clique(std::size_t n, s
     row.erase(std::unique(row.begin(), row.end()), row.end());
   }
   return {rows, planted};
+}
+
+inline BitGraph bit_graph(const Rows& rows, std::size_t vertices) {
+  BitGraph graph(vertices);
+  for (std::size_t v = 0; v < vertices; ++v)
+    for (const std::size_t u : rows[v]) graph.connect(u, v);
+  return graph;
+}
+inline BitGraph bit_graph(const Rows& rows) {
+  return bit_graph(rows, rows.size());
+}
+
+/// The same graph with its vertices in another order: vertex v becomes place[v].
+inline Rows reordered(const Rows& rows, const std::vector<std::size_t>& place) {
+  Rows result(rows.size());
+  for (std::size_t v = 0; v < rows.size(); ++v)
+    for (const std::size_t u : rows[v])
+      result[std::max(place[u], place[v])].push_back(std::min(place[u], place[v]));
+  for (auto& row : result) std::sort(row.begin(), row.end());
+  return result;
 }
 
 inline bool is_clique(const Rows& rows, std::span<const std::size_t> clique) {

@@ -6,24 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/lie.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/pose_graph/recorded_graph.hpp"
 
 namespace km {
-
-/// The keyframes of a recorded graph along its odometry, with accumulated covariance.
-inline std::vector<OdometryPose> odometry_poses(const RecordedGraph& graph) {
-  std::vector<OdometryPose> poses{{{graph.robot, 0}, SE3::Identity(), Matrix6::Zero()}};
-  UncertainPose T_odom_kf;
-  for (const RelativePose& step : graph.odometry) {
-    T_odom_kf = compose(T_odom_kf, {step.T_from_to, step.covariance});
-    T_odom_kf.T.linear() = nearest_rotation(T_odom_kf.T.linear());
-    poses.push_back({step.to, T_odom_kf.T, T_odom_kf.Sigma});
-  }
-  return poses;
-}
 
 /// Every closure in the given files of one team, in the order in which robots that drive at the
 /// same pace would meet them.

@@ -1,9 +1,9 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
-#include <fstream>
+#include <bit>
+#include <numeric>
 #include <random>
-#include <sstream>
 #include <vector>
 
 #include "modules/outlier_rejection/clique_search.hpp"
@@ -36,29 +36,73 @@ std::size_t brute_force(const Rows& rows, std::size_t n) {
 
 // The same from scratch by the search itself, over all vertices at once.
 std::size_t from_scratch(const Rows& rows, std::size_t n) {
-  BitGraph graph(n);
-  for (std::size_t v = 0; v < n; ++v)
-    for (const std::size_t u : rows[v]) graph.connect(u, v);
   std::vector<std::size_t> all(n);
-  for (std::size_t v = 0; v < n; ++v) all[v] = v;
-  return find_clique(graph, all, {.more_than = 0, .enough = n, .max_nodes = kNoLimit})
+  std::iota(all.begin(), all.end(), 0);
+  return find_clique(bit_graph(rows, n), all, {.more_than = 0, .enough = n, .max_nodes = kNoLimit})
       .clique.size();
 }
 
 TEST_CASE("The clique is a maximum after every insertion, by brute force", "[clique]") {
-  const unsigned seed = GENERATE(range(0U, 12U));
+  const double density = GENERATE(0.1, 0.3, 0.5, 0.7, 0.9);
+  CAPTURE(density);
+  for (unsigned seed = 0; seed < 500; ++seed) {
+    CAPTURE(seed);
+    std::mt19937 rng(seed);
+    const Rows rows = random_graph(10, density, rng);
+    MaxClique clique(kNoLimit);
+    for (std::size_t n = 1; n <= rows.size(); ++n) {
+      const std::size_t before = clique.clique().size();
+      const bool grew = clique.add(rows[n - 1]);
+      REQUIRE(clique.clique().size() == brute_force(rows, n));
+      REQUIRE(grew == (clique.clique().size() > before));
+      REQUIRE(is_clique(rows, clique.clique()));
+      REQUIRE(clique.proven());
+    }
+  }
+}
+
+TEST_CASE("Whatever the limit and the method, the bound is one and the clique a clique",
+          "[clique]") {
+  const auto [method, limit] =
+      GENERATE(table<CliqueMethod, std::uint64_t>({{CliqueMethod::kExact, 1},
+                                                   {CliqueMethod::kExact, 3},
+                                                   {CliqueMethod::kExact, 10},
+                                                   {CliqueMethod::kIncremental, kNoLimit},
+                                                   {CliqueMethod::kBatch, kNoLimit}}));
+  const double density = GENERATE(0.3, 0.6, 0.9);
+  CAPTURE(static_cast<int>(method), limit, density);
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    CAPTURE(seed);
+    std::mt19937 rng(seed);
+    const Rows rows = random_graph(40, density, rng);
+    MaxClique clique(limit, method), repeated(limit, method);
+    for (std::size_t n = 1; n <= rows.size(); ++n) {
+      clique.add(rows[n - 1]);
+      repeated.add(rows[n - 1]);
+      const std::size_t maximum = from_scratch(rows, n);
+      REQUIRE(is_clique(rows, clique.clique()));
+      REQUIRE(clique.clique().size() <= maximum);
+      REQUIRE(clique.bound() >= maximum);
+      if (clique.proven()) REQUIRE(clique.clique().size() == maximum);
+      // Nodes are counted, not time.
+      REQUIRE(std::ranges::equal(clique.clique(), repeated.clique()));
+    }
+  }
+}
+
+TEST_CASE("The size of the maximum does not depend on the order of insertion", "[clique]") {
+  const unsigned seed = GENERATE(range(0U, 20U));
   const double density = GENERATE(0.2, 0.5, 0.8);
   CAPTURE(seed, density);
   std::mt19937 rng(seed);
-  const Rows rows = random_graph(14, density, rng);
-  MaxClique clique(kNoLimit);
-  for (std::size_t n = 1; n <= rows.size(); ++n) {
-    const std::size_t before = clique.clique().size();
-    const bool grew = clique.add(rows[n - 1]);
-    CHECK(clique.clique().size() == brute_force(rows, n));
-    CHECK(grew == (clique.clique().size() > before));
-    CHECK(clique.proven());
-  }
+  const Rows rows = random_graph(50, density, rng);
+  MaxClique forwards(kNoLimit), shuffled(kNoLimit);
+  for (const auto& row : rows) forwards.add(row);
+  std::vector<std::size_t> place(rows.size());
+  std::iota(place.begin(), place.end(), 0);
+  std::shuffle(place.begin(), place.end(), rng);
+  for (const auto& row : reordered(rows, place)) shuffled.add(row);
+  CHECK(forwards.clique().size() == shuffled.clique().size());
 }
 
 TEST_CASE("Adding one at a time finds what a search from scratch finds", "[clique]") {
@@ -94,18 +138,34 @@ TEST_CASE("Of equally large cliques the older one is kept", "[clique]") {
         std::vector<std::size_t>{0, 1});
 }
 
-TEST_CASE("A search cut short keeps a valid clique and says so", "[clique]") {
+TEST_CASE("A search cut short falls back to the heuristic and says so", "[clique]") {
   std::mt19937 rng(5);
   const Rows rows = random_graph(120, 0.8, rng);
-  MaxClique limited(3), repeated(3);
+  MaxClique limited(1), greedy(kNoLimit, CliqueMethod::kIncremental);
   for (const auto& row : rows) {
     limited.add(row);
-    repeated.add(row);
-    REQUIRE(is_clique(rows, limited.clique()));
+    greedy.add(row);
   }
+  CHECK(limited.searches_ended() > 0);
   CHECK_FALSE(limited.proven());
-  CHECK(limited.clique().size() >= 2);
-  CHECK(std::ranges::equal(limited.clique(), repeated.clique()));  // nodes are counted, not time
+  CHECK(limited.bound() > limited.clique().size());
+  CHECK(limited.clique().size() >= greedy.clique().size());
+}
+
+TEST_CASE("A clique as large as the bound is proven again", "[clique]") {
+  std::mt19937 rng(5);
+  const Rows rows = random_graph(60, 0.8, rng);
+  MaxClique clique(1);
+  for (const auto& row : rows) clique.add(row);
+  REQUIRE_FALSE(clique.proven());
+  // A clique apart from the rest, larger than any bound on that: its last vertices prove it.
+  std::vector<std::size_t> planted;
+  for (std::size_t v = rows.size(); v < 2 * rows.size() + 1; ++v) {
+    clique.add(planted);
+    planted.push_back(v);
+  }
+  CHECK(clique.proven());
+  CHECK(std::ranges::equal(clique.clique(), planted));
 }
 
 TEST_CASE("Neighbours that cannot be are refused and change nothing", "[clique]") {

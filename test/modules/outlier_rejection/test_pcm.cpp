@@ -91,7 +91,7 @@ TEST_CASE("PCM keeps the true closures among as many random ones", "[pcm]") {
   }
   std::sort(truth.begin(), truth.end());
   CHECK(pcm.inliers() == truth);
-  CHECK(pcm.proven());
+  CHECK(pcm.clique().proven());
 }
 
 TEST_CASE("A closure given twice counts once, one from each side twice", "[pcm]") {

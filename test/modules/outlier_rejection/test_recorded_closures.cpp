@@ -54,7 +54,7 @@ TEST_CASE("The shipped configuration keeps a good set of the tunnels closures", 
   std::size_t inter = 0;
   for (const auto& [pair, pcm] : reject_outliers(closures, config)) {
     CAPTURE(pair.first, pair.second);
-    CHECK(pcm.proven());
+    CHECK(pcm.clique().proven());
     if (pair.first == pair.second) continue;
     inter += pcm.inliers().size();
     // Every pair of robots has a fifth of its closures agreeing: all end in one frame.
