@@ -37,12 +37,16 @@ void substitute_backward(const Factor& L, Eigen::MatrixXd& B) {
 }  // namespace
 
 BlockCholesky::BlockCholesky(const Eigen::SparseMatrix<double>& A) {
-  const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> llt(A);
-  if (llt.info() != Eigen::Success)
+  auto factor = try_factorise(A);
+  if (!factor)
     throw std::runtime_error("BlockCholesky: matrix of " + std::to_string(A.rows()) +
                              " rows is not positive definite");
-  L_ = llt.matrixL();
-  P_ = llt.permutationP();
+  *this = std::move(*factor);
+}
+
+std::optional<BlockCholesky> BlockCholesky::try_factorise(const Eigen::SparseMatrix<double>& A) {
+  const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> llt(A);
+  return llt.info() == Eigen::Success ? std::optional(BlockCholesky(llt)) : std::nullopt;
 }
 
 Eigen::MatrixXd BlockCholesky::solve_rows(const Eigen::MatrixXd& B) const {

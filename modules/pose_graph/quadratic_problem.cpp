@@ -10,9 +10,10 @@
 namespace km {
 namespace {
 
-// Relative to the largest entry of Q, bounds the condition number of the preconditioner as SE-Sync
-// does. Much less, and it amplifies directions that only the manifold's constraints make stiff.
-constexpr double kRegularisation = 1e-6;
+// Relative to the largest sum of tau over the edges of one pose: keeps the preconditioner definite,
+// no more. Translations are free of constraints, and long chains of them are soft; on rotations
+// much less than the default amplifies directions that only the constraints make stiff.
+constexpr double kTranslationShift = 1e-10;
 
 Eigen::Vector4d weights(double kappa, double tau) {
   return {kappa, kappa, kappa, tau};
@@ -171,11 +172,26 @@ LiftedPoses QuadraticProblem::hessian_product(const LiftedPoses& X, const Lifted
   return project_tangent(X, product);
 }
 
+void QuadraticProblem::set_rotation_shift(double shift) {
+  rotation_shift_ = shift;
+  preconditioner_.reset();
+}
+
+Eigen::Vector2d QuadraticProblem::largest_degrees() const {
+  Eigen::Matrix2Xd degrees = Eigen::Matrix2Xd::Zero(2, poses_);
+  for (const BlockEdge& e : edges_)
+    for (const Eigen::Index i : {e.i, e.j}) degrees.col(i) += Eigen::Vector2d(e.kappa, e.tau);
+  for (const PublicEdge& e : public_edges_) degrees.col(e.own) += Eigen::Vector2d(e.kappa, e.tau);
+  return degrees.rowwise().maxCoeff();
+}
+
 LiftedPoses QuadraticProblem::precondition(const LiftedPoses& X, const LiftedPoses& V) const {
   if (!preconditioner_) {
     Eigen::SparseMatrix<double> A = 2.0 * Q_;
-    const double shift = kRegularisation * A.diagonal().maxCoeff();
-    A.diagonal().array() += shift;
+    const Eigen::Vector2d degree = largest_degrees();
+    const double rotation = 2.0 * rotation_shift_ * degree.x();
+    const double translation = 2.0 * kTranslationShift * degree.y();
+    A.diagonal() += Eigen::Vector4d(rotation, rotation, rotation, translation).replicate(poses_, 1);
     preconditioner_ = std::make_unique<const BlockCholesky>(A);
   }
   return project_tangent(X, preconditioner_->solve_rows(V));

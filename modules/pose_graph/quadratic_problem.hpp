@@ -62,15 +62,23 @@ class QuadraticProblem {
   /// Hessian", 2013, for the Stiefel manifold).
   [[nodiscard]] LiftedPoses hessian_product(const LiftedPoses& X, const LiftedPoses& gradient,
                                             const LiftedPoses& V) const;
-  /// (2 Q + small multiple of the identity)^-1 applied to `V` and projected to the tangent space.
-  /// Q is factorised once, at the first call.
+  /// (2 Q + a small diagonal)^-1 applied to `V` and projected to the tangent space. Q is factorised
+  /// once, at the first call.
   [[nodiscard]] LiftedPoses precondition(const LiftedPoses& X, const LiftedPoses& V) const;
+
+  /// Sets the diagonal that precondition() adds on rotations, relative to the largest sum of kappa
+  /// over the edges of one pose. Small is fast near a minimum, and slow far from it.
+  void set_rotation_shift(double shift);
 
   [[nodiscard]] Eigen::Index rank() const { return rank_; }
   [[nodiscard]] Eigen::Index poses() const { return poses_; }
   [[nodiscard]] const std::vector<BlockEdge>& edges() const { return edges_; }
   [[nodiscard]] const std::vector<PublicEdge>& public_edges() const { return public_edges_; }
   [[nodiscard]] const LiftedPoses& fixed() const { return fixed_; }
+  /// Q, both triangles.
+  [[nodiscard]] const Eigen::SparseMatrix<double>& data_matrix() const { return Q_; }
+  /// Largest sums of kappa and of tau over the edges of one pose.
+  [[nodiscard]] Eigen::Vector2d largest_degrees() const;
 
  private:
   void check() const;
@@ -79,6 +87,7 @@ class QuadraticProblem {
   Eigen::Index rank_;
   Eigen::Index poses_;
   Eigen::Index fixed_count_ = 0;
+  double rotation_shift_ = 1e-3;
   std::vector<BlockEdge> edges_;
   std::vector<PublicEdge> public_edges_;
   Eigen::SparseMatrix<double> Q_;  // 4n x 4n, symmetric, both triangles

@@ -82,14 +82,17 @@ TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
   LiftedPoses gradient = project_tangent(X, euclidean);
   result.initial_gradient_norm = result.gradient_norm = gradient.norm();
   // A full Newton step of a least-squares cost has this norm at most when the model is exact.
-  double radius = 10.0 * std::sqrt(std::max(result.cost, 1e-12));
+  double radius = options.initial_radius > 0.0 ? options.initial_radius
+                                               : 10.0 * std::sqrt(std::max(result.cost, 1e-12));
+  bool last = false;
   int rejected = 0;
-  while (result.iterations < options.max_iterations && rejected < kMaxRejections &&
+  while (result.iterations < options.max_iterations && rejected < kMaxRejections && !last &&
          result.gradient_norm > options.gradient_tolerance) {
     const Step step = solve_model(problem, X, euclidean, gradient, radius, options);
     result.cg_iterations += step.cg_iterations;
     // A decrease below rounding is no decrease: stop rather than wander.
-    if (!(step.predicted_decrease > kRounding * result.cost)) break;
+    last = !(step.predicted_decrease > kRounding * result.cost);
+    if (last) break;
     LiftedPoses candidate = retract(X, step.V);
     const double cost = problem.cost(candidate);
     const double ratio = (result.cost - cost) / step.predicted_decrease;
@@ -101,6 +104,7 @@ TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
     }
     rejected = 0;
     ++result.iterations;
+    last = result.cost - cost <= options.relative_decrease_tolerance * result.cost;
     X = std::move(candidate);
     result.cost = cost;
     euclidean = problem.euclidean_gradient(X);
@@ -108,6 +112,9 @@ TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
     result.gradient_norm = gradient.norm();
   }
   result.X = std::move(X);
+  result.radius = radius;
+  result.converged =
+      last || rejected == kMaxRejections || result.gradient_norm <= options.gradient_tolerance;
   return result;
 }
 

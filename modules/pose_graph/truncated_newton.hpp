@@ -10,6 +10,8 @@ struct TruncatedNewtonOptions {
   int max_cg_iterations = 50;        ///< Hessian products per step.
   double cg_tolerance = 0.1;         ///< Residual of the Newton system over its right-hand side.
   double gradient_tolerance = 1e-6;  ///< Riemannian gradient norm at which nothing is left to do.
+  double relative_decrease_tolerance = 0.0;  ///< Of the cost in one step: less is the last one.
+  double initial_radius = 0.0;               ///< 0: too large to bind.
 };
 
 struct [[nodiscard]] TruncatedNewtonResult {
@@ -20,12 +22,14 @@ struct [[nodiscard]] TruncatedNewtonResult {
   double gradient_norm = 0.0;
   int iterations = 0;
   int cg_iterations = 0;
+  double radius = 0.0;     ///< To go on with.
+  bool converged = false;  ///< By a tolerance, or no step lowers the cost beyond rounding.
 };
 
 /// Minimises `problem` from feasible `X` by the Riemannian trust-region method with preconditioned
 /// truncated conjugate gradients (Absil, Baker, Gallivan, "Trust-Region Methods on Riemannian
 /// Manifolds", FoCM 2007, Alg. 1 and 2). The radius is measured in the norm of the preconditioner
-/// and starts out too large to bind.
+/// and, unless given, starts out too large to bind.
 [[nodiscard]] TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
                                              const TruncatedNewtonOptions& options);
 

@@ -1,0 +1,109 @@
+#include "modules/pose_graph/certificate.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "modules/pose_graph/lanczos.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kCertifiedGap = 1e-5;
+constexpr double kRounding = 1e-12;  // of the precisions that meet in a pose
+constexpr int kMaxProducts = 60;
+constexpr double kEigenTolerance = 1e-6;
+
+Eigen::SparseMatrix<double> rotations_shifted(const Eigen::SparseMatrix<double>& S, double shift,
+                                              double held) {
+  Eigen::SparseMatrix<double> A = S;
+  A.diagonal() += Eigen::Vector4d(shift, shift, shift, 0.0).replicate(S.rows() / 4, 1);
+  A.coeffRef(3, 3) += held;
+  return A;
+}
+
+struct Factor {
+  double shift;
+  BlockCholesky cholesky;
+};
+
+// The least shift of a geometric series, from `shift` on, that makes S definite.
+Factor factorise(const Eigen::SparseMatrix<double>& S, double shift, double held) {
+  constexpr double kGrowth = 30.0;
+  for (;; shift *= kGrowth)
+    if (auto cholesky = BlockCholesky::try_factorise(rotations_shifted(S, shift, held)))
+      return {shift, std::move(*cholesky)};
+}
+
+Eigen::VectorXd without_translations(Eigen::VectorXd v) {
+  for (Eigen::Index i = 3; i < v.size(); i += 4) v(i) = 0.0;
+  return v;
+}
+
+}  // namespace
+
+Eigen::SparseMatrix<double> certificate_matrix(const QuadraticProblem& problem,
+                                               const LiftedPoses& X) {
+  const LiftedPoses XQ = 0.5 * problem.euclidean_gradient(X);
+  Eigen::SparseMatrix<double> S = problem.data_matrix();
+  std::vector<Eigen::Triplet<double>> entries;
+  entries.reserve(static_cast<std::size_t>(9 * problem.poses()));
+  for (Eigen::Index i = 0; i < problem.poses(); ++i) {
+    const Eigen::Matrix3d product = X.middleCols<3>(4 * i).transpose() * XQ.middleCols<3>(4 * i);
+    const Eigen::Matrix3d Lambda = 0.5 * (product + product.transpose());
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c)
+        entries.emplace_back(static_cast<int>(4 * i) + r, static_cast<int>(4 * i) + c,
+                             Lambda(r, c));
+  }
+  Eigen::SparseMatrix<double> all(S.rows(), S.cols());
+  all.setFromTriplets(entries.begin(), entries.end());
+  S -= all;
+  return S;
+}
+
+Certificate certify(const QuadraticProblem& problem, const LiftedPoses& X) {
+  const Eigen::SparseMatrix<double> S = certificate_matrix(problem, X);
+  const Eigen::Vector2d degree = problem.largest_degrees();
+  const double cost = problem.cost(X);
+  const double trace = 3.0 * static_cast<double>(problem.poses());
+  const double threshold = std::max(kCertifiedGap * cost / trace, kRounding * degree.x());
+  const Factor factor = factorise(S, threshold, degree.y());
+
+  // Rotations of (S + shift)^-1 applied to rotations: the inverse of the shifted Schur complement.
+  const auto inverse = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
+    return without_translations(
+        factor.cholesky.solve_rows(without_translations(v).transpose()).transpose());
+  };
+  const LanczosResult largest = largest_eigenpair(inverse, S.rows(), kMaxProducts, kEigenTolerance);
+  Certificate certificate;
+  certificate.certified = factor.shift == threshold;
+  certificate.lambda_min = 1.0 / largest.value - factor.shift;
+  const double deficit = std::max(0.0, -certificate.lambda_min) * trace;
+  certificate.relative_gap = deficit / std::max(cost, kRounding * degree.x() * trace);
+  certificate.direction = factor.cholesky.solve_rows(largest.vector.transpose()).transpose();
+  certificate.direction.normalize();
+  return certificate;
+}
+
+LiftedPoses escape(const QuadraticProblem& problem, const LiftedPoses& X,
+                   const Eigen::VectorXd& direction) {
+  LiftedPoses lifted = LiftedPoses::Zero(X.rows() + 1, X.cols());
+  lifted.topRows(X.rows()) = X;
+  LiftedPoses step = LiftedPoses::Zero(lifted.rows(), lifted.cols());
+  step.bottomRows(1) = direction.transpose();
+  const double cost = problem.cost(lifted);
+  // One pose turns by half a radian at first.
+  double largest = 0.0;
+  for (Eigen::Index i = 0; i < problem.poses(); ++i)
+    largest = std::max(largest, direction.segment<3>(4 * i).norm());
+  constexpr int kMaxHalvings = 40;
+  double length = 0.5 / std::max(largest, 1e-300);
+  for (int k = 0; k < kMaxHalvings; ++k, length *= 0.5) {
+    LiftedPoses candidate = retract(lifted, length * step);
+    if (problem.cost(candidate) < cost) return candidate;
+  }
+  return lifted;
+}
+
+}  // namespace km
