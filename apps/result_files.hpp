@@ -7,8 +7,9 @@ namespace km {
 
 /// What a robot leaves in its output folder.
 inline constexpr std::array kResultFiles = {
-    "odometry.tum",  "optimized.tum", "pose_graph.g2o", "keyframes.csv", "loop_closures.csv",
-    "optimizer.csv", "traffic.csv",   "timing.csv",     "config.yaml",   "summary.json"};
+    "odometry.tum",  "optimized.tum",      "pose_graph.g2o",   "keyframes.csv", "loop_closures.csv",
+    "optimizer.csv", "traffic.csv",        "timing.csv",       "config.yaml",   "summary.json",
+    "mesh.ply",      "mesh_optimized.ply", "label_palette.csv"};
 
 /// Removes a robot's results from `folder`, so that those of an earlier run cannot be taken for
 /// those of one that fails. Throws std::filesystem::filesystem_error naming the file.

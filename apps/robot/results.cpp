@@ -102,6 +102,30 @@ void write_rounds(const fs::path& file, const RunRecord& record) {
   close(out, file);
 }
 
+// Frames that went into the map, and why others did not.
+void write_map_counts(JsonWriter& json, const RunRecord& record) {
+  const MappingProgress map = record.mapping().value_or(MappingProgress{});
+  const DenseSensingProgress sensing = record.dense_sensing().value_or(DenseSensingProgress{});
+  json.key("mapping");
+  json.begin_object();
+  json.field("frames", map.integrated);
+  json.field("skipped_wrong_size", sensing.wrong_size + map.wrong_size);
+  json.field("skipped_bad_pose", map.bad_pose);
+  json.field("skipped_too_late", map.too_late);
+  json.field("without_labels", map.unlabelled);
+  json.field("label_pixels_outside_palette", map.labels_outside + sensing.classes_outside);
+  json.field("blocks_refused", map.blocks_refused);
+  json.field("blocks", map.size.blocks);
+  json.field("vertices", map.size.vertices);
+  json.field("faces", map.size.faces);
+  const RunRecord::MeshCorrections& corrections = record.mesh_corrections();
+  json.field("corrections", corrections.deformed);
+  json.field("moves_as_a_whole", corrections.moved);
+  json.field("correction_seconds", corrections.seconds);
+  json.field("unbound_vertices", corrections.last.unbound_vertices);
+  json.end_object();
+}
+
 void write_summary(const fs::path& file, const RunRecord& record, const RunSummary& summary) {
   RunRecord::StageCounts total;
   for (const auto& [peer, counts] : record.stages_per_peer()) {
@@ -134,6 +158,7 @@ void write_summary(const fs::path& file, const RunRecord& record, const RunSumma
   json.field("settled", progress.settled);
   json.array("members", progress.members);
   json.end_object();
+  if (record.dense_sensing()) write_map_counts(json, record);
   json.key("traffic");
   json.begin_object();
   for (const auto& [category, bytes] : summary.traffic_bytes) json.field(category, bytes);

@@ -70,6 +70,11 @@ RobotConfig load_robot_config(const RobotOptions& options) {
   config.pcm = layers.load<PcmConfig>();
   config.pose_graph = layers.load<PoseGraphConfig>();
   config.graph_playback = layers.load<GraphPlaybackConfig>();
+  config.mapping = layers.load<MappingConfig>();
+  config.stereo_depth = layers.load<StereoDepthConfig>();
+  config.segmentation = layers.load<SegmentationConfig>();
+  config.semantic_mapping = layers.load<SemanticMappingConfig>();
+  config.mesh_deformation = layers.load<MeshDeformationConfig>();
   layers.finish();
   config.effective = layers.effective();
   return config;

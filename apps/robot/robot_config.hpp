@@ -3,14 +3,19 @@
 #include <filesystem>
 #include <string>
 
+#include "apps/robot/mapping_config.hpp"
 #include "apps/robot/options.hpp"
 #include "apps/robot/run_config.hpp"
+#include "modules/dense_sensing/segmentation_config.hpp"
+#include "modules/dense_sensing/stereo_depth_config.hpp"
 #include "modules/loop_closure/keyframe_features_config.hpp"
 #include "modules/loop_closure/loop_closure_config.hpp"
+#include "modules/mesh_deformation/mesh_deformation_config.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"
 #include "modules/place_recognition/place_recognition_config.hpp"
 #include "modules/pose_graph/graph_playback_config.hpp"
 #include "modules/pose_graph/pose_graph_config.hpp"
+#include "modules/semantic_mapping/semantic_mapping_config.hpp"
 #include "modules/sensors/sensors_config.hpp"
 #include "modules/vio/tracker_config.hpp"
 #include "modules/vio/vio_config.hpp"
@@ -31,6 +36,11 @@ struct RobotConfig {
   PcmConfig pcm;
   PoseGraphConfig pose_graph;
   GraphPlaybackConfig graph_playback;
+  MappingConfig mapping;
+  StereoDepthConfig stereo_depth;
+  SegmentationConfig segmentation;
+  SemanticMappingConfig semantic_mapping;
+  MeshDeformationConfig mesh_deformation;
 
   std::string effective;  ///< As YAML: a file that gives this configuration again.
 };

@@ -21,15 +21,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-RobotInput open_input(const RobotOptions& options, const RobotConfig& config) {
+RobotInput open_input(const RobotOptions& options, const RobotConfig& config,
+                      const std::optional<MappingPlan>& mapping) {
   if (!options.dataset.empty())
     return std::make_unique<EurocReader>(
         options.dataset,
         EurocOptions{.from_s = options.from_s.value_or(0.0),
                      .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
                      .stereo_tolerance_s = config.sensors.stereo_tolerance_s,
-                     .depth = config.sensors.depth,
-                     .labels = config.sensors.labels});
+                     .depth = config.sensors.depth || (mapping && mapping->reads_depth()),
+                     .labels = config.sensors.labels || (mapping && mapping->reads_labels())});
   RecordedGraph graph = read_recorded_graph(options.graph);
   if (graph.robot != options.robot)
     throw std::invalid_argument(options.graph.string() + " holds robot " +
@@ -184,12 +185,16 @@ RunSummary summarize(const RobotOptions& options, Robot& robot, double seconds, 
 
 int run_robot(const RobotOptions& options, SignalWatch& signals) {
   const RobotConfig config = load_robot_config(options);
-  RobotInput input = open_input(options, config);
-  Robot robot(options, config, std::move(input), signals);
+  const std::optional<MappingPlan> mapping =
+      plan_mapping(config.mapping, config.stereo_depth, config.segmentation, options.dataset);
+  RobotInput input = open_input(options, config, mapping);
+  Robot robot(options, config, std::move(input), mapping, signals);
   log_network(config, robot.interface());
   make_output_folder(options.output);
   remove_results(options.output);
   open_result(options.output / "config.yaml") << config.effective;
+  if (mapping && !mapping->palette.classes().empty())
+    open_result(options.output / "label_palette.csv") << to_csv(mapping->palette);
 
   std::optional<Watch> watch;
   watch.emplace(options, config, robot);
@@ -201,6 +206,7 @@ int run_robot(const RobotOptions& options, SignalWatch& signals) {
 
   robot.recorder().with_record([&](const RunRecord& record) {
     write_results(options.output, record, summarize(options, robot, seconds, end));
+    if (robot.mesh_files() != nullptr) robot.mesh_files()->finish(record.trajectory());
   });
   write_timings(options.output / "timing.csv", robot);
   const Verdict verdict = verdict_of(end);

@@ -53,6 +53,13 @@ void RunRecord::add(const Trajectory& trajectory) {
   if (trajectory.robot == robot_) trajectory_ = trajectory;
 }
 
+void RunRecord::add(const OptimizedMesh& mesh) {
+  ++activity_;
+  ++(mesh.deformed ? mesh_corrections_.deformed : mesh_corrections_.moved);
+  mesh_corrections_.seconds += mesh.seconds;
+  mesh_corrections_.last = mesh.report;
+}
+
 double RunRecord::median_depth_m(std::uint32_t keyframe) const {
   const auto found = median_depths_m_.find(keyframe);
   return found != median_depths_m_.end() ? found->second : 0.0;

@@ -10,6 +10,10 @@
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/core/stamped_pose.hpp"
+#include "modules/dense_sensing/dense_sensing_progress.hpp"
+#include "modules/mesh/map_mesh.hpp"
+#include "modules/mesh_deformation/optimized_mesh.hpp"
+#include "modules/semantic_mapping/mapping_progress.hpp"
 
 namespace km {
 
@@ -27,19 +31,38 @@ class RunRecord {
   void add(const ClosureOutcome& outcome);
   void add(const Trajectory& trajectory);  ///< Of this robot.
   void add(const OptimizerProgress& progress);
+  void add(const DenseSensingProgress& progress) { dense_sensing_ = progress; }
+  void add(const MappingProgress& progress) { mapping_ = progress; }
+  void add(const MapMesh& /*map*/) { ++activity_; }  // its correction follows
+  void add(const OptimizedMesh& mesh);
 
   [[nodiscard]] RobotId robot() const { return robot_; }
 
   /// True if the optimiser has nothing left to do (or never had).
   [[nodiscard]] bool settled() const { return keyframes_.size() < 2 || progress_.settled; }
 
-  /// Changes with every keyframe, closure, outcome and round.
+  /// Changes with every keyframe, closure, outcome, round and mesh.
   [[nodiscard]] std::uint64_t activity() const { return activity_; }
 
   [[nodiscard]] const std::vector<StampedPose>& odometry() const { return odometry_; }
   [[nodiscard]] const std::vector<KeyframeOdometry>& keyframes() const { return keyframes_; }
   /// Median depth of a keyframe's keypoints in its left camera [m]; 0: unknown.
   [[nodiscard]] double median_depth_m(std::uint32_t keyframe) const;
+
+  /// Absent where mapping is off, or no frame has come yet.
+  [[nodiscard]] const std::optional<DenseSensingProgress>& dense_sensing() const {
+    return dense_sensing_;
+  }
+  [[nodiscard]] const std::optional<MappingProgress>& mapping() const { return mapping_; }
+
+  /// Corrections of the mesh.
+  struct MeshCorrections {
+    std::size_t deformed = 0;         ///< By Local Mesh Optimization.
+    std::size_t moved = 0;            ///< As a whole.
+    double seconds = 0.0;             ///< Time of all.
+    MeshDeformationReport last = {};  ///< Of the last optimization.
+  };
+  [[nodiscard]] const MeshCorrections& mesh_corrections() const { return mesh_corrections_; }
 
   [[nodiscard]] const std::optional<Trajectory>& trajectory() const { return trajectory_; }
   [[nodiscard]] const OptimizerProgress& progress() const { return progress_; }
@@ -86,6 +109,9 @@ class RunRecord {
   std::map<std::pair<RobotId, RobotId>, InlierSet> inlier_sets_;
   std::map<ClosureId, ClosureOutcome> outcomes_;
   std::optional<Trajectory> trajectory_;
+  std::optional<DenseSensingProgress> dense_sensing_;
+  std::optional<MappingProgress> mapping_;
+  MeshCorrections mesh_corrections_;
   OptimizerProgress progress_;
   std::vector<OptimizerRound> rounds_;
   std::uint64_t activity_ = 0;

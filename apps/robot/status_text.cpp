@@ -58,6 +58,20 @@ std::string optimizer_text(const OptimizerProgress& progress) {
          std::to_string(progress.members.empty() ? 0 : progress.members.size() - 1);
 }
 
+std::string count_text(std::size_t count) {
+  const auto value = static_cast<double>(count);
+  if (count < 1000) return std::to_string(count);
+  return count < 1'000'000 ? format("%.0f k", value * 1e-3) : format("%.2f M", value * 1e-6);
+}
+
+// Nothing where mapping is off.
+std::string map_text(const std::optional<MappingProgress>& mapping) {
+  if (!mapping) return "";
+  return " | map: " + std::to_string(mapping->size.blocks) + " blocks, " +
+         count_text(mapping->size.vertices) + " vertices, " + count_text(mapping->size.faces) +
+         " faces";
+}
+
 }  // namespace
 
 std::string status_text(double dataset_time_s, const RunRecord& record,
@@ -68,7 +82,7 @@ std::string status_text(double dataset_time_s, const RunRecord& record,
   return format("%.1f s, ", dataset_time_s) + std::to_string(record.odometry().size()) +
          " images, " + std::to_string(record.keyframes().size()) + " keyframes | " +
          peers_text(peers) + " | " + closures_text(record, peers) + " | " +
-         optimizer_text(record.progress()) + " | out: place " +
+         optimizer_text(record.progress()) + map_text(record.mapping()) + " | out: place " +
          sent(TrafficCategory::kPlaceRecognition) + ", verify " +
          sent(TrafficCategory::kGeometricVerification) + ", pgo " +
          sent(TrafficCategory::kPoseGraphOptimization) + ", other " + sent(TrafficCategory::kOther);

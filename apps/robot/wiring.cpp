@@ -1,7 +1,9 @@
 #include "apps/robot/wiring.hpp"
 
+#include <cmath>
 #include <utility>
 
+#include "modules/dense_sensing/dense_sensing_node.hpp"
 #include "modules/loop_closure/keyframe_features_node.hpp"
 #include "modules/loop_closure/loop_closure_codec.hpp"
 #include "modules/loop_closure/loop_closure_node.hpp"
@@ -12,6 +14,7 @@
 #include "modules/place_recognition/vocabulary_file.hpp"
 #include "modules/pose_graph/pose_graph_codec.hpp"
 #include "modules/pose_graph/pose_graph_node.hpp"
+#include "modules/semantic_mapping/semantic_mapping_node.hpp"
 #include "modules/vio/vio_node.hpp"
 #include "runtime/dds/robot_status_codec.hpp"
 
@@ -26,17 +29,18 @@ NodeType& Robot::add(bool feeds, Arguments&&... arguments) {
 }
 
 Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput input,
-             SignalWatch& signals)
+             const std::optional<MappingPlan>& mapping, SignalWatch& signals)
     : identity_{.robot = options.robot, .name = options.name, .boot = random_boot_id()},
       participant_(config.dds, identity_),
       supervisor_(signals) {
   auto bridge = std::make_unique<DdsBridge>(participant_);
   bridge_ = bridge.get();
   if (auto* reader = std::get_if<std::unique_ptr<DatasetReader>>(&input))
-    add_sensing(config, options.rate, std::move(*reader));
+    add_sensing(config, options.rate, std::move(*reader), mapping);
   else
     add_playback(config, options.rate, std::get<RecordedGraph>(std::move(input)));
   add_back_end(config);
+  if (mapping) add_mesh_correction(config, options.output);
   add_network();
   add_records();
   nodes_.push_back(bridge_);
@@ -44,12 +48,15 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
 }
 
 void Robot::add_sensing(const RobotConfig& config, double rate,
-                        std::unique_ptr<DatasetReader> reader) {
+                        std::unique_ptr<DatasetReader> reader,
+                        const std::optional<MappingPlan>& mapping) {
   const SensorRig rig = reader->rig();
   sensors_ = &add<SensorsNode>(true, config.sensors, rate, std::move(reader), topics_.packets,
                                topics_.sensors_end);
   add<VioNode>(true, identity_.robot, rig, config.tracker, config.vio,
-               VioTopics{topics_.packets, topics_.odometry, topics_.keyframe_odometry});
+               VioTopics{topics_.packets, topics_.odometry, topics_.keyframe_odometry,
+                         topics_.located_frames});
+  if (mapping) add_mapping(config, rate, rig.stereo, *mapping);
   add<KeyframeFeaturesNode>(true, config.keyframe_features, rig.stereo, topics_.keyframe_odometry,
                             topics_.keyframes);
   add<PlaceRecognitionNode>(
@@ -58,6 +65,32 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
       PlaceRecognitionTopics{topics_.keyframes, topics_.peer_bows, topics_.own_bows,
                              topics_.candidates, topics_.place_queries});
   topics_.sensors_end.subscribe([this](const auto&) { source_ended_ = true; });
+}
+
+// A mapper that is too slow leaves frames out; at --rate max, where no frame is late, it holds the
+// others up, so that the map does not depend on the machine.
+void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
+                        const MappingPlan& plan) {
+  const Overflow overflow = std::isinf(rate) ? Overflow::kBlock : Overflow::kDropOldest;
+  DenseSensor sensor(rig, plan.sensor);
+  const PinholeCamera camera = sensor.camera();
+  add<DenseSensingNode>(true, std::move(sensor), plan.sensor.labels, config.mapping.rate_hz,
+                        overflow,
+                        DenseSensingTopics{topics_.located_frames, topics_.dense_frames,
+                                           topics_.dense_sensing_progress});
+  add<SemanticMappingNode>(
+      true, config.semantic_mapping, camera, plan.palette, config.mapping.mesh_interval_s, overflow,
+      SemanticMappingTopics{topics_.dense_frames, topics_.maps, topics_.mapping_progress});
+}
+
+void Robot::add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder) {
+  mesh_deformation_ = &add<MeshDeformationNode>(
+      false, config.mesh_deformation, identity_.robot,
+      MeshDeformationTopics{topics_.maps, topics_.keyframe_odometry, topics_.trajectory,
+                            topics_.optimized_meshes});
+  mesh_files_ = &add<MeshFilesNode>(false, folder,
+                                    MeshFilesTopics{topics_.keyframe_odometry, topics_.trajectory,
+                                                    topics_.maps, topics_.optimized_meshes});
 }
 
 void Robot::add_playback(const RobotConfig& config, double rate, RecordedGraph graph) {
@@ -127,6 +160,10 @@ void Robot::add_records() {
   recorder_->record(topics_.peer_inlier_sets);
   recorder_->record(topics_.trajectory);
   recorder_->record(topics_.progress);
+  recorder_->record(topics_.dense_sensing_progress);
+  recorder_->record(topics_.mapping_progress);
+  recorder_->record(topics_.maps);
+  recorder_->record(topics_.optimized_meshes);
   // The first stamp is the origin of the dataset's time shown to people.
   topics_.keyframe_odometry.subscribe(
       [this, first = std::optional<Stamp>()](const auto& keyframe) mutable {
@@ -140,6 +177,11 @@ void Robot::add_records() {
 
 RobotStatus Robot::own_status() const {
   return {identity_.robot, identity_.name, phase_, dataset_time_s_, keyframes_};
+}
+
+void Robot::freeze_record() {
+  recorder_->freeze();
+  if (mesh_deformation_ != nullptr) mesh_deformation_->finish();
 }
 
 bool Robot::input_ended() {

@@ -6,15 +6,21 @@
 #include <variant>
 #include <vector>
 
+#include "apps/robot/mapping_plan.hpp"
+#include "apps/robot/mesh_files_node.hpp"
 #include "apps/robot/recorder_node.hpp"
 #include "apps/robot/robot_config.hpp"
+#include "modules/core/dense_frame.hpp"
 #include "modules/core/frame.hpp"
+#include "modules/dense_sensing/dense_sensing_progress.hpp"
 #include "modules/loop_closure/keyframe_exchange.hpp"
+#include "modules/mesh_deformation/mesh_deformation_node.hpp"
 #include "modules/place_recognition/keyframe_bow.hpp"
 #include "modules/place_recognition/place_query.hpp"
 #include "modules/pose_graph/graph_playback_node.hpp"
 #include "modules/pose_graph/pgo_messages.hpp"
 #include "modules/pose_graph/recorded_graph.hpp"
+#include "modules/semantic_mapping/mapping_progress.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/sensors_node.hpp"
 #include "runtime/dds/bridge.hpp"
@@ -32,6 +38,12 @@ struct Topics {
   Topic<OdometryState> odometry;
   Topic<KeyframeOdometry> keyframe_odometry;
   Topic<Keyframe> keyframes;
+  Topic<LocatedFrame> located_frames;
+  Topic<DenseFrame> dense_frames;
+  Topic<DenseSensingProgress> dense_sensing_progress;
+  Topic<MapMesh> maps;
+  Topic<OptimizedMesh> optimized_meshes;
+  Topic<MappingProgress> mapping_progress;
   Topic<RelativePose> measured_closures;
   Topic<KeyframeBow> own_bows, peer_bows;
   Topic<PlaceQuery> place_queries;
@@ -57,9 +69,10 @@ using RobotInput = std::variant<std::unique_ptr<DatasetReader>, RecordedGraph>;
 /// All nodes of one robot and how they are joined: the system on one page (wiring.cpp).
 class Robot {
  public:
-  /// Builds and joins everything; nothing runs yet. Throws ConfigError and DdsError.
+  /// Builds and joins everything; nothing runs yet. Without `mapping` there is no map. Throws
+  /// ConfigError and DdsError.
   Robot(const RobotOptions& options, const RobotConfig& config, RobotInput input,
-        SignalWatch& signals);
+        const std::optional<MappingPlan>& mapping, SignalWatch& signals);
 
   /// Runs until the robot may leave its team, a node fails, or a signal.
   [[nodiscard]] RunResult run(const Supervisor::Finished& finished) {
@@ -74,17 +87,23 @@ class Robot {
   [[nodiscard]] DdsBridge& bridge() { return *bridge_; }
   [[nodiscard]] const RobotStatusNode& status_node() const { return *status_; }
   [[nodiscard]] const SensorsNode* sensors() const { return sensors_; }  ///< Null without sensors.
+  /// Null without mapping.
+  [[nodiscard]] MeshFilesNode* mesh_files() { return mesh_files_; }
   /// True if another living robot has claimed this robot's id.
   [[nodiscard]] bool id_taken() const { return id_taken_; }
   [[nodiscard]] const NetworkInterface& interface() const { return participant_.interface(); }
   void set_phase(RobotPhase phase) { phase_ = phase; }
-  /// Nothing is recorded from now on.
-  void freeze_record() { recorder_->freeze(); }
+  /// Nothing is recorded from now on, and the mesh is corrected by what is known now.
+  void freeze_record();
   [[nodiscard]] double dataset_time_s() const { return dataset_time_s_; }
   [[nodiscard]] const std::vector<const Node*>& nodes() const { return nodes_; }
 
  private:
-  void add_sensing(const RobotConfig& config, double rate, std::unique_ptr<DatasetReader> reader);
+  void add_sensing(const RobotConfig& config, double rate, std::unique_ptr<DatasetReader> reader,
+                   const std::optional<MappingPlan>& mapping);
+  void add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
+                   const MappingPlan& plan);
+  void add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder);
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_back_end(const RobotConfig& config);
   void add_network();
@@ -108,6 +127,8 @@ class Robot {
   std::vector<const Node*> nodes_;
   SensorsNode* sensors_ = nullptr;
   RecorderNode* recorder_ = nullptr;
+  MeshDeformationNode* mesh_deformation_ = nullptr;
+  MeshFilesNode* mesh_files_ = nullptr;
   RobotStatusNode* status_ = nullptr;
   DdsBridge* bridge_ = nullptr;
   Supervisor supervisor_;  // last member: stops the nodes before what they use

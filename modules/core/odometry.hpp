@@ -28,4 +28,12 @@ struct KeyframeOdometry {
   std::shared_ptr<const StereoFrame> frame;  ///< Null where there are no images (recorded graphs).
 };
 
+/// An image and where its camera was, relative to the keyframes: what is built from such images
+/// hangs on the keyframes and moves with them when the pose graph is optimised.
+struct LocatedFrame {
+  std::shared_ptr<const StereoFrame> frame;
+  KeyframeIndex keyframe = 0;         ///< The last one at or before it.
+  SE3 T_odom_body = SE3::Identity();  ///< T_odom_kf of that keyframe, then odometry's motion since.
+};
+
 }  // namespace km

@@ -119,9 +119,12 @@ void Vio::try_start(VioResult& result) {
       result.states = *states;
       running_ = true;
       hand_on_first(states->front(), held_.front().frame, result);
-      for (std::size_t k = 1; k < held_.size(); ++k)
+      locate(states->front(), held_.front().frame, result);
+      for (std::size_t k = 1; k < held_.size(); ++k) {
         if (smoother_.window().frames[k].keyframe && due((*states)[k], *held_[k].frame))
           hand_on((*states)[k], held_[k].frame, result);
+        locate((*states)[k], held_[k].frame, result);
+      }
       held_.clear();
       return;
     }
@@ -163,6 +166,7 @@ void Vio::advance(const Held& held, VioResult& result) {
   const bool last_chance = last_keyframe_ && smoother_.leaving(last_keyframe_->stamp);
   if (result.smoother->keyframe && (last_chance || due(result.smoother->state, *held.frame)))
     hand_on(result.smoother->state, held.frame, result);
+  locate(result.smoother->state, held.frame, result);
 }
 
 bool Vio::plausible(const SmootherUpdate& update) const {

@@ -42,6 +42,7 @@ struct VioResult {
   VioProblem problem = VioProblem::kNone;
   std::vector<OdometryState> states;        ///< In order of time; several at a start.
   std::vector<KeyframeOdometry> keyframes;  ///< New keyframes; several at a start.
+  std::vector<LocatedFrame> frames;         ///< One for each state.
   std::optional<StartStatus> start;         ///< Outcome, if a start was attempted.
   TrackerStatistics tracking;               ///< Of this image.
   std::optional<SmootherUpdate> smoother;   ///< Not before the start.
@@ -79,6 +80,7 @@ class Vio {
   void continue_from_last_pose(std::vector<OdometryState>& states) const;
   void hand_on_first(const OdometryState& state, const Frame& frame, VioResult& result);
   void hand_on(const OdometryState& state, const Frame& frame, VioResult& result);
+  void locate(const OdometryState& state, const Frame& frame, VioResult& result);
   [[nodiscard]] bool locates_points(const StereoFrame& frame) const;
   [[nodiscard]] bool due(const OdometryState& state, const StereoFrame& frame) const;
 
@@ -94,6 +96,7 @@ class Vio {
   bool running_ = false;
   std::optional<OdometryState> last_;              // Last state that was given out.
   std::optional<KeyframeOdometry> last_keyframe_;  // Without its images.
+  SE3 T_chain_odom_ = SE3::Identity();             // From live odometry to the chain of keyframes.
 };
 
 }  // namespace km

@@ -19,6 +19,13 @@ Matrix6 restart_covariance() {
 
 }  // namespace
 
+// Live odometry refines the recent keyframes after they were handed on; the chain does not.
+void Vio::locate(const OdometryState& state, const Frame& frame, VioResult& result) {
+  if (const WindowFrame* keyframe = smoother_.frame_at(last_keyframe_->stamp))
+    T_chain_odom_ = last_keyframe_->T_odom_kf * keyframe->state.T_odom_body.inverse();
+  result.frames.push_back({frame, last_keyframe_->id.index, T_chain_odom_ * state.T_odom_body});
+}
+
 bool Vio::locates_points(const StereoFrame& frame) const {
   return rig_.stereo.depth_source == DepthSource::kRightImage || frame.depth != nullptr;
 }

@@ -71,6 +71,7 @@ void VioNode::step(const SensorPacket& packet) {
   report(result, packet.frame ? packet.frame->stamp : 0);
   for (const OdometryState& state : result.states) topics_.odometry.publish(state);
   for (const KeyframeOdometry& keyframe : result.keyframes) topics_.keyframes.publish(keyframe);
+  for (const LocatedFrame& frame : result.frames) topics_.frames.publish(frame);
 }
 
 void VioNode::report(const VioResult& result, Stamp stamp) const {

@@ -15,6 +15,7 @@ struct VioTopics {
   Topic<SensorPacket>& packets;              ///< In, in order of time.
   const Topic<OdometryState>& odometry;      ///< Out: one per image, in order of time.
   const Topic<KeyframeOdometry>& keyframes;  ///< Out: indices without gaps.
+  const Topic<LocatedFrame>& frames;         ///< Out: one per image, after its keyframe.
 };
 
 /// Stereo-inertial odometry as a thread: one Vio. A full queue holds the sensors up.

@@ -23,7 +23,8 @@ TEST_CASE("config/robot.yaml shows every key with its default", "[robot]") {
   const std::string effective = std::string(1, '\n').append(load_robot_config({}).effective);
   for (const char* name :
        {"run", "sensors", "tracker", "vio", "keyframe_features", "place_recognition",
-        "loop_closure", "pcm", "pose_graph", "graph_playback"}) {
+        "loop_closure", "pcm", "pose_graph", "graph_playback", "mapping", "stereo_depth",
+        "segmentation", "semantic_mapping", "mesh_deformation"}) {
     CAPTURE(name);
     CHECK_FALSE(section(effective, name).empty());
     CHECK(section(shipped, name) == section(effective, name));

@@ -52,6 +52,7 @@ VioResult feed(Vio& vio, const Bench& bench, int first, int last) {
     const VioResult result = vio.process(bench.packet(k));
     all.states.insert(all.states.end(), result.states.begin(), result.states.end());
     all.keyframes.insert(all.keyframes.end(), result.keyframes.begin(), result.keyframes.end());
+    all.frames.insert(all.frames.end(), result.frames.begin(), result.frames.end());
     if (result.start) all.start = result.start;
     if (result.problem != VioProblem::kNone) all.problem = result.problem;
   }
@@ -88,6 +89,27 @@ TEST_CASE("Keyframes are numbered without gaps and chain by their relative poses
     CHECK(keyframe.frame->stamp == keyframe.stamp);
     CHECK(is_covariance(keyframe.covariance));
     CHECK((keyframe.covariance.trace() > 0.0) == (k > 0));
+  }
+}
+
+TEST_CASE("Every image is located by the last keyframe at or before it", "[vio]") {
+  const Bench bench;
+  Vio vio = bench.vio();
+  const VioResult result = feed(vio, bench, 0, 150);
+  REQUIRE(result.frames.size() == result.states.size());
+  REQUIRE(result.keyframes.size() >= 3);
+  std::size_t last = 0;
+  for (std::size_t k = 0; k < result.frames.size(); ++k) {
+    const LocatedFrame& frame = result.frames[k];
+    REQUIRE(frame.frame->stamp == result.states[k].stamp);
+    while (last + 1 < result.keyframes.size() &&
+           result.keyframes[last + 1].stamp <= frame.frame->stamp)
+      ++last;
+    const KeyframeOdometry& keyframe = result.keyframes[last];
+    CHECK(frame.keyframe == keyframe.id.index);
+    const SE3 T_kf_body = keyframe.T_odom_kf.inverse() * frame.T_odom_body;
+    const double moved_m = T_kf_body.translation().norm();
+    CHECK(moved_m < (frame.frame->stamp == keyframe.stamp ? 1e-9 : 1e-3));  // at rest
   }
 }
 

@@ -1,0 +1,55 @@
+#pragma once
+
+#include "modules/core/config.hpp"
+
+namespace km {
+
+/// What a robot makes of its images beside its trajectory.
+enum class MappingMode {
+  kOff,       ///< Nothing.
+  kMetric,    ///< A mesh.
+  kSemantic,  ///< A mesh with labels.
+};
+
+/// Where depth, or labels, of all pixels come from.
+enum class DenseSource {
+  kAuto,      ///< The recording's images where it has them, else computed.
+  kRecorded,  ///< The recording's images.
+  kComputed,  ///< Stereo matching; the network of `segmentation:`.
+};
+
+/// Parameters of a robot's map that are not those of a module. Field names are the YAML keys below
+/// `mapping:`.
+struct MappingConfig {
+  static constexpr const char* kSection = "mapping";
+
+  MappingMode mode = MappingMode::kOff;
+  DenseSource depth = DenseSource::kAuto;
+  DenseSource labels = DenseSource::kAuto;
+
+  /// Frames a second that go into the map, by their stamps. A mapper that is too slow for it leaves
+  /// frames out; at --rate max it holds the others up instead.
+  double rate_hz = 5.0;
+
+  /// Time between meshes: to be corrected, and written to files.
+  double mesh_interval_s = 3.0;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("mode", mode,
+                  {{"off", MappingMode::kOff},
+                   {"metric", MappingMode::kMetric},
+                   {"semantic", MappingMode::kSemantic}});
+    visitor.field("depth", depth,
+                  {{"auto", DenseSource::kAuto},
+                   {"recorded", DenseSource::kRecorded},
+                   {"stereo", DenseSource::kComputed}});
+    visitor.field("labels", labels,
+                  {{"auto", DenseSource::kAuto},
+                   {"recorded", DenseSource::kRecorded},
+                   {"network", DenseSource::kComputed}});
+    visitor.field("rate_hz", rate_hz, {0.01, 100.0}, "[1/s] frames that go into the map");
+    visitor.field("mesh_interval_s", mesh_interval_s, {0.1, 3600.0}, "[s] between meshes");
+  }
+};
+
+}  // namespace km

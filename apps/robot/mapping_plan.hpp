@@ -1,0 +1,28 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "apps/robot/mapping_config.hpp"
+#include "modules/core/label_palette.hpp"
+#include "modules/dense_sensing/dense_sensor.hpp"
+
+namespace km {
+
+/// How a robot comes by depth and labels for its map.
+struct MappingPlan {
+  DenseSensorConfig sensor;
+  LabelPalette palette;  ///< Empty without labels.
+
+  [[nodiscard]] bool reads_depth() const { return sensor.depth == DepthFrom::kImages; }
+  [[nodiscard]] bool reads_labels() const { return sensor.labels == LabelsFrom::kImages; }
+};
+
+/// What `config` asks for, with the sources that the recording `dataset` (empty: none) has; nullopt
+/// if mapping is off. Throws ConfigError if it cannot be had, with what can.
+[[nodiscard]] std::optional<MappingPlan> plan_mapping(const MappingConfig& config,
+                                                      const StereoDepthConfig& stereo,
+                                                      const SegmentationConfig& segmentation,
+                                                      const std::filesystem::path& dataset);
+
+}  // namespace km

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <variant>
+
+#include "modules/core/odometry.hpp"
+#include "modules/core/pose_graph.hpp"
+#include "modules/mesh/map_mesh.hpp"
+#include "modules/mesh_deformation/optimized_mesh.hpp"
+#include "runtime/node.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+
+/// Channels of the mesh writer; they must outlive it.
+struct MeshFilesTopics {
+  Topic<KeyframeOdometry>& keyframes;
+  Topic<Trajectory>& trajectory;  ///< Of this robot.
+  Topic<MapMesh>& maps;
+  Topic<OptimizedMesh>& optimized;
+};
+
+/// Keeps a robot's meshes on disk while it runs, each file whole at any time.
+///
+/// mesh.ply is the mapper's mesh, as odometry built it; as a whole it is moved to where the first
+/// keyframe belongs in the team's frame, so that it can be laid over others. mesh_optimized.ply is
+/// the mesh bent to the optimised keyframes, in the team's frame.
+class MeshFilesNode final : public Node {
+ public:
+  MeshFilesNode(std::filesystem::path folder, const MeshFilesTopics& topics);
+
+  std::string_view name() const override { return "mesh_files"; }
+  void start() override { worker_.start(); }
+  void stop() noexcept override { worker_.stop(); }
+  std::exception_ptr error() const override { return worker_.error(); }
+  DurationHistogram timing() const override { return worker_.timing(); }
+
+  /// Handles one input synchronously, as the thread does. Throws MeshFileError.
+  void step(const KeyframeOdometry& keyframe);
+  void step(const Trajectory& trajectory);
+  void step(const MapMesh& map);
+  void step(const OptimizedMesh& mesh);
+
+  /// Call after stop(): writes mesh.ply again, by the trajectory the robot ended with.
+  void finish(const std::optional<Trajectory>& trajectory);
+
+ private:
+  template <typename... T>
+  using AnyOf = std::variant<std::shared_ptr<const T>...>;
+  using Input = AnyOf<KeyframeOdometry, Trajectory, MapMesh, OptimizedMesh>;
+
+  template <typename T>
+  void take(Topic<T>& topic) {
+    topic.subscribe([this](const std::shared_ptr<const T>& message) { worker_.post(message); });
+  }
+  void write_map(const LabelledMesh& map) const;
+
+  const std::filesystem::path folder_;
+  std::optional<SE3> T_odom_first_;   // the first keyframe
+  std::optional<SE3> T_world_first_;  // likewise, optimised
+  std::shared_ptr<const MapMesh> map_;
+  Worker<Input> worker_;  // last member: stops first
+};
+
+}  // namespace km

@@ -1,0 +1,69 @@
+#include "modules/dense_sensing/dense_sensing_node.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "runtime/log.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kQueuedFrames = 4;  // so that of images without depth between, none displaces
+constexpr double kStampJitter_s = 2e-3;
+
+double interval_of(double rate_hz) {
+  if (!(rate_hz > 0.0) || !std::isfinite(rate_hz))
+    throw std::invalid_argument("DenseSensingNode: a rate of " + std::to_string(rate_hz) + " Hz");
+  return 1.0 / rate_hz;
+}
+
+}  // namespace
+
+DenseSensingNode::DenseSensingNode(DenseSensor sensor, LabelsFrom labels, double rate_hz,
+                                   Overflow overflow, const DenseSensingTopics& topics)
+    : sensor_(std::move(sensor)),
+      wants_labels_(labels != LabelsFrom::kNone),
+      interval_s_(interval_of(rate_hz)),
+      topics_(topics),
+      worker_(
+          kQueuedFrames, overflow, [this](const auto& located) { step(*located); },
+          "dense_sensing") {
+  topics_.located.subscribe([this](const auto& located) { worker_.post(located); });
+}
+
+void DenseSensingNode::stop() noexcept {
+  worker_.stop();
+  if (std::exchange(stopped_, true)) return;
+  const DenseSensingProgress& p = progress_;
+  log::info(name()) << p.frames << " frames with depth, " << p.without_labels << " without labels";
+  if (p.wrong_size + p.wrong_label_size + p.classes_outside > 0)
+    log::warn(name()) << "images of the wrong size in " << p.wrong_size << " frames, labels in "
+                      << p.wrong_label_size << "; " << p.classes_outside
+                      << " pixels of classes that segmentation.label_map lacks";
+}
+
+void DenseSensingNode::step(const LocatedFrame& located) {
+  const Stamp stamp = located.frame->stamp;
+  if (last_ && seconds_between(*last_, stamp) < interval_s_ - kStampJitter_s) return;
+  DenseImages images;
+  {
+    const auto scope = sensing_.measure();
+    images = sensor_.sense(*located.frame);
+  }
+  progress_.without_depth += images.problem == DenseProblem::kNoDepthImage ? 1 : 0;
+  progress_.wrong_size += images.problem == DenseProblem::kWrongSize ? 1 : 0;
+  progress_.wrong_label_size += images.wrong_label_size ? 1 : 0;
+  progress_.classes_outside += images.classes_outside;
+  if (images.problem == DenseProblem::kNone) {
+    last_ = stamp;
+    ++progress_.frames;
+    progress_.without_labels += wants_labels_ && images.labels == nullptr ? 1 : 0;
+    topics_.frames.publish({stamp, images.depth, images.labels,
+                            located.T_odom_body * sensor_.camera().T_body_cam, located.keyframe});
+  }
+  topics_.progress.publish(progress_);
+}
+
+}  // namespace km

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <exception>
+#include <optional>
+#include <string_view>
+
+#include "modules/core/dense_frame.hpp"
+#include "modules/core/odometry.hpp"
+#include "modules/dense_sensing/dense_sensing_progress.hpp"
+#include "modules/dense_sensing/dense_sensor.hpp"
+#include "runtime/node.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+
+/// Channels of the dense sensing node; they must outlive it.
+struct DenseSensingTopics {
+  Topic<LocatedFrame>& located;                 ///< In, in order of time.
+  const Topic<DenseFrame>& frames;              ///< Out.
+  const Topic<DenseSensingProgress>& progress;  ///< Out: with every frame that was due.
+};
+
+/// Makes depth and labels of the frames that are due, as a thread: one DenseSensor.
+class DenseSensingNode final : public Node {
+ public:
+  /// At most `rate_hz` frames a second are handed on, by their stamps. `overflow`: whether a full
+  /// queue holds odometry up or drops the oldest frame. Throws std::invalid_argument unless the
+  /// rate is positive.
+  DenseSensingNode(DenseSensor sensor, LabelsFrom labels, double rate_hz, Overflow overflow,
+                   const DenseSensingTopics& topics);
+  ~DenseSensingNode() override { stop(); }
+
+  std::string_view name() const override { return "dense_sensing"; }
+  void start() override { worker_.start(); }
+  /// Finishes queued frames and says in the log what was wrong with frames, if anything.
+  void stop() noexcept override;
+  std::exception_ptr error() const override { return worker_.error(); }
+  DurationHistogram timing() const override { return sensing_.histogram(); }
+
+  /// Handles one frame synchronously. The thread calls only this; so can tests and replay.
+  void step(const LocatedFrame& located);
+
+ private:
+  DenseSensor sensor_;
+  const bool wants_labels_;
+  const double interval_s_;
+  const DenseSensingTopics topics_;
+  std::optional<Stamp> last_;
+  DenseSensingProgress progress_;
+  Timing sensing_;  // of the frames that were due
+  bool stopped_ = false;
+  Worker<Topic<LocatedFrame>::Message> worker_;  // last member: stops first
+};
+
+}  // namespace km

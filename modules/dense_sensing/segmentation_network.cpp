@@ -1,0 +1,179 @@
+#include "modules/dense_sensing/segmentation_network.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <opencv2/dnn.hpp>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <string>
+
+#include "modules/core/text_rows.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kClasses = 256;  // at most, as labels
+
+std::array<std::optional<LabelId>, kClasses> labels_of(const SegmentationConfig& config) {
+  std::array<std::optional<LabelId>, kClasses> labels;
+  if (config.label_map.size() > kClasses)
+    throw ConfigError("segmentation.label_map has " + std::to_string(config.label_map.size()) +
+                      " entries, more than labels exist\n");
+  for (std::size_t i = 0; i < config.label_map.size(); ++i) {
+    const auto value = parse_int64(config.label_map[i]);
+    if (!value || *value < 0 || *value > 255)
+      throw ConfigError("segmentation.label_map: '" + config.label_map[i] + "' of class " +
+                        std::to_string(i) + " is no label from 0 to 255\n");
+    labels[i] = static_cast<LabelId>(*value);
+  }
+  if (config.label_map.empty())
+    for (std::size_t i = 0; i < kClasses; ++i) labels[i] = static_cast<LabelId>(i);
+  return labels;
+}
+
+SegmentationConfig checked_network(SegmentationConfig config) {
+  config = checked(config);
+  if (config.channels == 2) throw ConfigError("segmentation.channels = 2 is neither 1 nor 3\n");
+  return config;
+}
+
+// OpenCV says where in its sources, then in brackets what; the last part is for people.
+std::string reason(const cv::Exception& error) {
+  std::string text = error.err.empty() ? error.what() : error.err;
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  return text;
+}
+
+cv::dnn::Net read_network(const std::string& file) {
+  if (!std::filesystem::is_regular_file(file))
+    throw ConfigError("segmentation.network: no such file: " + file + "\n");
+  try {
+    cv::dnn::Net net = cv::dnn::readNetFromONNX(file);
+    net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
+    net.setPreferableTarget(cv::dnn::DNN_TARGET_CPU);
+    return net;
+  } catch (const cv::Exception& error) {
+    throw ConfigError("segmentation.network: " + file +
+                      " cannot be read as ONNX: " + reason(error) + "\n");
+  }
+}
+
+std::string shape_text(const cv::Mat& blob) {
+  std::string text;
+  for (int i = 0; i < blob.dims; ++i) text += (i > 0 ? " x " : "") + std::to_string(blob.size[i]);
+  return text;
+}
+
+// A network's output as one plane of scores per class, or a single one of class numbers.
+struct Planes {
+  int count = 0, height = 0, width = 0;
+  const float* values = nullptr;
+};
+
+std::optional<Planes> planes_of(const cv::Mat& output) {
+  const bool has_channels = output.dims == 4;
+  if (output.depth() != CV_32F || !output.isContinuous() || (!has_channels && output.dims != 3) ||
+      output.size[0] != 1)
+    return std::nullopt;
+  Planes planes;
+  planes.count = has_channels ? output.size[1] : 1;
+  planes.height = output.size[output.dims - 2];
+  planes.width = output.size[output.dims - 1];
+  planes.values = output.ptr<float>();
+  const bool usable = planes.count >= 1 && planes.height >= 1 && planes.width >= 1;
+  return usable ? std::optional(planes) : std::nullopt;
+}
+
+// Class of every pixel of the output: the number there, or that of the plane with the best score.
+std::vector<float> classes_of(const Planes& planes) {
+  const auto size =
+      static_cast<std::size_t>(planes.height) * static_cast<std::size_t>(planes.width);
+  std::vector<float> best(planes.values, planes.values + size);
+  if (planes.count == 1) return best;
+  std::vector<float> classes(size, 0.0F);
+  for (int k = 1; k < planes.count; ++k) {
+    const float* scores = planes.values + static_cast<std::size_t>(k) * size;
+    for (std::size_t i = 0; i < size; ++i) {
+      if (!(scores[i] > best[i])) continue;
+      best[i] = scores[i];
+      classes[i] = static_cast<float>(k);
+    }
+  }
+  return classes;
+}
+
+}  // namespace
+
+struct SegmentationNetwork::State {
+  explicit State(const SegmentationConfig& settings)
+      : config(checked_network(settings)),
+        labels(labels_of(config)),
+        net(read_network(config.network)) {}
+
+  cv::Mat run(const GrayImage& image) {
+    const cv::Mat grey(image.height, image.width, CV_8UC1,
+                       const_cast<std::uint8_t*>(image.pixels.data()));
+    cv::Mat resized;
+    cv::resize(grey, resized, {config.width_px, config.height_px}, 0.0, 0.0,
+               grey.cols > config.width_px ? cv::INTER_AREA : cv::INTER_LINEAR);
+    cv::Mat input = resized;
+    if (config.channels == 3) cv::cvtColor(resized, input, cv::COLOR_GRAY2BGR);
+    net.setInput(cv::dnn::blobFromImage(input, config.scale, {}, cv::Scalar::all(config.mean)));
+    return net.forward();
+  }
+
+  [[nodiscard]] std::optional<LabelId> label_of(float value) const {
+    const auto index = static_cast<std::int64_t>(std::lround(value));
+    if (!(value >= 0.0F) || index >= static_cast<std::int64_t>(kClasses)) return std::nullopt;
+    return labels[static_cast<std::size_t>(index)];
+  }
+
+  SegmentationConfig config;
+  std::array<std::optional<LabelId>, kClasses> labels;  // by class
+  cv::dnn::Net net;
+};
+
+SegmentationNetwork::SegmentationNetwork(const SegmentationConfig& config)
+    : state_(std::make_unique<State>(config)) {
+  const auto& c = state_->config;
+  const auto size = static_cast<std::size_t>(c.width_px) * static_cast<std::size_t>(c.height_px);
+  const std::string place = "segmentation.network: " + c.network + ": ";
+  try {
+    const cv::Mat output = state_->run({c.width_px, c.height_px, std::vector<std::uint8_t>(size)});
+    if (!planes_of(output))
+      throw ConfigError(place + "its output is " + shape_text(output) +
+                        ", not 1 x classes x height x width\n");
+  } catch (const cv::Exception& error) {
+    throw ConfigError(place + "does not run on an image of " + std::to_string(c.width_px) + " x " +
+                      std::to_string(c.height_px) + " px with " + std::to_string(c.channels) +
+                      " channels: " + reason(error) + "\n");
+  }
+}
+
+SegmentationNetwork::~SegmentationNetwork() = default;
+SegmentationNetwork::SegmentationNetwork(SegmentationNetwork&&) noexcept = default;
+SegmentationNetwork& SegmentationNetwork::operator=(SegmentationNetwork&&) noexcept = default;
+
+Segmentation SegmentationNetwork::segment(const GrayImage& image) {
+  const cv::Mat output = state_->run(image);
+  const Planes planes = planes_of(output).value();
+  const std::vector<float> classes = classes_of(planes);
+  std::vector<std::optional<LabelId>> labels;
+  for (const float value : classes) labels.push_back(state_->label_of(value));
+  Segmentation result{{image.width, image.height, {}}, 0};
+  result.labels.ids.reserve(image.pixels.size());
+  for (int y = 0; y < image.height; ++y) {
+    const int row = (2 * y + 1) * planes.height / (2 * image.height);
+    for (int x = 0; x < image.width; ++x) {
+      const int column = (2 * x + 1) * planes.width / (2 * image.width);
+      const auto& label = labels[static_cast<std::size_t>(row * planes.width + column)];
+      result.labels.ids.push_back(label.value_or(0));
+      result.classes_outside += label ? 0 : 1;
+    }
+  }
+  return result;
+}
+
+}  // namespace km

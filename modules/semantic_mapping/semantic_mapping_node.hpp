@@ -1,0 +1,59 @@
+#pragma once
+
+#include <exception>
+#include <optional>
+#include <string_view>
+
+#include "modules/core/dense_frame.hpp"
+#include "modules/semantic_mapping/mapping_progress.hpp"
+#include "modules/semantic_mapping/semantic_mapper.hpp"
+#include "runtime/node.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+
+/// Channels of the mapping node; they must outlive it.
+struct SemanticMappingTopics {
+  Topic<DenseFrame>& frames;               ///< In, in order of time.
+  const Topic<MapMesh>& maps;              ///< Out: the whole map.
+  const Topic<MappingProgress>& progress;  ///< Out: with every frame.
+};
+
+/// Builds a robot's map as a thread: one SemanticMapper. The mesh is published every few seconds,
+/// and once more at the end.
+class SemanticMappingNode final : public Node {
+ public:
+  /// `camera` takes the frames. A mesh every `mesh_interval_s`, by stamps. `overflow`: whether a
+  /// full queue holds the frames up or drops the oldest. Throws as SemanticMapper does.
+  SemanticMappingNode(const SemanticMappingConfig& config, const PinholeCamera& camera,
+                      const LabelPalette& palette, double mesh_interval_s, Overflow overflow,
+                      const SemanticMappingTopics& topics);
+  ~SemanticMappingNode() override { stop(); }
+
+  std::string_view name() const override { return SemanticMappingConfig::kSection; }
+  void start() override { worker_.start(); }
+  /// Finishes queued frames and publishes the final mesh.
+  void stop() noexcept override;
+  std::exception_ptr error() const override { return worker_.error(); }
+  DurationHistogram timing() const override { return worker_.timing(); }
+
+  /// Handles one frame synchronously. The thread calls only this; so can tests and replay.
+  void step(const DenseFrame& frame);
+
+ private:
+  void count(const DenseFrame& frame, const IntegrationReport& report);
+  void publish_mesh();
+
+  SemanticMapper mapper_;
+  LabelPalette palette_;
+  const double mesh_interval_s_;
+  const SemanticMappingTopics topics_;
+  MappingProgress progress_;
+  std::optional<KeyframeIndex> meshed_;  // keyframe of the last update of the mesh
+  std::optional<Stamp> published_;       // frame of the last mesh published
+  bool stopped_ = false;
+  Worker<Topic<DenseFrame>::Message> worker_;  // last member: stops first
+};
+
+}  // namespace km

@@ -1,0 +1,74 @@
+#include <catch2/catch.hpp>
+
+#include "apps/robot/mesh_files_node.hpp"
+#include "modules/core/lie.hpp"
+#include "modules/mesh/ply_file.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+MapMesh triangle() {
+  MapMesh map;
+  map.mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  map.mesh.labels = {3, 3, 4};
+  map.mesh.faces = {{0, 1, 2}};
+  map.seen_by = {{0, 0}, {0, 0}, {0, 0}};
+  return map;
+}
+
+struct Bench {
+  TemporaryFolder folder;
+  Topic<KeyframeOdometry> keyframes;
+  Topic<Trajectory> trajectory;
+  Topic<MapMesh> maps;
+  Topic<OptimizedMesh> optimized;
+  MeshFilesNode node{folder.path(), {keyframes, trajectory, maps, optimized}};
+
+  [[nodiscard]] LabelledMesh written(const char* file) const {
+    return read_ply(folder.path() / file);
+  }
+};
+
+TEST_CASE("A mesh is written in the odometry frame until the team's is known", "[robot][mapping]") {
+  Bench bench;
+  bench.node.step(triangle());
+  CHECK(bench.written("mesh.ply").vertices == triangle().mesh.vertices);
+  CHECK(bench.written("mesh.ply").labels == triangle().mesh.labels);
+  CHECK_FALSE(std::filesystem::exists(bench.folder.path() / "mesh_optimized.ply"));
+}
+
+TEST_CASE("A mesh goes to where its first keyframe belongs", "[robot][mapping]") {
+  Bench bench;
+  bench.node.start();
+  const SE3 T_odom_first = make_pose(so3_exp(Eigen::Vector3d(0.0, 0.0, 0.3)), {1.0, 2.0, 0.5});
+  const SE3 T_world_first = make_pose(so3_exp(Eigen::Vector3d(0.1, 0.0, -1.0)), {-4.0, 0.0, 1.0});
+  bench.keyframes.publish({.id = {2, 0}, .T_odom_kf = T_odom_first, .frame = nullptr});
+  bench.keyframes.publish({.id = {2, 1}, .T_odom_kf = SE3::Identity(), .frame = nullptr});
+  bench.trajectory.publish({2, 2, {SE3::Identity()}});  // not yet joined to the team
+  bench.maps.publish(triangle());
+  bench.optimized.publish({.mesh = triangle().mesh, .report = {}});
+  bench.node.stop();
+  REQUIRE(bench.node.error() == nullptr);
+  bench.node.finish(Trajectory{2, 0, {T_world_first, SE3::Identity()}});
+  const LabelledMesh mesh = bench.written("mesh.ply");
+  const SE3 T_world_odom = T_world_first * T_odom_first.inverse();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Eigen::Vector3d p = T_world_odom * triangle().mesh.vertices[i].cast<double>();
+    CHECK((mesh.vertices[i].cast<double>() - p).norm() < 1e-5);  // stored as floats
+  }
+  CHECK(bench.written("mesh_optimized.ply").vertices == triangle().mesh.vertices);
+}
+
+TEST_CASE("A mesh that cannot be written ends the node", "[robot][mapping]") {
+  Bench bench;
+  std::filesystem::create_directory(bench.folder.path() / "mesh.ply");
+  bench.node.start();
+  bench.maps.publish(triangle());
+  bench.node.stop();
+  REQUIRE(bench.node.error() != nullptr);
+  CHECK_THROWS_WITH(std::rethrow_exception(bench.node.error()), Catch::Contains("mesh.ply"));
+}
+
+}  // namespace
+}  // namespace km

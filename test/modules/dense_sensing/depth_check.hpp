@@ -1,0 +1,90 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+#include <vector>
+
+#include "modules/dense_sensing/stereo_depth.hpp"
+
+namespace km {
+
+/// A corner seen by both cameras, triangulated: its place in the left camera.
+struct TriangulatedCorner {
+  Eigen::Vector3d p_left = Eigen::Vector3d::Zero();
+};
+
+/// Corners of a raw stereo pair, found in the other image by optical flow and back, and
+/// triangulated as the nearest point of both rays (OpenCV's functions alone: nothing of what is
+/// tested). Kept are those whose rays pass within `max_gap` [bearing] and whose depth is within [1,
+/// 10] m.
+inline std::vector<TriangulatedCorner> triangulated_corners(const StereoFrame& frame,
+                                                            const StereoRig& rig,
+                                                            double max_gap = 0.0015) {
+  const auto as_mat = [](const GrayImage& image) {
+    return cv::Mat(image.height, image.width, CV_8UC1,
+                   const_cast<std::uint8_t*>(image.pixels.data()));
+  };
+  const cv::Mat left = as_mat(frame.left), right = as_mat(frame.right);
+  std::vector<cv::Point2f> corners, found, back;
+  cv::goodFeaturesToTrack(left, corners, 400, 0.01, 12.0);
+  std::vector<std::uint8_t> ok, ok_back;
+  std::vector<float> error;
+  if (corners.empty()) return {};
+  cv::calcOpticalFlowPyrLK(left, right, corners, found, ok, error, {21, 21}, 4);
+  cv::calcOpticalFlowPyrLK(right, left, found, back, ok_back, error, {21, 21}, 4);
+  const SE3 T_left_right = rig.T_left_right();
+  std::vector<TriangulatedCorner> result;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    if (ok[i] == 0 || ok_back[i] == 0 || cv::norm(back[i] - corners[i]) > 0.3) continue;
+    const auto a = rig.cameras[0].unproject({corners[i].x, corners[i].y});
+    const auto b = rig.cameras[1].unproject({found[i].x, found[i].y});
+    if (!a || !b) continue;
+    const Eigen::Vector3d ray_a = a->homogeneous();
+    const Eigen::Vector3d ray_b = T_left_right.linear() * b->homogeneous();
+    Eigen::Matrix<double, 3, 2> A;
+    A << ray_a, -ray_b;
+    const Eigen::Vector2d s =
+        (A.transpose() * A).ldlt().solve(A.transpose() * T_left_right.translation());
+    const double gap = (A * s - T_left_right.translation()).norm();
+    if (s[0] < 1.0 || s[0] > 10.0 || gap / s[0] > max_gap) continue;
+    result.push_back({s[0] * ray_a});
+  }
+  return result;
+}
+
+/// Differences of dense depth to the corners', where it has a depth: in disparity [px], and in
+/// depth over depth.
+struct DepthDifferences {
+  std::vector<double> px, relative;
+  std::size_t corners = 0;
+};
+
+inline void add_differences(const DepthImage& depth, const StereoDepth& stereo,
+                            const StereoRig& rig, const std::vector<TriangulatedCorner>& corners,
+                            DepthDifferences& differences) {
+  const PinholeCamera& camera = stereo.camera();
+  const SE3 T_cam_left = camera.T_body_cam.inverse() * rig.cameras[0].T_body_cam;
+  const double focal_baseline = camera.fx * stereo.rectification().baseline_m();
+  for (const TriangulatedCorner& corner : corners) {
+    const Eigen::Vector3d p = T_cam_left * corner.p_left;
+    const Eigen::Vector2d px = camera.project(p.hnormalized());
+    const long x = std::lround(px.x()), y = std::lround(px.y());
+    if (x < stereo.disparities() || y < 0 || x >= depth.width || y >= depth.height) continue;
+    ++differences.corners;
+    const double z_m = 1e-3 * depth.millimetres[static_cast<std::size_t>(y * depth.width + x)];
+    if (z_m == 0.0) continue;
+    differences.px.push_back(std::abs(focal_baseline / z_m - focal_baseline / p.z()));
+    differences.relative.push_back(std::abs(z_m - p.z()) / p.z());
+  }
+}
+
+inline double median_of(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::infinity();
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace km

@@ -1,0 +1,101 @@
+#include <catch2/catch.hpp>
+
+#include <memory>
+#include <vector>
+
+#include "modules/dense_sensing/dense_sensing_node.hpp"
+#include "test/modules/vio/textured_plane.hpp"
+
+namespace km {
+namespace {
+
+constexpr Stamp kPeriod = 50'000'000;  // 20 Hz
+
+// An RGB-D camera half a metre above the body, and a node that keeps 5 frames a second.
+struct Bench {
+  StereoRig rig;
+  StereoFrame seen;
+  Topic<LocatedFrame> located;
+  Topic<DenseFrame> frames;
+  Topic<DenseSensingProgress> progress;
+  std::vector<DenseFrame> published;
+  DenseSensingProgress last;
+  std::unique_ptr<DenseSensingNode> node;
+
+  explicit Bench(Overflow overflow = Overflow::kBlock) {
+    PinholeCamera camera = test_rig().cameras[0];
+    camera.T_body_cam.translation().z() = 0.5;
+    rig = rgbd_rig(camera, 0.1);
+    seen = TexturedPlane{}.render_rgbd(rig, SE3::Identity(), 0);
+    frames.subscribe([this](const auto& message) { published.push_back(*message); });
+    progress.subscribe([this](const auto& message) { last = *message; });
+    node = std::make_unique<DenseSensingNode>(DenseSensor(rig, {.labels = LabelsFrom::kImages}),
+                                              LabelsFrom::kImages, 5.0, overflow,
+                                              DenseSensingTopics{located, frames, progress});
+  }
+
+  LocatedFrame frame(int i, bool with_depth) const {
+    auto copy = std::make_shared<StereoFrame>(seen);
+    copy->stamp = i * kPeriod;
+    if (!with_depth) copy->depth = nullptr;
+    LocatedFrame result{copy, static_cast<KeyframeIndex>(i / 10), SE3::Identity()};
+    result.T_odom_body.translation().x() = i;
+    return result;
+  }
+};
+
+TEST_CASE("Frames are handed on at the rate, with the camera's pose", "[dense_sensing_node]") {
+  Bench bench;
+  for (int i = 0; i < 41; ++i) bench.node->step(bench.frame(i, true));
+  REQUIRE(bench.published.size() == 11);  // 2 s, both ends
+  for (std::size_t k = 0; k < bench.published.size(); ++k) {
+    const DenseFrame& frame = bench.published[k];
+    const int i = 4 * static_cast<int>(k);
+    CHECK(frame.stamp == i * kPeriod);
+    CHECK(frame.keyframe == static_cast<KeyframeIndex>(i / 10));
+    CHECK(frame.T_odom_cam.translation() == Eigen::Vector3d(i, 0.0, 0.5));
+    CHECK(frame.depth == bench.seen.depth);
+  }
+  CHECK(bench.last.frames == 11);
+  CHECK(bench.last.without_labels == 11);
+}
+
+TEST_CASE("A due frame without depth is made up for by the next one", "[dense_sensing_node]") {
+  Bench bench;
+  for (int i = 0; i < 40; ++i) bench.node->step(bench.frame(i, i % 3 == 1));
+  REQUIRE(bench.published.size() >= 7);  // every 0.3 s
+  CHECK(bench.published.front().stamp == kPeriod);
+  CHECK(bench.last.without_depth > 0);
+  CHECK(bench.last.frames == bench.published.size());
+}
+
+TEST_CASE("The thread handles what was queued before it stops", "[dense_sensing_node]") {
+  Bench bench;
+  bench.node->start();
+  for (int i = 0; i < 20; ++i) bench.located.publish(bench.frame(i, true));
+  bench.node->stop();
+  CHECK(bench.published.size() == 5);
+  CHECK(bench.node->error() == nullptr);
+  CHECK(bench.node->timing().count() == 5);
+}
+
+TEST_CASE("A sensor that is too slow gives up the oldest frames", "[dense_sensing_node]") {
+  Bench bench(Overflow::kDropOldest);
+  for (int i = 0; i < 400; ++i) bench.located.publish(bench.frame(i, true));  // nobody waits
+  bench.node->start();
+  bench.node->stop();
+  REQUIRE(bench.published.size() == 1);  // the four newest lie within one interval
+  CHECK(bench.published[0].stamp == 396 * kPeriod);
+}
+
+TEST_CASE("A rate that is none is refused", "[dense_sensing_node]") {
+  const Bench bench;
+  Topic<LocatedFrame> located;
+  const double rate_hz = GENERATE(0.0, -5.0, std::numeric_limits<double>::infinity());
+  CHECK_THROWS_AS(DenseSensingNode(DenseSensor(bench.rig, {}), LabelsFrom::kNone, rate_hz,
+                                   Overflow::kBlock, {located, bench.frames, bench.progress}),
+                  std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace km

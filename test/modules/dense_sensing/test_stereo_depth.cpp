@@ -1,0 +1,140 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "modules/core/lie.hpp"
+#include "modules/dense_sensing/stereo_depth.hpp"
+#include "test/modules/vio/textured_plane.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kMaxMedian_px = 0.12;  // of disparity: the matcher's steps are a sixteenth
+constexpr double kMinShare = 0.85;      // of the pixels that can have depth
+
+struct DepthError {
+  double median_px = 0.0;  // in disparity
+  double share = 0.0;      // of pixels with depth, right of those that cannot be matched
+};
+
+// Against the true distance of `plane` along the axis of the depth camera.
+DepthError compare(const DepthImage& depth, const StereoDepth& stereo, const TexturedPlane& plane,
+                   const SE3& T_world_body) {
+  const PinholeCamera& camera = stereo.camera();
+  const SE3 T_world_cam = T_world_body * camera.T_body_cam;
+  const double focal_baseline = camera.fx * stereo.rectification().baseline_m();
+  std::vector<double> errors_px;
+  int possible = 0;
+  for (int y = 0; y < depth.height; ++y)
+    for (int x = stereo.disparities(); x < depth.width; ++x) {
+      const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(depth.width) +
+                         static_cast<std::size_t>(x);
+      ++possible;
+      if (depth.millimetres[pixel] == 0) continue;
+      const auto bearing = camera.unproject(Eigen::Vector2d(x, y));
+      const double z_m = (T_world_cam.inverse() * plane.meet(T_world_cam, *bearing)).z();
+      errors_px.push_back(
+          std::abs(focal_baseline / (1e-3 * depth.millimetres[pixel]) - focal_baseline / z_m));
+    }
+  DepthError error{1e9, static_cast<double>(errors_px.size()) / possible};
+  if (errors_px.empty()) return error;
+  const auto middle = errors_px.begin() + static_cast<std::ptrdiff_t>(errors_px.size() / 2);
+  std::nth_element(errors_px.begin(), middle, errors_px.end());
+  error.median_px = *middle;
+  return error;
+}
+
+DepthError error_on(const StereoRig& rig, const StereoDepthConfig& config,
+                    const TexturedPlane& plane, const SE3& T_world_body) {
+  StereoDepth stereo(rig, config);
+  const StereoFrame frame = plane.render(rig, T_world_body, 0);
+  return compare(stereo.compute(frame.left, frame.right), stereo, plane, T_world_body);
+}
+
+TEST_CASE("Planes at any distance and slant come out where they are", "[stereo_depth]") {
+  const double depth_m = GENERATE(1.0, 2.0, 4.0);
+  const double slant_rad = GENERATE(0.0, 0.5);
+  const auto effort = GENERATE(StereoEffort::kFast, StereoEffort::kThorough);
+  CAPTURE(depth_m, slant_rad, static_cast<int>(effort));
+  StereoDepthConfig config;
+  config.effort = effort;
+  TexturedPlane plane;
+  plane.depth_m = depth_m;
+  plane.cell_m = 0.03 * depth_m;
+  const SE3 T_world_body =
+      make_pose(so3_exp(slant_rad * Eigen::Vector3d(0.6, 0.8, 0.0)), Eigen::Vector3d::Zero());
+  const DepthError error = error_on(test_rig(), config, plane, T_world_body);
+  CHECK(error.median_px < kMaxMedian_px);
+  CHECK(error.share > kMinShare);
+}
+
+TEST_CASE("Cameras that are turned and unlike each other are rectified", "[stereo_depth]") {
+  StereoRig rig = test_rig();
+  rig.cameras[1].T_body_cam =
+      make_pose(so3_exp(Eigen::Vector3d(0.02, -0.03, 0.025)), {0.11, 0.004, -0.003});
+  rig.cameras[1].cx += 9.0;
+  rig.cameras[1].cy -= 6.0;
+  rig.cameras[1].fx *= 1.03;
+  rig.cameras[1].distortion = {-0.25, 0.05, -3e-4, 2e-4};
+  const DepthError error = error_on(rig, {}, TexturedPlane{}, SE3::Identity());
+  CHECK(error.median_px < kMaxMedian_px);
+  CHECK(error.share > kMinShare);
+}
+
+TEST_CASE("Half the resolution is as good in its own pixels", "[stereo_depth]") {
+  StereoDepthConfig config;
+  config.downscale = 2;
+  TexturedPlane plane;
+  plane.depth_m = 1.0;
+  plane.cell_m = 0.06;
+  const DepthError error = error_on(test_rig(), config, plane, SE3::Identity());
+  CHECK(error.median_px < kMaxMedian_px);
+  CHECK(error.share > kMinShare);
+}
+
+TEST_CASE("What lies out of range has no depth", "[stereo_depth]") {
+  StereoDepthConfig config;
+  config.max_depth_m = 1.5;
+  CHECK(error_on(test_rig(), config, TexturedPlane{}, SE3::Identity()).share < 0.01);
+}
+
+TEST_CASE("Images that do not belong together give little depth", "[stereo_depth]") {
+  const StereoRig rig = test_rig();
+  TexturedPlane other;
+  other.seed = 77;
+  StereoDepth stereo(rig, {});
+  const DepthImage depth = stereo.compute(TexturedPlane{}.render(rig.cameras[0], SE3::Identity()),
+                                          other.render(rig.cameras[1], SE3::Identity()));
+  const auto none = std::count(depth.millimetres.begin(), depth.millimetres.end(), 0);
+  CHECK(static_cast<double>(none) > 0.6 * static_cast<double>(depth.millimetres.size()));
+}
+
+TEST_CASE("Rigs and depths that leave nothing to match are refused", "[stereo_depth]") {
+  const StereoRig rig = test_rig();
+  CHECK_THROWS_AS(StereoDepth(rgbd_rig(rig.cameras[0], 0.1), {}), std::invalid_argument);
+  StereoRig swapped = rig;
+  std::swap(swapped.cameras[0].T_body_cam, swapped.cameras[1].T_body_cam);
+  CHECK_THROWS_WITH(StereoDepth(swapped, {}), Catch::Contains("stand to its right"));
+  StereoRig crossed = rig;
+  crossed.cameras[1].T_body_cam.linear() = so3_exp(Eigen::Vector3d(0.0, 1.0, 0.0));
+  CHECK_THROWS_WITH(StereoDepth(crossed, {}), Catch::Contains("look the way"));
+  StereoDepthConfig config;
+  config.min_depth_m = 20.0;
+  CHECK_THROWS_AS(StereoDepth(rig, config), ConfigError);
+  config = {};
+  config.min_depth_m = 5.0;
+  config.max_depth_m = 4.0;
+  CHECK_THROWS_WITH(StereoDepth(rig, config), Catch::Contains("not below max_depth_m"));
+  config = {};
+  config.block_px = 4;
+  CHECK_THROWS_WITH(StereoDepth(rig, config), Catch::Contains("not odd"));
+  config = {};
+  config.min_depth_m = 0.1;  // 253 px: fits
+  CHECK_NOTHROW(StereoDepth(rig, config));
+  CHECK_THROWS_WITH(StereoDepth(test_rig(0.2), config), Catch::Contains("as wide as the image"));
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,104 @@
+#include <catch2/catch.hpp>
+
+#include <memory>
+#include <vector>
+
+#include "modules/semantic_mapping/semantic_mapping_node.hpp"
+#include "test/modules/semantic_mapping/wall_scene.hpp"
+
+namespace km {
+namespace {
+
+constexpr Stamp kPeriod = 200'000'000;  // 5 Hz
+
+struct Bench {
+  Topic<DenseFrame> frames;
+  Topic<MapMesh> maps;
+  Topic<MappingProgress> progress;
+  std::vector<std::shared_ptr<const MapMesh>> meshes;
+  MappingProgress last;
+  std::unique_ptr<SemanticMappingNode> node;
+
+  explicit Bench(Overflow overflow = Overflow::kBlock) {
+    maps.subscribe([this](const auto& message) { meshes.push_back(message); });
+    progress.subscribe([this](const auto& message) { last = *message; });
+    node = std::make_unique<SemanticMappingNode>(settings(), small_camera(), two_classes(), 3.0,
+                                                 overflow,
+                                                 SemanticMappingTopics{frames, maps, progress});
+  }
+};
+
+DenseFrame frame(int i) {
+  static const DepthAndLabels images = wall(2.03, true);
+  static const auto depth = std::make_shared<const DepthImage>(images.depth);
+  static const auto labels = std::make_shared<const LabelImage>(images.labels);
+  return {i * kPeriod, depth, labels, at(0), static_cast<KeyframeIndex>(i / 2)};
+}
+
+TEST_CASE("A mesh comes every few seconds and at the end, coloured by its labels",
+          "[semantic_mapping_node]") {
+  Bench bench;
+  for (int i = 0; i < 35; ++i) bench.node->step(frame(i));
+  CHECK(bench.meshes.size() == 2);  // at 3 s and 6 s
+  bench.node->stop();
+  bench.node->stop();
+  REQUIRE(bench.meshes.size() == 3);
+  const MapMesh& map = *bench.meshes.back();
+  REQUIRE(map.mesh.vertices.size() > 100);
+  CHECK(map.mesh.faces.size() == bench.last.size.faces);
+  CHECK(std::count(map.mesh.labels.begin(), map.mesh.labels.end(), LabelId{2}) > 50);  // the ball
+  const LabelPalette palette = two_classes();
+  CHECK(map.seen_by.size() == map.mesh.vertices.size());
+  REQUIRE(map.mesh.colors.size() == map.mesh.vertices.size());
+  for (std::size_t i = 0; i < map.mesh.vertices.size(); ++i) {
+    const LabelClass* label = palette.find(map.mesh.labels[i]);
+    CHECK(map.mesh.colors[i] == (label != nullptr ? label->color : LabelledMesh::Color{}));
+  }
+  CHECK(bench.last.integrated == 35);
+  CHECK(bench.last.unlabelled == 0);
+}
+
+TEST_CASE("Frames that cannot be used are counted, by reason", "[semantic_mapping_node]") {
+  Bench bench;
+  DenseFrame unlabelled = frame(0);
+  unlabelled.labels = nullptr;
+  bench.node->step(unlabelled);
+  DenseFrame small = frame(1);
+  small.depth = std::make_shared<const DepthImage>(DepthImage{2, 2, {1, 1, 1, 1}});
+  bench.node->step(small);
+  DenseFrame lost = frame(2);
+  lost.T_odom_cam.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  bench.node->step(lost);
+  DenseFrame strange = frame(3);
+  strange.labels = std::make_shared<const LabelImage>(
+      LabelImage{160, 120, std::vector<std::uint8_t>(160 * 120, 99)});
+  bench.node->step(strange);
+  CHECK(bench.last.integrated == 2);
+  CHECK(bench.last.unlabelled == 1);
+  CHECK(bench.last.wrong_size == 1);
+  CHECK(bench.last.bad_pose == 1);
+  CHECK(bench.last.labels_outside == 160 * 120);
+}
+
+TEST_CASE("A mapper that is too slow gives up the oldest frames and counts them",
+          "[semantic_mapping_node]") {
+  Bench bench(Overflow::kDropOldest);
+  for (int i = 0; i < 10; ++i) bench.frames.publish(frame(i));  // nobody waits
+  bench.node->start();
+  bench.node->stop();
+  CHECK(bench.last.integrated + bench.last.too_late == 10);
+  CHECK(bench.last.too_late == 8);
+  CHECK(bench.meshes.size() == 1);
+  CHECK(bench.meshes.back()->seen_by.front()[0] == 4);  // frames 8 and 9
+}
+
+TEST_CASE("Nothing seen, no mesh", "[semantic_mapping_node]") {
+  Bench bench;
+  bench.node->start();
+  bench.node->stop();
+  CHECK(bench.meshes.empty());
+  CHECK(bench.node->error() == nullptr);
+}
+
+}  // namespace
+}  // namespace km
