@@ -16,7 +16,6 @@ constexpr float kSampleBudget = 700'000.0F;
 constexpr float kFinestIndoors_m = 0.06F;
 constexpr float kFinestOutdoors_m = 0.3F;
 constexpr float kLargestAmbient = 2.0F;  // irradiance that 8 bits can hold
-constexpr float kLift = 0.5F;            // light is looked up this far before the surface [cells]
 
 Eigen::Vector3f corner(const SurfaceMesh& mesh, std::size_t triangle, std::size_t i) {
   return mesh.vertices[mesh.triangles[triangle][i]];
@@ -63,7 +62,8 @@ LightVolume::LightVolume(const World& world, const RayTracer& tracer, const Surf
   if (lamps_ > kMaxLamps)
     throw std::invalid_argument("world " + world.name + ": " + std::to_string(lamps_) +
                                 " lamps, at most " + std::to_string(kMaxLamps) + " are supported");
-  sample_bytes_ = lamps_ <= 2 ? 8 : 16;
+  constexpr int kFewLamps = static_cast<int>(kFewLampsBytes) - kAxisDirections;
+  sample_bytes_ = lamps_ <= kFewLamps ? kFewLampsBytes : kManyLampsBytes;
   if (world.mesh.triangles.empty()) return;
   lay_out(world);
   const std::vector<std::uint8_t> wanted = mark(world.mesh, surfaces);
@@ -208,65 +208,6 @@ void LightVolume::fill_from_neighbours(std::vector<std::uint8_t>& known) {
     filled[sample] = 1;
   }
   known = std::move(filled);
-}
-
-LightVolume::Light LightVolume::at(const Eigen::Vector3f& point,
-                                   const Eigen::Vector3f& normal) const {
-  Light light;
-  const Eigen::Vector3f at = (point + kLift * cell_m_ * normal - origin_) * per_cell_;
-  const auto x = static_cast<int>(at.x());
-  const auto y = static_cast<int>(at.y());
-  const auto z = static_cast<int>(at.z());
-  const int bx = x / kBrick;
-  const int by = y / kBrick;
-  const int bz = z / kBrick;
-  std::int32_t brick = -1;
-  if (at.minCoeff() >= 0.0F && bx < bricks_.x() && by < bricks_.y() && bz < bricks_.z())
-    brick = brick_index_[static_cast<std::size_t>((bz * bricks_.y() + by) * bricks_.x() + bx)];
-  if (brick < 0) {
-    light.ambient = open_ambient_;
-    light.lamp_visibility.fill(1.0F);
-    return light;
-  }
-  const std::size_t first =
-      static_cast<std::size_t>(brick) * kBrickSamples +
-      static_cast<std::size_t>(((z - bz * kBrick) * kSide + (y - by * kBrick)) * kSide +
-                               (x - bx * kBrick));
-  interpolate(
-      samples_.data() + first * sample_bytes_,
-      at - Eigen::Vector3f(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)),
-      normal, light);
-  return light;
-}
-
-// Trilinear in the lattice. In direction: the squares of the normal's components weigh the three
-// axes it leans to (the ambient cube).
-void LightVolume::interpolate(const std::uint8_t* low, const Eigen::Vector3f& share,
-                              const Eigen::Vector3f& normal, Light& light) const {
-  const std::array<std::size_t, 3> axis = {normal.x() < 0.0F ? 1U : 0U, normal.y() < 0.0F ? 3U : 2U,
-                                           normal.z() < 0.0F ? 5U : 4U};
-  const Eigen::Vector3f direction = normal.cwiseProduct(normal);
-  std::array<float, 8> weights;
-  std::array<const std::uint8_t*, 8> bytes;
-  for (std::size_t i = 0; i < 8; ++i) {
-    weights[i] = ((i & 1U) != 0U ? share.x() : 1.0F - share.x()) *
-                 ((i & 2U) != 0U ? share.y() : 1.0F - share.y()) *
-                 ((i & 4U) != 0U ? share.z() : 1.0F - share.z());
-    bytes[i] =
-        low + ((i & 1U) + (i >> 1U & 1U) * kSide + (i >> 2U) * kSide * kSide) * sample_bytes_;
-  }
-  float ambient = 0.0F;
-  for (std::size_t i = 0; i < 8; ++i)
-    ambient += weights[i] * (direction.x() * static_cast<float>(bytes[i][axis[0]]) +
-                             direction.y() * static_cast<float>(bytes[i][axis[1]]) +
-                             direction.z() * static_cast<float>(bytes[i][axis[2]]));
-  light.ambient = ambient_scale_ * ambient;
-  for (std::size_t lamp = 0; lamp < static_cast<std::size_t>(lamps_); ++lamp) {
-    float visible = 0.0F;
-    for (std::size_t i = 0; i < 8; ++i)
-      visible += weights[i] * static_cast<float>(bytes[i][kAxisDirections + lamp]);
-    light.lamp_visibility[lamp] = visible / 255.0F;
-  }
 }
 
 }  // namespace km

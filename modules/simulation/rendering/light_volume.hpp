@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "modules/simulation/rendering/lanes.hpp"
 #include "modules/simulation/rendering/light_bake.hpp"
 #include "modules/simulation/rendering/ray_tracer.hpp"
 #include "modules/simulation/rendering/sky.hpp"
@@ -22,20 +23,21 @@ class LightVolume {
   static constexpr int kMaxLamps = 10;
 
   struct Light {
-    float ambient = 0.0F;                          ///< Irradiance.
-    std::array<float, kMaxLamps> lamp_visibility;  ///< 0 to 1; only those of the world are set.
+    Lanes ambient;                                 ///< Irradiance.
+    std::array<Lanes, kMaxLamps> lamp_visibility;  ///< 0 to 1; only those of the world are set.
   };
 
   /// Throws std::invalid_argument for more than kMaxLamps lamps.
   LightVolume(const World& world, const RayTracer& tracer, const SurfaceTable& surfaces,
               const Sky& sky);
 
-  /// Light at a point of a surface, `normal` towards the side that is lit; unit length.
-  [[nodiscard]] Light at(const Eigen::Vector3f& point, const Eigen::Vector3f& normal) const;
+  /// Light at points of surfaces, `normals` towards the sides that are lit; unit length.
+  void look_up(const Lanes3& points, const Lanes3& normals, Light& light) const;
 
   [[nodiscard]] float cell_m() const { return cell_m_; }
 
  private:
+  static constexpr float kLift = 0.5F;  // light is looked up this far before the surface [cells]
   // A brick holds kBrick^3 cells, so (kBrick + 1)^3 samples: the last ones are those of the next
   // brick again, and a lookup stays within one brick.
   static constexpr int kBrick = 8;
@@ -51,15 +53,26 @@ class LightVolume {
                                          std::size_t sample) const;
   void store(const LightBake::Sample& baked, std::size_t sample);
   void fill_from_neighbours(std::vector<std::uint8_t>& known);
-  void interpolate(const std::uint8_t* low, const Eigen::Vector3f& share,
-                   const Eigen::Vector3f& normal, Light& light) const;
+  /// Where lookups fall: the lowest corner of a cell, and how far they are beyond it.
+  struct Cells {
+    IntLanes brick;   ///< Place in brick_index_; -1: outside of it.
+    IntLanes corner;  ///< Sample within the brick.
+    Lanes3 share;
+  };
+  void find_cells(const Lanes3& points, const Lanes3& normals, Cells& cells) const;
+  template <std::size_t kWords>
+  void interpolate(const Cells& cells, const Lanes3& normals, Light& light) const;
 
   float cell_m_ = 0.5F;
   float per_cell_ = 2.0F;
   Eigen::Vector3f origin_ = Eigen::Vector3f::Zero();
   Eigen::Vector3i bricks_ = Eigen::Vector3i::Zero();  ///< Along each axis.
   std::vector<std::int32_t> brick_index_;             ///< -1: no surface near.
-  std::size_t sample_bytes_ = 8;  ///< Six directions, then the lamps, padded to eight.
+  /// A sample is six directions, then the lamps.
+  static constexpr std::size_t kFewLampsBytes = 8;
+  static constexpr std::size_t kManyLampsBytes = 16;
+  static_assert(kAxisDirections + kMaxLamps == kManyLampsBytes);
+  std::size_t sample_bytes_ = kFewLampsBytes;
   std::vector<std::uint8_t> samples_;
   int lamps_ = 0;
   float ambient_scale_ = 1.0F;  ///< Irradiance of one step of 8 bit.

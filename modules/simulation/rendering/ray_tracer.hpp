@@ -2,21 +2,13 @@
 
 #include <embree3/rtcore.h>
 
-#include <Eigen/Core>
-#include <array>
 #include <cstdint>
 #include <memory>
 
+#include "modules/simulation/rendering/lanes.hpp"
 #include "modules/simulation/world/surface_mesh.hpp"
 
 namespace km {
-
-/// Rays travel in packets of sixteen, side by side in memory.
-inline constexpr int kLanes = 16;
-using LaneMask = std::uint32_t;  ///< Bit i stands for lane i.
-inline constexpr LaneMask kAllLanes = 0xFFFFU;
-
-struct alignas(64) Lanes : std::array<float, kLanes> {};
 
 /// What rays have in common: neighbours that run side by side are traced faster together.
 enum class RayKind { kCoherent, kIncoherent };

@@ -94,6 +94,14 @@ Eigen::Vector3f direction_of(int column, int row) {
   return d;
 }
 
+// Between a texel and its neighbours to the right and below.
+template <typename Value>
+Value bilinear(const Value* texel, float x, float y) {
+  const Value low = texel[0] + x * (texel[1] - texel[0]);
+  const Value high = texel[kSize] + x * (texel[kSize + 1] - texel[kSize]);
+  return low + y * (high - low);
+}
+
 }  // namespace
 
 Sky::Sky(const Lighting& lighting) {
@@ -131,33 +139,45 @@ void Sky::measure_and_scale(float ambient) {
   }
 }
 
-Sky::Cell Sky::cell_of(const Eigen::Vector3f& direction) {
-  const float z = std::max(direction.z(), 0.0F);
-  const float horizontal2 = direction.x() * direction.x() + direction.y() * direction.y();
-  const float length = std::sqrt(horizontal2 + z * z);
+inline Sky::Cell Sky::cell_of(float dx, float dy, float dz) {
+  const float z = std::max(dz, 0.0F);
+  const float length = std::sqrt(dx * dx + dy * dy + z * z);
   const float scale = length > 0.0F ? 1.0F / (length + z) : 0.0F;
   constexpr float kHalf = 0.5F * (kSize - 1);
-  const float x = std::clamp(kHalf * (direction.x() * scale + 1.0F), 0.0F, kSize - 1.001F);
-  const float y = std::clamp(kHalf * (direction.y() * scale + 1.0F), 0.0F, kSize - 1.001F);
-  const auto column = static_cast<std::size_t>(x);
-  const auto row = static_cast<std::size_t>(y);
+  constexpr float kMost = kSize - 1.001F;
+  const float x = std::min(std::max(kHalf * (dx * scale + 1.0F), 0.0F), kMost);
+  const float y = std::min(std::max(kHalf * (dy * scale + 1.0F), 0.0F), kMost);
+  const auto column = static_cast<std::int32_t>(x);
+  const auto row = static_cast<std::int32_t>(y);
   return {row * kSize + column, x - static_cast<float>(column), y - static_cast<float>(row)};
 }
 
 float Sky::luminance(const Eigen::Vector3f& direction) const {
-  const Cell c = cell_of(direction);
-  const float* texel = luminance_.data() + c.index;
-  const float low = texel[0] + c.x * (texel[1] - texel[0]);
-  const float high = texel[kSize] + c.x * (texel[kSize + 1] - texel[kSize]);
-  return low + c.y * (high - low);
+  const Cell c = cell_of(direction.x(), direction.y(), direction.z());
+  return bilinear(luminance_.data() + c.index, c.x, c.y);
 }
 
 Eigen::Vector3f Sky::color(const Eigen::Vector3f& direction) const {
-  const Cell c = cell_of(direction);
-  const Eigen::Vector3f* texel = color_.data() + c.index;
-  const Eigen::Vector3f low = texel[0] + c.x * (texel[1] - texel[0]);
-  const Eigen::Vector3f high = texel[kSize] + c.x * (texel[kSize + 1] - texel[kSize]);
-  return low + c.y * (high - low);
+  const Cell c = cell_of(direction.x(), direction.y(), direction.z());
+  return bilinear(color_.data() + c.index, c.x, c.y);
+}
+
+Lanes Sky::luminance(const Lanes3& directions) const {
+  Lanes result;
+  run_wide([&] {
+    IntLanes index;
+    Lanes x;
+    Lanes y;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const Cell c = cell_of(directions.x[i], directions.y[i], directions.z[i]);
+      index[i] = c.index;
+      x[i] = c.x;
+      y[i] = c.y;
+    }
+    for (std::size_t i = 0; i < kLanes; ++i)
+      result[i] = bilinear(luminance_.data() + index[i], x[i], y[i]);
+  });
+  return result;
 }
 
 }  // namespace km

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <vector>
 
+#include "modules/simulation/rendering/lanes.hpp"
 #include "modules/simulation/world/world.hpp"
 
 namespace km {
@@ -17,6 +19,8 @@ class Sky {
   /// `direction` need not have unit length.
   [[nodiscard]] float luminance(const Eigen::Vector3f& direction) const;
   [[nodiscard]] Eigen::Vector3f color(const Eigen::Vector3f& direction) const;
+  /// Sixteen at once.
+  [[nodiscard]] Lanes luminance(const Lanes3& directions) const;
 
   /// Mean radiance at the horizon: what distance fades to.
   [[nodiscard]] float haze_luminance() const { return haze_luminance_; }
@@ -25,10 +29,10 @@ class Sky {
  private:
   /// Position in the table: the upper hemisphere in stereographic projection.
   struct Cell {
-    std::size_t index = 0;
+    std::int32_t index = 0;
     float x = 0.0F, y = 0.0F;
   };
-  [[nodiscard]] static Cell cell_of(const Eigen::Vector3f& direction);
+  [[nodiscard]] static Cell cell_of(float x, float y, float z);
   void measure_and_scale(float ambient);
 
   std::vector<float> luminance_;

@@ -1,141 +1,38 @@
 #include "modules/simulation/rendering/surface_shader.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
+
+#include "modules/simulation/rendering/texture_lanes.hpp"
 
 namespace km {
 namespace {
 
-Eigen::Vector3f direction_of(const RayPacket& rays, int lane) {
-  return {rays.ray.dir_x[lane], rays.ray.dir_y[lane], rays.ray.dir_z[lane]};
-}
-
-// Semi-axes of the ellipse that the unit circle of the pixel becomes in texture coordinates: J maps
-// a step in the image to one on the texture, and J J^T has them as its eigenvectors.
-struct Footprint {
-  float major_u = 0.0F, major_v = 0.0F, major_m = 0.0F, minor_m = 0.0F;
+// What a point's radiance is made of, as factors that hold for grey and for colour:
+// albedo * (sky + lamps) + mirrored_sky * sky(mirrored) + mirrored_rest + haze, and albedo * sun.
+struct Mixture {
+  Lanes sun, sky, lamps;
+  Lanes mirrored_sky, mirrored_rest;
+  Lanes haze;
+  Lanes3 mirrored;  // direction
+  bool any_mirror = false;
 };
 
-Footprint footprint_of(float u_x, float u_y, float v_x, float v_y) {
-  const float a = u_x * u_x + u_y * u_y;
-  const float b = u_x * v_x + u_y * v_y;
-  const float c = v_x * v_x + v_y * v_y;
-  const float half = 0.5F * (a - c);
-  const float largest = 0.5F * (a + c) + std::sqrt(half * half + b * b);
-  // Two forms of the eigenvector; the longer one is the safe one.
-  const float eu = half > 0.0F ? largest - c : b;
-  const float ev = half > 0.0F ? b : largest - a;
-  const float length = std::sqrt(eu * eu + ev * ev);
-  constexpr float kMost_m = 1e4F;  // at the horizon
-  Footprint result;
-  result.major_m = std::min(std::sqrt(largest), kMost_m);
-  result.minor_m = result.major_m > 0.0F
-                       ? std::min(std::abs(u_x * v_y - u_y * v_x) / result.major_m, result.major_m)
-                       : 0.0F;
-  const float scale = length > 0.0F ? result.major_m / length : 0.0F;
-  result.major_u = scale * eu;
-  result.major_v = scale * ev;
-  return result;
-}
-
-// A texture averaged over the footprint: a few round samples side by side along its longer axis.
-struct Taps {
-  Eigen::Vector2f first, step;  // [m]
-  int count = 1;
-  float width_m = 0.0F;
-};
-
-Taps taps_of(const SurfacePoints& points, std::size_t lane) {
-  constexpr float kMostTaps = 4.0F;
-  const float ratio = points.major_m[lane] / std::max(points.minor_m[lane], 1e-9F);
-  Taps taps;
-  taps.count = static_cast<int>(std::clamp(ratio + 0.5F, 1.0F, kMostTaps));
-  const auto n = static_cast<float>(taps.count);
-  taps.width_m = std::max(points.minor_m[lane], points.major_m[lane] / n);
-  taps.step = Eigen::Vector2f(points.major_u[lane], points.major_v[lane]) / n;
-  taps.first = Eigen::Vector2f(points.u[lane], points.v[lane]) - (0.5F * (n - 1.0F)) * taps.step;
-  return taps;
-}
-
-template <typename Value>
-struct Channels;
-
-template <>
-struct Channels<float> {
-  static float texel(const Texture& texture, const Eigen::Vector2f& uv, float width) {
-    return texture.luminance(uv, width);
-  }
-  static float product(float a, float b) { return a * b; }
-  static float zero() { return 0.0F; }
-  static float one() { return 1.0F; }
-  static float tint(const ShadingMaterial& material) { return material.tint_luminance; }
-  static float sky(const Sky& sky, const Eigen::Vector3f& d) { return sky.luminance(d); }
-  static float haze(const Sky& sky) { return sky.haze_luminance(); }
-  static float sunlight() { return 1.0F; }
-  static float skylight() { return 1.0F; }
-};
-
-template <>
-struct Channels<Eigen::Vector3f> {
-  static Eigen::Vector3f texel(const Texture& texture, const Eigen::Vector2f& uv, float width) {
-    return texture.color(uv, width);
-  }
-  static Eigen::Vector3f product(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
-    return a.cwiseProduct(b);
-  }
-  static Eigen::Vector3f zero() { return Eigen::Vector3f::Zero(); }
-  static Eigen::Vector3f one() { return Eigen::Vector3f::Ones(); }
-  static Eigen::Vector3f tint(const ShadingMaterial& material) { return material.tint; }
-  static Eigen::Vector3f sky(const Sky& sky, const Eigen::Vector3f& d) { return sky.color(d); }
-  static Eigen::Vector3f haze(const Sky& sky) { return sky.haze_color(); }
-  // A warm sun and a blue sky; both of luminance 1.
-  static Eigen::Vector3f sunlight() { return {1.06F, 0.995F, 0.87F}; }
-  static Eigen::Vector3f skylight() { return {0.93F, 1.0F, 1.2F}; }
-};
-
-template <typename Value>
-Value albedo(const ShadingMaterial& material, const Taps& taps) {
-  using C = Channels<Value>;
-  Value base = C::zero();
-  Value detail = C::zero();
-  // Where a sample covers a whole tile of the detail, nothing of it is left.
-  const float detail_width = taps.width_m * material.detail_per_m;
-  const bool detailed = detail_width < 1.0F;
-  Eigen::Vector2f uv = taps.first;
-  for (int i = 0; i < taps.count; ++i, uv += taps.step) {
-    base += C::texel(*material.base, uv * material.base_per_m, taps.width_m * material.base_per_m);
-    if (detailed) detail += C::texel(*material.detail, uv * material.detail_per_m, detail_width);
-  }
-  const auto n = static_cast<float>(taps.count);
-  const Value factor = detailed ? Value((2.0F / n) * detail) : C::one();
-  return C::product(C::tint(material), C::product((1.0F / n) * base, factor));
-}
-
-float lamp_light(const Lighting& lighting, const LightVolume::Light& light,
-                 const Eigen::Vector3f& point, const Eigen::Vector3f& normal) {
-  float sum = 0.0F;
-  for (std::size_t i = 0; i < lighting.lamps.size(); ++i) {
-    const Eigen::Vector3f to_lamp = lighting.lamps[i].position - point;
-    constexpr float kNearest_m2 = 0.1F;  // a lamp has a size
-    const float distance2 = std::max(to_lamp.squaredNorm(), kNearest_m2);
-    const float cosine = std::max(0.0F, normal.dot(to_lamp)) / std::sqrt(distance2);
-    sum += lighting.lamps[i].intensity * light.lamp_visibility[i] * cosine / distance2;
-  }
-  return sum;
-}
-
-// What a glossy surface mirrors: the sky, as far as the surroundings leave it open that way.
-template <typename Value>
-Value mirrored(const RenderScene& scene, const Eigen::Vector3f& point,
-               const Eigen::Vector3f& direction, const Eigen::Vector3f& normal) {
-  using C = Channels<Value>;
-  const Eigen::Vector3f d = direction - 2.0F * direction.dot(normal) * normal;
-  const float around = scene.light.at(point, d).ambient;
-  if (!(scene.lighting.sun > 0.0F)) return around * C::one();
-  const float open = std::min(1.0F, around / std::max(scene.lighting.ambient, 1e-6F));
-  const float up = std::clamp(10.0F * d.z() + 0.5F, 0.0F, 1.0F);
-  return (up * open) * C::sky(scene.sky, d) + ((1.0F - up) * around) * C::one();
+// exp(-x) for x >= 0, to 2e-7 of it. Of the library's, each processor has its own.
+float exp_negative(float x) {
+  constexpr float kLog2e = 1.44269504F;
+  constexpr float kLn2 = 0.693147181F;
+  constexpr float kHalfRoot = 0.707106781F;
+  constexpr float kSmallest = 100.0F;  // as a power of two
+  const float power = std::min(x * kLog2e, kSmallest);
+  const auto whole = static_cast<std::int32_t>(power);
+  const float z = (0.5F - (power - static_cast<float>(whole))) * kLn2;  // within 0.35 of zero
+  const float series =
+      1.0F +
+      z * (1.0F + z * (0.5F + z * (1.0F / 6 + z * (1.0F / 24 + z * (1.0F / 120 + z / 720)))));
+  return kHalfRoot * series * std::bit_cast<float>((127 - whole) << 23);
 }
 
 // Schlick's approximation, for a surface that mirrors `specular` seen head-on.
@@ -146,35 +43,191 @@ float mirrored_share(float specular, float cosine) {
          (1.0F - specular) * std::min(1.0F, 2.0F * specular) * grazing2 * grazing2 * grazing;
 }
 
-template <typename Value>
-Shade<Value> shade_surface(const RenderScene& scene, const SurfacePoints& points, std::size_t lane,
-                           const Eigen::Vector3f& view, float distance_m) {
-  using C = Channels<Value>;
-  const ShadingMaterial& material = *points.material[lane];
-  const Eigen::Vector3f& point = points.position[lane];
-  const Eigen::Vector3f& normal = points.normal[lane];
-  const Value surface = albedo<Value>(material, taps_of(points, lane));
-  const LightVolume::Light light = scene.light.at(point, normal);
-  const float sun_side = points.plane_normal[lane].dot(scene.lighting.to_sun);
-  const float cosine = normal.dot(scene.lighting.to_sun);
-  const float facing =
-      sun_side > 0.0F ? std::max(0.0F, cosine) : material.transmission * std::max(0.0F, -cosine);
-  Shade<Value> result;
-  result.sun = (scene.lighting.sun * facing) * C::product(surface, C::sunlight());
-  result.ambient = light.ambient * C::product(surface, C::skylight()) +
-                   (lamp_light(scene.lighting, light, point, normal) + material.glow) * surface;
-  if (material.specular > 0.0F) {
-    const float share = mirrored_share(material.specular, std::abs(view.dot(normal)));
-    result.ambient =
-        (1.0F - share) * result.ambient + share * mirrored<Value>(scene, point, view, normal);
-    result.sun *= 1.0F - share;
+float dot(const Lanes3& a, const Lanes3& b, std::size_t i) {
+  return a.x[i] * b.x[i] + a.y[i] * b.y[i] + a.z[i] * b.z[i];
+}
+
+float dot(const Lanes3& a, const Eigen::Vector3f& b, std::size_t i) {
+  return a.x[i] * b.x() + a.y[i] * b.y() + a.z[i] * b.z();
+}
+
+void add_lamps(const Lighting& lighting, const LightVolume::Light& light,
+               const SurfacePoints& points, Lanes& sum) {
+  for (std::size_t lamp = 0; lamp < lighting.lamps.size(); ++lamp) {
+    const Eigen::Vector3f at = lighting.lamps[lamp].position;
+    const float intensity = lighting.lamps[lamp].intensity;
+    const Lanes& visibility = light.lamp_visibility[lamp];
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const float x = at.x() - points.position.x[i];
+      const float y = at.y() - points.position.y[i];
+      const float z = at.z() - points.position.z[i];
+      constexpr float kNearest_m2 = 0.1F;  // a lamp has a size
+      const float distance2 = std::max(x * x + y * y + z * z, kNearest_m2);
+      const float along = x * points.normal.x[i] + y * points.normal.y[i] + z * points.normal.z[i];
+      sum[i] +=
+          intensity * visibility[i] * std::max(0.0F, along) / (distance2 * std::sqrt(distance2));
+    }
   }
-  if (scene.lighting.haze_distance_m > 0.0F) {
-    const float clear = std::exp(-distance_m / scene.lighting.haze_distance_m);
-    result.ambient = clear * result.ambient + (1.0F - clear) * C::haze(scene.sky);
-    result.sun *= clear;
+}
+
+// The sun on each side, before shadows; light comes through leaves and cloth from behind.
+void set_sunlight(const Lighting& lighting, const SurfacePoints& points, const Lanes& transmission,
+                  Lanes& sun) {
+  const Eigen::Vector3f to_sun = lighting.to_sun;
+  const float strength = lighting.sun;
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const float side = dot(points.plane_normal, to_sun, i);
+    const float cosine = dot(points.normal, to_sun, i);
+    const float through = -transmission[i];
+    const float share = side > 0.0F ? 1.0F : through;
+    sun[i] = strength * std::max(0.0F, share * cosine);
   }
-  return result;
+}
+
+// A glossy surface mirrors the sky, as far as the surroundings leave it open that way.
+void add_mirror(const RenderScene& scene, const SurfacePoints& points, const Lanes& specular,
+                Mixture& mixture) {
+  run_wide([&] {
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const float twice = 2.0F * dot(points.view, points.normal, i);
+      mixture.mirrored.x[i] = points.view.x[i] - twice * points.normal.x[i];
+      mixture.mirrored.y[i] = points.view.y[i] - twice * points.normal.y[i];
+      mixture.mirrored.z[i] = points.view.z[i] - twice * points.normal.z[i];
+    }
+  });
+  LightVolume::Light around;
+  scene.light.look_up(points.position, mixture.mirrored, around);
+  const float least_ambient = std::max(scene.lighting.ambient, 1e-6F);
+  const bool outdoors = scene.lighting.sun > 0.0F;
+  run_wide([&] {
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const float cosine = std::abs(dot(points.view, points.normal, i));
+      const float share = specular[i] > 0.0F ? mirrored_share(specular[i], cosine) : 0.0F;
+      const float open = std::min(1.0F, around.ambient[i] / least_ambient);
+      const float height = std::min(std::max(10.0F * mixture.mirrored.z[i] + 0.5F, 0.0F), 1.0F);
+      const float up = outdoors ? height : 0.0F;
+      mixture.mirrored_sky[i] = share * up * open;
+      mixture.mirrored_rest[i] = share * (1.0F - up) * around.ambient[i];
+      mixture.sun[i] *= 1.0F - share;
+      mixture.sky[i] *= 1.0F - share;
+      mixture.lamps[i] *= 1.0F - share;
+    }
+  });
+}
+
+void add_haze(float distance_scale_m, const SurfacePoints& points, Mixture& mixture) {
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const float clear = exp_negative(points.distance_m[i] / distance_scale_m);
+    mixture.sun[i] *= clear;
+    mixture.sky[i] *= clear;
+    mixture.lamps[i] *= clear;
+    mixture.mirrored_sky[i] *= clear;
+    mixture.mirrored_rest[i] *= clear;
+    mixture.haze[i] = 1.0F - clear;
+  }
+}
+
+Mixture mixture_of(const RenderScene& scene, const SurfacePoints& points) {
+  Lanes transmission;
+  Lanes specular;
+  Mixture mixture;
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const ShadingMaterial& material = *points.material[i];
+    transmission[i] = material.transmission;
+    specular[i] = material.specular;
+    mixture.any_mirror = mixture.any_mirror || material.specular > 0.0F;
+    mixture.lamps[i] = material.glow;
+  }
+  LightVolume::Light light;
+  scene.light.look_up(points.position, points.normal, light);
+  mixture.sky = light.ambient;
+  mixture.mirrored_sky.fill(0.0F);
+  mixture.mirrored_rest.fill(0.0F);
+  mixture.haze.fill(0.0F);
+  run_wide([&] {
+    set_sunlight(scene.lighting, points, transmission, mixture.sun);
+    add_lamps(scene.lighting, light, points, mixture.lamps);
+  });
+  if (mixture.any_mirror) add_mirror(scene, points, specular, mixture);
+  if (scene.lighting.haze_distance_m > 0.0F)
+    run_wide([&] { add_haze(scene.lighting.haze_distance_m, points, mixture); });
+  return mixture;
+}
+
+using Grays = std::array<Shade<float>, kLanes>;
+using Colors = std::array<Shade<Eigen::Vector3f>, kLanes>;
+
+void shade_surfaces(const RenderScene& scene, const SurfacePoints& points, const Mixture& mixture,
+                    LaneMask /*wanted*/, Grays& shades) {
+  const Lanes albedo = gray_albedo(points, taps_of(points));
+  Lanes mirrored{};
+  if (mixture.any_mirror) mirrored = scene.sky.luminance(mixture.mirrored);
+  const float haze = scene.sky.haze_luminance();
+  run_wide([&] {
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const float ambient = albedo[i] * (mixture.sky[i] + mixture.lamps[i]) +
+                            mixture.mirrored_sky[i] * mirrored[i] + mixture.mirrored_rest[i] +
+                            mixture.haze[i] * haze;
+      shades[i] = {ambient, albedo[i] * mixture.sun[i]};
+    }
+  });
+}
+
+Eigen::Vector3f color_albedo(const ShadingMaterial& material, const Taps& taps, std::size_t lane) {
+  Eigen::Vector3f base = Eigen::Vector3f::Zero();
+  Eigen::Vector3f detail = Eigen::Vector3f::Zero();
+  // Where a sample covers a whole tile of the detail, nothing of it is left.
+  const float base_width = taps.width_m[lane] * material.base_per_m;
+  const float detail_width = taps.width_m[lane] * material.detail_per_m;
+  const bool detailed = detail_width < 1.0F;
+  Eigen::Vector2f uv(taps.first_u[lane], taps.first_v[lane]);
+  const Eigen::Vector2f step(taps.step_u[lane], taps.step_v[lane]);
+  for (int i = 0; i < taps.count[lane]; ++i, uv += step) {
+    base += material.base->color(uv * material.base_per_m, base_width);
+    if (detailed) detail += material.detail->color(uv * material.detail_per_m, detail_width);
+  }
+  const float share = 1.0F / static_cast<float>(taps.count[lane]);
+  const Eigen::Vector3f albedo = share * material.tint.cwiseProduct(base);
+  return detailed ? Eigen::Vector3f(2.0F * share * albedo.cwiseProduct(detail)) : albedo;
+}
+
+void shade_surfaces(const RenderScene& scene, const SurfacePoints& points, const Mixture& mixture,
+                    LaneMask wanted, Colors& shades) {
+  // A warm sun and a blue sky; both of luminance 1.
+  const Eigen::Vector3f sunlight(1.06F, 0.995F, 0.87F);
+  const Eigen::Vector3f skylight(0.93F, 1.0F, 1.2F);
+  const Taps taps = taps_of(points);
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    if (!has_lane(wanted, i)) continue;
+    const Eigen::Vector3f albedo = color_albedo(*points.material[i], taps, i);
+    const Eigen::Vector3f light =
+        mixture.sky[i] * skylight + Eigen::Vector3f::Constant(mixture.lamps[i]);
+    shades[i].sun = mixture.sun[i] * albedo.cwiseProduct(sunlight);
+    shades[i].ambient = albedo.cwiseProduct(light) +
+                        Eigen::Vector3f::Constant(mixture.mirrored_rest[i]) +
+                        mixture.haze[i] * scene.sky.haze_color();
+    if (mixture.mirrored_sky[i] > 0.0F)
+      shades[i].ambient += mixture.mirrored_sky[i] * scene.sky.color(mixture.mirrored.at(i));
+  }
+}
+
+void shade_sky(const Sky& sky, const Lanes3& directions, LaneMask wanted, Grays& shades) {
+  const Lanes radiance = sky.luminance(directions);
+  for (std::size_t i = 0; i < kLanes; ++i)
+    if (has_lane(wanted, i)) shades[i] = {radiance[i], 0.0F};
+}
+
+void shade_sky(const Sky& sky, const Lanes3& directions, LaneMask wanted, Colors& shades) {
+  for (std::size_t i = 0; i < kLanes; ++i)
+    if (has_lane(wanted, i)) shades[i] = {sky.color(directions.at(i)), Eigen::Vector3f::Zero()};
+}
+
+Lanes3 directions_of(const RayPacket& rays) {
+  Lanes3 directions;
+  std::copy_n(rays.ray.dir_x, kLanes, directions.x.begin());
+  std::copy_n(rays.ray.dir_y, kLanes, directions.y.begin());
+  std::copy_n(rays.ray.dir_z, kLanes, directions.z.begin());
+  return directions;
 }
 
 }  // namespace
@@ -186,85 +239,39 @@ RenderScene::RenderScene(const World& world)
       sky(world.lighting),
       light(world, tracer, surfaces, sky) {}
 
-void locate(const SurfaceTable& surfaces, const SurfaceHits& hits, SurfacePoints& points) {
-  const RayPacket& rays = hits.rays;
-  for (int i = 0; i < kLanes; ++i) {
-    if ((hits.surface >> i & 1U) == 0U) continue;
-    const auto lane = static_cast<std::size_t>(i);
-    const std::uint32_t triangle = rays.hit.primID[i];
-    const SurfaceRecord& surface = surfaces.record(triangle);
-    const Eigen::Vector3f d = direction_of(rays, i);
-    const Eigen::Vector3f origin(rays.ray.org_x[i], rays.ray.org_y[i], rays.ray.org_z[i]);
-    const float t = rays.ray.tfar[i];
-    const Eigen::Vector3f p = origin + t * d;
-    points.position[lane] = p;
-    points.material[lane] = &surfaces.material(surface);
-    const float along = surface.normal.dot(d);
-    const float side = along > 0.0F ? -1.0F : 1.0F;
-    points.plane_normal[lane] = side * surface.normal;
-    points.normal[lane] =
-        surface.smooth
-            ? Eigen::Vector3f(side * surfaces.normal(triangle, rays.hit.u[i], rays.hit.v[i]))
-            : points.plane_normal[lane];
-    points.u[lane] = surface.u_gradient.dot(p) + surface.u_offset;
-    points.v[lane] = surface.v_gradient.dot(p) + surface.v_offset;
-    // The hit moves with the direction d as t * (dd - d * (n . dd) / (n . d)).
-    const Eigen::Vector3f right(hits.right_x[lane], hits.right_y[lane], hits.right_z[lane]);
-    const Eigen::Vector3f down(hits.down_x[lane], hits.down_y[lane], hits.down_z[lane]);
-    const float slope_right = surface.normal.dot(right) / along;
-    const float slope_down = surface.normal.dot(down) / along;
-    const float u_along = surface.u_gradient.dot(d);
-    const float v_along = surface.v_gradient.dot(d);
-    const Footprint footprint =
-        footprint_of(t * (surface.u_gradient.dot(right) - slope_right * u_along),
-                     t * (surface.u_gradient.dot(down) - slope_down * u_along),
-                     t * (surface.v_gradient.dot(right) - slope_right * v_along),
-                     t * (surface.v_gradient.dot(down) - slope_down * v_along));
-    points.major_u[lane] = footprint.major_u;
-    points.major_v[lane] = footprint.major_v;
-    points.major_m[lane] = footprint.major_m;
-    points.minor_m[lane] = footprint.minor_m;
-  }
-}
-
 LaneMask shadowed(const RenderScene& scene, LaneMask wanted, const SurfacePoints& points) {
-  const Eigen::Vector3f& to_sun = scene.lighting.to_sun;
+  if (wanted == 0) return 0;
+  const Eigen::Vector3f to_sun = scene.lighting.to_sun;
   RayPacket rays;
-  LaneMask dark = 0;
-  LaneMask cast = 0;
-  for (int i = 0; i < kLanes; ++i) {
-    if ((wanted >> i & 1U) == 0U) continue;
-    const auto lane = static_cast<std::size_t>(i);
-    const float facing = points.plane_normal[lane].dot(to_sun);
-    if (facing <= 0.0F && !(points.material[lane]->transmission > 0.0F)) {
-      dark |= 1U << i;
-      continue;
+  Lanes facing;
+  run_wide([&] {
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      facing[i] = dot(points.plane_normal, to_sun, i);
+      constexpr float kLift_m = 0.002F;
+      const float lift = facing[i] > 0.0F ? kLift_m : -kLift_m;
+      rays.ray.org_x[i] = points.position.x[i] + lift * points.plane_normal.x[i];
+      rays.ray.org_y[i] = points.position.y[i] + lift * points.plane_normal.y[i];
+      rays.ray.org_z[i] = points.position.z[i] + lift * points.plane_normal.z[i];
+      rays.ray.dir_x[i] = to_sun.x();
+      rays.ray.dir_y[i] = to_sun.y();
+      rays.ray.dir_z[i] = to_sun.z();
+      rays.ray.tnear[i] = 0.0F;
+      rays.ray.tfar[i] = std::numeric_limits<float>::infinity();
     }
-    cast |= 1U << i;
-    constexpr float kLift_m = 0.002F;
-    const float lift = facing > 0.0F ? kLift_m : -kLift_m;
-    set_ray(rays, i, points.position[lane] + lift * points.plane_normal[lane], to_sun, 0.0F,
-            std::numeric_limits<float>::infinity());
-  }
-  return dark | scene.tracer.occluded(cast, RayKind::kCoherent, rays);
+  });
+  LaneMask dark = 0;
+  for (std::size_t i = 0; i < kLanes; ++i)
+    if (facing[i] <= 0.0F && !(points.material[i]->transmission > 0.0F)) dark |= 1U << i;
+  return (dark & wanted) | scene.tracer.occluded(wanted & ~dark, RayKind::kCoherent, rays);
 }
 
 template <typename Value>
 void shade(const RenderScene& scene, const SurfaceHits& hits, const SurfacePoints& points,
            LaneMask wanted, std::array<Shade<Value>, kLanes>& shades) {
-  using C = Channels<Value>;
-  for (int i = 0; i < kLanes; ++i) {
-    if ((wanted >> i & 1U) == 0U) continue;
-    const auto lane = static_cast<std::size_t>(i);
-    const Eigen::Vector3f d = direction_of(hits.rays, i);
-    if ((hits.surface >> i & 1U) == 0U) {
-      shades[lane] = {C::sky(scene.sky, d), C::zero()};
-      continue;
-    }
-    const float length = d.norm();
-    shades[lane] =
-        shade_surface<Value>(scene, points, lane, d / length, length * hits.rays.ray.tfar[i]);
-  }
+  const LaneMask surface = wanted & hits.surface;
+  if (surface != 0) shade_surfaces(scene, points, mixture_of(scene, points), surface, shades);
+  if (const LaneMask sky = wanted & ~hits.surface; sky != 0)
+    shade_sky(scene.sky, directions_of(hits.rays), sky, shades);
 }
 
 template void shade<float>(const RenderScene&, const SurfaceHits&, const SurfacePoints&, LaneMask,

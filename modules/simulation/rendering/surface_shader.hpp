@@ -6,6 +6,7 @@
 #include "modules/simulation/rendering/light_volume.hpp"
 #include "modules/simulation/rendering/ray_tracer.hpp"
 #include "modules/simulation/rendering/sky.hpp"
+#include "modules/simulation/rendering/surface_points.hpp"
 #include "modules/simulation/rendering/surface_table.hpp"
 #include "modules/simulation/world/world.hpp"
 
@@ -30,35 +31,13 @@ struct Shade {
   Value sun;      ///< What the sun adds where it is not hidden.
 };
 
-/// Up to sixteen rays that hit something, and what is needed to shade and to shadow their ends.
-struct SurfaceHits {
-  RayPacket rays;        ///< Traced; directions have z = 1 in the camera frame, so tfar is depth.
-  LaneMask active = 0;   ///< Lanes that belong to the image.
-  LaneMask surface = 0;  ///< Of these, lanes that hit a surface; the others see the sky.
-  /// Change of the direction per pixel to the right and down.
-  Lanes right_x, right_y, right_z, down_x, down_y, down_z;
-};
-
-/// Geometry of the points that were hit, lane by lane.
-struct SurfacePoints {
-  std::array<Eigen::Vector3f, kLanes> position;
-  std::array<Eigen::Vector3f, kLanes> plane_normal;  ///< Towards the viewer.
-  std::array<Eigen::Vector3f, kLanes> normal;        ///< For shading, towards the viewer.
-  std::array<const ShadingMaterial*, kLanes> material;
-  Lanes u, v;              ///< Texture coordinates [m].
-  Lanes major_u, major_v;  ///< Longer axis of a pixel's footprint [m].
-  Lanes major_m, minor_m;  ///< Its axes' lengths [m].
-};
-
-/// Computes positions, normals and texture footprints (exact ray differentials: Igehy, "Tracing Ray
-/// Differentials", 1999).
-void locate(const SurfaceTable& surfaces, const SurfaceHits& hits, SurfacePoints& points);
-
-/// Lanes of `wanted` whose points the sun does not reach: shadowed, or turned away.
+/// Lanes of `wanted` whose points the sun does not reach: shadowed, or turned away. All of `wanted`
+/// must have been located.
 [[nodiscard]] LaneMask shadowed(const RenderScene& scene, LaneMask wanted,
                                 const SurfacePoints& points);
 
-/// Radiance of each active lane, haze included.
+/// Radiance of each wanted lane, haze included; the others' is undefined. Those of `wanted` that
+/// are in hits.surface must have been located.
 template <typename Value>
 void shade(const RenderScene& scene, const SurfaceHits& hits, const SurfacePoints& points,
            LaneMask wanted, std::array<Shade<Value>, kLanes>& shades);

@@ -34,6 +34,8 @@ ShadingMaterial shading_material(const World& world, const Material& material) {
   ShadingMaterial result;
   result.base = &world.textures[material.base];
   result.detail = &world.textures[material.detail];
+  result.base_gray = result.base->gray_texels();
+  result.detail_gray = result.detail->gray_texels();
   result.tint = material.tint;
   result.tint_luminance = luminance_of(material.tint);
   result.base_per_m = 1.0F / material.base_period_m;
@@ -87,13 +89,6 @@ SurfaceTable::SurfaceTable(const World& world) : mesh_(&world.mesh) {
   records_.reserve(mesh_->triangles.size());
   for (std::size_t i = 0; i < mesh_->triangles.size(); ++i)
     records_.push_back(surface_record(*mesh_, i));
-}
-
-Eigen::Vector3f SurfaceTable::normal(std::uint32_t triangle, float u, float v) const {
-  const auto& corners = mesh_->triangles[triangle];
-  const Eigen::Vector3f normal = (1.0F - u - v) * mesh_->normals[corners[0]] +
-                                 u * mesh_->normals[corners[1]] + v * mesh_->normals[corners[2]];
-  return normal.normalized();
 }
 
 }  // namespace km

@@ -23,6 +23,8 @@ struct alignas(64) SurfaceRecord {
 struct ShadingMaterial {
   const Texture* base = nullptr;
   const Texture* detail = nullptr;
+  Texture::GrayTexels base_gray;
+  Texture::GrayTexels detail_gray;
   Eigen::Vector3f tint = Eigen::Vector3f::Ones();
   float tint_luminance = 1.0F;
   float base_per_m = 1.0F;    ///< Tiles per metre.
@@ -48,8 +50,14 @@ class SurfaceTable {
   [[nodiscard]] const ShadingMaterial& material(const SurfaceRecord& record) const {
     return materials_[record.material];
   }
-  /// Normal at barycentric coordinates (u, v), as Embree gives them; unit length.
-  [[nodiscard]] Eigen::Vector3f normal(std::uint32_t triangle, float u, float v) const;
+  /// Mean of the vertices' normals at barycentric coordinates (u, v), as Embree gives them; at most
+  /// of unit length.
+  [[nodiscard]] Eigen::Vector3f interpolated_normal(std::uint32_t triangle, float u,
+                                                    float v) const {
+    const auto& corners = mesh_->triangles[triangle];
+    return (1.0F - u - v) * mesh_->normals[corners[0]] + u * mesh_->normals[corners[1]] +
+           v * mesh_->normals[corners[2]];
+  }
 
  private:
   const SurfaceMesh* mesh_;

@@ -85,9 +85,9 @@ void ViewPass::trace(const Aim& aim, SurfaceHits& hits) const {
       origin[lane] = origin_[row];
     }
   };
-  rotate(0, hits.rays.ray.dir_x, hits.right_x, hits.down_x, hits.rays.ray.org_x);
-  rotate(1, hits.rays.ray.dir_y, hits.right_y, hits.down_y, hits.rays.ray.org_y);
-  rotate(2, hits.rays.ray.dir_z, hits.right_z, hits.down_z, hits.rays.ray.org_z);
+  rotate(0, hits.rays.ray.dir_x, hits.right.x, hits.down.x, hits.rays.ray.org_x);
+  rotate(1, hits.rays.ray.dir_y, hits.right.y, hits.down.y, hits.rays.ray.org_y);
+  rotate(2, hits.rays.ray.dir_z, hits.right.z, hits.down.z, hits.rays.ray.org_z);
   std::fill_n(hits.rays.ray.tnear, kLanes, 0.0F);
   std::fill_n(hits.rays.ray.tfar, kLanes, std::numeric_limits<float>::infinity());
 

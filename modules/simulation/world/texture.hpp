@@ -28,6 +28,18 @@ class Texture {
   /// The same of the luminance alone (Rec. 709 weights): what a grey camera sees.
   [[nodiscard]] float luminance(const Eigen::Vector2f& uv, float footprint) const;
 
+  /// The storage behind luminance(), for lookups of many points side by side: all levels one after
+  /// the other, rows of `quads`, each a texel and its neighbours at +u, +v, +uv (lowest byte first)
+  /// in steps of `scale`. Valid as long as the texture is.
+  struct GrayTexels {
+    const std::uint32_t* quads = nullptr;
+    int log_size = 0;
+    float scale = 1.0F;
+  };
+  [[nodiscard]] GrayTexels gray_texels() const {
+    return {luminance_.data(), log_size_, luminance_scale_};
+  }
+
  private:
   static constexpr int kMaxLogSize = 12;
 
