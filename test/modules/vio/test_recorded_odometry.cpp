@@ -154,11 +154,14 @@ TEST_CASE("The odometry node publishes what odometry gives, in order of time", "
   Topic<SensorPacket> packets;
   Topic<OdometryState> odometry;
   Topic<KeyframeOdometry> keyframes;
+  Topic<LocatedFrame> frames;
   std::vector<Stamp> stamps;  // of the node's thread, read after it has ended
   std::vector<std::uint32_t> indices;
+  std::vector<LocatedFrame> located;
   odometry.subscribe([&](const auto& state) { stamps.push_back(state->stamp); });
   keyframes.subscribe([&](const auto& keyframe) { indices.push_back(keyframe->id.index); });
-  VioNode node(5, data->rig, TrackerConfig{}, VioConfig{}, {packets, odometry, keyframes});
+  frames.subscribe([&](const auto& frame) { located.push_back(*frame); });
+  VioNode node(5, data->rig, TrackerConfig{}, VioConfig{}, {packets, odometry, keyframes, frames});
   node.start();
   for (std::size_t k = 0; k < 40; ++k) packets.publish(data->packets[k]);
   node.stop();  // drains the queue
@@ -167,6 +170,9 @@ TEST_CASE("The odometry node publishes what odometry gives, in order of time", "
   CHECK(std::is_sorted(stamps.begin(), stamps.end()));
   REQUIRE(indices.size() >= 2);
   for (std::size_t k = 0; k < indices.size(); ++k) CHECK(indices[k] == k);
+  REQUIRE(located.size() == stamps.size());
+  for (std::size_t k = 0; k < stamps.size(); ++k) CHECK(located[k].frame->stamp == stamps[k]);
+  CHECK(located.back().keyframe == indices.back());
 }
 
 }  // namespace
