@@ -37,9 +37,13 @@ class MeshCorrector {
   /// Throws ConfigError if `config` is out of bounds.
   explicit MeshCorrector(const MeshDeformationConfig& config);
 
-  /// The mesh corrected anew, nullopt if the last one still holds. `exactly`: thresholds are zero.
-  /// Throws as LocalMeshOptimizer::optimize().
-  [[nodiscard]] std::optional<MeshCorrection> correct(const CorrectionInput& input, bool exactly);
+  /// The mesh corrected anew, nullopt if the last one still holds. Throws as
+  /// LocalMeshOptimizer::optimize().
+  [[nodiscard]] std::optional<MeshCorrection> correct(const CorrectionInput& input);
+
+  /// The mesh corrected as if for the first time: depends on nothing but `input`, bit by bit,
+  /// however often the mesh was corrected on the way. Throws likewise.
+  [[nodiscard]] MeshCorrection correct_afresh(const CorrectionInput& input);
 
  private:
   [[nodiscard]] MeshCorrection deform(const CorrectionInput& input, std::vector<SE3> anchors);

@@ -75,7 +75,7 @@ void MeshDeformationNode::step(const Input& input, double now_s) {
     return;
   }
   ended_ = std::holds_alternative<End>(input);
-  if (ended_ || now_s >= next_s_) correct(ended_);
+  if (ended_ || now_s >= next_s_) correct();
 }
 
 void MeshDeformationNode::take(const KeyframeOdometry& keyframe) {
@@ -97,21 +97,24 @@ bool MeshDeformationNode::can_correct() const {
          !T_odom_kf_.empty() && keyframes_of_map_ <= T_odom_kf_.size();
 }
 
-void MeshDeformationNode::correct(bool exactly) {
+CorrectionInput MeshDeformationNode::input() const {
+  const auto& T_world_kf = trajectory_->T_world_kf;
+  return {*map_, map_version_, T_odom_kf_,
+          std::span(T_world_kf).first(std::min(T_world_kf.size(), T_odom_kf_.size()))};
+}
+
+void MeshDeformationNode::correct() {
   if (!can_correct()) {
-    if (exactly && map_ != nullptr)
+    if (ended_ && map_ != nullptr)
       log::warn(name()) << "the last map is not corrected: it was made with " << keyframes_of_map_
                         << " keyframes; " << T_odom_kf_.size() << " and "
                         << (trajectory_ == nullptr ? 0 : trajectory_->T_world_kf.size())
                         << " optimised ones are known";
     return;
   }
-  const auto& T_world_kf = trajectory_->T_world_kf;
   const double start_s = steady_now_s();
-  std::optional<MeshCorrection> correction = corrector_.correct(
-      {*map_, map_version_, T_odom_kf_,
-       std::span(T_world_kf).first(std::min(T_world_kf.size(), T_odom_kf_.size()))},
-      exactly);
+  std::optional<MeshCorrection> correction =
+      ended_ ? corrector_.correct_afresh(input()) : corrector_.correct(input());
   if (!correction) return;
   const double end_s = steady_now_s();
   next_s_ = end_s + config_.period_s;

@@ -45,8 +45,9 @@ class MeshDeformationNode final : public Node {
   /// Of the corrections.
   DurationHistogram timing() const override { return timing_.histogram(); }
 
-  /// One last correction, exact and whatever the time, of what has come so far; what comes later is
-  /// ignored. Returns at once. Idempotent, thread-safe.
+  /// One last correction, afresh and whatever the time, of what has come so far: the result does
+  /// not depend on the corrections before, nor on when they were. What comes later is ignored.
+  /// Returns at once. Idempotent, thread-safe.
   void finish();
 
   /// Time passes, and the end. Always null: as plain structs among pointers they set off a false
@@ -64,8 +65,9 @@ class MeshDeformationNode final : public Node {
  private:
   void take(const KeyframeOdometry& keyframe);
   void take(Topic<MapMesh>::Message map);
-  void correct(bool exactly);
+  void correct();
   [[nodiscard]] bool can_correct() const;
+  [[nodiscard]] CorrectionInput input() const;
   void report(const OptimizedMesh& result) const;
 
   const MeshDeformationConfig config_;

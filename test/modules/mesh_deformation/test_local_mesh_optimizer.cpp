@@ -161,7 +161,7 @@ TEST_CASE("Vertices that vanish and others that move keep the rest in place",
   LocalMeshOptimizer optimizer;
   const std::size_t nodes = optimizer.optimize(map, keyframes, keyframes).report.nodes;
   map.mesh.faces.clear();
-  const auto last = [](auto& list) { list.resize(list.size() - 20); };
+  const auto last = [](auto& list) { list.erase(list.end() - 20, list.end()); };
   last(map.mesh.vertices);
   last(map.mesh.labels);
   last(map.seen_by);

@@ -158,7 +158,7 @@ TEST_CASE("A trajectory that is behind is completed by odometry", "[node]") {
   CHECK(robot.results.size() == 1);
 }
 
-TEST_CASE("At the end the mesh is corrected exactly, and never after", "[node]") {
+TEST_CASE("At the end the mesh is corrected afresh, and never after", "[node]") {
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
   for (std::size_t i = 0; i < robot.T_odom_kf.size(); ++i) node.step(robot.keyframe(i), 0.0);
@@ -170,7 +170,10 @@ TEST_CASE("At the end the mesh is corrected exactly, and never after", "[node]")
   last.T_world_kf[3].translation().z() += 0.001;  // below the threshold, before the time
   node.step(std::make_shared<const Trajectory>(last), now_s);
   node.step(kEnd, now_s);
-  CHECK(robot.results.size() == 2);
+  REQUIRE(robot.results.size() == 2);
+  LocalMeshOptimizer optimizer;
+  const auto expected = optimizer.optimize(*robot.map, robot.T_odom_kf, last.T_world_kf);
+  CHECK(robot.results[1].mesh.vertices == expected.mesh.vertices);
   node.step(robot.solution(10.0), now_s);
   node.step(kEnd, now_s + 3600.0);
   CHECK(robot.results.size() == 2);
@@ -210,8 +213,8 @@ TEST_CASE("The mesh deformation node works as a thread", "[node]") {
   robot.trajectory.publish(robot.solution(15.0));  // too late
   node.stop();
   CHECK(node.error() == nullptr);
-  REQUIRE(robot.results.size() == 2);
-  CHECK(robot.results[1].mesh.vertices.back().x() == Approx(last_vertex_x(10.0)).margin(0.05));
+  REQUIRE(robot.results.size() >= 2);  // the last, and maybe one in time before
+  CHECK(robot.results.back().mesh.vertices.back().x() == Approx(last_vertex_x(10.0)).margin(0.05));
 }
 
 }  // namespace
