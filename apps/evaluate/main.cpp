@@ -4,6 +4,8 @@
 
 #include "apps/evaluate/closures.hpp"
 #include "apps/evaluate/images.hpp"
+#include "apps/evaluate/mesh.hpp"
+#include "apps/evaluate/render.hpp"
 #include "apps/evaluate/trajectory.hpp"
 
 namespace {
@@ -102,6 +104,101 @@ void define(CLI::App& app, km::ImagesCommand& command) {
   app.add_option("--json", command.json, "Also write the figures to this file, as JSON");
 }
 
+constexpr const char* kMesh =
+    "Errors of estimated meshes against the true one, of each robot and of all together\n\n"
+    "Both are sampled evenly, the estimates are moved by ONE rigid transform (ICP) onto the "
+    "truth,\n"
+    "and distances go from each sample to the nearest one on the other side: \"mean\" of the "
+    "first\n"
+    "table is the mesh error of the Kimera-Multi paper. Samples of two equal surfaces are still\n"
+    "0.5 / sqrt(density) apart, 16 mm at 1000 per square metre; \"surface\" is the mean without "
+    "that\n"
+    "floor, to the triangles nearby. A true world is larger than what robots saw of it: true "
+    "points\n"
+    "further than --crop from the estimate are not judged (\"covered\" is the share that is, in "
+    "the\n"
+    "second table the share of the estimate that has the truth as near). Labels are judged where\n"
+    "the other side is nearer than --max-distance; unknown counts as not right.\n\n"
+    "A robot's mesh lies in the frame of its trajectory. Where that is not the truth's, "
+    "--trajectory\n"
+    "and --trajectory-truth place it before ICP.\n\n"
+    "Examples:\n"
+    "  kimera_multi_evaluate mesh --truth city/world.ply --estimate mesh.ply --json mesh.json\n"
+    "  kimera_multi_evaluate mesh --truth city/world.ply \\\n"
+    "      --estimate results/robot0/mesh_optimized.ply results/robot1/mesh_optimized.ply \\\n"
+    "      --trajectory results/robot0/optimized.tum results/robot1/optimized.tum \\\n"
+    "      --trajectory-truth city/robot0/mav0/state_groundtruth_estimate0/data.csv \\\n"
+    "                         city/robot1/mav0/state_groundtruth_estimate0/data.csv";
+
+void define(CLI::App& app, km::MeshCommand& command) {
+  km::MeshErrorOptions& options = command.options;
+  app.add_option("--truth", command.truth, "The true mesh (PLY)")->required();
+  app.add_option("--estimate", command.estimates,
+                 "Estimated meshes (PLY) in one common frame, one file per robot")
+      ->required();
+  app.add_option("--trajectory", command.trajectories,
+                 "Estimated poses of the robots in the frame of the meshes, TUM or EuRoC CSV");
+  app.add_option("--trajectory-truth", command.true_trajectories,
+                 "Their true poses: one file for all or one for each");
+  app.add_option("--samples-per-m2", options.samples_per_m2, "Samples per square metre")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--max-samples", options.max_samples,
+                 "Of either side: with more, the density is lowered, and said so")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--seed", options.seed, "Of the samples")->capture_default_str();
+  app.add_flag("!--no-icp", options.icp, "Compare the meshes where they are");
+  app.add_option("--crop", options.crop_m,
+                 "True points further from the estimate are not judged [m]; errors count up to it")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--max-distance", options.label_distance_m,
+                 "Labels are judged up to this distance [m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--palette", command.palette,
+                 "Names of the labels (CSV); default: label_palette.csv beside the truth");
+  app.add_option("--json", command.json, "Also write the numbers to this file, as JSON");
+}
+
+constexpr const char* kRender =
+    "Shaded picture of meshes, without a display: colours of labels with a legend, a scale bar,\n"
+    "and trajectories on top\n\n"
+    "Faces are seen from the side they were mapped from: from above one looks into rooms. Views:\n"
+    "  top, front, oblique     parallel, fill the picture\n"
+    "  x,y,z,yaw,pitch         perspective from there [m, deg]: yaw 90 looks along y, pitch -30 "
+    "down\n"
+    "  x,y,z,qx,qy,qz,qw       likewise, a camera's pose (its z forward, y down)\n"
+    "Write --view=-1,... for one that begins with a minus sign.\n\n"
+    "Examples:\n"
+    "  kimera_multi_evaluate render --mesh mesh.ply --trajectory optimized.tum --output map.png\n"
+    "  kimera_multi_evaluate render --mesh a.ply b.ply --color robot --view oblique --output "
+    "team.png\n"
+    "  kimera_multi_evaluate render --mesh room/world.ply --view=-2,1,1.7,20,-10 --output "
+    "inside.png";
+
+void define(CLI::App& app, km::RenderCommand& command) {
+  app.add_option("--mesh", command.meshes, "Meshes (PLY) in one frame")->required();
+  app.add_option("--output", command.output, "PNG; of several views the second is NAME_2.png")
+      ->required();
+  app.add_option("--view", command.views, "Where from, see above; several: a picture each")
+      ->capture_default_str();
+  app.add_option("--trajectory", command.trajectories, "Poses drawn on top (TUM or EuRoC CSV)");
+  app.add_option(
+         "--color", command.color,
+         "Of the label, the vertices' own, none, or one per mesh; auto: labels if there are")
+      ->check(CLI::IsMember({"auto", "label", "own", "shade", "robot"}))
+      ->capture_default_str();
+  app.add_option("--size", command.size, "WIDTHxHEIGHT without the legend [px]")
+      ->capture_default_str();
+  app.add_option("--cut", command.above_m, "Leave out all above this height [m]");
+  app.add_flag("--both-sides", command.both_sides, "Also draw faces that are seen from behind");
+  app.add_option(
+      "--palette", command.palette,
+      "Names and colours of the labels (CSV); default: label_palette.csv beside the mesh");
+}
+
 void define(CLI::App& app, km::TrajectoryCommand& command) {
   app.add_option("--truth", command.truths,
                  "True poses: one file for all estimates or one for each")
@@ -131,9 +228,13 @@ int main(int argc, char** argv) try {
   km::TrajectoryCommand trajectory;
   km::ClosuresCommand closures;
   km::ImagesCommand images;
+  km::MeshCommand mesh;
+  km::RenderCommand render;
   define(*app.add_subcommand("trajectory", kTrajectory), trajectory);
   define(*app.add_subcommand("closures", kClosures), closures);
   define(*app.add_subcommand("images", kImages), images);
+  define(*app.add_subcommand("mesh", kMesh), mesh);
+  define(*app.add_subcommand("render", kRender), render);
   try {
     app.parse(argc, argv);
   } catch (const CLI::RequiredError& error) {
@@ -147,6 +248,8 @@ int main(int argc, char** argv) try {
   if (app.got_subcommand("trajectory")) km::evaluate_trajectories(trajectory);
   if (app.got_subcommand("closures")) km::evaluate_closures(closures);
   if (app.got_subcommand("images")) km::evaluate_images(images);
+  if (app.got_subcommand("mesh")) km::evaluate_meshes(mesh);
+  if (app.got_subcommand("render")) km::render_meshes(render);
   return 0;
 } catch (const std::exception& error) {
   std::cerr << "kimera_multi_evaluate: " << error.what() << '\n';

@@ -2,12 +2,11 @@
 
 #include <cmath>
 #include <deque>
-#include <fstream>
 #include <iostream>
 #include <sstream>
 #include <stdexcept>
-#include <string>
 
+#include "apps/evaluate/named_files.hpp"
 #include "modules/core/json_writer.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/evaluation/trajectory_plot.hpp"
@@ -29,18 +28,6 @@ TimeWindow window_of(const TrajectoryCommand& command, const std::vector<Stamped
   if (std::isfinite(command.to_s)) window.to = absolute(command.to_s, start);
   if (window.from >= window.to) throw std::invalid_argument("--from is not before --to");
   return window;
-}
-
-// "robot0/optimized" for ".../robot0/optimized.tum".
-std::string short_name(const std::filesystem::path& file) {
-  const std::filesystem::path folder = std::filesystem::absolute(file).parent_path().filename();
-  return (folder / file.stem()).string();
-}
-
-void write_file(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream stream(file);
-  stream << text;
-  if (!stream.flush()) throw std::runtime_error(file.string() + ": cannot be written");
 }
 
 }  // namespace

@@ -1,0 +1,83 @@
+#include "apps/evaluate/mesh.hpp"
+
+#include <algorithm>
+#include <deque>
+#include <iostream>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+
+#include "apps/evaluate/label_palette_file.hpp"
+#include "apps/evaluate/named_files.hpp"
+#include "apps/evaluate/stage_progress.hpp"
+#include "modules/core/json_writer.hpp"
+#include "modules/evaluation/mesh/mesh_checks.hpp"
+#include "modules/evaluation/mesh/mesh_report.hpp"
+#include "modules/evaluation/trajectory_error.hpp"
+#include "modules/evaluation/trajectory_file.hpp"
+#include "modules/mesh/ply_file.hpp"
+
+namespace km {
+namespace {
+
+// Puts the meshes where the robots' trajectories belong.
+SE3 alignment_of(const MeshCommand& command) {
+  const auto& estimates = command.trajectories;
+  const auto& truths = command.true_trajectories;
+  if (estimates.empty() && truths.empty()) return command.options.T_truth_estimate;
+  if (estimates.empty() || (truths.size() != 1 && truths.size() != estimates.size()))
+    throw std::invalid_argument(
+        "give one --trajectory-truth for all --trajectory, or one for each");
+  std::deque<std::vector<StampedPose>> poses;  // inputs refer to them
+  const auto read = [&](const std::filesystem::path& file) -> const std::vector<StampedPose>& {
+    return poses.emplace_back(read_trajectory(file));
+  };
+  std::vector<TrajectoryInput> inputs;
+  for (std::size_t i = 0; i < estimates.size(); ++i)
+    inputs.push_back({short_name(estimates[i]), read(truths[truths.size() == 1 ? 0 : i]),
+                      read(estimates[i]), std::nullopt});
+  return trajectory_error(inputs).alignment.T_truth_estimate;
+}
+
+// The palette given, or the one beside the truth, or none.
+LabelPalette palette_of(const MeshCommand& command, const LabelledMesh& truth,
+                        std::span<const MeshInput> inputs) {
+  const std::filesystem::path file =
+      command.palette.empty() ? palette_beside(command.truth) : command.palette;
+  if (file.empty()) return {};
+  const LabelPalette palette = read_label_palette(file);
+  check_labels(truth, command.truth.string(), palette, file.string());
+  for (const MeshInput& input : inputs)
+    check_labels(input.mesh, input.name, palette, file.string());
+  return palette;
+}
+
+std::string json_of(const MeshReport& report, const LabelPalette& palette) {
+  std::ostringstream text;
+  JsonWriter json(text);
+  write_json(json, report, palette);
+  return text.str();
+}
+
+}  // namespace
+
+void evaluate_meshes(const MeshCommand& command) {
+  MeshErrorOptions options = command.options;
+  options.T_truth_estimate = alignment_of(command);
+  StageProgress progress;
+  progress("reading", 0.0);
+  const LabelledMesh truth = read_ply(command.truth);
+  std::deque<LabelledMesh> meshes;  // inputs refer to them
+  std::vector<MeshInput> inputs;
+  for (const auto& file : command.estimates)
+    inputs.push_back({short_name(file), meshes.emplace_back(read_ply(file))});
+  const LabelPalette palette = palette_of(command, truth, inputs);
+
+  const MeshReport report =
+      mesh_error(truth, inputs, options,
+                 [&](std::string_view stage, double share) { progress(stage, share); });
+  std::cout << to_table(report, palette);
+  if (!command.json.empty()) write_file(command.json, json_of(report, palette));
+}
+
+}  // namespace km

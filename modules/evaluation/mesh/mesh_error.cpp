@@ -1,0 +1,279 @@
+#include "modules/evaluation/mesh/mesh_error.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+#include "modules/evaluation/mesh/mesh_checks.hpp"
+#include "modules/evaluation/mesh/nearby_cells.hpp"
+#include "modules/evaluation/mesh/nearest_surface.hpp"
+#include "modules/evaluation/mesh/surface_samples.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kRegistrationPerM2 = 250.0;  // planes need no more
+constexpr double kLargeMove_m = 0.5;
+constexpr double kLargeTurn_deg = 3.0;
+
+std::string text_of(double value, int decimals) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(decimals) << value;
+  return text.str();
+}
+
+class Evaluation {
+ public:
+  Evaluation(const LabelledMesh& truth, std::span<const MeshInput> inputs,
+             const MeshErrorOptions& options, const MeshProgress& progress)
+      : truth_(truth), inputs_(inputs), options_(options), progress_(progress) {
+    check(options);
+    check_comparable(truth, "truth");
+    if (inputs.empty()) throw std::invalid_argument("no estimated mesh");
+    double area = 0.0;
+    for (const MeshInput& input : inputs) {
+      check_comparable(input.mesh, input.name);
+      area += surface_area(input.mesh);
+    }
+    per_m2_ = std::min(options.samples_per_m2, static_cast<double>(options.max_samples) / area);
+  }
+
+  MeshReport run() {
+    place(options_.T_truth_estimate);
+    report_.registration.T_truth_estimate = options_.T_truth_estimate;
+    if (options_.icp) register_estimates();
+    sample();
+    report_.samples_per_m2 = per_m2_;
+    note_labels();
+    compare();
+    note_density();
+    return std::move(report_);
+  }
+
+ private:
+  void tell(std::string_view stage, double share) const {
+    if (progress_) progress_(stage, share);
+  }
+
+  void place(const SE3& T_truth_estimate) {
+    moved_.clear();
+    for (const MeshInput& input : inputs_) {
+      moved_.push_back(input.mesh);
+      moved_.back().transform(T_truth_estimate);
+    }
+  }
+
+  [[nodiscard]] std::vector<SurfaceSamples> sampled_estimates(double per_m2) const {
+    std::vector<SurfaceSamples> samples;
+    // Another seed than the truth's: a mesh compared with itself must not meet its own points.
+    for (std::size_t i = 0; i < moved_.size(); ++i) {
+      samples.push_back(sample_surface(moved_[i], per_m2, options_.seed + 1));
+      if (samples.back().points.empty())
+        throw std::invalid_argument(inputs_[i].name + ": too small for a single sample at " +
+                                    text_of(per_m2, 0) + " per square metre");
+    }
+    return samples;
+  }
+
+  [[nodiscard]] SurfaceSamples sampled_truth(double per_m2, double reach_m,
+                                             const std::vector<SurfaceSamples>& estimates) const {
+    NearbyCells nearby(reach_m);
+    for (const SurfaceSamples& samples : estimates) nearby.add(samples.points);
+    SurfaceSamples truth =
+        sample_surface(truth_, per_m2, options_.seed, &nearby, options_.max_samples);
+    if (truth.near == 0)
+      throw std::invalid_argument("no part of the truth is within " + text_of(reach_m, 2) +
+                                  " m of the estimate: are both in one frame?");
+    return truth;
+  }
+
+  void register_estimates() {
+    tell("registering", 0.0);
+    const double per_m2 = std::min(per_m2_, kRegistrationPerM2);
+    const auto estimates = sampled_estimates(per_m2);
+    const SurfaceSamples truth = sampled_truth(per_m2, options_.registration.reach_m, estimates);
+    const NearestSurface nearest(truth_, truth);
+    SurfaceSamples all;
+    for (const SurfaceSamples& samples : estimates)
+      all.points.insert(all.points.end(), samples.points.begin(), samples.points.end());
+    report_.registration =
+        register_mesh(truth_, nearest, all, SE3::Identity(), options_.registration);
+    note_registration(report_.registration);
+    report_.registration.T_truth_estimate =
+        report_.registration.T_truth_estimate * options_.T_truth_estimate;
+    place(report_.registration.T_truth_estimate);
+  }
+
+  // `found` moves the estimates from where they were assumed to be.
+  void note_registration(const Registration& found) {
+    Eigen::AlignedBox3d box;
+    for (const LabelledMesh& mesh : moved_)
+      for (const Eigen::Vector3f& vertex : mesh.vertices) box.extend(vertex.cast<double>());
+    for (int i = 0; i < 8; ++i) {
+      const Eigen::Vector3d corner = box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i));
+      report_.moved_m =
+          std::max(report_.moved_m, (found.T_truth_estimate * corner - corner).norm());
+    }
+    const double turn_deg = angle_of(found.T_truth_estimate.linear()) * 180.0 / M_PI;
+    if (report_.moved_m > kLargeMove_m || turn_deg > kLargeTurn_deg)
+      report_.notes.push_back("registration moved the estimate by up to " +
+                              text_of(report_.moved_m, 2) + " m and " + text_of(turn_deg, 2) +
+                              " degrees: is it in the frame of the truth?");
+    if (!found.converged)
+      report_.notes.push_back("registration did not converge in " +
+                              std::to_string(found.iterations) + " iterations");
+    if (found.free_directions > 0)
+      report_.notes.push_back("the surfaces leave " + std::to_string(found.free_directions) +
+                              " of 6 directions open; registration did not move along these");
+  }
+
+  // Both sides with the same density, below max_samples.
+  void sample() {
+    tell("sampling", 0.0);
+    for (;;) {
+      estimates_ = sampled_estimates(per_m2_);
+      true_samples_ = sampled_truth(per_m2_, options_.crop_m, estimates_);
+      if (true_samples_.near <= options_.max_samples) return;
+      per_m2_ *= 0.98 * static_cast<double>(options_.max_samples) /
+                 static_cast<double>(true_samples_.near);
+    }
+  }
+
+  void note_density() {
+    if (per_m2_ >= options_.samples_per_m2) return;
+    std::size_t estimated = 0;
+    for (const SurfaceSamples& samples : estimates_) estimated += samples.points.size();
+    report_.notes.push_back(
+        "sampled at " + text_of(per_m2_, 0) + " points per square metre instead of " +
+        text_of(options_.samples_per_m2, 0) + ", to stay below " +
+        std::to_string(options_.max_samples) + ": " + std::to_string(estimated) +
+        " estimated and " + std::to_string(true_samples_.points.size()) + " true points");
+  }
+
+  void note_labels() {
+    std::string without = truth_.labels.empty() ? "truth" : "";
+    for (const MeshInput& input : inputs_)
+      if (input.mesh.labels.empty()) without += (without.empty() ? "" : ", ") + input.name;
+    report_.has_labels = without.empty();
+    if (!report_.has_labels) report_.notes.push_back("labels are not judged: none in " + without);
+  }
+
+  void compare() {
+    for (const MeshInput& input : inputs_) {
+      MeshError& error = report_.robots.emplace_back();
+      error.name = input.name;
+      error.area_m2 = surface_area(input.mesh);
+      error.faces = input.mesh.faces.size();
+      report_.merged.area_m2 += error.area_m2;
+      report_.merged.faces += error.faces;
+    }
+    report_.merged.name = "merged";
+    compare_truth();
+    compare_estimates();
+    if (inputs_.size() == 1) report_.merged = report_.robots.front();
+  }
+
+  void compare_truth() {
+    PointMatches nearest_of_all;
+    for (std::size_t i = 0; i < inputs_.size(); ++i) {
+      tell("indexing the estimate", 0.0);
+      const NearestSurface nearest(moved_[i], estimates_[i]);
+      PointMatches matches =
+          match_points({truth_, true_samples_}, {moved_[i], estimates_[i]}, nearest,
+                       options_.crop_m, "true points to " + inputs_[i].name, progress_);
+      judge_truth(matches, report_.robots[i]);
+      if (i == 0)
+        nearest_of_all = std::move(matches);
+      else
+        nearest_of_all.keep_nearer(matches);
+    }
+    if (inputs_.size() > 1) judge_truth(nearest_of_all, report_.merged);
+  }
+
+  // From the true points that have the estimate within reach.
+  void judge_truth(const PointMatches& matches, MeshError& error) const {
+    std::vector<float> point_m;
+    std::vector<float> surface_m;
+    for (std::size_t i = 0; i < matches.point_m.size(); ++i) {
+      if (!std::isfinite(matches.point_m[i])) continue;
+      point_m.push_back(matches.point_m[i]);
+      surface_m.push_back(matches.surface_m[i]);
+      if (report_.has_labels && static_cast<double>(point_m.back()) <= options_.label_distance_m)
+        error.truth.labels.add(SampledMesh{truth_, true_samples_}.label(i), matches.labels[i]);
+    }
+    error.coverage = static_cast<double>(point_m.size()) / static_cast<double>(true_samples_.total);
+    error.truth.point = summary_of(std::move(point_m));
+    error.truth.surface = summary_of(std::move(surface_m));
+  }
+
+  void compare_estimates() {
+    tell("indexing the truth", 0.0);
+    const NearestSurface nearest(truth_, true_samples_);
+    std::vector<float> all_point_m;
+    std::vector<float> all_surface_m;
+    for (std::size_t i = 0; i < inputs_.size(); ++i) {
+      const SampledMesh estimate{moved_[i], estimates_[i]};
+      const PointMatches matches =
+          match_points(estimate, {truth_, true_samples_}, nearest, options_.crop_m,
+                       inputs_[i].name + " to the truth", progress_);
+      MeshError& error = report_.robots[i];
+      error.estimate.labels = labels_of(estimate, matches);
+      report_.merged.estimate.labels.add(error.estimate.labels);
+      const std::size_t start = all_point_m.size();
+      append_clamped(matches.point_m, all_point_m);
+      append_clamped(matches.surface_m, all_surface_m);
+      judge_estimate(std::span(all_point_m).subspan(start), std::span(all_surface_m).subspan(start),
+                     error);
+    }
+    if (inputs_.size() > 1) judge_estimate(all_point_m, all_surface_m, report_.merged);
+  }
+
+  void append_clamped(const std::vector<float>& distances_m, std::vector<float>& all_m) const {
+    const auto limit = static_cast<float>(options_.crop_m);
+    for (const float distance_m : distances_m) all_m.push_back(std::min(distance_m, limit));
+  }
+
+  [[nodiscard]] LabelConfusion labels_of(const SampledMesh& estimate,
+                                         const PointMatches& matches) const {
+    LabelConfusion labels;
+    if (!report_.has_labels) return labels;
+    for (std::size_t i = 0; i < matches.point_m.size(); ++i)
+      if (static_cast<double>(matches.point_m[i]) <= options_.label_distance_m)
+        labels.add(matches.labels[i], estimate.label(i));
+    return labels;
+  }
+
+  void judge_estimate(std::span<const float> point_m, std::span<const float> surface_m,
+                      MeshError& error) const {
+    const auto limit = static_cast<float>(options_.crop_m);
+    const auto beyond = std::count_if(point_m.begin(), point_m.end(),
+                                      [&](float distance_m) { return distance_m >= limit; });
+    error.beyond = static_cast<double>(beyond) / static_cast<double>(point_m.size());
+    error.estimate.point = summary_of({point_m.begin(), point_m.end()});
+    error.estimate.surface = summary_of({surface_m.begin(), surface_m.end()});
+  }
+
+  const LabelledMesh& truth_;
+  std::span<const MeshInput> inputs_;
+  const MeshErrorOptions& options_;
+  const MeshProgress& progress_;
+  double per_m2_ = 0.0;
+  std::vector<LabelledMesh> moved_;  // the estimates in the truth's frame
+  std::vector<SurfaceSamples> estimates_;
+  SurfaceSamples true_samples_;
+  MeshReport report_;
+};
+
+}  // namespace
+
+MeshReport mesh_error(const LabelledMesh& truth, std::span<const MeshInput> estimates,
+                      const MeshErrorOptions& options, const MeshProgress& progress) {
+  return Evaluation(truth, estimates, options, progress).run();
+}
+
+}  // namespace km

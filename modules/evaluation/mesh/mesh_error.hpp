@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "modules/core/geometry.hpp"
+#include "modules/evaluation/mesh/distance_summary.hpp"
+#include "modules/evaluation/mesh/label_scores.hpp"
+#include "modules/evaluation/mesh/mesh_registration.hpp"
+#include "modules/evaluation/mesh/point_matches.hpp"
+#include "modules/mesh/labelled_mesh.hpp"
+
+namespace km {
+
+/// How meshes are compared.
+struct MeshErrorOptions {
+  double samples_per_m2 = 1000.0;        ///< As in the Kimera-Multi paper.
+  std::size_t max_samples = 20'000'000;  ///< Of either side; the density sinks to stay below.
+  std::uint32_t seed = 1;
+  SE3 T_truth_estimate = SE3::Identity();  ///< Where registration starts, or all of it.
+  bool icp = true;
+  RegistrationOptions registration;
+
+  /// True points further from the estimate are not judged: a true world is larger than what was
+  /// seen of it. Also the largest error that counts. Half a metre is above what drift leaves in a
+  /// corrected map; more would take in the unseen backs of walls and furniture.
+  double crop_m = 0.5;
+
+  /// A point is judged by the label of the nearest face on the other side only if the nearest
+  /// sample there is within this distance: two voxels of 10 cm. (By the nearest sample, as is more
+  /// usual, the simulated room compared with itself has 97.3 % of its labels right: samples across
+  /// a border between classes come in between.)
+  double label_distance_m = 0.2;
+};
+
+/// One estimated mesh; outlives the call. All estimates are in one frame.
+struct MeshInput {
+  std::string name;
+  const LabelledMesh& mesh;
+};
+
+/// From one surface's points to the other's.
+struct SurfaceComparison {
+  DistanceSummary point;    ///< To the nearest sample: the paper's definition.
+  DistanceSummary surface;  ///< To the surface there: free of the floor that sampling sets.
+  LabelConfusion labels;    ///< Of the points within label_distance_m.
+};
+
+/// How one estimate, or all together, differ from the truth.
+struct MeshError {
+  std::string name;
+  double area_m2 = 0.0;        ///< Of the estimate.
+  std::size_t faces = 0;       ///< Of the estimate.
+  double coverage = 0.0;       ///< Share of the true surface within crop_m of the estimate.
+  double beyond = 0.0;         ///< Share of the estimate further than crop_m from the truth.
+  SurfaceComparison truth;     ///< From true points within crop_m to the estimate.
+  SurfaceComparison estimate;  ///< From estimated points to the truth; beyond crop_m as crop_m.
+};
+
+struct [[nodiscard]] MeshReport {
+  Registration registration;       ///< One transform for all estimates.
+  double moved_m = 0.0;            ///< By ICP: the largest way of a corner of the estimates' box.
+  double samples_per_m2 = 0.0;     ///< Below what was asked for if max_samples would be exceeded.
+  bool has_labels = false;         ///< Truth and every estimate carry labels.
+  std::vector<MeshError> robots;   ///< In the order of the inputs.
+  MeshError merged;                ///< All estimates as one; that of the robot if there is one.
+  std::vector<std::string> notes;  ///< One line each: what a reader should know.
+};
+
+/// Compares estimated meshes with the true one as Chang et al. do ("Kimera-Multi: a System for
+/// Distributed Multi-Robot Metric-Semantic Simultaneous Localization and Mapping", 2021): both
+/// sampled, registered by ICP, distance from each true point to the nearest estimated one; also the
+/// other way round, and labels. All estimates are moved by ONE transform, so that robots are judged
+/// in their common frame.
+///
+/// Throws std::invalid_argument, naming the mesh, for one without faces or whose faces name
+/// vertices there are not, for no estimates, for options out of range, and if nothing of the truth
+/// is near the estimates. Uses OpenCV's threads; the result does not depend on how many. Memory
+/// about 60 bytes per sample, besides the meshes and a copy of the estimates.
+MeshReport mesh_error(const LabelledMesh& truth, std::span<const MeshInput> estimates,
+                      const MeshErrorOptions& options = {}, const MeshProgress& progress = {});
+
+}  // namespace km

@@ -1,0 +1,166 @@
+#include "modules/evaluation/mesh/mesh_registration.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core/utility.hpp>
+#include <optional>
+#include <vector>
+
+#include "modules/core/lie.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kStop_m = 1e-5;  // step that ends the iterations
+constexpr double kShrink = 0.7;   // of the gate from one iteration to the next
+constexpr double kOpen = 1e-3;    // share of the pairs' weight below which a direction is open
+constexpr std::size_t kMinPairs = 6;
+
+// An estimated point, moved by the present transform, and the plane of the true face near it.
+struct Pair {
+  Eigen::Vector3d point;
+  Eigen::Vector3d normal;
+  double offset_m = 0.0;    // along the normal, from the plane to the point
+  float distance_m = 0.0F;  // to the face
+};
+
+class Pairing {
+ public:
+  Pairing(const LabelledMesh& truth, const NearestSurface& nearest, const SurfaceSamples& estimate,
+          const RegistrationOptions& options)
+      : truth_(truth), nearest_(nearest), options_(options) {
+    const std::size_t step = std::max<std::size_t>(
+        1, estimate.points.size() / std::max<std::size_t>(1, options.max_points));
+    for (std::size_t i = 0; i < estimate.points.size(); i += step)
+      points_.emplace_back(estimate.points[i].cast<double>());
+  }
+
+  // The pairs that count, in the order of the points.
+  [[nodiscard]] std::vector<Pair> pairs(const SE3& T, double gate_m) const {
+    std::vector<std::optional<Pair>> found(points_.size());
+    cv::parallel_for_(cv::Range(0, static_cast<int>(points_.size())), [&](const cv::Range& range) {
+      for (int i = range.start; i < range.end; ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        found[at] = pair_of(T * points_[at]);
+      }
+    });
+    std::vector<Pair> result;
+    for (const auto& pair : found)
+      if (pair) result.push_back(*pair);
+    return within(std::move(result), gate_m);
+  }
+
+ private:
+  [[nodiscard]] std::optional<Pair> pair_of(const Eigen::Vector3d& point) const {
+    const auto near = nearest_.find(point.cast<float>(), options_.reach_m);
+    if (!near) return std::nullopt;
+    const LabelledMesh::Face& face = truth_.faces[near->face];
+    const auto corner = [&](std::size_t k) {
+      return Eigen::Vector3d(truth_.vertices[face[k]].cast<double>());
+    };
+    const Eigen::Vector3d normal = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+    if (!(normal.norm() > 0.0)) return std::nullopt;
+    const Eigen::Vector3d unit = normal.normalized();
+    return Pair{point, unit, unit.dot(point - corner(0)), near->surface_m};
+  }
+
+  [[nodiscard]] std::vector<Pair> within(std::vector<Pair> pairs, double gate_m) const {
+    if (pairs.empty()) return pairs;
+    std::vector<float> distances;
+    distances.reserve(pairs.size());
+    for (const Pair& pair : pairs) distances.push_back(pair.distance_m);
+    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    const double limit_m =
+        std::max({gate_m, options_.gate_m, options_.gate_medians * static_cast<double>(*middle)});
+    std::erase_if(pairs,
+                  [&](const Pair& pair) { return static_cast<double>(pair.distance_m) > limit_m; });
+    return pairs;
+  }
+
+  const LabelledMesh& truth_;
+  const NearestSurface& nearest_;
+  const RegistrationOptions& options_;
+  std::vector<Eigen::Vector3d> points_;
+};
+
+struct Step {
+  SE3 T = SE3::Identity();  // moves the points
+  double length_m = 0.0;
+  int free_directions = 0;
+};
+
+Eigen::Vector3d centre_of(const std::vector<Pair>& pairs) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Pair& pair : pairs) sum += pair.point;
+  return sum / static_cast<double>(pairs.size());
+}
+
+// Least squares of n^T (dR (p - c) + c + dt - q) over the pairs, about their centre c and with
+// rotations as the way [m] they move a point at the typical radius: all six unknowns are lengths,
+// so that eigenvalues tell what the surfaces hold.
+Step step_of(const std::vector<Pair>& pairs) {
+  const Eigen::Vector3d centre = centre_of(pairs);
+  double radius2 = 0.0;
+  for (const Pair& pair : pairs) radius2 += (pair.point - centre).squaredNorm();
+  const double radius = std::max(std::sqrt(radius2 / static_cast<double>(pairs.size())), 1e-3);
+
+  Matrix6 H = Matrix6::Zero();
+  Vector6 g = Vector6::Zero();
+  for (const Pair& pair : pairs) {
+    Vector6 J;
+    J << (pair.point - centre).cross(pair.normal) / radius, pair.normal;
+    H += J * J.transpose();
+    g += J * pair.offset_m;
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix6> solver(H);
+  Step step;
+  Vector6 x = Vector6::Zero();
+  for (int i = 0; i < 6; ++i) {
+    const double value = solver.eigenvalues()[i];
+    const Vector6 direction = solver.eigenvectors().col(i);
+    if (value < kOpen * static_cast<double>(pairs.size()))
+      ++step.free_directions;
+    else
+      x -= direction * (direction.dot(g) / value);
+  }
+  step.length_m = x.norm();
+  const Eigen::Matrix3d R = so3_exp(x.head<3>() / radius);
+  step.T = make_pose(R, centre + x.tail<3>() - R * centre);
+  return step;
+}
+
+double rms_of(const std::vector<Pair>& pairs) {
+  double sum = 0.0;
+  for (const Pair& pair : pairs) sum += pair.offset_m * pair.offset_m;
+  return pairs.empty() ? 0.0 : std::sqrt(sum / static_cast<double>(pairs.size()));
+}
+
+}  // namespace
+
+Registration register_mesh(const LabelledMesh& truth, const NearestSurface& nearest_truth,
+                           const SurfaceSamples& estimate, const SE3& T_truth_estimate,
+                           const RegistrationOptions& options) {
+  const Pairing pairing(truth, nearest_truth, estimate, options);
+  Registration result;
+  result.T_truth_estimate = T_truth_estimate;
+  // At first all within reach count, so that what is far off in one direction only is drawn in.
+  double gate_m = options.reach_m;
+  while (result.iterations < options.max_iterations && !result.converged) {
+    const std::vector<Pair> pairs = pairing.pairs(result.T_truth_estimate, gate_m);
+    result.pairs = pairs.size();
+    result.rms_m = rms_of(pairs);
+    if (pairs.size() < kMinPairs) break;
+    const Step step = step_of(pairs);
+    result.T_truth_estimate = step.T * result.T_truth_estimate;
+    result.free_directions = step.free_directions;
+    result.converged = step.length_m < kStop_m && gate_m <= options.gate_m;
+    gate_m = std::max(options.gate_m, kShrink * gate_m);
+    ++result.iterations;
+  }
+  return result;
+}
+
+}  // namespace km

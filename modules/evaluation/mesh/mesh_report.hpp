@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+
+#include "modules/core/json_writer.hpp"
+#include "modules/core/label_palette.hpp"
+#include "modules/evaluation/mesh/mesh_error.hpp"
+
+namespace km {
+
+/// Tables for people: distances and label accuracy per robot and merged, then accuracy per class of
+/// the merged mesh, then registration and notes. Classes are named by the palette, else by number.
+[[nodiscard]] std::string to_table(const MeshReport& report, const LabelPalette& palette);
+
+/// The same numbers as one JSON object: {registration: {...}, samples_per_m2, robots: [{name,
+/// area_m2, faces, coverage, beyond, truth_to_estimate: {point: {mean_m, ...}, surface: {...},
+/// labels: {right, ..., classes: [...]}}, estimate_to_truth: {...}}], merged: {...}, notes}. Labels
+/// are null where they are not judged, numbers of nothing too.
+void write_json(JsonWriter& json, const MeshReport& report, const LabelPalette& palette);
+
+}  // namespace km

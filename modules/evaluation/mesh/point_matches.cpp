@@ -1,0 +1,48 @@
+#include "modules/evaluation/mesh/point_matches.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <opencv2/core/utility.hpp>
+
+namespace km {
+namespace {
+
+constexpr std::size_t kChunk = 1U << 18;  // points between two reports of progress
+
+}  // namespace
+
+void PointMatches::keep_nearer(const PointMatches& other) {
+  for (std::size_t i = 0; i < point_m.size(); ++i) {
+    point_m[i] = std::min(point_m[i], other.point_m[i]);
+    if (other.surface_m[i] >= surface_m[i]) continue;
+    surface_m[i] = other.surface_m[i];
+    labels[i] = other.labels[i];
+  }
+}
+
+PointMatches match_points(const SampledMesh& from, const SampledMesh& to,
+                          const NearestSurface& nearest_to, double reach_m, std::string_view stage,
+                          const MeshProgress& progress) {
+  const std::size_t count = from.samples.points.size();
+  PointMatches matches;
+  matches.point_m.assign(count, std::numeric_limits<float>::infinity());
+  matches.surface_m = matches.point_m;
+  matches.labels.assign(count, 0);
+  const auto match = [&](std::size_t i) {
+    const auto near = nearest_to.find(from.samples.points[i], reach_m);
+    if (!near) return;
+    matches.point_m[i] = near->distance_m;
+    matches.surface_m[i] = near->surface_m;
+    matches.labels[i] = to.mesh.face_label(near->face);
+  };
+  for (std::size_t start = 0; start < count; start += kChunk) {
+    if (progress) progress(stage, static_cast<double>(start) / static_cast<double>(count));
+    const auto size = static_cast<int>(std::min(kChunk, count - start));
+    cv::parallel_for_(cv::Range(0, size), [&](const cv::Range& range) {
+      for (int i = range.start; i < range.end; ++i) match(start + static_cast<std::size_t>(i));
+    });
+  }
+  return matches;
+}
+
+}  // namespace km

@@ -1,0 +1,170 @@
+#include "modules/evaluation/picture/mesh_picture.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+
+#include "modules/evaluation/picture/picture_legend.hpp"
+#include "modules/evaluation/picture/surface_shading.hpp"
+
+namespace km {
+namespace {
+
+constexpr int kFiner = 2;  // drawn so many times larger each way, then averaged
+constexpr double kInFront_m = 0.05;
+constexpr LabelledMesh::Color kClay = {214, 210, 200};
+constexpr LabelledMesh::Color kUnknown = {150, 150, 150};
+constexpr std::array<LabelledMesh::Color, 8> kRobots = {{{230, 97, 80},
+                                                         {80, 150, 220},
+                                                         {110, 190, 90},
+                                                         {180, 130, 210},
+                                                         {250, 170, 70},
+                                                         {70, 200, 210},
+                                                         {170, 125, 110},
+                                                         {240, 140, 200}}};
+constexpr std::array<LabelledMesh::Color, 8> kLines = {{{214, 39, 40},
+                                                        {31, 119, 180},
+                                                        {20, 120, 20},
+                                                        {148, 40, 189},
+                                                        {255, 127, 14},
+                                                        {0, 160, 180},
+                                                        {110, 60, 50},
+                                                        {227, 60, 180}}};
+
+cv::Vec3b bgr(const LabelledMesh::Color& color) {
+  return {color[2], color[1], color[0]};
+}
+
+LabelledMesh::Color color_of(LabelId label, const LabelPalette& palette) {
+  const LabelClass* found = label == 0 ? nullptr : palette.find(label);
+  return found != nullptr ? found->color : kUnknown;
+}
+
+std::string name_of(const PictureScene& scene, std::size_t mesh) {
+  return mesh < scene.names.size() ? scene.names[mesh] : "mesh " + std::to_string(mesh);
+}
+
+std::vector<LabelledMesh::Color> colors_of(const PictureScene& scene, std::size_t i,
+                                           PictureColor color) {
+  const LabelledMesh& mesh = scene.meshes[i];
+  const std::size_t count = mesh.vertices.size();
+  if (color == PictureColor::kShade) return std::vector(count, kClay);
+  if (color == PictureColor::kRobot) return std::vector(count, kRobots[i % kRobots.size()]);
+  if (color == PictureColor::kOwn) {
+    if (mesh.colors.size() != count)
+      throw std::invalid_argument(name_of(scene, i) + ": its vertices have no colours");
+    return mesh.colors;
+  }
+  if (mesh.labels.size() != count)
+    throw std::invalid_argument(name_of(scene, i) + ": its vertices have no labels");
+  std::vector<LabelledMesh::Color> colors;
+  colors.reserve(count);
+  for (const LabelId label : mesh.labels) colors.push_back(color_of(label, scene.palette));
+  return colors;
+}
+
+// All meshes as one; their colours are taken apart from it before.
+LabelledMesh merged(const PictureScene& scene) {
+  LabelledMesh all;
+  for (const LabelledMesh& mesh : scene.meshes) all.append(mesh);
+  if (all.faces.empty()) throw std::invalid_argument("no mesh to draw has a face");
+  return all;
+}
+
+// The labels in sight, those of most pixels first.
+std::vector<LegendEntry> label_entries(const LabelledMesh& mesh, const SurfaceImage& surface,
+                                       const LabelPalette& palette) {
+  std::array<std::size_t, 256> pixels{};
+  for (const std::uint32_t face : surface.faces)
+    if (face != SurfaceImage::kNone) ++pixels[mesh.face_label(face)];
+  std::vector<std::size_t> labels;
+  for (std::size_t label = 0; label < pixels.size(); ++label)
+    if (pixels[label] > 0) labels.push_back(label);
+  std::stable_sort(labels.begin(), labels.end(),
+                   [&](std::size_t a, std::size_t b) { return pixels[a] > pixels[b]; });
+  std::vector<LegendEntry> entries;
+  for (const std::size_t label : labels) {
+    const auto id = static_cast<LabelId>(label);
+    const LabelClass* found = palette.find(id);
+    const std::string name = id == 0 ? "unknown" : "label " + std::to_string(label);
+    entries.push_back({found != nullptr ? found->name : name, bgr(color_of(id, palette)), false});
+  }
+  return entries;
+}
+
+std::vector<LegendEntry> legend_of(const PictureScene& scene, const LabelledMesh& mesh,
+                                   const SurfaceImage& surface, PictureColor color) {
+  std::vector<LegendEntry> entries;
+  if (color == PictureColor::kLabel) entries = label_entries(mesh, surface, scene.palette);
+  if (color == PictureColor::kRobot)
+    for (std::size_t i = 0; i < scene.meshes.size(); ++i)
+      entries.push_back({name_of(scene, i), bgr(kRobots[i % kRobots.size()]), false});
+  for (std::size_t i = 0; i < scene.lines.size(); ++i)
+    entries.push_back({scene.lines[i].name, bgr(kLines[i % kLines.size()]), true});
+  return entries;
+}
+
+constexpr int kShift = 4;  // bits of a pixel's fraction in OpenCV's drawing
+
+cv::Point fixed_point(const Eigen::Vector3d& pixel) {
+  constexpr double kLimit = 1e6;  // within an int after the shift
+  const auto fixed = [=](double value) {
+    return static_cast<int>(
+        std::lround((std::clamp(value, -kLimit, kLimit) - 0.5) * (1 << kShift)));
+  };
+  return {fixed(pixel.x()), fixed(pixel.y())};
+}
+
+void draw_path(cv::Mat3b& picture, const PictureLine& line, const cv::Vec3b& color,
+               const PictureView& view) {
+  const cv::Scalar ink(color[0], color[1], color[2]);
+  const cv::Scalar white(255, 255, 255);
+  const auto in_sight = [&](const Eigen::Vector3d& pixel) {
+    return !view.perspective || pixel.z() > kInFront_m;
+  };
+  // White below, so that the path shows on any colour.
+  for (const auto& [thickness, shade] : {std::pair(5, white), std::pair(2, ink)})
+    for (std::size_t i = 1; i < line.points.size(); ++i) {
+      const Eigen::Vector3d from = view.project(line.points[i - 1]);
+      const Eigen::Vector3d to = view.project(line.points[i]);
+      if (in_sight(from) && in_sight(to))
+        cv::line(picture, fixed_point(from), fixed_point(to), shade, thickness, cv::LINE_AA,
+                 kShift);
+    }
+  if (line.points.empty()) return;
+  const auto mark = [&](const Eigen::Vector3d& point, const cv::Scalar& inside) {
+    const Eigen::Vector3d pixel = view.project(point);
+    if (!in_sight(pixel)) return;
+    cv::circle(picture, fixed_point(pixel), 6 << kShift, inside, cv::FILLED, cv::LINE_AA, kShift);
+    cv::circle(picture, fixed_point(pixel), 6 << kShift, ink, 2, cv::LINE_AA, kShift);
+  };
+  mark(line.points.front(), white);
+  mark(line.points.back(), ink);
+}
+
+}  // namespace
+
+cv::Mat3b draw_meshes(const PictureScene& scene, const PictureView& view,
+                      const PictureOptions& options) {
+  std::vector<LabelledMesh::Color> colors;
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    const auto own = colors_of(scene, i, options.color);
+    colors.insert(colors.end(), own.begin(), own.end());
+  }
+  const LabelledMesh mesh = merged(scene);
+  const PictureView finer = view.enlarged(kFiner);
+  const SurfaceImage surface = rasterise(mesh, finer, options.cut);
+  cv::Mat3b large = paint(mesh, surface, finer, colors, options.color == PictureColor::kOwn);
+  shade(large, mesh, surface, finer, options.occlusion_m);
+  cv::Mat3b picture;
+  cv::resize(large, picture, {view.width, view.height}, 0, 0, cv::INTER_AREA);
+  for (std::size_t i = 0; i < scene.lines.size(); ++i)
+    draw_path(picture, scene.lines[i], bgr(kLines[i % kLines.size()]), view);
+  const cv::Mat3b legend = draw_legend(legend_of(scene, mesh, surface, options.color), view);
+  if (!legend.empty()) picture.push_back(legend);
+  return picture;
+}
+
+}  // namespace km

@@ -1,0 +1,134 @@
+#include <catch2/catch.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+
+#include "modules/mesh/ply_file.hpp"
+#include "test/modules/evaluation/mesh/shapes.hpp"
+#include "test/support/command.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+const std::string kTool = std::string(KM_BIN_DIR) + "/kimera_multi_evaluate ";
+const char* const kPalette =
+    "name,red,green,blue,alpha,id\nunknown,0,0,0,255,0\nfloor,200,0,0,255,1\nwest,0,200,0,255,2\n"
+    "east,0,0,200,255,3\nsouth,90,90,0,255,4\nnorth,0,90,90,255,5\n";
+
+// A room, true and as two robots have it: one shifted by 3 cm, the other only its floor.
+struct Meshes {
+  Meshes() {
+    write_ply(truth, room());
+    LabelledMesh shifted = room();
+    shifted.transform(make_pose(Eigen::Matrix3d::Identity(), {0.03, 0.02, 0.01}));
+    folder.write("a/x", "");
+    folder.write("b/x", "");
+    write_ply(a, shifted);
+    write_ply(b, rectangle({0, 0, 0}, {4, 0, 0}, {0, 3, 0}, 8, 1));
+  }
+
+  TemporaryFolder folder;
+  std::filesystem::path truth = folder.path() / "world.ply";
+  std::filesystem::path a = folder.path() / "a/mesh.ply";
+  std::filesystem::path b = folder.path() / "b/mesh.ply";
+  std::filesystem::path json = folder.path() / "out.json";
+  std::filesystem::path png = folder.path() / "out.png";
+};
+
+}  // namespace
+
+TEST_CASE("mesh judges each robot and all together", "[evaluate]") {
+  const Meshes meshes;
+  meshes.folder.write("label_palette.csv", kPalette);
+  const std::string command = kTool + "mesh --samples-per-m2 100 --truth " + meshes.truth.string() +
+                              " --estimate " + meshes.a.string() + ' ' + meshes.b.string() +
+                              " --json " + meshes.json.string();
+  const auto result = run_command(command);
+  CAPTURE(result.output);
+  REQUIRE(result.exit_code == 0);
+  CHECK_THAT(result.output, Catch::Contains("\na/mesh ") && Catch::Contains("\nb/mesh ") &&
+                                Catch::Contains("\nmerged ") && Catch::Contains("\nnorth "));
+  CHECK_THAT(meshes.folder.read("out.json"), Catch::Contains("\"truth_to_estimate\"") &&
+                                                 Catch::Contains("\"name\": \"merged\"") &&
+                                                 Catch::Contains("\"samples_per_m2\": 100"));
+  CHECK(run_command(command).output == result.output);
+}
+
+TEST_CASE("mesh starts registration where the trajectories say", "[evaluate]") {
+  const Meshes meshes;
+  LabelledMesh far = room();
+  far.transform(make_pose(Eigen::Matrix3d::Identity(), {50, 0, 0}));
+  write_ply(meshes.a, far);
+  const auto truth = meshes.folder.write(
+      "truth.tum", "1 0 0 1 0 0 0 1\n2 2 0 1 0 0 0 1\n3 2 2 1 0 0 0 1\n4 0 2 2 0 0 0 1\n");
+  const auto moved = meshes.folder.write(
+      "moved.tum", "1 50 0 1 0 0 0 1\n2 52 0 1 0 0 0 1\n3 52 2 1 0 0 0 1\n4 50 2 2 0 0 0 1\n");
+  const std::string command =
+      kTool + "mesh --truth " + meshes.truth.string() + " --estimate " + meshes.a.string();
+  const auto lost = run_command(command);
+  CHECK(lost.exit_code == 1);
+  CHECK_THAT(lost.output, Catch::Contains("are both in one frame?"));
+  const auto placed = run_command(command + " --trajectory " + moved.string() +
+                                  " --trajectory-truth " + truth.string() + " --no-icp");
+  CAPTURE(placed.output);
+  CHECK(placed.exit_code == 0);
+  CHECK_THAT(placed.output, Catch::Contains("[-50.0000, "));
+  CHECK_THAT(run_command(command + " --trajectory-truth " + truth.string()).output,
+             Catch::Contains("give one --trajectory-truth for all --trajectory"));
+}
+
+TEST_CASE("mesh refuses what it cannot compare, by name", "[evaluate]") {
+  const Meshes meshes;
+  const std::string truth = kTool + "mesh --truth " + meshes.truth.string() + " --estimate ";
+  CHECK(run_command(truth + "/none.ply").output ==
+        "kimera_multi_evaluate: /none.ply: cannot be opened\n");
+  const auto palette =
+      meshes.folder.write("few.csv", "name,red,green,blue,alpha,id\nfloor,1,2,3,255,1\n");
+  const auto mismatch = run_command(truth + meshes.b.string() + " --palette " + palette.string());
+  CHECK(mismatch.exit_code == 1);
+  CHECK_THAT(mismatch.output,
+             Catch::Contains("world.ply: label 2 is not in") && Catch::Contains("few.csv"));
+  CHECK_THAT(run_command(truth + meshes.b.string() + " --palette /none.csv").output,
+             Catch::Contains("/none.csv: cannot be read"));
+  LabelledMesh cloud = room();
+  cloud.faces.clear();
+  write_ply(meshes.a, cloud);
+  CHECK_THAT(run_command(truth + meshes.a.string()).output,
+             Catch::Contains("a/mesh: no faces, so no surface to compare"));
+  CHECK(run_command(truth + meshes.b.string() + " --crop 0").exit_code == 1);
+}
+
+TEST_CASE("render draws one picture per view", "[evaluate]") {
+  const Meshes meshes;
+  meshes.folder.write("label_palette.csv", kPalette);
+  const auto path = meshes.folder.write("path.tum", "1 1 1 1 0 0 0 1\n2 3 2 1 0 0 0 1\n");
+  const auto result = run_command(kTool + "render --mesh " + meshes.truth.string() +
+                                  " --size 320x240 --view top --view 2,1,1,45,0 --output " +
+                                  meshes.png.string() + " --trajectory " + path.string());
+  CAPTURE(result.output);
+  REQUIRE(result.exit_code == 0);
+  const cv::Mat3b top = cv::imread(meshes.png.string());
+  CHECK(top.cols == 320);
+  CHECK(top.rows > 240);
+  // The floor's red, away from the path; and the picture from within.
+  const cv::Vec3b floor = top(60, 100);
+  CHECK(static_cast<int>(floor[2]) > 2 * static_cast<int>(floor[1]) + 20);
+  CHECK(cv::imread((meshes.folder.path() / "out_2.png").string()).cols == 320);
+}
+
+TEST_CASE("render refuses what it cannot draw", "[evaluate]") {
+  const Meshes meshes;
+  const std::string command = kTool + "render --mesh " + meshes.truth.string() + " --output ";
+  CHECK_THAT(run_command(command + "out.jpg").output, Catch::Contains("out.jpg: pictures are PNG"));
+  CHECK_THAT(run_command(command + "/none/out.png").output,
+             Catch::Contains("/none/out.png: cannot be written"));
+  const std::string good = command + meshes.png.string();
+  CHECK_THAT(run_command(good + " --size 10x10").output, Catch::Contains("--size 10x10: not"));
+  CHECK_THAT(run_command(good + " --size 320").output, Catch::Contains("--size 320: not"));
+  CHECK_THAT(run_command(good + " --view below").output, Catch::Contains("no view 'below'"));
+  CHECK_THAT(run_command(good + " --color own").output,
+             Catch::Contains("its vertices have no colours"));
+  CHECK(run_command(good + " --color red").exit_code == 1);
+}
+
+}  // namespace km

@@ -1,0 +1,257 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <numbers>
+#include <opencv2/core/utility.hpp>
+#include <sstream>
+#include <vector>
+
+#include "modules/evaluation/mesh/mesh_checks.hpp"
+#include "modules/evaluation/mesh/mesh_error.hpp"
+#include "modules/evaluation/mesh/mesh_report.hpp"
+#include "test/modules/evaluation/mesh/shapes.hpp"
+
+namespace km {
+namespace {
+
+MeshErrorOptions in_place(std::uint32_t seed = 1) {
+  MeshErrorOptions options;
+  options.icp = false;
+  options.seed = seed;
+  return options;
+}
+
+MeshReport compare(const LabelledMesh& truth, const LabelledMesh& estimate,
+                   const MeshErrorOptions& options) {
+  const std::vector<MeshInput> inputs = {{"a", estimate}};
+  return mesh_error(truth, inputs, options);
+}
+
+// Mean distance from a point at height h above a plane to the nearest of random points on it,
+// `density` of them per square metre: P(r > x) = exp(-pi density x^2) in the plane.
+double mean_distance(double h, double density) {
+  const double a = std::numbers::pi * density;
+  return h + std::exp(a * h * h) * std::erfc(h * std::sqrt(a)) / (2.0 * std::sqrt(density));
+}
+
+std::string json_of(const MeshReport& report) {
+  std::ostringstream text;
+  JsonWriter json(text);
+  write_json(json, report, {});
+  return text.str();
+}
+
+}  // namespace
+
+TEST_CASE("Two parallel planes are their distance apart", "[mesh_error]") {
+  const double h = GENERATE(0.0, 0.01, 0.03, 0.08);
+  const double density = GENERATE(250.0, 1000.0);
+  CAPTURE(h, density);
+  MeshErrorOptions options = in_place();
+  options.samples_per_m2 = density;
+  const MeshReport report =
+      compare(square(6.0F, 0.0F, 1), square(6.0F, static_cast<float>(h), 1), options);
+  // 9000 points or more: the mean of their distances is known to 1 %; the border adds as much.
+  const double expected = mean_distance(h, density);
+  for (const SurfaceComparison* way : {&report.merged.truth, &report.merged.estimate}) {
+    CHECK(way->point.mean_m == Approx(expected).epsilon(0.03));
+    CHECK(way->surface.mean_m == Approx(h).margin(1e-6));
+    CHECK(way->surface.median_m == Approx(h).margin(1e-6));
+    CHECK(way->surface.within_5cm == (h < 0.05 ? 1.0 : 0.0));
+    CHECK(way->surface.within_10cm == 1.0);
+    const double near = 1.0 - std::exp(-std::numbers::pi * density * (0.01 - h * h));
+    CHECK(way->point.within_10cm == Approx(near).margin(0.01));
+  }
+  CHECK(report.merged.coverage == 1.0);
+  CHECK(report.merged.beyond == 0.0);
+  CHECK(report.samples_per_m2 == density);
+}
+
+TEST_CASE("A sphere too large by 5 cm is 5 cm off", "[mesh_error]") {
+  MeshErrorOptions options;
+  const MeshReport report = compare(sphere(1.0F), sphere(1.05F), options);
+  // Both are cut short by their chords, 1 - cos(pi / 96) = 0.5 mm at most, alike.
+  CHECK(report.merged.truth.surface.mean_m == Approx(0.05).margin(6e-4));
+  CHECK(report.merged.estimate.surface.mean_m == Approx(0.05).margin(6e-4));
+  CHECK(report.registration.free_directions == 3);  // a sphere turns in itself
+  CHECK(report.registration.T_truth_estimate.translation().norm() < 1e-3);
+}
+
+TEST_CASE("Shares of right, wrong and unknown labels are those of the areas", "[mesh_error]") {
+  LabelledMesh truth = rectangle({0, 0, 0}, {5, 0, 0}, {0, 4, 0}, 8, 1);
+  truth.append(rectangle({5, 0, 0}, {5, 0, 0}, {0, 4, 0}, 8, 7));
+  // Class 1: 60 % right, 40 % called 7. Class 7: 50 % right, 30 % called 2, 20 % unknown.
+  LabelledMesh estimate = rectangle({0, 0, 0}, {3, 0, 0}, {0, 4, 0}, 8, 1);
+  estimate.append(rectangle({3, 0, 0}, {4.5F, 0, 0}, {0, 4, 0}, 8, 7));
+  estimate.append(rectangle({7.5F, 0, 0}, {1.5F, 0, 0}, {0, 4, 0}, 8, 2));
+  estimate.append(rectangle({9, 0, 0}, {1, 0, 0}, {0, 4, 0}, 8, 0));
+  const MeshReport report = compare(truth, estimate, in_place(GENERATE(1U, 2U)));
+  REQUIRE(report.has_labels);
+  constexpr double kBorder = 0.01;  // 5 m wide classes, samples 3 cm apart
+  const auto scores = report.merged.truth.labels.by_class();
+  REQUIRE(scores.size() == 2);
+  CHECK(scores[0].id == 1);
+  CHECK(scores[0].accuracy() == Approx(0.6).margin(kBorder));
+  CHECK(scores[0].unknown == 0);
+  CHECK(scores[1].id == 7);
+  CHECK(scores[1].accuracy() == Approx(0.5).margin(kBorder));
+  CHECK(scores[1].accuracy_of_known() == Approx(0.625).margin(kBorder));
+  const LabelScore total = report.merged.truth.labels.total();
+  CHECK(total.accuracy() == Approx(0.55).margin(kBorder));
+  CHECK(static_cast<double>(total.unknown) / static_cast<double>(total.points()) ==
+        Approx(0.1).margin(kBorder));
+  CHECK(report.merged.estimate.labels.total().accuracy() == Approx(0.55).margin(kBorder));
+}
+
+TEST_CASE("Labels further than the given distance are not judged", "[mesh_error]") {
+  MeshErrorOptions options = in_place();
+  options.label_distance_m = 0.2;
+  const float z = GENERATE(0.15F, 0.25F);
+  const MeshReport report = compare(square(3.0F, 0.0F), square(3.0F, z), options);
+  CHECK(report.merged.truth.labels.total().points() == (z < 0.2F ? 9000 : 0));
+  CHECK(std::isnan(report.merged.truth.labels.total().accuracy()) == (z > 0.2F));
+}
+
+TEST_CASE("Points whose true class is unknown are not judged", "[mesh_error]") {
+  const MeshReport report = compare(square(2.0F, 0.0F, 4, 0), square(2.0F, 0.0F, 4, 3), in_place());
+  CHECK(report.merged.truth.labels.total().points() == 0);
+  CHECK(report.merged.truth.labels.count(0, 3) == 4000);
+}
+
+TEST_CASE("True points far from the estimate are not judged", "[mesh_error]") {
+  LabelledMesh estimate = square(2.0F, 0.0F);
+  estimate.transform(make_pose(Eigen::Matrix3d::Identity(), {4, 4, 0}));
+  const MeshReport report = compare(square(10.0F, 0.0F), estimate, in_place());
+  // The square, four strips of half a metre, four quarters of a disc.
+  const double area = 4.0 + 4.0 * 2.0 * 0.5 + std::numbers::pi * 0.25;
+  CHECK(report.merged.coverage == Approx(area / 100.0).epsilon(0.02));
+  CHECK(report.merged.estimate.surface.mean_m < 1e-4);
+  MeshErrorOptions all = in_place();
+  all.crop_m = 20.0;
+  CHECK(compare(square(10.0F, 0.0F), estimate, all).merged.coverage == 1.0);
+}
+
+TEST_CASE("What the truth does not have counts as the crop distance", "[mesh_error]") {
+  LabelledMesh estimate = square(2.0F, 0.0F);
+  estimate.append(square(1.0F, 3.0F));  // a fifth of the estimate, in the air
+  const MeshReport report = compare(square(2.0F, 0.0F), estimate, in_place());
+  CHECK(report.merged.beyond == Approx(0.2).margin(1e-3));
+  CHECK(report.merged.estimate.surface.mean_m == Approx(0.1).margin(1e-3));
+  CHECK(report.merged.truth.surface.mean_m < 1e-4);
+}
+
+TEST_CASE("Several robots are judged each and merged", "[mesh_error]") {
+  LabelledMesh left = rectangle({0, 0, 0}, {3, 0, 0}, {0, 4, 0}, 8, 1);
+  LabelledMesh right = rectangle({2, 0, 0.04F}, {4, 0, 0}, {0, 4, 0}, 8, 2);
+  const std::vector<MeshInput> inputs = {{"left", left}, {"right", right}};
+  MeshErrorOptions options = in_place();
+  options.crop_m = 0.1;
+  const LabelledMesh truth = rectangle({0, 0, 0}, {6, 0, 0}, {0, 4, 0}, 8, 1);
+  const MeshReport report = mesh_error(truth, inputs, options);
+  REQUIRE(report.robots.size() == 2);
+  CHECK(report.robots[0].name == "left");
+  CHECK(report.robots[0].coverage == Approx(0.5 + 0.1 / 6.0).margin(0.01));
+  CHECK(report.robots[1].coverage == Approx(4.0 / 6.0 + 0.09 / 6.0).margin(0.01));
+  CHECK(report.robots[1].estimate.surface.mean_m == Approx(0.04).margin(1e-6));
+  CHECK(report.merged.name == "merged");
+  CHECK(report.merged.area_m2 == Approx(28.0));
+  CHECK(report.merged.coverage == 1.0);
+  CHECK(report.merged.estimate.point.count == 28'000);
+  CHECK(report.merged.estimate.surface.mean_m == Approx(0.04 * 16.0 / 28.0).margin(1e-5));
+  // Where both are, the nearer counts: half of the truth is at 0, half at 4 cm.
+  CHECK(report.merged.truth.surface.mean_m == Approx(0.02).margin(6e-4));
+  CHECK(report.merged.truth.labels.total().accuracy() == Approx(0.5).margin(0.02));
+}
+
+TEST_CASE("The same arguments give the same report on any number of threads", "[mesh_error]") {
+  LabelledMesh estimate = room();
+  estimate.transform(make_pose(Eigen::Matrix3d::Identity(), {0.02, 0.01, 0.03}));
+  const int threads = cv::getNumThreads();
+  cv::setNumThreads(1);
+  const std::string one = json_of(compare(room(), estimate, {}));
+  cv::setNumThreads(4);
+  const std::string four = json_of(compare(room(), estimate, {}));
+  cv::setNumThreads(threads);
+  CHECK(one == four);
+  MeshErrorOptions other;
+  other.seed = 2;
+  CHECK(one != json_of(compare(room(), estimate, other)));
+}
+
+TEST_CASE("More samples than allowed lower the density of both sides, with a note",
+          "[mesh_error]") {
+  MeshErrorOptions options = in_place();
+  options.max_samples = 5000;
+  const MeshReport report = compare(square(10.0F, 0.0F), square(5.0F, 0.0F), options);
+  CHECK(report.merged.estimate.point.count <= 5000);
+  CHECK(report.merged.truth.point.count <= 5000);
+  CHECK(report.merged.truth.point.count > 3500);
+  CHECK(report.samples_per_m2 < 200.0);
+  REQUIRE(report.notes.size() == 1);
+  CHECK_THAT(report.notes[0], Catch::StartsWith("sampled at 1") &&
+                                  Catch::Contains("instead of 1000, to stay below 5000"));
+}
+
+TEST_CASE("Meshes without labels are compared by shape, with a note", "[mesh_error]") {
+  LabelledMesh bare = square(1.0F, 0.0F);
+  bare.labels.clear();
+  const MeshReport report = compare(square(1.0F, 0.0F), bare, in_place());
+  CHECK_FALSE(report.has_labels);
+  REQUIRE(report.notes.size() == 1);
+  CHECK(report.notes[0] == "labels are not judged: none in a");
+  CHECK_THAT(json_of(report), Catch::Contains("\"labels\": null"));
+  CHECK_THAT(to_table(report, {}), !Catch::Contains("True class"));
+}
+
+TEST_CASE("What cannot be compared is refused by name", "[mesh_error]") {
+  const LabelledMesh good = square(1.0F, 0.0F);
+  const auto message = [&](const LabelledMesh& truth, const LabelledMesh& estimate,
+                           MeshErrorOptions options = {}) -> std::string {
+    try {
+      (void)compare(truth, estimate, options);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  LabelledMesh cloud = good;
+  cloud.faces.clear();
+  CHECK(message(good, {}) == "a: no faces, so no surface to compare");
+  CHECK(message(cloud, good) == "truth: no faces, so no surface to compare");
+  LabelledMesh outside = good;
+  outside.faces[3][1] = 1000;
+  CHECK(message(good, outside) == "a: a face names vertex 1000 of 81");
+  LabelledMesh flat = good;
+  for (auto& vertex : flat.vertices) vertex.setZero();
+  CHECK(message(good, flat) == "a: its faces have no area");
+  LabelledMesh broken = good;
+  broken.vertices[0].x() = std::nanf("");
+  CHECK(message(broken, good) == "truth: coordinates that are not finite");
+  LabelledMesh labels = good;
+  labels.labels.pop_back();
+  CHECK(message(good, labels) == "a: 80 labels for 81 vertices");
+  CHECK_THAT(message(good, square(0.01F, 0.0F)), Catch::StartsWith("a: too small for a single"));
+  CHECK_THAT(message(good, square(1.0F, 50.0F)), Catch::Contains("are both in one frame?"));
+  MeshErrorOptions options;
+  options.crop_m = -1.0;
+  CHECK_THAT(message(good, good, options), Catch::StartsWith("the crop distance must be positive"));
+  CHECK_THROWS_AS(mesh_error(good, {}, {}), std::invalid_argument);
+}
+
+TEST_CASE("A label that the palette lacks is refused by file and number", "[mesh_error]") {
+  const LabelPalette palette({{1, "road", {1, 2, 3}}});
+  CHECK_NOTHROW(check_labels(square(1, 0, 2, 1), "a.ply", palette, "p.csv"));
+  CHECK_NOTHROW(check_labels(square(1, 0, 2, 0), "a.ply", palette, "p.csv"));
+  CHECK_THROWS_WITH(check_labels(square(1, 0, 2, 9), "a.ply", palette, "p.csv"),
+                    "a.ply: label 9 is not in p.csv");
+}
+
+TEST_CASE("The tables name robots, classes and numbers", "[mesh_error]") {
+  const LabelledMesh estimate = square(2.0F, 0.03F);
+  const std::string table = to_table(compare(square(2.0F, 0.0F), estimate, in_place()),
+                                     LabelPalette({{1, "road", {1, 2, 3}}}));
+  CAPTURE(table);
+  CHECK_THAT(table, Catch::Contains("\na ") && Catch::Contains(" 30.0 ") &&
+                        Catch::Contains("\nroad") && Catch::Contains("100.0%"));
+}
+
+}  // namespace km

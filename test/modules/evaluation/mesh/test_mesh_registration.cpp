@@ -1,0 +1,107 @@
+#include <catch2/catch.hpp>
+#include <random>
+#include <vector>
+
+#include "modules/core/lie.hpp"
+#include "modules/evaluation/mesh/mesh_error.hpp"
+#include "modules/evaluation/trajectory_error.hpp"
+#include "test/modules/evaluation/mesh/shapes.hpp"
+
+namespace km {
+namespace {
+
+// Where mesh_error() puts `estimate`.
+MeshReport report_of(const LabelledMesh& truth, const LabelledMesh& estimate,
+                     const SE3& guess = SE3::Identity()) {
+  const std::vector<MeshInput> inputs = {{"estimate", estimate}};
+  MeshErrorOptions options;
+  options.T_truth_estimate = guess;
+  return mesh_error(truth, inputs, options);
+}
+
+// How far `found` puts points of a room from where `truth` puts them [m], at most.
+double difference(const SE3& found, const SE3& truth) {
+  double worst = 0.0;
+  for (const Eigen::Vector3f& vertex : room().vertices) {
+    const Eigen::Vector3d point = vertex.cast<double>();
+    worst = std::max(worst, (found * point - truth * point).norm());
+  }
+  return worst;
+}
+
+constexpr double kError_m = 5e-5;  // a few of the steps at which registration stops
+
+}  // namespace
+
+TEST_CASE("Registration finds how a room was moved", "[mesh_error]") {
+  Vector6 xi;
+  xi << GENERATE(-0.04, 0.0, 0.05), 0.02, -0.03, 0.10, GENERATE(-0.08, 0.12), 0.05;
+  const SE3 T_truth_estimate = se3_exp(xi);
+  LabelledMesh estimate = room();
+  estimate.transform(T_truth_estimate.inverse());
+  const Registration found = report_of(room(), estimate).registration;
+  CHECK(found.converged);
+  CHECK(found.free_directions == 0);
+  CHECK(difference(found.T_truth_estimate, T_truth_estimate) < kError_m);
+}
+
+// The registration of 40 points of checks of this kind: a quarter turn about z and (1, 2, 3).
+TEST_CASE("A quarter turn is found by known pairs exactly, by ICP from nearby", "[mesh_error]") {
+  const SE3 T = make_pose(so3_exp({0, 0, -M_PI / 2}), {1, 2, 3});
+  std::mt19937 random(GENERATE(1U, 2U, 3U));
+  std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
+  LabelledMesh estimate;
+  std::vector<PosePair> pairs;
+  for (std::uint32_t i = 0; i < 40; ++i) {
+    const float x = uniform(random), y = uniform(random), z = uniform(random);
+    estimate.vertices.emplace_back(x, y, z);
+    if (i % 3 == 2) estimate.faces.push_back({i - 2, i - 1, i});
+    const Eigen::Vector3d point = estimate.vertices.back().cast<double>();
+    PosePair pair;
+    pair.T_truth_body.translation() = T * point;
+    pair.T_estimate_body.translation() = point;
+    pairs.push_back(pair);
+  }
+  const SE3 by_pairs = align(pairs, false).T_truth_estimate;
+  CHECK(difference(by_pairs, T) < 1e-12);
+
+  LabelledMesh truth = estimate;
+  truth.transform(T);
+  Vector6 off;
+  off << 0.01, -0.01, 0.02, 0.02, 0.01, -0.03;
+  const MeshReport report = report_of(truth, estimate, T * se3_exp(off));
+  // Triangles that cross each other pair points wrongly, ever fewer while they draw near.
+  CHECK(difference(report.registration.T_truth_estimate, T) < 3e-4);
+  CHECK(report.merged.truth.surface.mean_m < 1e-4);
+}
+
+TEST_CASE("Registration does not move along what the surfaces leave open", "[mesh_error]") {
+  LabelledMesh estimate = square(4.0F, 0.0F);
+  estimate.transform(make_pose(Eigen::Matrix3d::Identity(), {0.3, 0.0, 0.05}));
+  const MeshReport report = report_of(square(4.0F, 0.0F), estimate);
+  CHECK(report.registration.free_directions == 3);
+  const SE3 expected = make_pose(Eigen::Matrix3d::Identity(), {0.0, 0.0, -0.05});
+  CHECK(difference(report.registration.T_truth_estimate, expected) < kError_m);
+  REQUIRE(report.notes.size() >= 1);
+  CHECK(report.notes[0] ==
+        "the surfaces leave 3 of 6 directions open; registration did not move along these");
+}
+
+TEST_CASE("Registration is not drawn off by a part that is not in the truth", "[mesh_error]") {
+  LabelledMesh estimate = room();
+  estimate.append(square(1.0F, 0.5F));  // a table of 1 m^2 of 41, half a metre above the floor
+  const SE3 T_truth_estimate = make_pose(so3_exp({0.0, 0.0, 0.02}), {0.05, -0.05, 0.03});
+  estimate.transform(T_truth_estimate.inverse());
+  const Registration found = report_of(room(), estimate).registration;
+  CHECK(difference(found.T_truth_estimate, T_truth_estimate) < kError_m);
+}
+
+TEST_CASE("A large move is noted", "[mesh_error]") {
+  LabelledMesh estimate = room();
+  estimate.transform(make_pose(Eigen::Matrix3d::Identity(), {0.6, 0.0, 0.0}));
+  const MeshReport report = report_of(room(), estimate);
+  REQUIRE_FALSE(report.notes.empty());
+  CHECK_THAT(report.notes[0], Catch::StartsWith("registration moved the estimate by up to 0.6"));
+}
+
+}  // namespace km
