@@ -12,6 +12,30 @@ Value lit(const Shade<Value>& shade, bool dark) {
   return dark ? shade.ambient : Value(shade.ambient + shade.sun);
 }
 
+void copy_lane(const Lanes3& from, std::size_t lane, Lanes3& to, std::size_t to_lane) {
+  to.set(to_lane, from.at(lane));
+}
+
+void copy_lane(const SurfaceHits& from, std::size_t lane, SurfaceHits& to, std::size_t to_lane) {
+  const RTCRay16& a = from.rays.ray;
+  RTCRay16& b = to.rays.ray;
+  b.org_x[to_lane] = a.org_x[lane];
+  b.org_y[to_lane] = a.org_y[lane];
+  b.org_z[to_lane] = a.org_z[lane];
+  b.dir_x[to_lane] = a.dir_x[lane];
+  b.dir_y[to_lane] = a.dir_y[lane];
+  b.dir_z[to_lane] = a.dir_z[lane];
+  b.tfar[to_lane] = a.tfar[lane];
+  to.rays.hit.primID[to_lane] = from.rays.hit.primID[lane];
+  to.rays.hit.u[to_lane] = from.rays.hit.u[lane];
+  to.rays.hit.v[to_lane] = from.rays.hit.v[lane];
+  copy_lane(from.right, lane, to.right, to_lane);
+  copy_lane(from.down, lane, to.down, to_lane);
+  const LaneMask bit = 1U << to_lane;
+  to.active |= bit;
+  if (has_lane(from.surface, lane)) to.surface |= bit;
+}
+
 }  // namespace
 
 // Whether a sample on this side of a pixel's centre may see what the pixel's edges are with.
@@ -46,6 +70,7 @@ void ViewPass::refine_edges() {
       for (int y = y0; y < std::min(y0 + kTile, height_); ++y)
         for (int x = x0; x < std::min(x0 + kTile, width_); ++x) refine_pixel(x, y);
   refine(batch);
+  light_deferred();
 }
 
 // Whether the centre of a pixel shows a surface that looks like one at `depth_m`: the same material
@@ -79,58 +104,71 @@ std::optional<std::size_t> ViewPass::shaded_nearby(const Sample& sample, std::ui
   return std::nullopt;
 }
 
-void ViewPass::find_sources(std::span<const Sample> batch, const SurfaceHits& hits,
-                            Sources& sources) const {
-  for (std::size_t lane = 0; lane < batch.size(); ++lane) {
-    const LaneMask bit = 1U << lane;
-    const auto nearby =
-        shaded_nearby(batch[lane], hits.rays.hit.primID[lane], hits.rays.ray.tfar[lane]);
-    if (nearby) {
-      sources.pixel[lane] = *nearby;
-      if (pixels_[*nearby].dark) sources.dark |= bit;
-      if ((edge_[index(batch[lane].x, batch[lane].y)] & kShadow) != 0) sources.ask_sun |= bit;
-    } else {
-      sources.fresh |= bit;
-      sources.ask_sun |= bit;
-    }
-  }
-  sources.ask_sun &= hits.surface;
-}
-
-// A sample takes the shade of a pixel nearby, or is shaded itself; at shadows' edges each sample
-// asks for the sun itself.
+// A sample takes the shade of a pixel nearby, or is shaded itself, later, together with others; at
+// shadows' edges each sample asks for the sun itself.
 void ViewPass::refine(std::span<const Sample> batch) {
   Aim aim;
   for (std::size_t lane = 0; lane < batch.size(); ++lane)
     aim.set(lane, batch[lane].x, batch[lane].y, batch[lane].offset);
   SurfaceHits hits;
   trace(aim, hits);
-  Sources sources;
-  find_sources(batch, hits, sources);
+  for (std::size_t lane = 0; lane < batch.size(); ++lane) {
+    const std::size_t pixel = index(batch[lane].x, batch[lane].y);
+    const auto source =
+        shaded_nearby(batch[lane], hits.rays.hit.primID[lane], hits.rays.ray.tfar[lane]);
+    const bool ask_sun = has_lane(hits.surface, lane) && (edge_[pixel] & kShadow) != 0;
+    if (!source || ask_sun) {
+      defer(hits, lane, pixel, source);
+    } else if (*source != pixel) {
+      const bool dark = pixels_[*source].dark;
+      if (request_.radiance) add_sample(pixel, lit(gray_[*source], dark), gray_, view_.radiance);
+      if (request_.rgb) add_sample(pixel, lit(color_[*source], dark), color_, view_.rgb);
+    }
+  }
+}
+
+// Puts a sample whose light is not known yet into the packet of those that are lit together.
+void ViewPass::defer(const SurfaceHits& hits, std::size_t lane, std::size_t pixel,
+                     std::optional<std::size_t> source) {
+  const std::size_t to = deferred_.count++;
+  const LaneMask bit = 1U << to;
+  copy_lane(hits, lane, deferred_.hits, to);
+  deferred_.pixel[to] = pixel;
+  deferred_.source[to] = source.value_or(pixel);
+  if (!source) deferred_.fresh |= bit;
+  if (deferred_.count == kLanes) light_deferred();
+}
+
+void ViewPass::light_deferred() {
+  const SurfaceHits& hits = deferred_.hits;
   SurfacePoints points;
-  hits.surface &= sources.fresh | sources.ask_sun;
   locate(scene_.surfaces, hits, points);
-  if (options_.shadows && scene_.lighting.sun > 0.0F)
-    sources.dark = (sources.dark & ~sources.ask_sun) | shadowed(scene_, sources.ask_sun, points);
-  mix<float>(batch, hits, points, sources, gray_, view_.radiance);
-  mix<Eigen::Vector3f>(batch, hits, points, sources, color_, view_.rgb);
+  LaneMask dark = 0;
+  if (options_.shadows && scene_.lighting.sun > 0.0F) dark = shadowed(scene_, hits.surface, points);
+  if (request_.radiance) mix(points, dark, gray_, view_.radiance);
+  if (request_.rgb) mix(points, dark, color_, view_.rgb);
+  deferred_ = {};
 }
 
 template <typename Value>
-void ViewPass::mix(std::span<const Sample> batch, const SurfaceHits& hits,
-                   const SurfacePoints& points, const Sources& sources,
+void ViewPass::mix(const SurfacePoints& points, LaneMask dark,
                    const std::vector<Shade<Value>>& shaded, std::vector<Value>& image) const {
-  if (image.empty()) return;
   std::array<Shade<Value>, kLanes> shades;
-  shade(scene_, hits, points, sources.fresh, shades);
-  const float weight = 1.0F / static_cast<float>(samples_ + 1);
-  for (std::size_t lane = 0; lane < batch.size(); ++lane) {
-    const std::size_t pixel = index(batch[lane].x, batch[lane].y);
-    const bool fresh = (sources.fresh >> lane & 1U) != 0U;
-    const Value sample =
-        lit(fresh ? shades[lane] : shaded[sources.pixel[lane]], (sources.dark >> lane & 1U) != 0U);
-    image[pixel] += weight * (sample - lit(shaded[pixel], pixels_[pixel].dark));
+  shade(scene_, deferred_.hits, points, deferred_.fresh, shades);
+  for (std::size_t i = 0; i < deferred_.count; ++i) {
+    const Shade<Value>& light =
+        has_lane(deferred_.fresh, i) ? shades[i] : shaded[deferred_.source[i]];
+    add_sample(deferred_.pixel[i], lit(light, has_lane(dark, i)), shaded, image);
   }
+}
+
+// In the mean of a pixel's centre and samples, those not added count as the centre.
+template <typename Value>
+void ViewPass::add_sample(std::size_t pixel, const Value& radiance,
+                          const std::vector<Shade<Value>>& shaded,
+                          std::vector<Value>& image) const {
+  const float weight = 1.0F / static_cast<float>(samples_ + 1);
+  image[pixel] += weight * (radiance - lit(shaded[pixel], pixels_[pixel].dark));
 }
 
 }  // namespace km

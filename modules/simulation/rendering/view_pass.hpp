@@ -75,25 +75,30 @@ class ViewPass {
     int x = 0, y = 0;
     Eigen::Vector2f offset = Eigen::Vector2f::Zero();  ///< From the pixel's centre [px].
   };
-  /// Where the shades of a batch of samples come from.
-  struct Sources {
-    std::array<std::size_t, kLanes> pixel{};  ///< The pixel whose shade a sample takes,
-    LaneMask fresh = 0;                       ///< unless it must be shaded itself.
-    LaneMask dark = 0;                        ///< The sun does not reach it.
-    LaneMask ask_sun = 0;                     ///< That is to be found out.
+  /// Samples whose light must be found out: they wait until there are enough for a packet.
+  struct Deferred {
+    SurfaceHits hits{};
+    std::size_t count = 0;
+    std::array<std::size_t, kLanes> pixel{};   ///< That the sample belongs to.
+    std::array<std::size_t, kLanes> source{};  ///< Pixel whose shade it takes,
+    LaneMask fresh = 0;                        ///< unless it must be shaded itself.
   };
   [[nodiscard]] static bool beyond_edge(std::uint8_t edge, const Eigen::Vector2f& offset);
   void refine_edges();
   void refine(std::span<const Sample> batch);
-  void find_sources(std::span<const Sample> batch, const SurfaceHits& hits, Sources& sources) const;
   [[nodiscard]] std::optional<std::size_t> shaded_nearby(const Sample& sample,
                                                          std::uint32_t triangle,
                                                          float depth_m) const;
   [[nodiscard]] bool alike(const Pixel& pixel, const SurfaceRecord& surface, float depth_m) const;
+  void defer(const SurfaceHits& hits, std::size_t lane, std::size_t pixel,
+             std::optional<std::size_t> source);
+  void light_deferred();
   template <typename Value>
-  void mix(std::span<const Sample> batch, const SurfaceHits& hits, const SurfacePoints& points,
-           const Sources& sources, const std::vector<Shade<Value>>& shaded,
+  void mix(const SurfacePoints& points, LaneMask dark, const std::vector<Shade<Value>>& shaded,
            std::vector<Value>& image) const;
+  template <typename Value>
+  void add_sample(std::size_t pixel, const Value& radiance, const std::vector<Shade<Value>>& shaded,
+                  std::vector<Value>& image) const;
 
   /// Casts the rays; the direction has z = 1 in the camera frame.
   void trace(const Aim& aim, SurfaceHits& hits) const;
@@ -117,6 +122,7 @@ class ViewPass {
   std::vector<std::uint8_t> edge_;  ///< Of Edge.
   std::vector<Shade<float>> gray_;
   std::vector<Shade<Eigen::Vector3f>> color_;
+  Deferred deferred_;
 };
 
 }  // namespace km
