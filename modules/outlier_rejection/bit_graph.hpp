@@ -45,21 +45,35 @@ class BitSet {
   void intersect(const BitSet& other) {
     for (std::size_t w = 0; w < words_.size(); ++w) words_[w] &= other.words_[w];
   }
-  [[nodiscard]] std::size_t count() const {
-    std::size_t count = 0;
-    for (const std::uint64_t word : words_) count += static_cast<std::size_t>(std::popcount(word));
-    return count;
-  }
   [[nodiscard]] std::size_t count_common(const BitSet& other) const {
     std::size_t count = 0;
     for (std::size_t w = 0; w < words_.size(); ++w)
       count += static_cast<std::size_t>(std::popcount(words_[w] & other.words_[w]));
     return count;
   }
-  [[nodiscard]] bool contains_all(const BitSet& other) const {
-    for (std::size_t w = 0; w < words_.size(); ++w)
-      if ((other.words_[w] & ~words_[w]) != 0) return false;
+  /// True if every element but `i` is in `other`. Precondition: `i` is an element.
+  [[nodiscard]] bool all_but_one_in(std::size_t i, const BitSet& other) const {
+    for (std::size_t w = 0; w < words_.size(); ++w) {
+      const std::uint64_t itself = w == i / 64 ? std::uint64_t{1} << (i % 64) : 0;
+      if ((words_[w] & ~other.words_[w]) != itself) return false;
+    }
     return true;
+  }
+  [[nodiscard]] bool intersects(const BitSet& other) const {
+    for (std::size_t w = 0; w < words_.size(); ++w)
+      if ((words_[w] & other.words_[w]) != 0) return true;
+    return false;
+  }
+  /// The common element if there is exactly one; faster than counting them.
+  [[nodiscard]] std::optional<std::size_t> only_common(const BitSet& other) const {
+    std::optional<std::size_t> only;
+    for (std::size_t w = 0; w < words_.size(); ++w) {
+      const std::uint64_t word = words_[w] & other.words_[w];
+      if (word == 0) continue;
+      if (only || (word & (word - 1)) != 0) return std::nullopt;
+      only = 64 * w + static_cast<std::size_t>(std::countr_zero(word));
+    }
+    return only;
   }
 
  private:

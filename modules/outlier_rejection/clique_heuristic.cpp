@@ -4,19 +4,19 @@
 
 namespace km {
 
-std::vector<std::size_t> greedy_clique_with(const BitGraph& graph, std::size_t v,
-                                            std::size_t more_than) {
-  if (graph.degree(v) < more_than) return {};
+std::vector<std::size_t> greedy_extension(const BitGraph& graph, std::vector<std::size_t> clique,
+                                          std::size_t more_than) {
+  for (const std::size_t v : clique)
+    if (graph.degree(v) < more_than) return {};
+  BitSet adjacent_to_all = graph.neighbours(clique.front());
+  for (const std::size_t v : clique) adjacent_to_all.intersect(graph.neighbours(v));
   std::vector<std::size_t> by_degree;
-  const BitSet& neighbours = graph.neighbours(v);
-  for (auto u = neighbours.next(0); u; u = neighbours.next(*u + 1))
+  for (auto u = adjacent_to_all.next(0); u; u = adjacent_to_all.next(*u + 1))
     if (graph.degree(*u) >= more_than) by_degree.push_back(*u);
-  if (by_degree.size() < more_than) return {};
+  if (clique.size() + by_degree.size() <= more_than) return {};
   std::stable_sort(by_degree.begin(), by_degree.end(),
                    [&](std::size_t x, std::size_t y) { return graph.degree(x) > graph.degree(y); });
 
-  std::vector<std::size_t> clique{v};
-  BitSet adjacent_to_all = neighbours;
   for (const std::size_t u : by_degree) {
     if (!adjacent_to_all.contains(u)) continue;
     clique.push_back(u);
@@ -30,7 +30,7 @@ std::vector<std::size_t> greedy_clique_with(const BitGraph& graph, std::size_t v
 std::vector<std::size_t> greedy_clique(const BitGraph& graph) {
   std::vector<std::size_t> best;
   for (std::size_t v = 0; v < graph.size(); ++v) {
-    std::vector<std::size_t> clique = greedy_clique_with(graph, v, best.size());
+    std::vector<std::size_t> clique = greedy_extension(graph, {v}, best.size());
     if (!clique.empty()) best = std::move(clique);
   }
   return best;

@@ -13,12 +13,13 @@ namespace km {
 // Vertices whose degree is too small for a clique larger than the known one are left out. Equal
 // degrees: the vertex with the lowest number. No guarantee; O(vertices^2 / 64) per start.
 
-/// The clique that this finds from v, ascending, v included; empty unless it has more than
-/// `more_than` vertices.
-[[nodiscard]] std::vector<std::size_t> greedy_clique_with(const BitGraph& graph, std::size_t v,
-                                                          std::size_t more_than);
+/// The clique that this makes of `clique`, which it contains; ascending. Empty unless it has more
+/// than `more_than` vertices. Precondition: `clique` is one and not empty.
+[[nodiscard]] std::vector<std::size_t> greedy_extension(const BitGraph& graph,
+                                                        std::vector<std::size_t> clique,
+                                                        std::size_t more_than);
 
-/// The largest found from any vertex; of equally large ones that from the lowest.
+/// The largest that it makes of any single vertex; of equally large ones that from the lowest.
 [[nodiscard]] std::vector<std::size_t> greedy_clique(const BitGraph& graph);
 
 }  // namespace km

@@ -38,6 +38,23 @@ Vertices core_in_degeneracy_order(const BitGraph& graph, std::span<const std::si
   return order;
 }
 
+// True if a greedy colouring in the order of their numbers needs no more colours: the candidates
+// then have no larger clique. Far cheaper than all that follows, and most often enough.
+bool is_colourable(const BitGraph& graph, std::span<const std::size_t> candidates,
+                   std::size_t colours) {
+  BitSet uncoloured(graph.capacity());
+  for (const std::size_t v : candidates) uncoloured.insert(v);
+  BitSet rest;
+  for (std::size_t c = 0; c < colours && uncoloured.next(0); ++c) {
+    rest = uncoloured;
+    for (auto v = rest.next(0); v; v = rest.next(*v + 1)) {
+      uncoloured.erase(*v);
+      rest.subtract(graph.neighbours(*v));
+    }
+  }
+  return !uncoloured.next(0);
+}
+
 BitGraph induced(const BitGraph& graph, const Vertices& vertices) {
   BitGraph result(vertices.size());
   for (std::size_t i = 0; i < vertices.size(); ++i)
@@ -63,7 +80,7 @@ class BranchAndBound {
 
  private:
   struct Level {
-    BitSet candidates, uncoloured, rest, conflict;
+    BitSet candidates, uncoloured, rest;
     std::vector<BitSet> colours;     // independent sets, [c - 1] for colour c
     Vertices order;                  // vertices that could lead to a larger clique ...
     std::vector<std::size_t> bound;  // ... and the colours in use up to each
@@ -81,20 +98,38 @@ class BranchAndBound {
       return;
     }
     Level& here = level(depth);
-    colour_candidates(here, best_size_ - std::min(best_size_, clique_.size()));
+    const std::size_t size = clique_.size();
+    take_universal(here);
+    if (here.candidates.next(0))
+      branch(depth);
+    else if (clique_.size() > best_size_)
+      record();
+    clique_.resize(size);
+  }
+
+  // Candidates adjacent to all others are in a largest clique of them: no need to try without.
+  void take_universal(Level& here) {
+    for (auto v = here.candidates.next(0); v; v = here.candidates.next(*v + 1)) {
+      if (!here.candidates.all_but_one_in(*v, graph_.neighbours(*v))) continue;
+      here.candidates.erase(*v);
+      clique_.push_back(*v);
+    }
+  }
+
+  void branch(std::size_t depth) {
+    Level& here = level(depth);
+    const std::size_t taken = clique_.size();
+    colour_candidates(here, best_size_ - std::min(best_size_, taken));
     while (!here.order.empty() && !done_) {
-      if (clique_.size() + here.bound.back() <= best_size_) return;
-      if (depth == 0) root_bound_ = here.bound.back();
+      if (taken + here.bound.back() <= best_size_) return;
+      if (depth == 0) root_bound_ = taken + here.bound.back();
       const std::size_t v = here.order.back();
       here.order.pop_back();
       here.bound.pop_back();
       clique_.push_back(v);
       Level& below = level(depth + 1);
       below.candidates.assign_intersection(here.candidates, graph_.neighbours(v));
-      if (below.candidates.next(0))
-        expand(depth + 1);
-      else if (clique_.size() > best_size_)
-        record();
+      expand(depth + 1);
       clique_.pop_back();
       here.candidates.erase(v);
     }
@@ -134,17 +169,14 @@ class BranchAndBound {
   // Tries to give v one of the first `spare` colours by moving the only vertex there that is in its
   // way to another of them.
   bool recolour(Level& here, std::size_t v, std::size_t spare) {
-    const BitSet& neighbours = graph_.neighbours(v);
     for (std::size_t c = 0; c + 1 < spare; ++c) {
       BitSet& colour = here.colours[c];
-      if (colour.count_common(neighbours) != 1) continue;
-      BitSet& conflict = here.conflict;
-      conflict.assign_intersection(colour, neighbours);
-      const std::size_t w = *conflict.next(0);
+      const auto w = colour.only_common(graph_.neighbours(v));
+      if (!w) continue;
       for (std::size_t d = c + 1; d < spare; ++d) {
-        if (here.colours[d].count_common(graph_.neighbours(w)) != 0) continue;
-        colour.erase(w);
-        here.colours[d].insert(w);
+        if (here.colours[d].intersects(graph_.neighbours(*w))) continue;
+        colour.erase(*w);
+        here.colours[d].insert(*w);
         colour.insert(v);
         return true;
       }
@@ -166,9 +198,10 @@ class BranchAndBound {
 
 CliqueSearch find_clique(const BitGraph& graph, std::span<const std::size_t> candidates,
                          const CliqueGoal& goal) {
+  const CliqueSearch none{.clique = {}, .proven = true, .bound = goal.more_than, .nodes = 0};
+  if (is_colourable(graph, candidates, goal.more_than)) return none;
   const Vertices vertices = core_in_degeneracy_order(graph, candidates, goal.more_than);
-  if (vertices.size() <= goal.more_than)
-    return {.clique = {}, .proven = true, .bound = goal.more_than, .nodes = 0};
+  if (vertices.size() <= goal.more_than) return none;
   const BitGraph subgraph = induced(graph, vertices);
   CliqueSearch result = BranchAndBound(subgraph, goal).run();
   for (std::size_t& v : result.clique) v = vertices[v];

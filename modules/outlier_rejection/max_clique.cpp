@@ -40,7 +40,7 @@ bool MaxClique::add(std::span<const std::size_t> neighbours) {
     if (neighbours.size() >= before) search_exactly(v, neighbours, most);
   } else {
     adopt(method_ == CliqueMethod::kBatch ? greedy_clique(graph_)
-                                          : greedy_clique_with(graph_, v, before));
+                                          : greedy_extension(graph_, {v}, before));
     bound_ = std::max(bound_, most);
   }
   return clique_.size() > before;
@@ -48,9 +48,11 @@ bool MaxClique::add(std::span<const std::size_t> neighbours) {
 
 void MaxClique::search_exactly(std::size_t v, std::span<const std::size_t> neighbours,
                                std::size_t most) {
-  const auto is_neighbour = [&](std::size_t u) { return graph_.adjacent(u, v); };
-  if (std::all_of(clique_.begin(), clique_.end(), is_neighbour)) clique_.push_back(v);
-  adopt(greedy_clique_with(graph_, v, clique_.size()));
+  std::vector<std::size_t> known{v};
+  for (const std::size_t u : clique_)
+    if (graph_.adjacent(u, v)) known.push_back(u);
+  adopt(greedy_extension(graph_, std::move(known), clique_.size()));
+  adopt(greedy_extension(graph_, {v}, clique_.size()));
   if (clique_.size() < most)
     search_tree(v, neighbours, most);
   else

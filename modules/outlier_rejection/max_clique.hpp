@@ -18,9 +18,10 @@ namespace km {
 /// searched only until it has gained one. Of equally large cliques the older one is kept.
 /// Deterministic. Not thread-safe. Copyable.
 ///
-/// The exact method first tries what costs next to nothing: the known clique with the new vertex,
-/// and the greedy heuristic from it. The search tree then finds more, or proves that there is none;
-/// where its limit ends it, the better of both stands, and bound() says how much may be missing.
+/// The exact method first tries what costs next to nothing: the greedy heuristic, from the new
+/// vertex with its neighbours in the known clique and from it alone. The search tree then finds
+/// more, or proves that there is none; where its limit ends it, the better of both stands, and
+/// bound() says how much may be missing.
 class MaxClique {
  public:
   /// `max_search_nodes` bounds the search tree of one add() of the exact method.

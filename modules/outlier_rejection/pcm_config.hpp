@@ -47,7 +47,7 @@ struct PcmConfig {
 
   /// Exact: bound on the search tree after one closure; beyond it the better of what the tree and
   /// the heuristic found is kept.
-  int max_search_nodes = 100000;
+  int max_search_nodes = 10000;
 
   /// Sets that changed are published together this often [s]: while closures pour in, not every
   /// intermediate set has to travel.

@@ -29,10 +29,11 @@ TEST_CASE("The greedy clique follows the degrees", "[clique]") {
                                                                              {1, 8},
                                                                              {1, 9}})
     graph.connect(u, v);
-  CHECK(greedy_clique_with(graph, 0, 0) == Vertices{0, 1, 2});  // misled by vertex 1
-  CHECK(greedy_clique_with(graph, 0, 3).empty());
-  CHECK(greedy_clique_with(graph, 3, 0) == Vertices{0, 3, 4, 5});
-  CHECK(greedy_clique_with(graph, 6, 0) == Vertices{1, 6});
+  CHECK(greedy_extension(graph, {0}, 0) == Vertices{0, 1, 2});  // misled by vertex 1
+  CHECK(greedy_extension(graph, {0}, 3).empty());
+  CHECK(greedy_extension(graph, {3}, 0) == Vertices{0, 3, 4, 5});
+  CHECK(greedy_extension(graph, {6}, 0) == Vertices{1, 6});
+  CHECK(greedy_extension(graph, {4, 0}, 0) == Vertices{0, 3, 4, 5});
   CHECK(greedy_clique(graph) == Vertices{0, 3, 4, 5});
 }
 
@@ -44,10 +45,10 @@ TEST_CASE("What is greedily found is a clique with the vertex, and larger than a
   const Rows rows = random_graph(60, density, rng);
   const BitGraph graph = bit_graph(rows);
   for (std::size_t v = 0; v < rows.size(); ++v) {
-    const Vertices clique = greedy_clique_with(graph, v, 0);
+    const Vertices clique = greedy_extension(graph, {v}, 0);
     REQUIRE(is_clique(rows, clique));
     REQUIRE(std::ranges::binary_search(clique, v));
-    CHECK(greedy_clique_with(graph, v, clique.size()).size() != clique.size());
+    CHECK(greedy_extension(graph, {v}, clique.size()).size() != clique.size());
   }
   const Vertices best = greedy_clique(graph);
   CHECK(is_clique(rows, best));
