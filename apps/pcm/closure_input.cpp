@@ -125,10 +125,11 @@ ConsistencyRows read_consistency_rows(std::istream& in, const std::string& file)
   TextFields header(table.front(), file);
   const std::uint64_t vertices = header.integer("number of vertices", kMostVertices);
   if (!header.at_end()) header.fail("more than the number of vertices");
-  const auto lines = static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n'));
-  if (lines < vertices)
-    throw std::runtime_error(file + ": ends after " + std::to_string(lines) + " lines, has " +
-                             std::to_string(vertices) + " vertices");
+  const auto lines = static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n')) +
+                     (text.ends_with('\n') ? 0 : 1);
+  if (lines <= vertices)
+    throw std::runtime_error(file + ": ends after " + std::to_string(lines) + " lines, " +
+                             std::to_string(vertices) + " vertices need one each and the first");
   ConsistencyRows rows(vertices);
   for (const TextRow& row : std::span(table).subspan(1)) {
     const auto v = static_cast<std::size_t>(row.line) - 2;

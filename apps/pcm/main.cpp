@@ -120,6 +120,15 @@ void write(const fs::path& file, const auto& writer) {
   if (!out) throw std::runtime_error(file.string() + ": cannot be written");
 }
 
+// Told before the work is done, not after.
+void check_folder_of(const fs::path& file) {
+  if (file.empty()) return;
+  const fs::path folder = fs::absolute(file).parent_path();
+  if (!fs::is_directory(folder))
+    throw std::runtime_error(file.string() + ": cannot be written, there is no folder " +
+                             folder.string());
+}
+
 km::KeyframePairs labels_beside(const fs::path& file) {
   const fs::path labels = file.string() + ".labels";
   if (!fs::exists(labels)) return {};
@@ -142,6 +151,9 @@ std::vector<km::PcmRun> run(const Options& options) {
     return runs;
   };
   if (options.file.extension() == ".txt") {
+    if (options.selection.outliers > 0 || options.selection.keep > 0)
+      throw std::runtime_error("--outliers and --closures need a pose graph, " +
+                               options.file.string() + " is a consistency graph");
     std::ifstream in = opened(options.file);
     return runs_of(km::read_consistency_rows(in, options.file.string()));
   }
@@ -166,6 +178,8 @@ int main(int argc, char** argv) try {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 1;
   }
+  check_folder_of(options.json);
+  check_folder_of(options.plot);
   options.selection.shuffle = !options.file_order;
   options.config.odometry_gate = !options.keep_contradicting;
   const std::vector<km::PcmRun> runs = run(options);
