@@ -110,6 +110,8 @@ void write_file(const fs::path& file, const fs::path& dataset,
     json.field("compared_with", compare.string());
     json.key("compared_figures");
     write_json(json, other);
+    json.key("comparison");
+    write_comparison(json, figures, other);
   }
   json.end_object();
   if (!stream.flush()) throw std::runtime_error(file.string() + ": cannot be written");

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
+#include <limits>
+#include <optional>
 #include <sstream>
 
 namespace km {
@@ -33,6 +35,18 @@ bool is_amount(const ImageFigure& figure) {
 
 bool is_at_flow(const ImageFigure& figure) {
   return figure.name.find("flow ") != figure.name.npos;
+}
+
+// other / reference; NaN where either is not to be had.
+double ratio_of(const ImageFigure& reference, const ImageFigure& other) {
+  return other.value / reference.value;
+}
+
+// Whether the two differ by more than kMarkedDifference; nullopt: not judged.
+std::optional<bool> differs(const ImageFigure& reference, const ImageFigure& other) {
+  const double ratio = ratio_of(reference, other);
+  if (!std::isfinite(ratio) || is_amount(reference)) return std::nullopt;
+  return std::abs(ratio - 1.0) > kMarkedDifference;
 }
 
 struct Count {
@@ -79,13 +93,11 @@ std::string to_comparison(std::span<const ImageFigure> reference,
     begin_row(out, figure, section);
     out << std::setw(kValueWidth) << number(figure.value, figure.decimals) << std::setw(kValueWidth)
         << number(partner->value, figure.decimals);
-    const double ratio = partner->value / figure.value;
-    out << std::setw(kValueWidth) << number(ratio, 2);
-    if (std::isfinite(ratio) && !is_amount(figure)) {
-      const bool differs = std::abs(ratio - 1.0) > kMarkedDifference;
-      all.add(differs);
-      if (is_at_flow(figure)) like_flow.add(differs);
-      if (differs) out << "  <--";
+    out << std::setw(kValueWidth) << number(ratio_of(figure, *partner), 2);
+    if (const auto is_marked = differs(figure, *partner)) {
+      all.add(*is_marked);
+      if (is_at_flow(figure)) like_flow.add(*is_marked);
+      if (*is_marked) out << "  <--";
     }
     out << '\n';
   }
@@ -109,6 +121,36 @@ void write_json(JsonWriter& json, std::span<const ImageFigure> figures) {
     json.field(figure.name, figure.value);
   }
   if (section != nullptr) json.end_object();
+  json.end_object();
+}
+
+void write_comparison(JsonWriter& json, std::span<const ImageFigure> reference,
+                      std::span<const ImageFigure> other) {
+  Count all;
+  json.begin_object();
+  json.key("rows");
+  json.begin_array();
+  for (const ImageFigure& figure : reference) {
+    const ImageFigure* const partner = find(other, figure);
+    if (partner == nullptr) continue;
+    json.begin_object();
+    json.field("section", figure.section);
+    json.field("name", figure.name);
+    json.field("reference", figure.value);
+    json.field("other", partner->value);
+    json.field("ratio", ratio_of(figure, *partner));
+    const auto is_marked = differs(figure, *partner);
+    if (is_marked) {
+      all.add(*is_marked);
+      json.field("differs", *is_marked);
+    } else {
+      json.field("differs", std::numeric_limits<double>::quiet_NaN());
+    }
+    json.end_object();
+  }
+  json.end_array();
+  json.field("compared", all.rows);
+  json.field("differing", all.marked);
   json.end_object();
 }
 

@@ -27,4 +27,10 @@ inline constexpr double kMarkedDifference = 0.25;
 /// One JSON object: {section: {name: value, ...}, ...}; null for what is not to be had.
 void write_json(JsonWriter& json, std::span<const ImageFigure> figures);
 
+/// The comparison as one JSON object: {"rows": [{"section", "name", "reference", "other", "ratio",
+/// "differs"}, ...], "compared", "differing"}; "differs" is null for rows that are not judged:
+/// amounts, and those without a ratio.
+void write_comparison(JsonWriter& json, std::span<const ImageFigure> reference,
+                      std::span<const ImageFigure> other);
+
 }  // namespace km

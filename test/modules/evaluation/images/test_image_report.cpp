@@ -42,6 +42,20 @@ TEST_CASE("A comparison marks what differs by more than a quarter", "[image_stat
                            "1 of 3 rows differ by more than 25 %; of those at like flow 0 of 1\n"));
 }
 
+TEST_CASE("The JSON of a comparison says ratio and verdict, row by row", "[image_statistics]") {
+  std::ostringstream text;
+  JsonWriter json(text);
+  write_comparison(json, kReference, kOther);
+  std::string flat;
+  for (const char c : text.str())
+    if (c != ' ' && c != '\n') flat += c;
+  CHECK_THAT(flat,
+             Catch::Contains(R"("other":120,"ratio":1.2,"differs":false)") &&
+                 Catch::Contains(R"("other":20,"ratio":0.4,"differs":true)") &&
+                 Catch::Contains(R"("reference":null,"other":0.5,"ratio":null,"differs":null)") &&
+                 !Catch::Contains("onlyhere") && Catch::EndsWith(R"("compared":3,"differing":1})"));
+}
+
 TEST_CASE("The JSON nests figures in their sections, null for what is not had",
           "[image_statistics]") {
   std::ostringstream text;
