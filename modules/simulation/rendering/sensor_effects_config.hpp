@@ -25,16 +25,16 @@ struct SensorEffectsConfig {
 
   /// Correlation length of the noise [px]; 0: white. Recordings that went through a demosaic, a
   /// filter or JPEG have little of their noise left in the finest scale.
-  double noise_correlation_px = 1.5;
+  double noise_correlation_px = 1.2;
 
   /// Exponent of the response curve: grey = signal^(1 / gamma). 1: linear.
   double gamma = 1.0;
 
   /// Mean grey level that the auto-exposure aims at, as a share of saturation.
-  double target_level = 0.5;
+  double target_level = 0.55;
 
   /// Share of the way to its target (in log exposure) that the exposure goes per frame at 20 Hz.
-  double adaptation = 0.1;
+  double adaptation = 0.02;
 
   /// Shutter time at which a white wall in the sun saturates [s]; darker scenes open longer.
   double unit_exposure_s = 0.005;

@@ -41,7 +41,7 @@ constexpr std::array<Entry, kRecipeCount> kEntries = {{
     {{Recipe::kCanvas, "canvas", 512, 2.0F, kGrain, 0.37F}, recipes::canvas_cloth},
     {{Recipe::kWoodPlanks, "wood_planks", 1024, 2.0F, kStains, 3.41F}, recipes::wood_planks},
     {{Recipe::kMat, "mat", 512, 2.0F, kStains, 5.23F}, recipes::foam_mat},
-    {{Recipe::kCarpet, "carpet", 512, 2.0F, kStains, 4.79F}, recipes::carpet},
+    {{Recipe::kCarpet, "carpet", 512, 2.0F, kFlat, 1.0F}, recipes::carpet},
     {{Recipe::kCurtain, "curtain", 512, 2.0F, kGrain, 0.43F}, recipes::curtain},
     {{Recipe::kWallpaper, "wallpaper", 512, 1.0F, kStains, 3.77F}, recipes::wallpaper},
     {{Recipe::kMattress, "mattress", 512, 2.0F, kFlat, 1.0F}, recipes::mattress},

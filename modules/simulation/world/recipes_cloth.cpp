@@ -90,8 +90,8 @@ Canvas wood_planks(int size, SeededRandom& random) {
     const float from_joint = std::abs(static_cast<float>(x) / n - joint[b]);
     if (in_board == 0 || from_joint < 1.5F / n) return Vector3f(0.025F, 0.02F, 0.015F);
     const float veins = std::sin(5.0F * grain(x + shift[b], y));
-    float shade = shade_of[b] * (1.0F + 0.2F * grain(x + shift[b], y) + 0.12F * veins);
-    shade *= 1.0F + 0.2F * wear(x, y);
+    float shade = shade_of[b] * (1.0F + 0.13F * grain(x + shift[b], y) + 0.08F * veins);
+    shade *= 1.0F + 0.14F * wear(x, y);
     if (in_board == 1 || in_board == board - 1) shade *= 0.7F;
     return shade * Vector3f(0.36F, 0.26F, 0.17F);
   });
@@ -150,7 +150,7 @@ Canvas carpet(int size, SeededRandom& random) {
       fractal_noise(size, {.cells_u = 32, .cells_v = 32, .gain = 1.15F}, random);
   const NoiseField wear = fractal_noise(size, {.gain = 0.9F}, random);
   Canvas canvas = Canvas::painted(size, [&](int x, int y) -> Vector3f {
-    return Vector3f::Constant(0.7F * (1.0F + 0.055F * pile(x, y) + 0.03F * wear(x, y)));
+    return Vector3f::Constant(0.7F * (1.0F + 0.03F * pile(x, y) + 0.015F * wear(x, y)));
   });
   for (int i = 0; i < 500; ++i) {  // fluff and flecks
     const Vector2f at(random.uniform(0.0F, 1.0F), random.uniform(0.0F, 1.0F));
@@ -168,7 +168,7 @@ Canvas curtain(int size, SeededRandom& random) {
   const NoiseField fibres =
       fractal_noise(size, {.cells_u = 64, .cells_v = 16, .gain = 1.0F}, random);
   return Canvas::painted(size, [&](int x, int y) -> Vector3f {
-    float shade = 0.82F * (1.0F + 0.05F * creases(x, y) + 0.025F * fibres(x, y));
+    float shade = 0.82F * (1.0F + 0.065F * creases(x, y) + 0.025F * fibres(x, y));
     shade *= 1.0F + 0.02F * weave(x, y, 2);
     return Vector3f::Constant(shade);
   });
@@ -187,7 +187,7 @@ Canvas mattress(int size, SeededRandom& random) {
     const int sag = static_cast<int>(0.012F * n * bend(x, y));
     const float crease = std::clamp(tension(x, y + sag) - tension(x, y + sag - 4), -0.8F, 0.8F);
     const float amount = smooth_step(-0.5F, 1.5F, place(x, y));
-    float shade = 0.72F * (1.0F + 0.35F * amount * crease + 0.025F * threads(x, y));
+    float shade = 0.72F * (1.0F + 0.2F * amount * crease + 0.03F * threads(x, y));
     shade *= 1.0F + 0.02F * weave(x, y, 2);
     return Vector3f::Constant(shade);
   });

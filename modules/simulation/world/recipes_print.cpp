@@ -136,7 +136,7 @@ Canvas play_mat(int size, SeededRandom& random) {
   const auto street = [&](auto curve) {  // kerb, tarmac, dashes: each over the whole way at once
     constexpr int kSteps = 96;
     const std::array<std::pair<float, Vector3f>, 2> layers = {
-        {{0.062F, Vector3f::Constant(0.85F)}, {0.05F, Vector3f::Constant(0.2F)}}};
+        {{0.062F, Vector3f::Constant(0.85F)}, {0.05F, Vector3f::Constant(0.3F)}}};
     for (const auto& [width, color] : layers) {
       for (int i = 0; i < kSteps; ++i) {
         canvas.line(curve(static_cast<float>(i) / kSteps),
@@ -167,7 +167,7 @@ Canvas play_mat(int size, SeededRandom& random) {
 
 Canvas marker_tape(int size, SeededRandom& random) {
   constexpr int kStrips = 16;
-  Canvas canvas(size, Vector3f::Constant(0.028F));
+  Canvas canvas(size, Vector3f::Constant(0.06F));
   for (int strip = 0; strip < kStrips; ++strip) {
     for (float u = 0.0F; u < 0.99F; u += random.uniform(0.009F, 0.022F)) {
       const float v = (static_cast<float>(strip) + random.uniform(0.2F, 0.8F)) / kStrips;
@@ -182,7 +182,7 @@ Canvas tag_grid(int size, SeededRandom& random) {
   constexpr int kTags = 6;
   constexpr int kBits = 6;
   const Vector3f white = Vector3f::Constant(0.8F);
-  const Vector3f black = Vector3f::Constant(0.03F);
+  const Vector3f black = Vector3f::Constant(0.055F);
   Canvas canvas(size, white);
   const float pitch = 1.0F / (kTags + 0.6F);
   const float edge = pitch / 1.3F;

@@ -74,7 +74,7 @@ void add_tapes(Scene& scene, float width, float depth, SeededRandom& random) {
 
 void add_scraps(Scene& scene, float width, float depth, SeededRandom& random) {
   const MaterialId white = scene.plain(SurfaceClass::kFloor, 0.85F, 0.85F, 0.84F);
-  const MaterialId black = scene.plain(SurfaceClass::kFloor, 0.03F, 0.03F, 0.03F);
+  const MaterialId black = scene.plain(SurfaceClass::kFloor, 0.075F, 0.075F, 0.075F);
   const MaterialId print =
       scene.paint(SurfaceClass::kFloor, Recipe::kNewsprint, Vector3f::Ones(), 0.9F);
   const auto scattered = [&](float from, float to) {
@@ -82,7 +82,7 @@ void add_scraps(Scene& scene, float width, float depth, SeededRandom& random) {
     const float y = depth * random.uniform(0.06F, 0.94F);
     return standing_at({x, y, 0.0F}, random.uniform(0.0F, kPi));
   };
-  for (int i = 0; i < 300; ++i) {
+  for (int i = 0; i < 230; ++i) {
     const ScopedFrame scope(scene.mesh, scattered(0.05F, 0.8F));
     const float size = random.uniform(0.025F, 0.07F);
     add_flat(scene, {size, size * random.uniform(0.6F, 1.0F)}, 0.0035F,
@@ -106,7 +106,7 @@ void add_scraps(Scene& scene, float width, float depth, SeededRandom& random) {
 
 void add_room_floor(Scene& scene, float width_m, float depth_m, SeededRandom& random) {
   const MaterialId carpet =
-      scene.paint(SurfaceClass::kFloor, Recipe::kCarpet, {0.5F, 0.51F, 0.53F});
+      scene.paint(SurfaceClass::kFloor, Recipe::kCarpet, {0.56F, 0.57F, 0.59F});
   scene.mesh.quad({0, 0, 0}, {width_m, 0, 0}, {width_m, depth_m, 0}, {0, depth_m, 0}, carpet);
   add_play_mats(scene, width_m, depth_m, random);
   add_tapes(scene, width_m, depth_m, random);

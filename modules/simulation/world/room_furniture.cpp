@@ -31,16 +31,39 @@ std::vector<Vector2f> rounded_rectangle(float width, float depth, float radius) 
   return outline;
 }
 
+/// The piping along the edges of an upright mattress whose corners have this radius.
+void add_seams(Scene& scene, const Vector3f& size_m, float radius, float shade) {
+  constexpr float kPiping_m = 0.005F;
+  const MaterialId piping = scene.plain(SurfaceClass::kFurniture, shade, shade, shade);
+  const float inset = radius * (1.0F - std::numbers::sqrt2_v<float> / 2.0F);
+  const float x = 0.5F * size_m.x() - inset;
+  const float y = 0.5F * size_m.y() - inset;
+  for (const float face : {-y, y}) {
+    for (const float end : {-x, x}) {
+      scene.mesh.cylinder({end, face, 0.0F}, {end, face, size_m.z()}, kPiping_m, kPiping_m, 5,
+                          piping, false);
+    }
+    const float edge = face < 0.0F ? -0.5F * size_m.y() : 0.5F * size_m.y();
+    for (const float z : {0.0F, size_m.z()}) {
+      scene.mesh.cylinder({-x, edge, z}, {x, edge, z}, kPiping_m, kPiping_m, 5, piping, false);
+    }
+  }
+}
+
 /// Upright mattress centred on the origin's vertical axis, its cover of this albedo.
 void add_mattress(Scene& scene, const Vector3f& size_m, float shade, SeededRandom& random) {
   const MaterialId cover = scene.paint(SurfaceClass::kFurniture, Recipe::kMattress,
                                        {shade, 1.02F * shade, 1.1F * shade});
   const float u = random.uniform(0.0F, 2.0F);
   scene.mesh.set_uv_offset({u, random.uniform(0.0F, 2.0F)});
-  const auto outline =
-      rounded_rectangle(size_m.x(), size_m.y(), std::min(0.06F, 0.4F * size_m.y()));
-  scene.mesh.extrude(outline, 0.0F, size_m.z(), cover);
+  const float radius = std::min(0.06F, 0.4F * size_m.y());
+  scene.mesh.extrude(rounded_rectangle(size_m.x(), size_m.y(), radius), 0.0F, size_m.z(), cover);
   scene.mesh.set_uv_offset(Vector2f::Zero());
+  add_seams(scene, size_m, radius, std::min(1.5F * shade, 0.9F));
+  const MaterialId tag = scene.plain(SurfaceClass::kFurniture, 0.85F, 0.85F, 0.83F);
+  const float side = random.sign() * (0.5F * size_m.x() - radius - 0.08F);
+  const Vector3f low(side - 0.045F, -0.5F * size_m.y() - 0.003F, 0.08F);
+  scene.mesh.box(low, low + Vector3f(0.09F, 0.004F, 0.05F), tag);
 }
 
 Isometry3f leaning(float angle_rad) {
@@ -105,7 +128,7 @@ void add_mattress_stack(Scene& scene, int count, SeededRandom& random) {
     frame.translate(Vector3f(0.0F, 0.0F, -1.0F));
     const ScopedFrame scope(scene.mesh, frame);
     const bool top = i + 1 == count;
-    add_mattress(scene, {1.3F, kThickness_m, 2.0F}, top ? 0.75F : 0.5F, random);
+    add_mattress(scene, {1.3F, kThickness_m, 2.0F}, top ? 0.9F : 0.5F, random);
   }
 }
 
@@ -139,7 +162,7 @@ void add_table(Scene& scene, float width_m, float depth_m, int clutter, SeededRa
 }
 
 void add_chair(Scene& scene, SeededRandom& random) {
-  const float shade = random.uniform(0.03F, 0.35F);
+  const float shade = random.uniform(0.08F, 0.35F);
   const MaterialId seat =
       scene.paint(SurfaceClass::kFurniture, Recipe::kCarpet, {shade, shade, 1.2F * shade});
   const MaterialId metal = scene.plain(SurfaceClass::kFurniture, 0.25F, 0.25F, 0.25F, 0.1F);
@@ -178,7 +201,7 @@ void add_shelf(Scene& scene, float width_m, float height_m, SeededRandom& random
 
 void add_desk(Scene& scene, SeededRandom& random) {
   add_table(scene, 1.4F, 0.54F, 3, random);
-  const MaterialId black = scene.plain(SurfaceClass::kObject, 0.02F, 0.02F, 0.022F, 0.06F);
+  const MaterialId black = scene.plain(SurfaceClass::kObject, 0.065F, 0.065F, 0.067F, 0.06F);
   const MaterialId picture =
       scene.paint(SurfaceClass::kObject, Recipe::kNewsprint, {1.2F, 1.2F, 1.2F}, 0.6F);
   scene.mesh.box({-0.3F, -0.28F, 0.86F}, {0.3F, -0.24F, 1.22F}, black);
@@ -224,7 +247,7 @@ void add_ladder(Scene& scene, float height_m) {
 }
 
 void add_stand(Scene& scene, float height_m, SeededRandom& random) {
-  const MaterialId black = scene.plain(SurfaceClass::kObject, 0.025F, 0.025F, 0.025F, 0.05F);
+  const MaterialId black = scene.plain(SurfaceClass::kObject, 0.07F, 0.07F, 0.07F, 0.05F);
   constexpr float kReach_m = 0.22F;
   for (int leg = 0; leg < 3; ++leg) {
     const float angle = 2.0F * kPi * static_cast<float>(leg) / 3.0F;

@@ -13,7 +13,7 @@ constexpr float kPi = 3.14159265F;
 // Irradiance that would make a white surface in the room as bright as the outside is, and as the
 // day makes the thin curtains.
 constexpr float kOutside = 4.0F;
-constexpr float kBacklit = 0.2F;
+constexpr float kBacklit = 0.12F;
 constexpr float kBehind_m = 0.16F;  // depth of the window's niche
 
 /// Cloth in folds from z_low to z_high, from x = 0 to `width`, its mean at y = `depth`.
@@ -68,9 +68,10 @@ void add_window(Scene& scene, const WallWindow& window, SeededRandom& random) {
                    frame);
   }
   const float warm = random.uniform(0.95F, 1.0F);
-  const MaterialId thin = scene.library.add(SurfaceClass::kCurtain, Recipe::kCurtain,
-                                            {1.0F, warm, warm * warm}, 1.0F, 0.0F, kBacklit);
-  const float cloth = random.uniform(0.35F, 0.5F) * window.width_m;
+  const MaterialId thin =
+      scene.library.add(SurfaceClass::kCurtain, Recipe::kCurtain,
+                        0.72F * Vector3f(1.0F, warm, warm * warm), 1.0F, 0.0F, kBacklit);
+  const float cloth = random.uniform(0.5F, 0.58F) * window.width_m;
   for (const float left : {-half - 0.12F, half + 0.12F - cloth}) {
     const ScopedFrame side(scene.mesh, standing_at({left, 0.0F, 0.0F}, 0.0F));
     add_folds(scene, cloth, low - 0.08F, top + 0.12F, -0.07F, thin, random);
@@ -78,6 +79,24 @@ void add_window(Scene& scene, const WallWindow& window, SeededRandom& random) {
   const MaterialId rod = scene.plain(SurfaceClass::kCurtain, 0.3F, 0.3F, 0.3F, 0.1F);
   scene.mesh.cylinder({-half - 0.25F, -0.07F, top + 0.13F}, {half + 0.25F, -0.07F, top + 0.13F},
                       0.015F, 0.015F, 8, rod);
+}
+
+/// A duct for cables along the wall with sockets on it.
+void add_cable_duct(Scene& scene, float half_length, SeededRandom& random) {
+  const MaterialId white = scene.plain(SurfaceClass::kWall, 0.72F, 0.72F, 0.7F);
+  const MaterialId dark = scene.plain(SurfaceClass::kWall, 0.12F, 0.12F, 0.12F);
+  constexpr float kLow_m = 0.28F;
+  constexpr float kTop_m = 0.36F;
+  scene.mesh.box({-half_length, -0.02F, kLow_m}, {half_length, 0.0F, kTop_m}, white, kSidesNoBack);
+  for (float x = 0.4F - half_length; x < half_length - 0.4F; x += random.uniform(1.0F, 1.8F)) {
+    for (const float socket : {x, x + 0.09F}) {
+      scene.mesh.box({socket - 0.04F, -0.027F, kLow_m}, {socket + 0.04F, -0.02F, kTop_m}, white,
+                     kSidesNoBack);
+      const float z = 0.5F * (kLow_m + kTop_m);
+      scene.mesh.box({socket - 0.022F, -0.029F, z - 0.022F}, {socket + 0.022F, -0.027F, z + 0.022F},
+                     dark, kSidesNoBack);
+    }
+  }
 }
 
 void add_truss(Scene& scene, const Vector3f& from, const Vector3f& to, MaterialId metal) {
@@ -103,7 +122,7 @@ void add_truss(Scene& scene, const Vector3f& from, const Vector3f& to, MaterialI
 }
 
 void add_camera(Scene& scene, const Vector3f& position, float yaw) {
-  const MaterialId black = scene.plain(SurfaceClass::kObject, 0.02F, 0.02F, 0.02F, 0.06F);
+  const MaterialId black = scene.plain(SurfaceClass::kObject, 0.05F, 0.05F, 0.05F, 0.06F);
   const MaterialId glow = scene.library.add(SurfaceClass::kObject, Recipe::kPlain,
                                             {0.9F, 0.2F, 0.15F}, 1.0F, 0.0F, 1.0F);
   Eigen::Isometry3f frame = standing_at(position, yaw);
@@ -122,13 +141,14 @@ void add_wall(Scene& scene, float length_m, float height_m, const WallWindow* wi
   const MaterialId surface =
       window != nullptr
           ? scene.plain(SurfaceClass::kWall, 0.92F, 0.91F, 0.88F)
-          : scene.paint(SurfaceClass::kWall, Recipe::kPlaster, {1.04F, 1.03F, 1.0F}, 1.5F);
+          : scene.paint(SurfaceClass::kWall, Recipe::kPlaster, {1.12F, 1.11F, 1.08F}, 1.5F);
   const MaterialId skirting = scene.plain(SurfaceClass::kWall, 0.55F, 0.54F, 0.5F);
   const float half = 0.5F * length_m;
   const auto panel = [&](float x0, float x1, float z0, float z1) {
     scene.mesh.quad({x0, 0, z0}, {x1, 0, z0}, {x1, 0, z1}, {x0, 0, z1}, surface);
   };
   scene.mesh.box({-half, -0.018F, 0.0F}, {half, 0.0F, 0.1F}, skirting, kSideFront | kSideTop);
+  add_cable_duct(scene, half, random);
   if (window == nullptr) {
     panel(-half, half, 0.0F, height_m);
     return;
@@ -144,7 +164,7 @@ void add_wall(Scene& scene, float length_m, float height_m, const WallWindow* wi
 
 void add_plank_sheet(Scene& scene, float width_m, float top_m) {
   const MaterialId print =
-      scene.paint(SurfaceClass::kWall, Recipe::kWoodPlanks, {2.0F, 2.1F, 2.3F}, 0.5F);
+      scene.paint(SurfaceClass::kWall, Recipe::kWoodPlanks, {1.45F, 1.5F, 1.6F}, 0.5F);
   const MaterialId edge = scene.plain(SurfaceClass::kWall, 0.8F, 0.8F, 0.8F);
   // The boards stand upright: in a frame turned by a quarter, x runs up.
   Eigen::Isometry3f frame = Eigen::Isometry3f::Identity();
@@ -157,7 +177,7 @@ void add_plank_sheet(Scene& scene, float width_m, float top_m) {
 
 void add_foam_panel(Scene& scene, float width_m, float height_m) {
   const MaterialId foam =
-      scene.paint(SurfaceClass::kFurniture, Recipe::kCorrugatedMetal, {0.06F, 0.06F, 0.065F}, 0.7F);
+      scene.paint(SurfaceClass::kFurniture, Recipe::kCorrugatedMetal, {0.13F, 0.13F, 0.135F}, 0.7F);
   Eigen::Isometry3f frame = Eigen::Isometry3f(Eigen::Translation3f(0.0F, -0.22F, 0.0F));
   frame.rotate(Eigen::AngleAxisf(-0.15F, Vector3f::UnitX()));
   const ScopedFrame scope(scene.mesh, frame);

@@ -143,7 +143,7 @@ void furnish_middle(Scene& scene, SeededRandom& random) {
   add_mattress_stack(scene, 3, random);
   {
     const MaterialId tags =
-        scene.paint(SurfaceClass::kObject, Recipe::kTagGrid, Vector3f::Ones(), 0.78F);
+        scene.paint(SurfaceClass::kObject, Recipe::kTagGrid, Vector3f::Constant(1.15F), 0.78F);
     const MaterialId white = scene.plain(SurfaceClass::kObject, 0.8F, 0.8F, 0.8F);
     const ScopedFrame board(scene.mesh, standing_at({-0.5F, -1.05F, 0.0F}, 0.0F));
     add_board(scene, 0.78F, 0.78F, 0.95F, tags, white);
