@@ -84,6 +84,17 @@ TEST_CASE("A mesh that changes while it is sent leaves in its newest state", "[n
   CHECK(lowest == Approx(-0.5F).margin(0.01));
 }
 
+TEST_CASE("Cells and steps at their bounds can be sent", "[node]") {
+  Topic<MeshChunk> topic;
+  MeshChunksConfig config;
+  config.cell_m = GENERATE(0.1, 20.0);
+  config.position_step_m = GENERATE(0.001, 0.05);
+  MeshChunksNode node(config, 7, topic);
+  CHECK_NOTHROW(node.step({kAnchor, sheet(10)}, 0.0));
+  config.cell_m = 0.05;
+  CHECK_THROWS_AS(MeshChunksNode(config, 7, topic), ConfigError);
+}
+
 // A robot with the mesh's part of the wiring.
 struct MeshRobot {
   MeshRobot(std::shared_ptr<const DdsDomain> domain, RobotId id)
