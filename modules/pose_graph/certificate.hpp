@@ -14,22 +14,23 @@ namespace km {
 
 /// What is known of the optimality of a point.
 struct [[nodiscard]] Certificate {
-  bool certified = false;     ///< The cost is within `relative_gap` of the relaxation's minimum.
-  double lambda_min = 0.0;    ///< Smallest eigenvalue of S with the translations eliminated.
-  double relative_gap = 0.0;  ///< Bound: max(0, -lambda_min) tr(Y^T Y) over the cost.
+  bool certified = false;   ///< The cost is within `relative_gap` of the relaxation's minimum.
+  double lambda_min = 0.0;  ///< Smallest eigenvalue of S with the translations eliminated.
+  double relative_gap =
+      0.0;  ///< The cost lies above the relaxation's minimum by at most this part.
   /// Direction of the smallest eigenvalue, 4n, its translations the best ones for its rotations.
   Eigen::VectorXd direction = {};
 };
 
-/// Certifies the minimum of `problem` at feasible `X`, of dimension 3 (2: planar, lifted).
+/// Bounds from below what any feasible point of any rank can cost, and with it how far feasible `X`
+/// lies above: with the translations eliminated, tr(Q Z) = tr(Lambda) + tr(S Z) >= tr(Lambda) +
+/// 3n lambda_min for every feasible Z, whose trace is 3n; at a critical point tr(Lambda) is the
+/// cost.
 ///
-/// With translations eliminated, tr(Q Z) >= cost(X) + lambda_min tr(Z) for every feasible Z of the
-/// relaxation, whose trace is 3n: the cost lies within -3n lambda_min of the minimum. Certified
-/// means that this is below 1e-5 of the cost, which is decided by a sparse Cholesky factorisation
-/// of S, shifted on the rotations (as in Rosen, "Accelerating Certifiable Estimation with
-/// Preconditioned Eigensolvers", RA-L 2022); one translation is held, since S does not depend on
-/// where the origin lies. lambda_min then comes from Lanczos iterations on the inverse.
-/// Precondition: `problem` has no public edges and is connected.
+/// S, shifted on the rotations until a sparse Cholesky factorisation finds it definite (the test of
+/// Rosen, "Accelerating Certifiable Estimation with Preconditioned Eigensolvers", RA-L 2022), gives
+/// lambda_min by Lanczos iterations on the inverse. One translation is held, since S does not
+/// depend on where the origin lies. Precondition: `problem` has no public edges and is connected.
 [[nodiscard]] Certificate certify(const QuadraticProblem& problem, const LiftedPoses& X);
 
 /// Feasible poses of rank r + 1 with a lower cost than `X` of rank r, on the way along the negative

@@ -156,10 +156,9 @@ void RbcdAgent::enter_frame(PgoOutput& output) {
   finish_update(0.0, output);
 }
 
-// Grows with the rounds of a session: first the fast modes are damped, then the slow ones sped up.
 double RbcdAgent::relaxation_of(std::uint32_t round, std::size_t members) const {
   if (members == 1) return 1.0;
-  return std::min(config_.max_over_relaxation, 2.0 - 4.0 / (8.0 + round));
+  return growing_relaxation(round, config_.max_over_relaxation);
 }
 
 void RbcdAgent::finish_update(double squared_gradient, PgoOutput& output) {

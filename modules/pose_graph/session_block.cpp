@@ -1,5 +1,7 @@
 #include "modules/pose_graph/session_block.hpp"
 
+#include <algorithm>
+
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/rounding.hpp"
 
@@ -12,6 +14,10 @@ constexpr double kPerturbation = 1e-3;
 constexpr unsigned kPerturbationSeed = 1;
 
 }  // namespace
+
+double growing_relaxation(std::uint32_t round, double max) {
+  return std::min(max, 2.0 - 4.0 / (8.0 + round));
+}
 
 SessionBlock::SessionBlock(LiftedPoses X, std::vector<BlockEdge> own_edges,
                            const std::map<RobotId, std::vector<InterEdge>>& edges_to)
@@ -128,6 +134,12 @@ LiftedPoses SessionBlock::round_public_poses() {
 
 void SessionBlock::offer(LiftedPoses X) {
   if (problem_.cost(X) < problem_.cost(X_)) X_ = std::move(X);
+}
+
+double SessionBlock::gradient_norm() {
+  if (fixed_changed_) problem_.set_fixed(fixed_);
+  fixed_changed_ = false;
+  return project_tangent(X_, problem_.euclidean_gradient(X_)).norm();
 }
 
 double SessionBlock::share_of_cost(const std::set<RobotId>& counted) const {

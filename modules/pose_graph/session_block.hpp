@@ -13,6 +13,10 @@
 
 namespace km {
 
+/// Over-relaxation of the update that follows round `round`, see SessionBlock::update(): grows from
+/// 1.5 to `max`. First the fast modes are damped, then the slow ones sped up.
+[[nodiscard]] double growing_relaxation(std::uint32_t round, double max);
+
 /// One robot's block of variables in a session: its own poses, the edges that touch them, and the
 /// poses of its neighbours as last heard, which stay fixed while it updates its own.
 class SessionBlock {
@@ -53,6 +57,10 @@ class SessionBlock {
   [[nodiscard]] std::set<RobotId> neighbours() const;
   /// Takes `X` for the present poses if it lowers the cost. Precondition: no neighbours.
   void offer(LiftedPoses X);
+  /// Takes `X`, feasible, for the present poses.
+  void move_to(LiftedPoses X) { X_ = std::move(X); }
+  /// Of the Riemannian gradient of the block. Precondition: all neighbours were set.
+  [[nodiscard]] double gradient_norm();
 
  private:
   struct Slots {

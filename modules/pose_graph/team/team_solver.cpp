@@ -1,5 +1,7 @@
 #include "modules/pose_graph/team/team_solver.hpp"
 
+#include <optional>
+
 namespace km {
 
 LiftedPoses team_poses(const TeamGraph& graph, const TeamSolver& solver) {
@@ -11,14 +13,16 @@ LiftedPoses team_poses(const TeamGraph& graph, const TeamSolver& solver) {
 
 std::vector<TeamRound> run_team(const TeamGraph& graph, TeamSolver& solver,
                                 const TeamRunOptions& options, const TeamMeter& meter) {
-  const QuadraticProblem whole(solver.block(0).rows(), graph.poses(), graph.edges, {});
+  std::optional<QuadraticProblem> whole;
   RoundMeter round_meter(graph.robots(), meter);
   std::vector<TeamRound> rounds;
   TeamWork work;
   const auto record = [&] {
     const LiftedPoses X = team_poses(graph, solver);
-    const double gradient_norm = project_tangent(X, whole.euclidean_gradient(X)).norm();
-    rounds.push_back({whole.cost(X), gradient_norm, work});
+    if (!whole || whole->rank() != X.rows())
+      whole.emplace(X.rows(), graph.poses(), graph.edges, std::vector<PublicEdge>{});
+    const double gradient_norm = project_tangent(X, whole->euclidean_gradient(X)).norm();
+    rounds.push_back({whole->cost(X), gradient_norm, work});
     return gradient_norm > options.gradient_tolerance;
   };
   bool going = record();

@@ -1,0 +1,165 @@
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <map>
+
+#include "apps/pgo/pgo_output.hpp"
+#include "apps/pgo/pgo_report.hpp"
+#include "apps/pgo/wire_meter.hpp"
+#include "modules/pose_graph/team/team_graph_file.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kAbout =
+    "Optimises a recorded pose graph with a team of robots in one process: every robot has only\n"
+    "its part of the graph, and what it hears from the others are the messages that would cross\n"
+    "the network.\n\n"
+    "FILE is a g2o file, 2D or 3D, dealt out to --robots robots, or a folder with one *.csv or\n"
+    "*.g2o per robot. The cost is the chordal one without 1/2, weights as SE-Sync reads them:\n"
+    "  F = sum kappa |R_j - R_i R_ij|^2 + tau |t_j - t_i - R_i t_ij|^2\n"
+    "All methods start from the chordal initialisation of the whole graph (local: from its "
+    "own).\n\n"
+    "Methods:\n"
+    "  local             every robot alone; their frames joined by one closure each\n"
+    "  dgs               two-stage distributed Gauss-Seidel (Choudhary et al., IJRR 2017)\n"
+    "  rbcd              Riemannian block-coordinate descent (Tian et al., TRO 2021), "
+    "over-relaxed;\n"
+    "                    as published with --over-relaxation 1 or --schedule greedy\n"
+    "  rbcd-accelerated  the same with Nesterov's acceleration and restarts\n"
+    "  centralized       the whole graph on one computer: Riemannian staircase of SE-Sync\n\n"
+    "A round is one exchange of messages. The table says after how many rounds each gap to the\n"
+    "certified optimum was reached (computed centrally unless given), what had been sent by then\n"
+    "by all robots, a broadcast counting once, and the CPU time: of the slowest robot of each\n"
+    "round, summed, and of all. The certificate bounds how far any poses can lie below.\n"
+    "Exit code: 0 if it ran, 1 for input that cannot be used.\n\n"
+    "Examples:\n"
+    "  kimera_multi_pgo sphere2500.g2o --robots 5 --method rbcd --json out.json\n"
+    "  kimera_multi_pgo tunnels_8robots --method rbcd --rounds 300 --plot gap.svg\n"
+    "  kimera_multi_pgo manhattan.g2o --method centralized --output manhattan.tum";
+
+struct Options {
+  fs::path file, partition, json, plot, output;
+  std::string partition_name = "contiguous", schedule = "coloured";
+  std::size_t robots = 1;
+  km::PgoOptions pgo;
+  double optimum = 0.0;
+};
+
+void define(CLI::App& app, Options& options) {
+  const std::map<std::string, km::PgoMethod> methods{
+      {"local", km::PgoMethod::kLocal},
+      {"dgs", km::PgoMethod::kDgs},
+      {"rbcd", km::PgoMethod::kRbcd},
+      {"rbcd-accelerated", km::PgoMethod::kRbcdAccelerated},
+      {"centralized", km::PgoMethod::kCentralized}};
+  app.add_option("FILE", options.file, "Pose graph (*.g2o), or a folder with one file per robot")
+      ->required()
+      ->check(CLI::ExistingPath);
+  app.add_option("--robots", options.robots, "Number of robots that a single file is dealt out to")
+      ->check(CLI::Range(1, 65535))
+      ->capture_default_str();
+  app.add_option("--method", options.pgo.method, "See above")
+      ->transform(CLI::CheckedTransformer(methods).description(""))
+      ->default_str("rbcd");
+  app.add_option("--rank", options.pgo.rank, "Of the relaxation; centralized finds its own")
+      ->check(CLI::Range(3, 10))
+      ->capture_default_str();
+  app.add_option("--rounds", options.pgo.run.max_rounds, "At most so many")
+      ->check(CLI::Range(0, 1000000))
+      ->capture_default_str();
+  app.add_option("--gradient", options.pgo.run.gradient_tolerance,
+                 "Stop once the norm of the Riemannian gradient is at most this")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--partition", options.partition_name,
+                 "contiguous: runs of equal length; or a file with rows \"vertex robot\"")
+      ->capture_default_str();
+  app.add_option("--schedule", options.schedule,
+                 "rbcd: coloured (robots without common edges together) or greedy (the one with\n"
+                 "the largest gradient)")
+      ->check(CLI::IsMember({"coloured", "greedy"}))
+      ->capture_default_str();
+  app.add_option("--over-relaxation", options.pgo.over_relaxation,
+                 "rbcd, coloured: how far beyond the minimum of its block a robot may go")
+      ->check(CLI::Range(1.0, 1.99))
+      ->capture_default_str();
+  app.add_option("--optimum", options.optimum, "The optimum, if known: it is not computed then")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--json", options.json, "Also write every round to this file, as JSON");
+  app.add_option("--plot", options.plot,
+                 "Also draw the gap against rounds, bytes and time, as SVG");
+  app.add_option("--output", options.output,
+                 "Also write the rounded poses: *.tum (numbers of the poses as times) or *.g2o");
+}
+
+void write(const fs::path& file, const auto& writer) {
+  if (file.empty()) return;
+  std::ofstream out(file);
+  writer(out);
+  out.close();
+  if (!out) throw std::runtime_error(file.string() + ": cannot be written");
+}
+
+// Told before the work is done, not after.
+void check_folder_of(const fs::path& file) {
+  if (file.empty()) return;
+  const fs::path folder = fs::absolute(file).parent_path();
+  if (!fs::is_directory(folder))
+    throw std::runtime_error(file.string() + ": cannot be written, there is no folder " +
+                             folder.string());
+}
+
+void check(Options& options, const CLI::App& app) {
+  const bool rbcd = options.pgo.method == km::PgoMethod::kRbcd;
+  options.pgo.greedy = options.schedule == "greedy";
+  if (options.pgo.greedy && !rbcd)
+    throw std::runtime_error("--schedule greedy is for --method rbcd only");
+  if (app.count("--over-relaxation") > 0 && (!rbcd || options.pgo.greedy))
+    throw std::runtime_error("--over-relaxation is for --method rbcd with coloured schedule only");
+  if (options.optimum > 0.0) options.pgo.optimum = options.optimum;
+  for (const fs::path& file : {options.json, options.plot, options.output}) check_folder_of(file);
+  if (!options.output.empty()) km::check_output_name(options.output);
+}
+
+km::TeamGraph read(const Options& options, const CLI::App& app) {
+  const bool own_partition = options.partition_name != "contiguous";
+  if (fs::is_directory(options.file)) {
+    if (app.count("--robots") > 0 || own_partition)
+      throw std::runtime_error("--robots and --partition are for a single file, " +
+                               options.file.string() + " is a folder with one file per robot");
+    return km::read_team_folder(options.file);
+  }
+  const km::G2oGraph graph = km::read_g2o(options.file);
+  if (!own_partition) return km::deal_contiguously(graph, options.robots, options.file.string());
+  if (app.count("--robots") > 0)
+    throw std::runtime_error("--robots: the number of robots is that of the --partition file");
+  return km::deal(graph, km::read_partition(options.partition_name), options.partition_name);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  CLI::App app(kAbout);
+  Options options;
+  define(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 1;
+  }
+  check(options, app);
+  const km::TeamGraph graph = read(options, app);
+  const km::PgoRun run = km::run_pgo(graph, options.pgo, km::wire_meter());
+  std::cout << km::pgo_text(graph, run);
+  write(options.json, [&](std::ostream& out) { km::write_pgo_json(out, graph, run); });
+  write(options.plot, [&](std::ostream& out) { out << km::pgo_plot(run); });
+  if (!options.output.empty()) km::write_poses(options.output, graph, run.T_world_kf);
+  return 0;
+} catch (const std::exception& error) {
+  std::cerr << "kimera_multi_pgo: " << error.what() << '\n';
+  return 1;
+}

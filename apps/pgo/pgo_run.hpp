@@ -1,0 +1,42 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "modules/pose_graph/certificate.hpp"
+#include "modules/pose_graph/team/team_solver.hpp"
+
+namespace km {
+
+enum class PgoMethod { kLocal, kDgs, kRbcd, kRbcdAccelerated, kCentralized };
+
+[[nodiscard]] const char* to_string(PgoMethod method);
+
+struct PgoOptions {
+  PgoMethod method = PgoMethod::kRbcd;
+  Eigen::Index rank = 5;
+  TeamRunOptions run = {.max_rounds = 100};
+  bool greedy = false;                 ///< rbcd only.
+  double over_relaxation = 1.95;       ///< rbcd only, at most; 1: as published.
+  std::optional<double> optimum = {};  ///< Computed if not given.
+};
+
+/// What one method did to one graph.
+struct PgoRun {
+  PgoMethod method = PgoMethod::kRbcd;
+  std::vector<TeamRound> rounds;  ///< [0]: the start.
+  LiftedPoses X;
+  std::vector<SE3> T_world_kf;  ///< Rounded, in the frame of the first pose.
+  double rounded_cost = 0.0;
+  double optimum = 0.0;  ///< The certified one; the least cost known if none is.
+  Certificate certificate;
+  Eigen::Index rank = 0;  ///< Numerical, of the rotations; 3 (2 in the plane): no relaxation left.
+};
+
+/// Solves `graph` from its chordal initialisation, which is computed centrally and not counted.
+/// Throws std::invalid_argument if method and graph do not go together.
+[[nodiscard]] PgoRun run_pgo(const TeamGraph& graph, const PgoOptions& options,
+                             const TeamMeter& meter);
+
+}  // namespace km

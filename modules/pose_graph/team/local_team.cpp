@@ -1,0 +1,76 @@
+#include "modules/pose_graph/team/local_team.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+#include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/truncated_newton.hpp"
+
+namespace km {
+namespace {
+
+constexpr Eigen::Index kRank = 3;
+constexpr TruncatedNewtonOptions kExact{.max_iterations = 100,
+                                        .max_cg_iterations = 1000,
+                                        .cg_tolerance = 0.05,
+                                        .gradient_tolerance = 1e-9,
+                                        .relative_decrease_tolerance = 1e-9};
+
+SE3 pose_at(const LiftedPoses& X, Eigen::Index i) {
+  return make_pose(X.middleCols<3>(4 * i), X.col(4 * i + 3));
+}
+
+}  // namespace
+
+LocalTeam::LocalTeam(const TeamGraph& graph)
+    : tree_(breadth_first_tree(neighbours_in(graph))), depth_(graph.robots(), 0) {
+  for (std::size_t k = 0; k < graph.robots(); ++k) {
+    parts_.push_back(part_of(graph, k));
+    try {
+      const auto start = chordal_initialisation(parts_[k].poses, parts_[k].own_edges);
+      blocks_.push_back(lift(start, kRank));
+    } catch (const std::invalid_argument&) {
+      throw std::invalid_argument("robot " + std::to_string(k) +
+                                  " cannot solve alone: its own edges do not connect its poses");
+    }
+  }
+  for (const std::size_t k : tree_.order)
+    if (k != 0) depth_[k] = depth_[tree_.parent[k]] + 1;
+}
+
+bool LocalTeam::step(RoundMeter& meter) {
+  const std::size_t level = round_++;
+  if (level > *std::max_element(depth_.begin(), depth_.end())) return false;
+  for (std::size_t k = 0; k < blocks_.size(); ++k) {
+    if (level == 0) meter.run(k, [&] { solve(k); });
+    if (level > 0 && depth_[k] == level) join(k, meter);
+  }
+  return true;
+}
+
+void LocalTeam::solve(std::size_t k) {
+  const RobotPart& part = parts_[k];
+  const auto start = chordal_initialisation(part.poses, part.own_edges);
+  const QuadraticProblem problem(kRank, part.poses, part.own_edges, {});
+  blocks_[k] = minimise(problem, lift(start, kRank), kExact).X;
+}
+
+void LocalTeam::join(std::size_t k, RoundMeter& meter) {
+  const std::size_t parent = tree_.parent[k];
+  const InterEdge& closure = parts_[k].edges_to.at(static_cast<RobotId>(parent)).front();
+  PublicPoses told{.sender = {.robot = static_cast<RobotId>(parent)}};
+  told.keyframes = {closure.other};
+  told.X = blocks_[parent].middleCols<4>(4 * Eigen::Index{closure.other});
+  meter.sent(told);
+  meter.run(k, [&] {
+    const SE3 T_other_own = closure.from_own ? closure.T_from_to.inverse() : closure.T_from_to;
+    const SE3 T_frame_own = pose_at(blocks_[k], Eigen::Index{closure.own});
+    const SE3 T_world_frame = pose_at(told.X, 0) * T_other_own * T_frame_own.inverse();
+    for (Eigen::Index i = 0; i < pose_count(blocks_[k]); ++i)
+      blocks_[k].middleCols<4>(4 * i) =
+          (T_world_frame * pose_at(blocks_[k], i)).matrix().topRows<3>();
+  });
+}
+
+}  // namespace km

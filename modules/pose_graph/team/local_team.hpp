@@ -1,0 +1,35 @@
+#pragma once
+
+#include <vector>
+
+#include "modules/pose_graph/team/team_schedule.hpp"
+#include "modules/pose_graph/team/team_solver.hpp"
+
+namespace km {
+
+/// What cooperation is measured against: every robot solves its own graph alone (round 1); then the
+/// frames are joined along a tree of robots, each to its parent's by one closure between them, the
+/// first in the graph (one round for each level of the tree). Rank 3.
+class LocalTeam : public TeamSolver {
+ public:
+  /// Throws std::invalid_argument, naming the robot, if the own edges of one do not connect its
+  /// poses.
+  explicit LocalTeam(const TeamGraph& graph);
+
+  bool step(RoundMeter& meter) override;
+  [[nodiscard]] const LiftedPoses& block(std::size_t robot) const override {
+    return blocks_[robot];
+  }
+
+ private:
+  void solve(std::size_t k);
+  void join(std::size_t k, RoundMeter& meter);
+
+  std::vector<RobotPart> parts_;
+  TeamTree tree_;
+  std::vector<std::size_t> depth_;
+  std::vector<LiftedPoses> blocks_;
+  std::size_t round_ = 0;
+};
+
+}  // namespace km
