@@ -13,7 +13,7 @@
 #include "modules/core/json_writer.hpp"
 #include "modules/evaluation/mesh/mesh_checks.hpp"
 #include "modules/evaluation/mesh/mesh_report.hpp"
-#include "modules/evaluation/trajectory_error.hpp"
+#include "modules/evaluation/surroundings_alignment.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/mesh/ply_file.hpp"
 
@@ -36,7 +36,7 @@ SE3 alignment_of(const MeshCommand& command) {
   for (std::size_t i = 0; i < estimates.size(); ++i)
     inputs.push_back({short_name(estimates[i]), read(truths[truths.size() == 1 ? 0 : i]),
                       read(estimates[i]), std::nullopt});
-  return trajectory_error(inputs).alignment.T_truth_estimate;
+  return align_surroundings(inputs);
 }
 
 // The palette given, or the one beside the truth, or none.

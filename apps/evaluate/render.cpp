@@ -90,10 +90,12 @@ void render_meshes(const RenderCommand& command) {
     all.append(meshes.emplace_back(read_ply(file)));
     scene.names.push_back(short_name(file));
   }
-  const Eigen::AlignedBox3d extent = extent_of(all);
+  Eigen::AlignedBox3d extent = extent_of(all);
   scene.meshes = meshes;
   scene.palette = palette_of(command, meshes);
-  for (const fs::path& file : command.trajectories) scene.lines.push_back(line_of(file));
+  for (const fs::path& file : command.trajectories)
+    for (const Eigen::Vector3d& point : scene.lines.emplace_back(line_of(file)).points)
+      extent.extend(point);
   PictureOptions options;
   options.color = color_of(command.color, meshes);
   options.cut = {!command.both_sides, command.above_m};

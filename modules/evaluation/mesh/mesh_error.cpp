@@ -195,20 +195,30 @@ class Evaluation {
     if (inputs_.size() > 1) judge_truth(nearest_of_all, report_.merged);
   }
 
-  // From the true points that have the estimate within reach.
   void judge_truth(const PointMatches& matches, MeshError& error) const {
+    const auto all = [](std::size_t) { return true; };
+    error.truth = judged(matches, all);
+    error.seen = judged(matches, [&](std::size_t i) { return matches.in_front[i]; });
+    const auto total = static_cast<double>(true_samples_.total);
+    error.coverage = static_cast<double>(error.truth.point.count) / total;
+    error.seen_coverage = static_cast<double>(error.seen.point.count) / total;
+  }
+
+  // From the true points that have the estimate within reach, and of which `counts` is true.
+  [[nodiscard]] SurfaceComparison judged(const PointMatches& matches, const auto& counts) const {
     std::vector<float> point_m;
     std::vector<float> surface_m;
+    SurfaceComparison result;
     for (std::size_t i = 0; i < matches.point_m.size(); ++i) {
-      if (!std::isfinite(matches.point_m[i])) continue;
+      if (!std::isfinite(matches.point_m[i]) || !counts(i)) continue;
       point_m.push_back(matches.point_m[i]);
       surface_m.push_back(matches.surface_m[i]);
       if (report_.has_labels && static_cast<double>(point_m.back()) <= options_.label_distance_m)
-        error.truth.labels.add(SampledMesh{truth_, true_samples_}.label(i), matches.labels[i]);
+        result.labels.add(SampledMesh{truth_, true_samples_}.label(i), matches.labels[i]);
     }
-    error.coverage = static_cast<double>(point_m.size()) / static_cast<double>(true_samples_.total);
-    error.truth.point = summary_of(std::move(point_m));
-    error.truth.surface = summary_of(std::move(surface_m));
+    result.point = summary_of(std::move(point_m));
+    result.surface = summary_of(std::move(surface_m));
+    return result;
   }
 
   void compare_estimates() {

@@ -54,8 +54,10 @@ struct MeshError {
   double area_m2 = 0.0;        ///< Of the estimate.
   std::size_t faces = 0;       ///< Of the estimate.
   double coverage = 0.0;       ///< Share of the true surface within crop_m of the estimate.
+  double seen_coverage = 0.0;  ///< And of it that has the estimate in front.
   double beyond = 0.0;         ///< Share of the estimate further than crop_m from the truth.
   SurfaceComparison truth;     ///< From true points within crop_m to the estimate.
+  SurfaceComparison seen;      ///< Of these, with the estimate in front (PointMatches::in_front).
   SurfaceComparison estimate;  ///< From estimated points to the truth; beyond crop_m as crop_m.
 };
 
@@ -71,9 +73,9 @@ struct [[nodiscard]] MeshReport {
 
 /// Compares estimated meshes with the true one as Chang et al. do ("Kimera-Multi: a System for
 /// Distributed Multi-Robot Metric-Semantic Simultaneous Localization and Mapping", 2021): both
-/// sampled, registered by ICP, distance from each true point to the nearest estimated one; also the
-/// other way round, and labels. All estimates are moved by ONE transform, so that robots are judged
-/// in their common frame.
+/// sampled, registered by ICP, distance from each true point to the nearest estimated one; also
+/// without true points that the estimate cannot have seen, the other way round, and labels. All
+/// estimates are moved by ONE transform, so that robots are judged in their common frame.
 ///
 /// Throws std::invalid_argument, naming the mesh, for one without faces or whose faces name
 /// vertices there are not, for no estimates, for options out of range, and if nothing of the truth

@@ -69,6 +69,10 @@ void write_distances(std::ostream& out, const MeshReport& report) {
   write_row(out, width, "estimate", columns);
   for (const MeshError* row : rows_of(report))
     write_direction(out, width, row->name, row->truth, row->coverage);
+  out << "\nOnly true points with the estimate in front, neither past its rim nor behind it:\n";
+  write_row(out, width, "estimate", columns);
+  for (const MeshError* row : rows_of(report))
+    write_direction(out, width, row->name, row->seen, row->seen_coverage);
   out << "\nEach estimated point to the nearest true one:\n";
   write_row(out, width, "estimate", columns);
   for (const MeshError* row : rows_of(report))
@@ -78,7 +82,7 @@ void write_distances(std::ostream& out, const MeshReport& report) {
 void write_classes(std::ostream& out, const MeshReport& report, const LabelPalette& palette) {
   if (!report.has_labels) return;
   const int width = name_width(report);
-  out << "\nTrue class, of " << report.merged.name << ":\n";
+  out << "\nTrue class, of points with " << report.merged.name << " in front:\n";
   write_row(out, width, "class", {"points", "right", "wrong", "unknown"});
   const auto write = [&](const std::string& name, const LabelScore& score) {
     const auto points = static_cast<double>(score.points());
@@ -87,9 +91,9 @@ void write_classes(std::ostream& out, const MeshReport& report, const LabelPalet
                percent(static_cast<double>(score.wrong) / points),
                percent(static_cast<double>(score.unknown) / points)});
   };
-  for (const LabelScore& score : report.merged.truth.labels.by_class())
+  for (const LabelScore& score : report.merged.seen.labels.by_class())
     write(class_name(score.id, palette), score);
-  write("all", report.merged.truth.labels.total());
+  write("all", report.merged.seen.labels.total());
 }
 
 void write_json(JsonWriter& json, const DistanceSummary& summary) {
@@ -152,8 +156,10 @@ void write_json(JsonWriter& json, const MeshError& error, bool has_labels,
   json.field("area_m2", error.area_m2);
   json.field("faces", error.faces);
   json.field("coverage", error.coverage);
+  json.field("seen_coverage", error.seen_coverage);
   json.field("beyond", error.beyond);
   write_json(json, "truth_to_estimate", error.truth, has_labels, palette);
+  write_json(json, "seen_truth_to_estimate", error.seen, has_labels, palette);
   write_json(json, "estimate_to_truth", error.estimate, has_labels, palette);
   json.end_object();
 }

@@ -13,8 +13,9 @@ namespace km {
 [[nodiscard]] std::string to_table(const MeshReport& report, const LabelPalette& palette);
 
 /// The same numbers as one JSON object: {registration: {...}, samples_per_m2, robots: [{name,
-/// area_m2, faces, coverage, beyond, truth_to_estimate: {point: {mean_m, ...}, surface: {...},
-/// labels: {right, ..., classes: [...]}}, estimate_to_truth: {...}}], merged: {...}, notes}. Labels
+/// area_m2, faces, coverage, seen_coverage, beyond, truth_to_estimate: {point: {mean_m, ...},
+/// surface: {...}, labels: {right, ..., classes: [...]}}, seen_truth_to_estimate: {...},
+/// estimate_to_truth: {...}}], merged: {...}, notes}. Labels
 /// are null where they are not judged, numbers of nothing too.
 void write_json(JsonWriter& json, const MeshReport& report, const LabelPalette& palette);
 

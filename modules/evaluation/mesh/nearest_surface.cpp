@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nanoflann.hpp>
 
+#include "modules/evaluation/mesh/mesh_rim.hpp"
+
 namespace km {
 namespace {
 
@@ -58,18 +60,22 @@ class Nearest {
 using Index = nanoflann::KDTreeSingleIndexAdaptor<
     nanoflann::L2_Simple_Adaptor<float, Cloud, float, std::uint32_t>, Cloud, 3, std::uint32_t>;
 
-double distance_to_segment(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
-                           const Eigen::Vector3d& b) {
+// On the edge from corner `edge`, at a, to the next, at b.
+TrianglePoint nearest_on_edge(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
+                              const Eigen::Vector3d& b, int edge) {
   const Eigen::Vector3d along = b - a;
   const double length2 = along.squaredNorm();
   const double t = length2 > 0.0 ? std::clamp((point - a).dot(along) / length2, 0.0, 1.0) : 0.0;
-  return (point - a - t * along).norm();
+  const double distance_m = (point - a - t * along).norm();
+  if (t == 0.0) return {distance_m, -1, edge};
+  if (t == 1.0) return {distance_m, -1, (edge + 1) % 3};
+  return {distance_m, edge, -1};
 }
 
 }  // namespace
 
-double distance_to_triangle(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
-                            const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+TrianglePoint nearest_on_triangle(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
+                                  const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   const Eigen::Vector3d normal = (b - a).cross(c - a);
   const double length = normal.norm();
   if (length > 0.0) {
@@ -77,26 +83,28 @@ double distance_to_triangle(const Eigen::Vector3d& point, const Eigen::Vector3d&
       return (to - from).cross(point - from).dot(normal) >= 0.0;
     };
     if (inside(a, b) && inside(b, c) && inside(c, a))
-      return std::abs((point - a).dot(normal)) / length;
+      return {std::abs((point - a).dot(normal)) / length, -1, -1};
   }
-  return std::min({distance_to_segment(point, a, b), distance_to_segment(point, b, c),
-                   distance_to_segment(point, c, a)});
+  return std::min(
+      {nearest_on_edge(point, a, b, 0), nearest_on_edge(point, b, c, 1),
+       nearest_on_edge(point, c, a, 2)},
+      [](const TrianglePoint& p, const TrianglePoint& q) { return p.distance_m < q.distance_m; });
 }
 
 struct NearestSurface::Tree {
   Tree(const LabelledMesh& of, const SurfaceSamples& samples_of)
-      : mesh(of), samples(samples_of), cloud{samples_of.points}, index(3, cloud) {}
+      : mesh(of), samples(samples_of), rim(of), cloud{samples_of.points}, index(3, cloud) {}
 
-  [[nodiscard]] float distance_to_face(const Eigen::Vector3f& point, std::uint32_t face) const {
+  [[nodiscard]] TrianglePoint on_face(const Eigen::Vector3f& point, std::uint32_t face) const {
     const auto corner = [&](std::size_t k) {
       return Eigen::Vector3d(mesh.vertices[mesh.faces[face][k]].cast<double>());
     };
-    return static_cast<float>(
-        distance_to_triangle(point.cast<double>(), corner(0), corner(1), corner(2)));
+    return nearest_on_triangle(point.cast<double>(), corner(0), corner(1), corner(2));
   }
 
   const LabelledMesh& mesh;
   const SurfaceSamples& samples;
+  MeshRim rim;
   Cloud cloud;
   Index index;  // refers to cloud
 };
@@ -118,17 +126,20 @@ std::optional<NearestSample> NearestSurface::find(const Eigen::Vector3f& point,
   result.sample = nearest[0].second;
   result.distance_m = std::sqrt(nearest[0].first);
   result.face = tree_->samples.faces[nearest[0].second];
-  result.surface_m = std::min(result.distance_m, tree_->distance_to_face(point, result.face));
+  TrianglePoint best = tree_->on_face(point, result.face);
   std::uint32_t last = result.face;
   for (std::size_t i = 1; i < nearest.size(); ++i) {
     const std::uint32_t face = tree_->samples.faces[nearest[i].second];
     if (face == last) continue;
     last = face;
-    const float surface_m = tree_->distance_to_face(point, face);
-    if (surface_m >= result.surface_m) continue;
+    const TrianglePoint other = tree_->on_face(point, face);
+    if (other.distance_m >= best.distance_m) continue;
     result.face = face;
-    result.surface_m = surface_m;
+    best = other;
   }
+  result.surface_m = std::min(result.distance_m, static_cast<float>(best.distance_m));
+  result.past_rim = (best.edge >= 0 && tree_->rim.has_edge(result.face, best.edge)) ||
+                    (best.corner >= 0 && tree_->rim.has_corner(result.face, best.corner));
   return result;
 }
 

@@ -20,6 +20,7 @@ struct NearestSample {
   /// the mesh.
   std::uint32_t face = 0;
   float surface_m = 0.0F;
+  bool past_rim = false;  ///< The nearest point of that face lies where the mesh ends.
 };
 
 /// Finds the nearest of a mesh's samples in a k-d tree. Mesh and samples outlive this. Const calls
@@ -40,8 +41,16 @@ class NearestSurface {
   std::unique_ptr<Tree> tree_;
 };
 
-/// Distance from `point` to the triangle a, b, c, which may be degenerate [m].
-[[nodiscard]] double distance_to_triangle(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
-                                          const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+/// The point of a triangle that is nearest to another.
+struct TrianglePoint {
+  double distance_m = 0.0;
+  int edge = -1;    ///< It lies between corners `edge` and `edge` + 1 (of 3), or
+  int corner = -1;  ///< on this corner; both -1: inside.
+};
+
+/// Of the triangle a, b, c, which may be degenerate.
+[[nodiscard]] TrianglePoint nearest_on_triangle(const Eigen::Vector3d& point,
+                                                const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                                const Eigen::Vector3d& c);
 
 }  // namespace km

@@ -31,7 +31,13 @@ struct PointMatches {
   std::vector<float> surface_m;  ///< See NearestSample::surface_m; likewise.
   std::vector<LabelId> labels;   ///< Of the nearest face (NearestSample::face); 0 if none.
 
-  /// Takes what `other` has where it is nearer. Both are of the same points.
+  /// Whether that face is in front of the point's: neither does the mesh end there, nor do the two
+  /// face opposite ways. Else the point may lie on what the other mesh never saw: the ground below
+  /// a car, the back of a wall.
+  std::vector<bool> in_front;
+
+  /// Takes what `other` has where it is nearer; in front of either is in front. Both are of the
+  /// same points.
   void keep_nearer(const PointMatches& other);
 };
 

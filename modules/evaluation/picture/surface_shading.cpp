@@ -43,11 +43,27 @@ Eigen::Vector3d shares_of(const LabelledMesh& mesh, std::uint32_t face,
   return {1.0 - of_b - of_c, of_b, of_c};
 }
 
+template <typename Use>
+void for_each_pixel(const SurfaceImage& surface, const Use& use) {
+  cv::parallel_for_(cv::Range(0, surface.height), [&](const cv::Range& rows) {
+    for (int row = rows.start; row < rows.end; ++row)
+      for (int column = 0; column < surface.width; ++column)
+        if (surface.faces[surface.at(column, row)] != SurfaceImage::kNone) use(column, row);
+  });
+}
+
 class Shader {
  public:
   Shader(const LabelledMesh& mesh, const SurfaceImage& surface, const PictureView& view,
          double occlusion_m)
       : mesh_(mesh), surface_(surface), view_(view), occlusion_m_(occlusion_m) {
+    points_.resize(surface.faces.size());
+    for_each_pixel(surface, [&](int column, int row) {
+      const std::size_t at = surface.at(column, row);
+      points_[at] =
+          view.unproject(column + 0.5, row + 0.5, static_cast<double>(surface.depth_m[at]))
+              .cast<float>();
+    });
     const Eigen::Vector3d from(-0.45, -0.6, -0.66);  // in the camera: left, above, in front
     light_ = view.T_cam_world.linear().transpose() * from.normalized();
     for (int ring = 1; ring <= kRings; ++ring)
@@ -76,8 +92,7 @@ class Shader {
   }
 
   [[nodiscard]] Eigen::Vector3d point(int column, int row) const {
-    return view_.unproject(column + 0.5, row + 0.5,
-                           static_cast<double>(surface_.depth_m[surface_.at(column, row)]));
+    return points_[surface_.at(column, row)].cast<double>();
   }
 
   // The face's normal on the viewer's side.
@@ -135,17 +150,9 @@ class Shader {
   const PictureView& view_;
   double occlusion_m_;
   Eigen::Vector3d light_;
+  std::vector<Eigen::Vector3f> points_;  // of the world, of pixels that show a face
   std::vector<Eigen::Vector2d> around_;  // at most one long
 };
-
-template <typename Use>
-void for_each_pixel(const SurfaceImage& surface, const Use& use) {
-  cv::parallel_for_(cv::Range(0, surface.height), [&](const cv::Range& rows) {
-    for (int row = rows.start; row < rows.end; ++row)
-      for (int column = 0; column < surface.width; ++column)
-        if (surface.faces[surface.at(column, row)] != SurfaceImage::kNone) use(column, row);
-  });
-}
 
 }  // namespace
 

@@ -130,6 +130,19 @@ TEST_CASE("True points far from the estimate are not judged", "[mesh_error]") {
   CHECK(compare(square(10.0F, 0.0F), estimate, all).merged.coverage == 1.0);
 }
 
+TEST_CASE("True points past the rim of the estimate or behind it count apart", "[mesh_error]") {
+  // A wall that is 0.2 m thick, of which one side was seen, and that only in part.
+  LabelledMesh truth = rectangle({0, 0, 0}, {4, 0, 0}, {0, 0, 2}, 8, 1);
+  truth.append(rectangle({0, 0.2F, 0}, {0, 0, 2}, {4, 0, 0}, 8, 2));
+  const LabelledMesh estimate = rectangle({0, -0.03F, 0}, {3, 0, 0}, {0, 0, 2}, 8, 1);
+  const MeshReport report = compare(truth, estimate, in_place());
+  CHECK(report.merged.coverage > 0.8);
+  CHECK(report.merged.truth.surface.mean_m > 0.1);
+  CHECK(report.merged.seen_coverage == Approx(6.0 / 16.0).margin(0.01));
+  CHECK(report.merged.seen.surface.mean_m == Approx(0.03).margin(1e-5));
+  CHECK(report.merged.seen.labels.total().accuracy() == 1.0);
+}
+
 TEST_CASE("What the truth does not have counts as the crop distance", "[mesh_error]") {
   LabelledMesh estimate = square(2.0F, 0.0F);
   estimate.append(square(1.0F, 3.0F));  // a fifth of the estimate, in the air

@@ -3,25 +3,61 @@
 #include <limits>
 #include <random>
 
+#include "modules/evaluation/mesh/mesh_rim.hpp"
 #include "modules/evaluation/mesh/nearest_surface.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
 
 namespace km {
 
-TEST_CASE("Distance to a triangle: inside, sides, corners, degenerate", "[mesh_error]") {
+TEST_CASE("Nearest point of a triangle: inside, edges, corners, degenerate", "[mesh_error]") {
   const Eigen::Vector3d a(0, 0, 0), b(2, 0, 0), c(0, 2, 0);
-  const auto distance = [&](double x, double y, double z) {
-    return distance_to_triangle({x, y, z}, a, b, c);
+  const auto expect = [&](const Eigen::Vector3d& point, double distance_m, int edge, int corner) {
+    const TrianglePoint found = nearest_on_triangle(point, a, b, c);
+    CHECK(found.distance_m == Approx(distance_m));
+    CHECK(found.edge == edge);
+    CHECK(found.corner == corner);
   };
-  CHECK(distance(0.5, 0.5, 0.3) == Approx(0.3));
-  CHECK(distance(0.5, 0.5, -0.3) == Approx(0.3));
-  CHECK(distance(1, -1, 0) == Approx(1.0));
-  CHECK(distance(1, -3, 4) == Approx(5.0));
-  CHECK(distance(2, 2, 0) == Approx(std::sqrt(2.0)));
-  CHECK(distance(-3, -4, 0) == Approx(5.0));
-  CHECK(distance(5, 0, 4) == Approx(5.0));
-  CHECK(distance_to_triangle({0, 3, 4}, a, b, b) == Approx(5.0));
-  CHECK(distance_to_triangle({0, 3, 4}, a, a, a) == Approx(5.0));
+  expect({0.5, 0.5, 0.3}, 0.3, -1, -1);
+  expect({0.5, 0.5, -0.3}, 0.3, -1, -1);
+  expect({1, -1, 0}, 1.0, 0, -1);
+  expect({1, -3, 4}, 5.0, 0, -1);
+  expect({2, 2, 0}, std::sqrt(2.0), 1, -1);
+  expect({-1, 1, 0}, 1.0, 2, -1);
+  expect({-3, -4, 0}, 5.0, -1, 0);
+  expect({5, 0, 4}, 5.0, -1, 1);
+  expect({0, 5, 4}, 5.0, -1, 2);
+  CHECK(nearest_on_triangle({0, 3, 4}, a, b, b).distance_m == Approx(5.0));
+  CHECK(nearest_on_triangle({0, 3, 4}, a, a, a).distance_m == Approx(5.0));
+}
+
+TEST_CASE("A mesh ends where an edge has one face, whether vertices are shared or not",
+          "[mesh_error]") {
+  const bool shared = GENERATE(true, false);
+  LabelledMesh mesh = square(3.0F, 0.0F, 3);
+  if (!shared) {
+    LabelledMesh soup;
+    for (const auto& face : mesh.faces) {
+      const auto first = static_cast<std::uint32_t>(soup.vertices.size());
+      for (const std::uint32_t corner : face) soup.vertices.push_back(mesh.vertices[corner]);
+      soup.faces.push_back({first, first + 1, first + 2});
+    }
+    mesh = soup;
+  }
+  const MeshRim rim(mesh);
+  int edges = 0;
+  for (std::size_t face = 0; face < mesh.faces.size(); ++face)
+    for (int k = 0; k < 3; ++k) {
+      edges += rim.has_edge(face, k) ? 1 : 0;
+      const Eigen::Vector3f& place = mesh.vertices[mesh.faces[face][static_cast<std::size_t>(k)]];
+      const bool outside = place.head<2>().minCoeff() == 0.0F || place.maxCoeff() == 3.0F;
+      CHECK(rim.has_corner(face, k) == outside);
+    }
+  CHECK(edges == 12);
+  const SurfaceSamples samples = sample_surface(mesh, 1000.0, 1);
+  const NearestSurface nearest(mesh, samples);
+  CHECK_FALSE(nearest.find({1.5F, 1.0F, 0.2F}, 1.0)->past_rim);
+  CHECK(nearest.find({3.1F, 1.0F, 0.2F}, 1.0)->past_rim);
+  CHECK(nearest.find({3.1F, 3.1F, 0.0F}, 1.0)->past_rim);
 }
 
 TEST_CASE("The nearest sample is that of brute force", "[mesh_error]") {
