@@ -38,11 +38,9 @@ cv::Ptr<cv::StereoSGBM> make_matcher(const StereoDepthConfig& config, int dispar
   const int area = config.block_px * config.block_px;
   constexpr int kPrefilterCap = 31;
   constexpr int kSpeckleStep_px = 1;
-  return cv::StereoSGBM::create(
-      0, disparities, config.block_px, 8 * area, 32 * area, config.max_left_right_px, kPrefilterCap,
-      config.uniqueness_percent, config.speckle_px, kSpeckleStep_px,
-      config.effort == StereoEffort::kFast ? cv::StereoSGBM::MODE_SGBM_3WAY
-                                           : cv::StereoSGBM::MODE_SGBM);
+  return cv::StereoSGBM::create(0, disparities, config.block_px, 8 * area, 32 * area,
+                                config.max_left_right_px, kPrefilterCap, config.uniqueness_percent,
+                                config.speckle_px, kSpeckleStep_px, cv::StereoSGBM::MODE_SGBM_3WAY);
 }
 
 }  // namespace

@@ -15,7 +15,6 @@ namespace {
 
 struct Case {
   int downscale = 1;
-  StereoEffort effort = StereoEffort::kFast;
   double min_depth_m = 0.6;
 };
 
@@ -26,8 +25,7 @@ double cpu_ms() {
 void measure(const std::filesystem::path& folder, const Case& one) {
   EurocReader reader(folder, {.from_s = 0.0, .to_s = 15.0});
   const StereoRig& rig = reader.rig().stereo;
-  StereoDepth stereo(
-      rig, {.downscale = one.downscale, .effort = one.effort, .min_depth_m = one.min_depth_m});
+  StereoDepth stereo(rig, {.downscale = one.downscale, .min_depth_m = one.min_depth_m});
   DepthDifferences differences;
   std::vector<double> times_ms, shares;
   for (int i = 0; auto packet = reader.next(); ++i) {
@@ -42,11 +40,10 @@ void measure(const std::filesystem::path& folder, const Case& one) {
     add_differences(depth, stereo, rig, triangulated_corners(frame, rig), differences);
   }
   std::printf(
-      "  1/%d %-8s %3d px | %5.1f ms | %4.1f %% of pixels | %.2f px, %.2f %% (%zu corners, "
+      "  1/%d %3d px | %5.1f ms | %4.1f %% of pixels | %.2f px, %.2f %% (%zu corners, "
       "%.0f %% with depth)\n",
-      one.downscale, one.effort == StereoEffort::kFast ? "fast" : "thorough", stereo.disparities(),
-      median_of(times_ms), 1e2 * median_of(shares), median_of(differences.px),
-      1e2 * median_of(differences.relative), differences.corners,
+      one.downscale, stereo.disparities(), median_of(times_ms), 1e2 * median_of(shares),
+      median_of(differences.px), 1e2 * median_of(differences.relative), differences.corners,
       1e2 * static_cast<double>(differences.px.size()) /
           static_cast<double>(std::max<std::size_t>(differences.corners, 1)));
 }
@@ -55,10 +52,8 @@ TEST_CASE("Stereo depth on MH_01", "[!benchmark]") {
   const auto folder = shared_data("euroc/MH_01_easy");
   if (!folder) return;
   cv::setNumThreads(1);
-  std::printf("size effort disparities | CPU | with depth | median difference to corners\n");
-  for (const Case& one : {Case{}, Case{1, StereoEffort::kThorough}, Case{2},
-                          Case{2, StereoEffort::kThorough}, Case{1, StereoEffort::kFast, 0.35}})
-    measure(*folder, one);
+  std::printf("size, disparities | CPU | with depth | median difference to corners\n");
+  for (const Case& one : {Case{}, Case{2}, Case{1, 0.35}, Case{2, 0.35}}) measure(*folder, one);
 }
 
 }  // namespace
