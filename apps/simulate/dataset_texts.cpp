@@ -64,7 +64,11 @@ std::string team_yaml(const SimulationOptions& options) {
   std::string text =
       "# The robots of these recordings:\n"
       "#   kimera_multi_team --config team.yaml --output results\n"
-      "robots:\n";
+      "truth_mesh: world.ply\n";
+  if (options.depth)
+    text += std::string("arguments: [--set, mapping.mode=") +
+            (options.labels ? "semantic" : "metric") + "]\n";
+  text += "robots:\n";
   for (std::size_t i = 0; i < options.names.size(); ++i) {
     const std::string& name = options.names[i];
     text += "  - id: " + std::to_string(i) + "\n    name: \"" + name + "\"\n    dataset: \"" +

@@ -8,7 +8,8 @@
 
 namespace km {
 
-/// team.yaml: the robots and their true poses, for kimera_multi_team.
+/// team.yaml: the robots, their true poses and the true mesh, for kimera_multi_team. Robots with
+/// depth make a map, with labels where those were recorded.
 [[nodiscard]] std::string team_yaml(const SimulationOptions& options);
 
 /// README.md: how the folder was made and what is in it.

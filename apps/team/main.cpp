@@ -10,6 +10,7 @@
 #include "apps/team/run_team.hpp"
 #include "apps/team/team_report.hpp"
 #include "apps/team/team_results.hpp"
+#include "modules/mesh/ply_file.hpp"
 
 namespace {
 
@@ -28,7 +29,8 @@ constexpr const char* kAbout =
     "True poses are in one world for all robots: where they are given, the tables show errors of "
     "the\n"
     "trajectories and how many closures are true (see kimera_multi_evaluate closures --help;\n"
-    "closure_truth: {max_translation_m, max_rotation_deg, min_overlap, default_depth_m}).\n\n"
+    "closure_truth: {max_translation_m, max_rotation_deg, min_overlap, default_depth_m}). With "
+    "truth_mesh, a\nPLY file in that world, also how far the robots' meshes are from it.\n\n"
     "Exit code: 0 if every robot ended well, 1 for input that cannot be used, 3 if a robot "
     "failed.\n"
     "Ctrl-C asks the robots to end in order and prints what there is; a second one ends them.\n\n"
@@ -121,6 +123,11 @@ int run(const TeamOptions& options) {
     file << team.plot;
     if (!file.flush()) throw std::runtime_error(path.string() + ": cannot be written");
     std::cout << "\nSeen from above: " << path.string() << '\n';
+  }
+  if (!team.meshes.merged.empty()) {
+    const fs::path path = plan.output / "team_mesh.ply";
+    km::write_ply(path, team.meshes.merged);
+    std::cout << "The mesh of all robots: " << path.string() << '\n';
   }
   const bool ok = std::all_of(team.robots.begin(), team.robots.end(),
                               [](const km::RobotResult& robot) { return robot.run.exit.ok(); });

@@ -221,6 +221,7 @@ TeamPlan read_team_file(const fs::path& file, const fs::path& dataset) {
       keys.get<std::string>("output", "a path").value_or("results/" + file.stem().string());
   plan.time_limit_s = keys.get<double>("time_limit_s", "a number of seconds");
   const fs::path truth = keys.truth();
+  plan.truth_mesh = keys.existing_path("truth_mesh");
   plan.closure_truth = read_closure_truth(source, keys.child("closure_truth"));
   const auto common = keys.texts("arguments");
   const YAML::Node robots = keys.child("robots");

@@ -38,6 +38,7 @@ struct TeamPlan {
   std::filesystem::path output;                ///< Results, one folder per robot.
   std::optional<double> time_limit_s;          ///< The team is asked to end after this.
   ClosureTruthOptions closure_truth;           ///< When a closure counts as true.
+  std::filesystem::path truth_mesh;            ///< PLY, in the frame of true poses; or empty.
   std::vector<RobotPlan> robots;
   std::vector<std::string> notes;  ///< What cannot be had, for the table.
 };

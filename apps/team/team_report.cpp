@@ -7,6 +7,7 @@
 
 #include "apps/team/text_table.hpp"
 #include "modules/evaluation/closure_report.hpp"
+#include "modules/evaluation/mesh/mesh_report.hpp"
 #include "modules/evaluation/trajectory_report.hpp"
 
 namespace km {
@@ -214,6 +215,7 @@ std::string to_table(const TeamResult& team) {
   std::string text =
       run_table(team) + '\n' + trajectory_table(team) + '\n' + closure_table(team) + '\n';
   if (team.closures) text += to_table(*team.closures) + '\n';
+  if (const std::string meshes = to_table(team.meshes); !meshes.empty()) text += meshes + '\n';
   text += traffic_table(team);
   const std::string remarks = failures(team);
   return remarks.empty() ? text : text + '\n' + remarks;
@@ -232,6 +234,12 @@ void write_json(JsonWriter& json, const TeamResult& team) {
   if (team.closures) {
     json.key("closures");
     write_json(json, *team.closures);
+  }
+  for (const auto& [key, report] : {std::pair("meshes", &team.meshes.odometry),
+                                    std::pair("optimized_meshes", &team.meshes.optimized)}) {
+    if (!*report) continue;
+    json.key(key);
+    write_json(json, **report, {});
   }
   json.array("notes", team.notes);
   json.end_object();

@@ -13,7 +13,8 @@ namespace km {
 [[nodiscard]] std::string to_table(const TeamResult& team);
 
 /// Writes the same as one JSON object: {robots: [{robot, name, exit_code, ...}], optimized: {...},
-/// closures: {...}, notes: [...]}; what could not be had is absent.
+/// closures: {...}, meshes: {...}, optimized_meshes: {...}, notes: [...]}; what could not be had is
+/// absent.
 void write_json(JsonWriter& json, const TeamResult& team);
 
 }  // namespace km

@@ -152,6 +152,10 @@ TeamResult collect_results(const TeamPlan& plan, std::vector<RobotRun> runs) {
     result.optimized = trajectory_error(optimized);
     result.plot = plot_from_above(optimized, *result.optimized);
   }
+  if (plan.truth_mesh.empty() || result.optimized)
+    result.meshes = collect_meshes(
+        plan, result.optimized ? result.optimized->alignment.T_truth_estimate : SE3::Identity(),
+        result.notes);
   result.closures = judge_closures(plan, trajectories, result.notes);
   return result;
 }

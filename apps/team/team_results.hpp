@@ -9,6 +9,7 @@
 
 #include "apps/team/run_team.hpp"
 #include "apps/team/team_file.hpp"
+#include "apps/team/team_meshes.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 
@@ -49,6 +50,7 @@ struct TeamResult {
   std::optional<TeamError> optimized;     ///< Of the robots that have poses, under one alignment.
   std::string plot;                       ///< SVG of `optimized` from above; empty without it.
   std::optional<ClosureScores> closures;  ///< Of robots with cameras, where the truth is known.
+  TeamMeshes meshes;                      ///< Of robots that made a map.
   std::vector<std::string> notes;         ///< Why something of the team is absent.
 };
 
