@@ -10,7 +10,7 @@
 namespace km {
 namespace {
 
-constexpr double kClustersPerSpacing = 3.0;
+constexpr double kClustersPerSpacing = 2.0;
 constexpr double kNearSpacings = 0.5;  // nodes closer than this are one
 
 // Joins vertices to nodes that are there already.

@@ -25,7 +25,7 @@ struct SimplifiedMesh {
 
 /// Gives every vertex of `map` that has no node in `simplified` to one. Vertices within half a
 /// spacing of a node join it; the rest is simplified to new nodes, appended to the old: first
-/// vertices are clustered on a grid of a third of the spacing (what makes it fast), then the mesh
+/// vertices are clustered on a grid of half the spacing (what makes it fast), then the mesh
 /// of the clusters is decimated by OpenMesh to the number of nodes that its area asks for. The
 /// order of collapses is that of quadric error (Garland and Heckbert, "Surface Simplification Using
 /// Quadric Error Metrics", 1997) plus the spread of the merged region, which distributes the
