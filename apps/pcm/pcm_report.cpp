@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <ostream>
+#include <utility>
 #include <vector>
 
 #include "apps/team/text_table.hpp"
@@ -56,7 +57,9 @@ std::vector<std::string> table_row(Additions until) {
   const Additions recent = until.last(std::min(kWindow, until.size()));
   return {std::to_string(now.vertices),
           std::to_string(now.clique),
-          now.true_members ? std::to_string(*now.true_members) : "-",
+          now.true_members
+              ? std::to_string(*now.true_members) + '/' + std::to_string(*now.true_vertices)
+              : "-",
           now.true_members ? std::to_string(now.clique - *now.true_members) : "-",
           std::to_string(now.bound),
           ms(statistics_of(values(recent, &PcmAddition::search_s)).median),
@@ -109,6 +112,14 @@ std::vector<CurvePoint> sizes(Additions additions) {
   std::vector<CurvePoint> points;
   for (const PcmAddition& a : additions)
     points.push_back({static_cast<double>(a.vertices), static_cast<double>(a.clique)});
+  return points;
+}
+
+std::vector<CurvePoint> true_vertices(Additions additions) {
+  std::vector<CurvePoint> points;
+  for (const PcmAddition& a : additions)
+    if (a.true_vertices)
+      points.push_back({static_cast<double>(a.vertices), static_cast<double>(*a.true_vertices)});
   return points;
 }
 
@@ -177,10 +188,14 @@ std::string pcm_plot(std::span<const PcmRun> runs) {
         {name, running_median_ms(run.additions, &PcmAddition::search_s), colour, false});
     size.curves.push_back({name, sizes(run.additions), colour, false});
   }
-  const Additions first = runs.empty() ? Additions{} : Additions(runs.front().additions);
+  if (runs.empty()) return plot_curves(std::vector{time, size});
+  const Additions first(runs.front().additions);
+  const std::size_t colour = runs.size();
   if (total(first, &PcmAddition::check_s) > 0.0)
-    time.curves.push_back({"consistency checks", running_median_ms(first, &PcmAddition::check_s),
-                           runs.size(), false});
+    time.curves.push_back(
+        {"consistency checks", running_median_ms(first, &PcmAddition::check_s), colour, false});
+  if (auto all_true = true_vertices(first); !all_true.empty())
+    size.curves.push_back({"true closures added", std::move(all_true), colour, false});
   return plot_curves(std::vector{time, size});
 }
 

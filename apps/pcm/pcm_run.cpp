@@ -36,6 +36,7 @@ class Additions {
                               .search_s = search_s,
                               .clique = clique_.clique().size(),
                               .true_members = std::nullopt,
+                              .true_vertices = std::nullopt,
                               .bound = clique_.bound()});
   }
 
@@ -62,6 +63,7 @@ PcmRun run_pcm(const std::vector<LabelledClosure>& closures, const PcmConfig& co
   Additions additions(config);
   std::vector<PreparedClosure> vertices;
   std::vector<bool> is_true;
+  std::size_t true_vertices = 0;
   for (std::size_t n = 0; n < closures.size(); ++n) {
     if (progress) progress(n);
     const auto& [closure, outlier] = closures[n];
@@ -82,6 +84,8 @@ PcmRun run_pcm(const std::vector<LabelledClosure>& closures, const PcmConfig& co
     const auto members = additions.clique().clique();
     additions.last().true_members = static_cast<std::size_t>(
         std::count_if(members.begin(), members.end(), [&](std::size_t v) { return is_true[v]; }));
+    true_vertices += outlier ? 0 : 1;
+    additions.last().true_vertices = true_vertices;
   }
   return additions.finish();
 }

@@ -27,8 +27,9 @@ struct PcmAddition {
   double check_s = 0.0;   ///< Consistency of the new closure with all others.
   double search_s = 0.0;  ///< Of the larger clique.
   std::size_t clique = 0;
-  std::optional<std::size_t> true_members;  ///< Of the clique; nullopt without labels.
-  std::size_t bound = 0;                    ///< No clique is larger.
+  std::optional<std::size_t> true_members;   ///< Of the clique; nullopt without labels.
+  std::optional<std::size_t> true_vertices;  ///< Of the graph; likewise.
+  std::size_t bound = 0;                     ///< No clique is larger.
 };
 
 struct PcmRun {

@@ -130,7 +130,7 @@ class PanelDrawing {
 
   void draw_curve(const Curve& curve) const {
     svg_ << "<path fill=\"none\" stroke=\"" << colour_of(curve) << "\" stroke-linecap=\"round\" "
-         << (curve.dots ? "stroke-width=\"2\" opacity=\"0.25\"" : "stroke-width=\"1.6\"")
+         << (curve.dots ? "stroke-width=\"2.6\" opacity=\"0.35\"" : "stroke-width=\"1.6\"")
          << " d=\"";
     CurvePoint last{-1e9, -1e9};
     bool begun = false;

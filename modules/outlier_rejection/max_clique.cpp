@@ -22,10 +22,11 @@ void check_neighbours(std::span<const std::size_t> neighbours, std::size_t size)
 
 // A wrong set would weld wrong places together: one look at every pair costs little.
 void verify(const BitGraph& graph, std::span<const std::size_t> clique) {
-  for (std::size_t i = 0; i < clique.size(); ++i)
-    for (std::size_t k = 0; k < i; ++k)
-      if (!graph.adjacent(clique[i], clique[k]))
-        throw std::logic_error("MaxClique: the search returned a set that is not a clique");
+  BitSet members(graph.capacity());
+  for (const std::size_t v : clique) members.insert(v);
+  for (const std::size_t v : clique)
+    if (!members.all_but_one_in(v, graph.neighbours(v)))
+      throw std::logic_error("MaxClique: the search returned a set that is not a clique");
 }
 
 }  // namespace
@@ -48,11 +49,16 @@ bool MaxClique::add(std::span<const std::size_t> neighbours) {
 
 void MaxClique::search_exactly(std::size_t v, std::span<const std::size_t> neighbours,
                                std::size_t most) {
-  std::vector<std::size_t> known{v};
+  std::vector<std::size_t> known;
   for (const std::size_t u : clique_)
     if (graph_.adjacent(u, v)) known.push_back(u);
-  adopt(greedy_extension(graph_, std::move(known), clique_.size()));
-  adopt(greedy_extension(graph_, {v}, clique_.size()));
+  known.push_back(v);
+  if (known.size() == most) {
+    clique_ = std::move(known);
+  } else {
+    adopt(greedy_extension(graph_, std::move(known), clique_.size()));
+    if (clique_.size() < most) adopt(greedy_extension(graph_, {v}, clique_.size()));
+  }
   if (clique_.size() < most)
     search_tree(v, neighbours, most);
   else

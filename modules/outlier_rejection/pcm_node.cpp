@@ -72,8 +72,8 @@ void PcmNode::report(const Closure& closure, PcmVerdict verdict, const Pcm& pcm)
   const MaxClique& clique = pcm.clique();
   if (config_.search == CliqueMethod::kExact && !clique.proven())
     log::limited(log::Level::kInfo, name(), "unproven " + pair)
-        << pair << clique.clique().size() << " closures agree, but up to " << clique.bound()
-        << " may: a search ended at pcm.max_search_nodes, what the heuristic found stands";
+        << pair << clique.clique().size() << " closures agree, up to " << clique.bound()
+        << " may: a search ended at pcm.max_search_nodes and fell back to the heuristic";
 }
 
 void PcmNode::publish_changes() {

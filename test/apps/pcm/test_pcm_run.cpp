@@ -71,6 +71,7 @@ TEST_CASE("The JSON of a run has the agreed keys", "[pcm]") {
                     .search_s = 0.25,
                     .clique = 3,
                     .true_members = 2,
+                    .true_vertices = 2,
                     .bound = 4}};
   std::ostringstream one, two;
   write_pcm_json(one, std::vector{run});

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
 
 #include "modules/outlier_rejection/pcm.hpp"
 #include "test/modules/outlier_rejection/chain.hpp"
@@ -92,6 +93,27 @@ TEST_CASE("PCM keeps the true closures among as many random ones", "[pcm]") {
   std::sort(truth.begin(), truth.end());
   CHECK(pcm.inliers() == truth);
   CHECK(pcm.clique().proven());
+}
+
+TEST_CASE("As many closures agree in whatever order they come", "[pcm]") {
+  const unsigned seed = GENERATE(range(0U, 10U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const TwoRobots robots(0, 1, 40, 0.01, rng);
+  std::vector<Closure> closures;  // of two with the same id the first would count
+  std::set<ClosureId> known;
+  for (const Closure& closure : mixed_closures(robots, 60, rng))
+    if (known.insert(closure.id()).second) closures.push_back(closure);
+  PcmConfig config;
+  config.confidence = 0.6;  // many true ones disagree: the largest set is one of several
+  const auto agreeing = [&] {
+    Pcm pcm(0, 1, config);
+    for (const Closure& closure : closures) (void)pcm.add(closure);
+    return pcm.clique().clique().size();
+  };
+  const std::size_t expected = agreeing();
+  std::shuffle(closures.begin(), closures.end(), rng);
+  CHECK(agreeing() == expected);
 }
 
 TEST_CASE("A closure given twice counts once, one from each side twice", "[pcm]") {

@@ -8,6 +8,7 @@
 
 #include "modules/outlier_rejection/pcm_node.hpp"
 #include "test/modules/outlier_rejection/chain.hpp"
+#include "test/support/captured_log.hpp"
 
 namespace km {
 namespace {
@@ -117,6 +118,24 @@ TEST_CASE("The PCM node survives closures that cannot be weighed", "[node]") {
   node.publish_changes();
   REQUIRE(team.recorder.sets().size() == 1);
   CHECK(team.recorder.sets()[0].closures.size() == 3);
+}
+
+TEST_CASE("The PCM node says that a search was cut short, and how much may be missing", "[node]") {
+  Team team;
+  PcmConfig config = bounds_per_transform(0.5, 3.1);
+  config.bounds_per_transform = false;
+  config.max_search_nodes = 1;
+  PcmNode node(config, 0, team.closures, team.inlier_sets);
+  const CapturedLog log;
+  const Chain a(0), b(1);  // closures agree where their translations differ by half a metre
+  for (std::uint32_t n = 0; n < 300; ++n) {
+    OdometryPose from = a.at(0);
+    from.id.index = n;
+    const SE3 T_a_b = make_pose(Eigen::Matrix3d::Identity(), 0.25 * random_vector<3>(team.rng));
+    node.step(closure(from, b.at(0), T_a_b));
+  }
+  CHECK_THAT(log.text(),
+             Catch::Contains("robots 0 1: ") && Catch::Contains("ended at pcm.max_search_nodes"));
 }
 
 TEST_CASE("The PCM node's thread handles what was published before it stops", "[node]") {
