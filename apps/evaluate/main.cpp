@@ -173,8 +173,11 @@ constexpr const char* kRender =
     "down\n"
     "  x,y,z,qx,qy,qz,qw       likewise, a camera's pose (its z forward, y down)\n"
     "Write --view=-1,... for one that begins with a minus sign.\n\n"
+    "A team's frame is that of the first robot's first pose: it need not be upright. --reference\n"
+    "turns the map to lie in another frame.\n\n"
     "Examples:\n"
-    "  kimera_multi_evaluate render --mesh mesh.ply --trajectory optimized.tum --output map.png\n"
+    "  kimera_multi_evaluate render --mesh mesh.ply --trajectory optimized.tum \\\n"
+    "      --reference odometry.tum --output map.png\n"
     "  kimera_multi_evaluate render --mesh a.ply b.ply --color robot --view oblique --output "
     "team.png\n"
     "  kimera_multi_evaluate render --mesh room/world.ply --view=-2,1,1.7,20,-10 --output "
@@ -187,6 +190,9 @@ void define(CLI::App& app, km::RenderCommand& command) {
   app.add_option("--view", command.views, "Where from, see above; several: a picture each")
       ->capture_default_str();
   app.add_option("--trajectory", command.trajectories, "Poses drawn on top (TUM or EuRoC CSV)");
+  app.add_option("--reference", command.references,
+                 "Poses of the first trajectories in the frame to draw in: the truth puts the map "
+                 "into the world, the first robot's odometry.tum stands it upright");
   app.add_option(
          "--color", command.color,
          "Of the label, the vertices' own, none, or one per mesh; auto: labels if there are")

@@ -9,34 +9,24 @@
 
 #include "apps/evaluate/label_palette_file.hpp"
 #include "apps/evaluate/named_files.hpp"
+#include "apps/evaluate/placement.hpp"
 #include "apps/evaluate/stage_progress.hpp"
 #include "modules/core/json_writer.hpp"
 #include "modules/evaluation/mesh/mesh_checks.hpp"
 #include "modules/evaluation/mesh/mesh_report.hpp"
-#include "modules/evaluation/surroundings_alignment.hpp"
-#include "modules/evaluation/trajectory_file.hpp"
 #include "modules/mesh/ply_file.hpp"
 
 namespace km {
 namespace {
 
-// Puts the meshes where the robots' trajectories belong.
-SE3 alignment_of(const MeshCommand& command) {
-  const auto& estimates = command.trajectories;
-  const auto& truths = command.true_trajectories;
-  if (estimates.empty() && truths.empty()) return command.options.T_truth_estimate;
-  if (estimates.empty() || (truths.size() != 1 && truths.size() != estimates.size()))
+// Where the robots' trajectories put the meshes.
+SE3 placed_by(const MeshCommand& command) {
+  const std::size_t estimates = command.trajectories.size();
+  const std::size_t truths = command.true_trajectories.size();
+  if ((estimates == 0) != (truths == 0) || (truths > 1 && truths != estimates))
     throw std::invalid_argument(
         "give one --trajectory-truth for all --trajectory, or one for each");
-  std::deque<std::vector<StampedPose>> poses;  // inputs refer to them
-  const auto read = [&](const std::filesystem::path& file) -> const std::vector<StampedPose>& {
-    return poses.emplace_back(read_trajectory(file));
-  };
-  std::vector<TrajectoryInput> inputs;
-  for (std::size_t i = 0; i < estimates.size(); ++i)
-    inputs.push_back({short_name(estimates[i]), read(truths[truths.size() == 1 ? 0 : i]),
-                      read(estimates[i]), std::nullopt});
-  return align_surroundings(inputs);
+  return placement_of(command.trajectories, command.true_trajectories, true);
 }
 
 // The palette given, or the one beside the truth, or none.
@@ -63,7 +53,7 @@ std::string json_of(const MeshReport& report, const LabelPalette& palette) {
 
 void evaluate_meshes(const MeshCommand& command) {
   MeshErrorOptions options = command.options;
-  options.T_truth_estimate = alignment_of(command);
+  options.T_truth_estimate = placed_by(command);
   StageProgress progress;
   progress("reading", 0.0);
   const LabelledMesh truth = read_ply(command.truth);

@@ -9,6 +9,7 @@
 
 #include "apps/evaluate/label_palette_file.hpp"
 #include "apps/evaluate/named_files.hpp"
+#include "apps/evaluate/placement.hpp"
 #include "modules/evaluation/mesh/mesh_checks.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/mesh/ply_file.hpp"
@@ -58,10 +59,18 @@ LabelPalette palette_of(const RenderCommand& command, const std::vector<Labelled
   return palette;
 }
 
-PictureLine line_of(const fs::path& file) {
+PictureLine line_of(const fs::path& file, const SE3& T_picture_mesh) {
   PictureLine line{short_name(file), {}};
-  for (const StampedPose& pose : read_trajectory(file)) line.points.push_back(pose.T.translation());
+  for (const StampedPose& pose : read_trajectory(file))
+    line.points.emplace_back(T_picture_mesh * pose.T.translation());
   return line;
+}
+
+// The transform into the frame to draw in.
+SE3 placed_by(const RenderCommand& command) {
+  if (command.references.size() > command.trajectories.size())
+    throw std::invalid_argument("more --reference than --trajectory");
+  return placement_of(command.trajectories, command.references, false);
 }
 
 // NAME.png, NAME_2.png, ...
@@ -83,18 +92,21 @@ void render_meshes(const RenderCommand& command) {
   const auto [width, height] = size_of(command.size);
   if (command.output.extension() != ".png")
     throw std::invalid_argument(command.output.string() + ": pictures are PNG, named *.png");
+  const SE3 T_picture_mesh = placed_by(command);
   std::vector<LabelledMesh> meshes;
   PictureScene scene;
   LabelledMesh all;
   for (const fs::path& file : command.meshes) {
-    all.append(meshes.emplace_back(read_ply(file)));
+    meshes.emplace_back(read_ply(file)).transform(T_picture_mesh);
+    all.append(meshes.back());
     scene.names.push_back(short_name(file));
   }
   Eigen::AlignedBox3d extent = extent_of(all);
   scene.meshes = meshes;
   scene.palette = palette_of(command, meshes);
   for (const fs::path& file : command.trajectories)
-    for (const Eigen::Vector3d& point : scene.lines.emplace_back(line_of(file)).points)
+    for (const Eigen::Vector3d& point :
+         scene.lines.emplace_back(line_of(file, T_picture_mesh)).points)
       extent.extend(point);
   PictureOptions options;
   options.color = color_of(command.color, meshes);

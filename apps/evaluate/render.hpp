@@ -13,6 +13,8 @@ namespace km {
 struct RenderCommand {
   std::vector<std::filesystem::path> meshes;        ///< PLY.
   std::vector<std::filesystem::path> trajectories;  ///< TUM or EuRoC CSV, in the meshes' frame.
+  std::vector<std::filesystem::path> references;    ///< Of the first trajectories, in the frame to
+                                                    ///< draw in; by default the meshes'.
   std::vector<std::string> views = {"top"};         ///< See parse_view().
   std::string color = "auto";                       ///< auto, label, own, shade, robot.
   std::string size = "1600x1200";

@@ -1,4 +1,7 @@
+#include <Eigen/Geometry>
 #include <catch2/catch.hpp>
+#include <cmath>
+#include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
@@ -114,6 +117,33 @@ TEST_CASE("render draws one picture per view", "[evaluate]") {
   const cv::Vec3b floor = top(60, 100);
   CHECK(static_cast<int>(floor[2]) > 2 * static_cast<int>(floor[1]) + 20);
   CHECK(cv::imread((meshes.folder.path() / "out_2.png").string()).cols == 320);
+}
+
+TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]") {
+  const Meshes meshes;
+  LabelledMesh lying = room();
+  lying.transform(
+      make_pose(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitY()).matrix(), {0, 0, 0}));
+  write_ply(meshes.a, lying);
+  const auto upright = meshes.folder.write("odometry.tum", "1 1 1 1 0 0 0 1\n2 3 2 1 0 0 0 1\n");
+  // The same two poses after a quarter turn about y.
+  const auto turned = meshes.folder.write(
+      "optimized.tum", "1 1 1 -1 0 0.70710678 0 0.70710678\n2 1 2 -3 0 0.70710678 0 0.70710678\n");
+  const auto top = [&](const std::string& arguments) {
+    const auto result = run_command(kTool + "render --size 320x240 --color shade --output " +
+                                    meshes.png.string() + ' ' + arguments);
+    CAPTURE(result.output);
+    REQUIRE(result.exit_code == 0);
+    return cv::Mat3b(cv::imread(meshes.png.string())).rowRange(0, 240).clone();
+  };
+  const cv::Mat3b expected =
+      top("--mesh " + meshes.truth.string() + " --trajectory " + upright.string());
+  const cv::Mat3b found = top("--mesh " + meshes.a.string() + " --trajectory " + turned.string() +
+                              " --reference " + upright.string());
+  CHECK(cv::norm(expected, found, cv::NORM_L1) / (3.0 * 320 * 240) < 0.5);  // of 255
+  const auto many = run_command(kTool + "render --mesh " + meshes.a.string() + " --output " +
+                                meshes.png.string() + " --reference " + upright.string());
+  CHECK_THAT(many.output, Catch::Contains("more --reference than --trajectory"));
 }
 
 TEST_CASE("render refuses what it cannot draw", "[evaluate]") {
