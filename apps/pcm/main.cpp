@@ -14,6 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int kMostClosures = 100000;
+
 constexpr const char* kAbout =
     "Adds loop closures one at a time to the consistency graph of pairwise consistency\n"
     "maximisation (PCM) and follows its maximum clique: the closures to be trusted.\n\n"
@@ -35,9 +37,9 @@ constexpr const char* kAbout =
     "  incremental  greedy from the new vertex only (the heuristic of Kimera-Multi)\n"
     "  batch        greedy from every vertex, from scratch at every addition\n\n"
     "The table has, at growing sizes of the graph: the clique, its true members of all true\n"
-    "closures so far, its false ones, the bound on the maximum that is proven, the median time of "
-    "the last 50 searches and of the last\n"
-    "50 rounds of checks, the worst search and the sums so far. Times are CPU times.\n"
+    "closures so far, its false ones, the bound on the maximum that is proven, the median time\n"
+    "of the last 50 searches, the worst search and their sum, the median time of the last 50\n"
+    "rounds of checks and their sum. Times are CPU times of one thread.\n"
     "Exit code: 0 if all were added, 1 for input that cannot be used.\n\n"
     "Examples:\n"
     "  kimera_multi_pcm manhattan.g2o --outliers 1000 --seed 1 --json pcm.json --plot pcm.svg\n"
@@ -55,9 +57,11 @@ struct Options {
 void define_closures(CLI::App& app, Options& options) {
   km::ClosureSelection& selection = options.selection;
   app.add_option("--outliers", selection.outliers, "Random false closures to add")
+      ->check(CLI::Range(0, kMostClosures))
       ->capture_default_str();
   app.add_option("--closures", selection.keep,
                  "Use so many of the file's closures, drawn at random; 0: all")
+      ->check(CLI::Range(0, kMostClosures))
       ->capture_default_str();
   app.add_option("--outlier-range", selection.outlier_half_side_m,
                  "Translations of the random closures are at most this along every axis [m]")
