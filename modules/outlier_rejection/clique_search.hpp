@@ -26,11 +26,13 @@ struct [[nodiscard]] CliqueSearch {
 
 /// Searches the largest clique of `graph` among the vertices `candidates`.
 ///
-/// Vertices with too few neighbours are peeled off first (k-core; Pattabiraman et al., "Fast
-/// Algorithms for the Maximum Clique Problem on Massive Graphs", Internet Mathematics 2015). What
-/// is left is searched depth-first on bit sets in degeneracy order, bounded by greedy colouring
-/// with recolouring (San Segundo et al., "An improved bit parallel exact maximum clique algorithm",
-/// Optimization Letters 2013). Exact unless the limit ends it; deterministic. Exponential at worst.
+/// Where a greedy colouring needs no more colours than `more_than` there is none. Else vertices
+/// with too few neighbours are peeled off (k-core; Pattabiraman et al., "Fast Algorithms for the
+/// Maximum Clique Problem on Massive Graphs", Internet Mathematics 2015). What is left is searched
+/// depth-first on bit sets in degeneracy order, bounded by greedy colouring with recolouring (San
+/// Segundo et al., "An improved bit parallel exact maximum clique algorithm", Optimization Letters
+/// 2013); vertices adjacent to all other candidates are taken without branching. Exact unless the
+/// limit ends it; deterministic. Exponential at worst.
 CliqueSearch find_clique(const BitGraph& graph, std::span<const std::size_t> candidates,
                          const CliqueGoal& goal);
 
