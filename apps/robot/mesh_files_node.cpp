@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "modules/mesh/ply_file.hpp"
+#include "runtime/background_thread.hpp"
 
 namespace km {
 namespace {
@@ -16,6 +17,7 @@ MeshFilesNode::MeshFilesNode(std::filesystem::path folder, const MeshFilesTopics
       worker_(
           kQueueCapacity, Overflow::kBlock,
           [this](const Input& input) {
+            work_in_background();
             std::visit(
                 [this](const auto& message) {
                   step(*message);

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "runtime/background_thread.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -28,7 +29,11 @@ DenseSensingNode::DenseSensingNode(DenseSensor sensor, LabelsFrom labels, double
       interval_s_(interval_of(rate_hz)),
       topics_(topics),
       worker_(
-          kQueuedFrames, overflow, [this](const auto& located) { step(*located); },
+          kQueuedFrames, overflow,
+          [this](const auto& located) {
+            work_in_background();
+            step(*located);
+          },
           "dense_sensing") {
   topics_.located.subscribe([this](const auto& located) { worker_.post(located); });
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "runtime/background_thread.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 
@@ -35,7 +36,11 @@ MeshDeformationNode::MeshDeformationNode(const MeshDeformationConfig& config, Ro
       optimized_(topics.optimized),
       corrector_(config),
       worker_(
-          kQueue, Overflow::kBlock, [this](const Input& input) { step(input, steady_now_s()); },
+          kQueue, Overflow::kBlock,
+          [this](const Input& input) {
+            work_in_background();
+            step(input, steady_now_s());
+          },
           MeshDeformationConfig::kSection),
       ticks_(
           steady_duration(kTickShare * config.period_s), [this] { worker_.post(Tick()); },

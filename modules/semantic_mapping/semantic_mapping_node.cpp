@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "runtime/background_thread.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -20,7 +21,11 @@ SemanticMappingNode::SemanticMappingNode(const SemanticMappingConfig& config,
       mesh_interval_s_(mesh_interval_s),
       topics_(topics),
       worker_(
-          kQueuedFrames, overflow, [this](const auto& frame) { step(*frame); },
+          kQueuedFrames, overflow,
+          [this](const auto& frame) {
+            work_in_background();
+            step(*frame);
+          },
           SemanticMappingConfig::kSection) {
   topics_.frames.subscribe([this](const auto& frame) { worker_.post(frame); });
 }
