@@ -30,7 +30,9 @@ constexpr const char* kAbout =
     "over-relaxed;\n"
     "                    as published with --over-relaxation 1 or --schedule greedy\n"
     "  rbcd-accelerated  the same with Nesterov's acceleration and restarts\n"
-    "  centralized       the whole graph on one computer: Riemannian staircase of SE-Sync\n\n"
+    "  centralized       the whole graph on one computer: Riemannian staircase of SE-Sync\n"
+    "  newton            exact Newton steps of the whole team, one exchange each, by Schur\n"
+    "                    complements onto public poses; stays at the rank of rigid poses\n\n"
     "A round is one exchange of messages. The table says after how many rounds each gap to the\n"
     "certified optimum was reached (computed centrally unless given), what had been sent by then\n"
     "by all robots, a broadcast counting once, and the CPU time: of the slowest robot of each\n"
@@ -55,7 +57,8 @@ void define(CLI::App& app, Options& options) {
       {"dgs", km::PgoMethod::kDgs},
       {"rbcd", km::PgoMethod::kRbcd},
       {"rbcd-accelerated", km::PgoMethod::kRbcdAccelerated},
-      {"centralized", km::PgoMethod::kCentralized}};
+      {"centralized", km::PgoMethod::kCentralized},
+      {"newton", km::PgoMethod::kNewton}};
   app.add_option("FILE", options.file, "Pose graph (*.g2o), or a folder with one file per robot")
       ->required()
       ->check(CLI::ExistingPath);
@@ -87,6 +90,8 @@ void define(CLI::App& app, Options& options) {
                  "rbcd, coloured: how far beyond the minimum of its block a robot may go")
       ->check(CLI::Range(1.0, 1.99))
       ->capture_default_str();
+  app.add_flag("--own-start", options.pgo.own_start,
+               "newton: the team finds the chordal initialisation itself, in rounds that count");
   app.add_option("--optimum", options.optimum, "The optimum, if known: it is not computed then")
       ->check(CLI::PositiveNumber);
   app.add_option("--json", options.json, "Also write every round to this file, as JSON");
@@ -120,6 +125,8 @@ void check(Options& options, const CLI::App& app) {
     throw std::runtime_error("--schedule greedy is for --method rbcd only");
   if (app.count("--over-relaxation") > 0 && (!rbcd || options.pgo.greedy))
     throw std::runtime_error("--over-relaxation is for --method rbcd with coloured schedule only");
+  if (options.pgo.own_start && options.pgo.method != km::PgoMethod::kNewton)
+    throw std::runtime_error("--own-start is for --method newton only");
   if (options.optimum > 0.0) options.pgo.optimum = options.optimum;
   for (const fs::path& file : {options.json, options.plot, options.output}) check_folder_of(file);
   if (!options.output.empty()) km::check_output_name(options.output);

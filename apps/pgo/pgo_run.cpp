@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/newton/newton_team.hpp"
 #include "modules/pose_graph/rounding.hpp"
 #include "modules/pose_graph/team/block_descent_team.hpp"
 #include "modules/pose_graph/team/central_team.hpp"
@@ -31,6 +32,10 @@ std::unique_ptr<TeamSolver> make_solver(const TeamGraph& graph, const std::vecto
       return std::make_unique<BlockDescentTeam>(graph, lift(start, options.rank), descent);
     case PgoMethod::kCentralized:
       return std::make_unique<CentralTeam>(graph, lift(start, 3));
+    case PgoMethod::kNewton:
+      return std::make_unique<NewtonTeam>(
+          graph, options.rank, options.own_start ? LiftedPoses() : lift(start, options.rank),
+          NewtonOptions{});
   }
   throw std::invalid_argument("unknown method");
 }
@@ -66,6 +71,8 @@ const char* to_string(PgoMethod method) {
       return "rbcd-accelerated";
     case PgoMethod::kCentralized:
       return "centralized";
+    case PgoMethod::kNewton:
+      return "newton";
   }
   return "?";
 }

@@ -9,7 +9,7 @@
 
 namespace km {
 
-enum class PgoMethod { kLocal, kDgs, kRbcd, kRbcdAccelerated, kCentralized };
+enum class PgoMethod { kLocal, kDgs, kRbcd, kRbcdAccelerated, kCentralized, kNewton };
 
 [[nodiscard]] const char* to_string(PgoMethod method);
 
@@ -19,6 +19,7 @@ struct PgoOptions {
   TeamRunOptions run = {.max_rounds = 100};
   bool greedy = false;                 ///< rbcd only.
   double over_relaxation = 1.95;       ///< rbcd only, at most; 1: as published.
+  bool own_start = false;              ///< newton only: the team finds the chordal start itself.
   std::optional<double> optimum = {};  ///< Computed if not given.
 };
 
@@ -34,7 +35,8 @@ struct PgoRun {
   Eigen::Index rank = 0;  ///< Numerical, of the rotations; 3 (2 in the plane): no relaxation left.
 };
 
-/// Solves `graph` from its chordal initialisation, which is computed centrally and not counted.
+/// Solves `graph` from its chordal initialisation, which is computed centrally and not counted,
+/// unless the team finds it itself.
 /// Throws std::invalid_argument if method and graph do not go together.
 [[nodiscard]] PgoRun run_pgo(const TeamGraph& graph, const PgoOptions& options,
                              const TeamMeter& meter);

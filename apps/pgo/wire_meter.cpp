@@ -2,6 +2,7 @@
 
 #include <ctime>
 
+#include "modules/pose_graph/newton/newton_codec.hpp"
 #include "modules/pose_graph/pose_graph_codec.hpp"
 #include "runtime/dds/serialized_size.hpp"
 

@@ -6,12 +6,13 @@
 #include <variant>
 #include <vector>
 
+#include "modules/pose_graph/newton/newton_messages.hpp"
 #include "modules/pose_graph/pgo_messages.hpp"
 
 namespace km {
 
 /// Every message that a method may send between robots. The same structs cross the network.
-using TeamMessage = std::variant<PgoStatus, PgoSession, PublicPoses>;
+using TeamMessage = std::variant<PgoStatus, PgoSession, PublicPoses, NewtonHello, NewtonShare>;
 
 /// What the work of a team is measured with: modules read no clocks and know no wire format.
 struct TeamMeter {

@@ -1,0 +1,36 @@
+#pragma once
+
+#include "modules/core/geometry.hpp"
+#include "modules/pose_graph/quadratic_problem.hpp"
+
+namespace km {
+
+/// Second derivatives of which part of the cost.
+enum class Curvature {
+  kGaussNewton,  ///< Residuals taken as linear: never indefinite, zero along rigid motions.
+  kFull,         ///< The Riemannian Hessian.
+};
+
+/// Cost of one edge, f = kappa ||R_j - R_i R||_F^2 + tau ||t_j - t_i - R_i t||^2, to second order
+/// in the tangent vectors xi = [w; v] of its poses, moved as R exp(w), t + R v: geodesics of SO(3)
+/// x R^3, so that the second derivatives are those of the Riemannian Hessian. All depends on T_i^-1
+/// T_j alone: a team that moves as one, or bends smoothly, keeps its second derivatives.
+struct EdgeModel {
+  double cost = 0.0;
+  Vector6 g_i;
+  Vector6 g_j;
+  Matrix6 H_ii;
+  Matrix6 H_ij;
+  Matrix6 H_jj;
+};
+
+[[nodiscard]] EdgeModel model_edge(const BlockEdge& edge, const SE3& T_i, const SE3& T_j,
+                                   Curvature curvature);
+
+/// The same without second derivatives; those are left as they are.
+void slope_edge(const BlockEdge& edge, const SE3& T_i, const SE3& T_j, EdgeModel& model);
+
+/// The pose reached from `T` along tangent vector `xi`: R exp(w), t + R v.
+[[nodiscard]] SE3 move_along(const SE3& T, const Vector6& xi);
+
+}  // namespace km

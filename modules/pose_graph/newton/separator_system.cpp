@@ -1,0 +1,103 @@
+#include "modules/pose_graph/newton/separator_system.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+namespace km {
+namespace {
+
+[[noreturn]] void refuse(RobotId robot, const char* why) {
+  throw std::invalid_argument("SeparatorSystem: the share of robot " + std::to_string(robot) + ' ' +
+                              why);
+}
+
+bool is_place(int k, const std::vector<int>& list) {
+  return 0 <= k && k < static_cast<int>(list.size());
+}
+
+}  // namespace
+
+void SeparatorSystem::learn_pattern(const NewtonShares& shares) {
+  for (const auto& [robot, share] : shares)
+    separators_.insert(separators_.end(), share->kept.begin(), share->kept.end());
+  std::sort(separators_.begin(), separators_.end());
+  separators_.erase(std::unique(separators_.begin(), separators_.end()), separators_.end());
+  std::vector<NodePair> pairs;
+  for (const auto& [robot, share] : shares) {
+    Member& member = members_[robot];
+    for (const KeyframeId& id : share->kept)
+      member.kept.push_back(static_cast<int>(
+          std::lower_bound(separators_.begin(), separators_.end(), id) - separators_.begin()));
+    for (const auto& [i, j] : share->pairs) {
+      if (!is_place(i, member.kept) || !is_place(j, member.kept) || i == j)
+        refuse(robot, "couples what it does not keep");
+      const int a = member.kept[static_cast<std::size_t>(i)];
+      const int b = member.kept[static_cast<std::size_t>(j)];
+      pairs.push_back({std::min(a, b), std::max(a, b)});
+      member.transposed.push_back(a > b);
+    }
+  }
+  std::vector<NodePair> all = pairs;
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  auto pair = pairs.begin();
+  for (const auto& [robot, share] : shares)
+    for (std::size_t p = 0; p < share->pairs.size(); ++p)
+      members_[robot].pair.push_back(
+          static_cast<int>(std::lower_bound(all.begin(), all.end(), *pair++) - all.begin()));
+  std::vector<bool> keep(separators_.size(), false);
+  if (!keep.empty()) keep[keep.size() / 2] = true;
+  plan_ = std::make_shared<const EliminationPlan>(std::move(keep), std::move(all));
+}
+
+bool SeparatorSystem::factorise(const NewtonShares& shares) {
+  if (!plan_) learn_pattern(shares);
+  const Eigen::Index block = shares.empty() ? 0 : shares.begin()->second->schur.block();
+  BlockMatrix sum = BlockMatrix::zero(block, separators_.size(), plan_->pairs().size());
+  for (const auto& [robot, share] : shares) {
+    const auto member = members_.find(robot);
+    if (member == members_.end()) refuse(robot, "comes from no member");
+    const auto& [kept, pair, transposed] = member->second;
+    const BlockMatrix& schur = share->schur;
+    if (schur.block() != block || schur.diagonal.cols() != block * static_cast<int>(kept.size()) ||
+        schur.coupling.cols() != block * static_cast<int>(pair.size()))
+      refuse(robot, "has another size than its pattern");
+    for (std::size_t k = 0; k < kept.size(); ++k) sum.at(kept[k]) += schur.at(static_cast<int>(k));
+    for (std::size_t p = 0; p < pair.size(); ++p) {
+      if (transposed[p])
+        sum.between(pair[p]) += schur.between(static_cast<int>(p)).transpose();
+      else
+        sum.between(pair[p]) += schur.between(static_cast<int>(p));
+    }
+  }
+  factor_.emplace(plan_);
+  return factor_->factorise(sum);
+}
+
+SeparatorSystem::Solution SeparatorSystem::solve(const NewtonShares& shares,
+                                                 const Eigen::MatrixXd& given) const {
+  const Eigen::Index block = given.rows();
+  Solution solution;
+  solution.x =
+      Eigen::MatrixXd::Zero(block * static_cast<Eigen::Index>(separators_.size()), given.cols());
+  for (const auto& [robot, share] : shares) {
+    const std::vector<int>& kept = members_.at(robot).kept;
+    if (share->reduced.rows() != block * static_cast<Eigen::Index>(kept.size()) ||
+        share->reduced.cols() != given.cols())
+      refuse(robot, "has a right-hand side of another size");
+    for (std::size_t k = 0; k < kept.size(); ++k)
+      solution.x.middleRows(block * kept[k], block) +=
+          share->reduced.middleRows(block * static_cast<Eigen::Index>(k), block);
+    solution.decrement += share->decrement;
+  }
+  factor_->forward(solution.x);
+  const auto anchor = block * static_cast<Eigen::Index>(separators_.size() / 2);
+  solution.x.middleRows(anchor, block).setZero();
+  solution.decrement += solution.x.squaredNorm();
+  solution.x.middleRows(anchor, block) = given;
+  factor_->backward(solution.x);
+  return solution;
+}
+
+}  // namespace km

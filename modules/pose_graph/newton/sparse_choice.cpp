@@ -1,0 +1,105 @@
+#include "modules/pose_graph/newton/sparse_choice.hpp"
+
+#include <bit>
+#include <cstdint>
+#include <queue>
+
+#include "modules/pose_graph/newton/elimination_plan.hpp"
+
+namespace km {
+namespace {
+
+// A graph with one row of bits per node: eliminating a node is an OR of rows.
+class BitGraph {
+ public:
+  BitGraph(int nodes, const std::vector<NodePair>& pairs)
+      : words_((static_cast<std::size_t>(nodes) + 63) / 64),
+        bits_(words_ * static_cast<std::size_t>(nodes), 0) {
+    for (const auto& [i, j] : pairs) {
+      set(i, j);
+      set(j, i);
+    }
+  }
+
+  // Couplings that eliminating `v` adds, less those it removes.
+  [[nodiscard]] int growth(int v) const {
+    const std::uint64_t* own = row(v);
+    int degree = 0;
+    for (std::size_t w = 0; w < words_; ++w) degree += std::popcount(own[w]);
+    int coupled = 0;  // pairs among the neighbours, each twice
+    for_neighbours(v, [&](int u) {
+      const std::uint64_t* other = row(u);
+      for (std::size_t w = 0; w < words_; ++w) coupled += std::popcount(own[w] & other[w]);
+    });
+    return (degree * (degree - 1) - coupled) / 2 - degree;
+  }
+
+  // Removes `v` and couples its neighbours, which are returned.
+  std::vector<int> eliminate(int v) {
+    std::vector<int> neighbours;
+    for_neighbours(v, [&](int u) { neighbours.push_back(u); });
+    for (const int u : neighbours) {
+      std::uint64_t* other = row(u);
+      for (std::size_t w = 0; w < words_; ++w) other[w] |= row(v)[w];
+      clear(u, u);
+      clear(u, v);
+    }
+    return neighbours;
+  }
+
+ private:
+  std::uint64_t* row(int v) { return bits_.data() + words_ * static_cast<std::size_t>(v); }
+  [[nodiscard]] const std::uint64_t* row(int v) const {
+    return bits_.data() + words_ * static_cast<std::size_t>(v);
+  }
+  static std::uint64_t mask(int v) { return std::uint64_t{1} << (static_cast<unsigned>(v) % 64U); }
+  void set(int i, int j) { row(i)[j / 64] |= mask(j); }
+  void clear(int i, int j) { row(i)[j / 64] &= ~mask(j); }
+
+  template <typename F>
+  void for_neighbours(int v, F&& f) const {
+    const std::uint64_t* own = row(v);
+    for (std::size_t w = 0; w < words_; ++w)
+      for (std::uint64_t left = own[w]; left != 0; left &= left - 1)
+        f(static_cast<int>(64 * w) + std::countr_zero(left));
+  }
+
+  std::size_t words_;
+  std::vector<std::uint64_t> bits_;
+};
+
+}  // namespace
+
+std::vector<bool> keep_sparse(std::vector<bool> keep, const std::vector<bool>& free_to_keep,
+                              const std::vector<NodePair>& pairs) {
+  std::vector<bool> all = keep;
+  for (std::size_t v = 0; v < all.size(); ++v) all[v] = all[v] || free_to_keep[v];
+  const EliminationPlan plan(all, pairs);
+  const std::vector<int>& nodes = plan.kept();
+  BitGraph graph(static_cast<int>(nodes.size()), plan.kept_pairs());
+
+  std::vector<int> growth(nodes.size(), 0);
+  std::priority_queue<std::pair<int, int>> queue;  // least growth first, then lowest node
+  const auto offer = [&](int v) {
+    const auto place = static_cast<std::size_t>(v);
+    if (keep[static_cast<std::size_t>(nodes[place])]) return;
+    growth[place] = graph.growth(v);
+    queue.emplace(-growth[place], -v);
+  };
+  std::vector<bool> eliminated(nodes.size(), false);
+  for (std::size_t v = 0; v < nodes.size(); ++v) offer(static_cast<int>(v));
+  while (!queue.empty()) {
+    const auto [value, negative] = queue.top();
+    queue.pop();
+    const auto v = static_cast<std::size_t>(-negative);
+    if (eliminated[v] || -value != growth[v]) continue;  // an outdated entry
+    if (growth[v] > 0) break;
+    eliminated[v] = true;
+    for (const int u : graph.eliminate(-negative)) offer(u);
+  }
+  for (std::size_t v = 0; v < nodes.size(); ++v)
+    if (!eliminated[v]) keep[static_cast<std::size_t>(nodes[v])] = true;
+  return keep;
+}
+
+}  // namespace km
