@@ -127,7 +127,8 @@ int run(const TeamOptions& options) {
   if (!team.meshes.merged.empty()) {
     const fs::path path = plan.output / "team_mesh.ply";
     km::write_ply(path, team.meshes.merged);
-    std::cout << "The mesh of all robots: " << path.string() << '\n';
+    std::cout << "The mesh of all robots"
+              << (team.optimized ? ", in the frame of the truth: " : ": ") << path.string() << '\n';
   }
   const bool ok = std::all_of(team.robots.begin(), team.robots.end(),
                               [](const km::RobotResult& robot) { return robot.run.exit.ok(); });

@@ -94,6 +94,7 @@ TeamMeshes collect_meshes(const TeamPlan& plan, const SE3& T_truth_team,
   const Meshes after = read_meshes(plan, "mesh_optimized.ply", notes);
   note_uncorrected(before, after, notes);
   for (const auto& [name, mesh] : after) result.merged.append(mesh);
+  result.merged.transform(T_truth_team);
   if (plan.truth_mesh.empty() || before.empty()) return result;
   try {
     const LabelledMesh truth = read_ply(plan.truth_mesh);

@@ -14,12 +14,12 @@ namespace km {
 struct TeamMeshes {
   std::optional<MeshReport> odometry;   ///< Of mesh.ply; absent if the truth is unknown.
   std::optional<MeshReport> optimized;  ///< Of mesh_optimized.ply, likewise.
-  LabelledMesh merged;                  ///< All mesh_optimized.ply as one; empty if there is none.
+  LabelledMesh merged;                  ///< All mesh_optimized.ply as one, moved; may be empty.
 };
 
-/// Reads the meshes that the robots left and compares them with `plan.truth_mesh`, where the team's
-/// frame is that of the true poses after `T_truth_team`; then ICP brings all together onto it, in
-/// each of the two cases. What is missing of the robots that made a map is noted.
+/// Reads the meshes that the robots left, merges them in the frame of the true poses, to which
+/// `T_truth_team` leads, and compares them with `plan.truth_mesh`: there ICP brings all together
+/// onto it, in each of the two cases. What is missing of the robots that made a map is noted.
 [[nodiscard]] TeamMeshes collect_meshes(const TeamPlan& plan, const SE3& T_truth_team,
                                         std::vector<std::string>& notes);
 

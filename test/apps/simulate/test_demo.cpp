@@ -15,8 +15,8 @@ TEST_CASE("The demo joins three robots of a simulated world into one frame", "[d
   constexpr std::size_t kFrames = 160;  // 8 s at 20 Hz
   constexpr double kMaxError_m = 0.3;   // robots in frames of their own are a metre off and more
   const TemporaryFolder folder;
-  const auto demo =
-      run_command("apps/demo --short --programs " KM_BIN_DIR " --output " + folder.path().string());
+  const auto demo = run_command("apps/demo --short --rate max --programs " KM_BIN_DIR " --output " +
+                                folder.path().string());
   CAPTURE(demo.output);
   REQUIRE(demo.exit_code == 0);
   CHECK_THAT(demo.output, Catch::Contains("480 of 480 frames, 100 %") &&
@@ -29,10 +29,16 @@ TEST_CASE("The demo joins three robots of a simulated world into one frame", "[d
     CHECK(robot["frames"].as<std::size_t>() == kFrames);
     CHECK(robot["pgo"]["members"].size() == 3);
   }
+  // The room is 3 m high: a mesh that is half a metre off would fit nothing.
+  const YAML::Node mesh = team["optimized_meshes"]["merged"];
+  CHECK(mesh["coverage"].as<double>() > 0.3);
+  CHECK(mesh["truth_to_estimate"]["point"]["median_m"].as<double>() < 0.1);
+  CHECK(mesh["truth_to_estimate"]["labels"]["accuracy"].as<double>() > 0.7);
   CHECK(team["optimized"]["joint"]["position_m"]["rmse"].as<double>() < kMaxError_m);
-  for (const char* file :
-       {"trajectories.svg", "robot0/optimized.tum", "robot0/loop_closures.csv",
-        "robot0/traffic.csv", "robot0/robot.log", "robot0/config.yaml", "world_short/README.md"})
+  for (const char* file : {"trajectories.svg", "team_mesh.ply", "team_mesh.png", "robot0/mesh.ply",
+                           "robot0/mesh_optimized.ply", "robot0/label_palette.csv",
+                           "robot0/optimized.tum", "robot0/loop_closures.csv", "robot0/traffic.csv",
+                           "robot0/robot.log", "robot0/config.yaml", "world_short/README.md"})
     CHECK(std::filesystem::exists(folder.path() / file));
 }
 

@@ -77,6 +77,8 @@ TEST_CASE("Meshes are compared with the true one, before and after their correct
   CHECK(meshes.optimized->robots[1].truth.labels.total().accuracy() > 0.97);
   CHECK(meshes.odometry->robots[1].truth.labels.total().accuracy() < 0.4);
   CHECK(meshes.merged.faces.size() == 2 * corner().faces.size());
+  for (std::size_t i = 0; i < corner().vertices.size(); ++i)  // as floats
+    CHECK((meshes.merged.vertices[i] - corner().vertices[i]).norm() < 1e-5F);
 
   const std::string table = to_table(meshes);
   CAPTURE(table);
