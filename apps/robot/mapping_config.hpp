@@ -31,6 +31,11 @@ struct MappingConfig {
   /// frames out; at --rate max it holds the others up instead.
   double rate_hz = 5.0;
 
+  /// Depths that are expected to be off by more than this (one standard deviation) stay out of the
+  /// map: beyond about half of semantic_mapping's truncation, surfaces come out torn. An error is
+  /// taken for a quarter of a pixel of disparity, see usable_range_m().
+  double max_depth_error_m = 0.2;
+
   /// Time between meshes: to be corrected, and written to files.
   double mesh_interval_s = 3.0;
 
@@ -48,6 +53,8 @@ struct MappingConfig {
                    {"recorded", DenseSource::kRecorded},
                    {"network", DenseSource::kComputed}});
     visitor.field("rate_hz", rate_hz, {0.01, 100.0}, "[1/s] frames that go into the map");
+    visitor.field("max_depth_error_m", max_depth_error_m, {0.001, 100.0},
+                  "[m] expected of depths that go into it");
     visitor.field("mesh_interval_s", mesh_interval_s, {0.1, 3600.0}, "[s] between meshes");
   }
 };

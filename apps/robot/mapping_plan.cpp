@@ -1,5 +1,6 @@
 #include "apps/robot/mapping_plan.hpp"
 
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -72,6 +73,11 @@ std::optional<MappingPlan> plan_mapping(const MappingConfig& config,
   plan.palette =
       read_palette(own_table ? fs::path(segmentation.palette) : sensors / "label_palette.csv");
   return plan;
+}
+
+double usable_range_m(const StereoRig& rig, double max_error_m) {
+  constexpr double kDisparityError_px = 0.25;
+  return std::sqrt(max_error_m * rig.cameras[0].fx * rig.baseline_m() / kDisparityError_px);
 }
 
 }  // namespace km

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "apps/robot/mapping_config.hpp"
+#include "modules/core/camera.hpp"
 #include "modules/core/label_palette.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
 
@@ -24,5 +25,11 @@ struct MappingPlan {
                                                       const StereoDepthConfig& stereo,
                                                       const SegmentationConfig& segmentation,
                                                       const std::filesystem::path& dataset);
+
+/// Distance at which the depth of `rig` is off by `max_error_m`, one standard deviation, if its
+/// disparities are by a quarter of a pixel: sqrt(max_error_m * f * baseline / 0.25 px). With an
+/// RGB-D rig the baseline is the virtual one, see rgbd_rig(); beside stereo cameras depth images
+/// are taken to be no better than theirs.
+[[nodiscard]] double usable_range_m(const StereoRig& rig, double max_error_m);
 
 }  // namespace km

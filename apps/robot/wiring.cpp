@@ -1,5 +1,6 @@
 #include "apps/robot/wiring.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -72,6 +73,9 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
 void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
                         const MappingPlan& plan) {
   const Overflow overflow = std::isinf(rate) ? Overflow::kBlock : Overflow::kDropOldest;
+  SemanticMappingConfig map = config.semantic_mapping;
+  map.max_range_m =
+      std::min(map.max_range_m, usable_range_m(rig, config.mapping.max_depth_error_m));
   DenseSensor sensor(rig, plan.sensor);
   const PinholeCamera camera = sensor.camera();
   add<DenseSensingNode>(true, std::move(sensor), plan.sensor.labels, config.mapping.rate_hz,
@@ -79,7 +83,7 @@ void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig&
                         DenseSensingTopics{topics_.located_frames, topics_.dense_frames,
                                            topics_.dense_sensing_progress});
   add<SemanticMappingNode>(
-      true, config.semantic_mapping, camera, plan.palette, config.mapping.mesh_interval_s, overflow,
+      true, map, camera, plan.palette, config.mapping.mesh_interval_s, overflow,
       SemanticMappingTopics{topics_.dense_frames, topics_.maps, topics_.mapping_progress});
 }
 

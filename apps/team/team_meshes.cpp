@@ -63,7 +63,7 @@ const MeshError* find(const std::optional<MeshReport>& report, const std::string
 
 std::string right_labels(const std::optional<MeshReport>& report, const MeshError* error) {
   if (error == nullptr || !report->has_labels) return "-";
-  return fixed(100.0 * error->truth.labels.total().accuracy(), 1) + '%';
+  return fixed(100.0 * error->seen.labels.total().accuracy(), 1) + '%';
 }
 
 std::vector<std::string> row(const std::string& name, const TeamMeshes& meshes,
@@ -72,16 +72,16 @@ std::vector<std::string> row(const std::string& name, const TeamMeshes& meshes,
     return error != nullptr ? fixed(value(*error), 4) : std::string("-");
   };
   const auto mean = [](const MeshError& error) { return error.truth.point.mean_m; };
-  const auto median = [](const MeshError& error) { return error.truth.point.median_m; };
+  const auto in_front = [](const MeshError& error) { return error.seen.point.mean_m; };
   const MeshError* const any = after != nullptr ? after : before;
   return {name,
           any != nullptr ? std::to_string(any->faces) : "-",
           any != nullptr ? fixed(100.0 * any->coverage, 1) + '%' : "-",
           number(before, mean),
-          number(before, median),
+          number(before, in_front),
           right_labels(meshes.odometry, before),
           number(after, mean),
-          number(after, median),
+          number(after, in_front),
           right_labels(meshes.optimized, after)};
 }
 
@@ -109,9 +109,9 @@ TeamMeshes collect_meshes(const TeamPlan& plan, const SE3& T_truth_team,
 std::string to_table(const TeamMeshes& meshes) {
   const auto& any = meshes.optimized ? meshes.optimized : meshes.odometry;
   if (!any) return "";
-  std::vector<std::vector<std::string>> rows = {{"mesh", "faces", "seen", "odometry: error [m]",
-                                                 "median", "labels", "optimized: error [m]",
-                                                 "median", "labels"}};
+  std::vector<std::vector<std::string>> rows = {{"mesh", "faces", "covered", "odometry: error [m]",
+                                                 "in front", "labels", "optimized: error [m]",
+                                                 "in front", "labels"}};
   for (const MeshError& error : (meshes.odometry ? meshes.odometry : any)->robots)
     rows.push_back(row(error.name, meshes, find(meshes.odometry, error.name),
                        find(meshes.optimized, error.name)));
@@ -122,7 +122,8 @@ std::string to_table(const TeamMeshes& meshes) {
   return align_columns(rows) +
          "Error: mean distance to the mesh from the points of the true one, " +
          fixed(any->samples_per_m2, 0) + " a square metre, within " + fixed(options.crop_m, 1) +
-         " m of it\n(seen), after ICP of all together. Labels: share of them that is right.\n";
+         " m of it\n(covered), after ICP of all together. In front: without those that no robot "
+         "can have seen. Labels: share of\nthese that is right.\n";
 }
 
 }  // namespace km

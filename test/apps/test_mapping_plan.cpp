@@ -57,6 +57,17 @@ TEST_CASE("Recorded depth and labels are preferred, others computed", "[robot][m
   CHECK(full.plan(config, network)->sensor.labels == LabelsFrom::kNetwork);
 }
 
+TEST_CASE("Depth is used as far as it is good enough", "[robot][mapping]") {
+  PinholeCamera camera;
+  camera.fx = 500.0;
+  const StereoRig rig = rgbd_rig(camera, 0.1);
+  const double range_m = usable_range_m(rig, 0.2);
+  CHECK(range_m == Approx(6.3246).epsilon(1e-4));
+  // A quarter of a pixel further away it is off by 0.2 m, to first order.
+  const double disparity_px = 50.0 / range_m;
+  CHECK(50.0 / (disparity_px - 0.25) - range_m == Approx(0.2).epsilon(0.05));
+}
+
 TEST_CASE("A map that cannot be had is refused with what is missing", "[robot][mapping]") {
   const Recording stereo({"cam0", "cam1"});
   const Recording depth({"cam0", "depth0", "label0"});

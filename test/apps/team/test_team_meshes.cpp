@@ -82,7 +82,7 @@ TEST_CASE("Meshes are compared with the true one, before and after their correct
 
   const std::string table = to_table(meshes);
   CAPTURE(table);
-  CHECK(std::count(table.begin(), table.end(), '\n') == 6);
+  CHECK(std::count(table.begin(), table.end(), '\n') == 7);
   for (const char* part : {"odometry: error [m]", "\na ", "\nb ", "\nteam, one frame"})
     CHECK_THAT(table, Catch::Contains(part));
 }
