@@ -83,7 +83,9 @@ Certificate certify(const QuadraticProblem& problem, const LiftedPoses& X) {
     return without_translations(
         factor.cholesky.solve_rows(without_translations(v).transpose()).transpose());
   };
-  const LanczosResult largest = largest_eigenpair(inverse, S.rows(), kMaxProducts, kEigenTolerance);
+  // Another start at every rank: a direction left in the last escape hides its multiples.
+  const LanczosResult largest = largest_eigenpair(inverse, S.rows(), kMaxProducts, kEigenTolerance,
+                                                  static_cast<unsigned>(X.rows()));
   Certificate certificate;
   certificate.lambda_min = 1.0 / largest.value - factor.shift;
   const double bound = cost - translation_residual(problem, X) + certificate.lambda_min * trace;
@@ -108,11 +110,17 @@ LiftedPoses escape(const QuadraticProblem& problem, const LiftedPoses& X,
     largest = std::max(largest, direction.segment<3>(4 * i).norm());
   constexpr int kMaxHalvings = 40;
   double length = 0.5 / std::max(largest, 1e-300);
+  LiftedPoses best = lifted;
+  double best_cost = cost;
   for (int k = 0; k < kMaxHalvings; ++k, length *= 0.5) {
     LiftedPoses candidate = retract(lifted, length * step);
-    if (problem.cost(candidate) < cost) return candidate;
+    const double candidate_cost = problem.cost(candidate);
+    if (candidate_cost >= best_cost && best_cost < cost) break;
+    if (candidate_cost >= best_cost) continue;
+    best = std::move(candidate);
+    best_cost = candidate_cost;
   }
-  return lifted;
+  return best;
 }
 
 }  // namespace km

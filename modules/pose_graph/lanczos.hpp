@@ -15,15 +15,15 @@ struct [[nodiscard]] LanczosResult {
 
 /// Largest eigenvalue, with its vector, of a symmetric operator `apply` of size n, by the Lanczos
 /// method with full reorthogonalisation (Golub and Van Loan, "Matrix Computations"): the residual
-/// is at most `tolerance` times the value once converged. Deterministic.
+/// is at most `tolerance` times the value once converged. The start is random.
 template <typename Operator>
 LanczosResult largest_eigenpair(const Operator& apply, Eigen::Index n, int max_products,
-                                double tolerance) {
+                                double tolerance, unsigned seed) {
   const Eigen::Index m = std::min<Eigen::Index>(n, max_products);
   Eigen::MatrixXd V(n, m + 1);
   Eigen::VectorXd alpha(m);
   Eigen::VectorXd beta(m);
-  std::mt19937 rng(1);
+  std::mt19937 rng(seed);
   std::normal_distribution<double> normal;
   for (double& v : V.col(0)) v = normal(rng);
   V.col(0).normalize();

@@ -106,4 +106,13 @@ struct PublicPoses {
   LiftedPoses X = {};                         ///< r x 4 per keyframe, single precision.
 };
 
+/// One exchange of a distributed verification, see CertificateAgent.
+struct CertificateShare {
+  RobotId robot = 0;
+  std::uint32_t round = 0;
+  std::vector<double> rows = {};  ///< Of a vector, 4 per public pose; or empty.
+  std::vector<double> sums = {};  ///< To be added over the team; or empty.
+  bool operator==(const CertificateShare&) const = default;
+};
+
 }  // namespace km

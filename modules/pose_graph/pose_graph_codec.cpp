@@ -1,5 +1,6 @@
 #include "modules/pose_graph/pose_graph_codec.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -162,6 +163,33 @@ Decoded<PublicPoses> Codec<PublicPoses>::decode(const Wire& wire) {
   if (!result.X.allFinite() || !std::isfinite(wire.cost) || !std::isfinite(wire.squared_gradient))
     return Result::refuse("a number is not finite");
   return Result::accept(std::move(result));
+}
+
+Codec<CertificateShare>::Encoded Codec<CertificateShare>::encode(const CertificateShare& share) {
+  Encoded encoded{.wire = {}, .rows = share.rows, .sums = share.sums};
+  encoded.wire.robot = share.robot;
+  encoded.wire.round = share.round;
+  borrow(encoded.wire.rows, encoded.rows);
+  borrow(encoded.wire.sums, encoded.sums);
+  return encoded;
+}
+
+Decoded<CertificateShare> Codec<CertificateShare>::decode(const Wire& wire) {
+  using Result = Decoded<CertificateShare>;
+  constexpr std::size_t kMaxSums = 256;
+  if (wire.robot != wire.header.robot) return Result::refuse("written by another robot");
+  const auto rows = elements_of(wire.rows, 4 * kMaxPublicPoses);
+  const auto sums = elements_of(wire.sums, kMaxSums);
+  if (!rows || !sums) return Result::refuse("a list is missing or too long");
+  if (rows->size() % 4 != 0) return Result::refuse("rows are not four to a pose");
+  const auto finite = [](double value) { return std::isfinite(value); };
+  if (!std::all_of(rows->begin(), rows->end(), finite) ||
+      !std::all_of(sums->begin(), sums->end(), finite))
+    return Result::refuse("a number is not finite");
+  return Result::accept({.robot = wire.robot,
+                         .round = wire.round,
+                         .rows = {rows->begin(), rows->end()},
+                         .sums = {sums->begin(), sums->end()}});
 }
 
 }  // namespace km

@@ -68,4 +68,21 @@ struct Codec<PublicPoses> {
   static Decoded<PublicPoses> decode(const Wire& wire);
 };
 
+/// Written by the robot whose rows and sums they are.
+template <>
+struct Codec<CertificateShare> {
+  using Wire = km_wire_CertificateShare;
+  static constexpr const char* kTopic = "pgo_certificate_shares";
+  static constexpr std::uint16_t kVersion = 1;
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_CertificateShare_desc; }
+
+  struct Encoded {
+    Wire wire{};
+    std::vector<double> rows;
+    std::vector<double> sums;
+  };
+  static Encoded encode(const CertificateShare& share);
+  static Decoded<CertificateShare> decode(const Wire& wire);
+};
+
 }  // namespace km

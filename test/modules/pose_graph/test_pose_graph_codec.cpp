@@ -178,4 +178,34 @@ TEST_CASE("messages that cannot be meant are refused", "[pose_graph][codec]") {
   }
 }
 
+TEST_CASE("Shares of a verification come back as they were sent, bad ones are refused",
+          "[pose_graph][codec]") {
+  const CertificateShare share{
+      .robot = 700, .round = 9, .rows = {1.0, -2.5, 1e-300, 4.0}, .sums = {0.1, 7.0}};
+  auto encoded = written(share, {700, 8});
+  auto& wire = encoded.wire;
+  const auto decoded = Codec<CertificateShare>::decode(wire);
+  REQUIRE(decoded.value);
+  CHECK(*decoded.value == share);
+  SECTION("of another robot") {
+    wire.robot = 4;
+  }
+  SECTION("rows that are not four to a pose") {
+    wire.rows._length = 3;
+  }
+  SECTION("rows that are missing") {
+    wire.rows._buffer = nullptr;
+  }
+  SECTION("a row") {
+    encoded.rows[1] = kNaN;
+  }
+  SECTION("a sum") {
+    encoded.sums[0] = std::numeric_limits<double>::infinity();
+  }
+  SECTION("more sums than any matrix has") {
+    wire.sums._length = 1000;
+  }
+  CHECK_FALSE(Codec<CertificateShare>::decode(wire).value);
+}
+
 }  // namespace km

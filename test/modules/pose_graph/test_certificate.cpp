@@ -1,0 +1,127 @@
+#include "modules/pose_graph/certificate.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "modules/pose_graph/lanczos.hpp"
+#include "modules/pose_graph/rounding.hpp"
+#include "modules/pose_graph/staircase.hpp"
+#include "test/support/pose_graph_problems.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/team_graphs.hpp"
+
+namespace km {
+namespace {
+
+struct Known {
+  const char* file;
+  double
+      optimum;  // of SE-Sync, certified; parking-garage: of unit quaternions, Levenberg-Marquardt
+  double tolerance = 2e-7;  // relative: SE-Sync takes quaternions as they are rounded in the file
+};
+
+double run(Staircase& staircase) {
+  while (staircase.step()) {
+  }
+  return staircase.cost();
+}
+
+}  // namespace
+
+TEST_CASE("Lanczos finds the largest eigenvalue of a dense matrix", "[pose_graph]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  std::normal_distribution<double> normal;
+  Eigen::MatrixXd A(30, 30);
+  for (double& a : A.reshaped()) a = normal(rng);
+  A = (A * A.transpose()).eval();
+  const auto found = largest_eigenpair(
+      [&](const Eigen::VectorXd& v) -> Eigen::VectorXd { return A * v; }, 30, 30, 1e-10, seed);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> exact(A);
+  CHECK(found.value == Approx(exact.eigenvalues()(29)).epsilon(1e-9));
+  CHECK((A * found.vector - found.value * found.vector).norm() < 1e-6 * found.value);
+}
+
+TEST_CASE("X S is half the Riemannian gradient", "[pose_graph]") {
+  const unsigned seed = GENERATE(1U, 2U);
+  const Eigen::Index rank = GENERATE(3, 5);
+  CAPTURE(seed, rank);
+  std::mt19937 rng(seed);
+  const TeamGraph graph = noisy_chain(12, 1, 0.2, rng);
+  const QuadraticProblem problem(rank, 12, graph.edges, {});
+  const LiftedPoses X = random_lifted_poses(rng, rank, 12);
+  const Eigen::MatrixXd XS = X * certificate_matrix(problem, X);
+  CHECK(XS.isApprox(0.5 * project_tangent(X, problem.euclidean_gradient(X)), 1e-12));
+}
+
+TEST_CASE("A ring wound once has the negative eigenvalue it must have", "[pose_graph]") {
+  const Eigen::Index n = GENERATE(5, 12, 40);
+  CAPTURE(n);
+  const WoundRing ring(n, 1);
+  const QuadraticProblem problem(3, n, ring.graph.edges, {});
+  const Certificate certificate = certify(problem, lift(ring.wound, 3));
+  // S is the ring's Laplacian less 2 - 2 cos(2 pi / n) on two axes: constants have that eigenvalue.
+  const double expected = -2.0 + 2.0 * std::cos(2.0 * std::numbers::pi / static_cast<double>(n));
+  CHECK_FALSE(certificate.certified);
+  CHECK(certificate.lambda_min == Approx(expected).epsilon(1e-6));
+  // Cost n (4 - 4 cos) = -2n lambda_min, bound 0 at least: 3n lambda_min below, the cost is less.
+  CHECK(certificate.relative_gap == Approx(1.5).epsilon(1e-6));
+}
+
+TEST_CASE("The staircase leaves the wound ring for the optimum", "[pose_graph]") {
+  const Eigen::Index n = GENERATE(5, 12, 40);
+  CAPTURE(n);
+  const WoundRing ring(n, 1);
+  Staircase staircase(ring.graph.edges, lift(ring.wound, 3));
+  CHECK(run(staircase) < 1e-9);
+  CHECK(staircase.X().rows() > 3);
+  REQUIRE(staircase.certificate());
+  CHECK(staircase.certificate()->certified);
+  const auto poses = round_to_poses(staircase.X(), staircase.X().leftCols<4>());
+  for (const SE3& pose : poses) CHECK(pose.isApprox(SE3::Identity(), 1e-4));
+}
+
+TEST_CASE("No feasible point refutes the bound on the cost", "[pose_graph]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U, 4U);
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const TeamGraph graph = noisy_chain(20, 1, 0.3, rng);
+  Staircase staircase(graph.edges, lift(chordal_initialisation(20, graph.edges), 3));
+  const double optimum = run(staircase);
+  const QuadraticProblem problem(3, 20, graph.edges, {});
+  LiftedPoses X = random_lifted_poses(rng, 3, 20);
+  for (int step = 0; step < 10; ++step) {
+    const Certificate certificate = certify(problem, X);
+    CHECK(problem.cost(X) * (1.0 - certificate.relative_gap) <= optimum * (1.0 + 1e-9));
+    X = minimise(problem, X, {.max_iterations = 2}).X;
+  }
+}
+
+TEST_CASE("The staircase never raises the cost", "[pose_graph]") {
+  std::mt19937 rng(7);
+  const TeamGraph graph = noisy_chain(30, 1, 0.3, rng);
+  Staircase staircase(graph.edges, random_lifted_poses(rng, 3, 30));
+  for (double cost = staircase.cost(); staircase.step(); cost = staircase.cost())
+    REQUIRE(staircase.cost() <= cost * (1.0 + 1e-12));
+  CHECK(staircase.certificate());
+}
+
+TEST_CASE("Recorded graphs come out certified at their known optima", "[pose_graph]") {
+  const Known known = GENERATE(
+      Known{"3d/tinyGrid3D.g2o", 18.5193868, 2e-6}, Known{"3d/smallGrid3D.g2o", 1025.39802},
+      Known{"3d/parking-garage.g2o", 1.262524, 1e-6}, Known{"3d/sphere2500.g2o", 1687.00567},
+      Known{"3d/torus3D.g2o", 24227.0415, 3e-7}, Known{"2d/CSAIL.g2o", 31.7037159},
+      Known{"2d/MIT.g2o", 61.1541155}, Known{"2d/intel.g2o", 52.3482273},
+      Known{"2d/manhattan.g2o", 6431.39139}, Known{"2d/city10000.g2o", 638.62462},
+      Known{"2d/kitti_02.g2o", 108.351139});
+  const auto file = shared_data(std::string("pose_graphs/") + known.file);
+  if (!file) return;
+  CAPTURE(known.file);
+  const TeamGraph graph = deal_contiguously(read_g2o(*file), 1, known.file);
+  Staircase staircase(graph.edges, lift(chordal_initialisation(graph.poses(), graph.edges), 3));
+  CHECK(run(staircase) == Approx(known.optimum).epsilon(known.tolerance));
+  REQUIRE(staircase.certificate());
+  CHECK(staircase.certificate()->certified);
+}
+
+}  // namespace km

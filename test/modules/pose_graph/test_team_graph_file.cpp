@@ -1,0 +1,148 @@
+#include "modules/pose_graph/team/team_graph_file.hpp"
+
+#include <catch2/catch.hpp>
+#include <sstream>
+
+#include "test/support/shared_data.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+using Catch::Contains;
+
+G2oGraph graph_of(const std::string& text) {
+  std::istringstream in(text);
+  return read_g2o(in, "graph.g2o");
+}
+
+std::string planar_edge(int i, int j, const std::string& information = "4 0 0 4 0 9") {
+  return "EDGE_SE2 " + std::to_string(i) + ' ' + std::to_string(j) + " 1 0 0.1 " + information +
+         '\n';
+}
+
+}  // namespace
+
+TEST_CASE("Weights of a planar graph are those of the plane", "[pose_graph]") {
+  const G2oGraph graph = graph_of(planar_edge(0, 1, "4 0 0 2 0 9"));
+  const Precision weight = precision_of_blocks(graph.edges[0].covariance, 2);
+  CHECK(weight.kappa == Approx(9.0));
+  CHECK(weight.tau == Approx(2.0 / (0.25 + 0.5)));
+}
+
+TEST_CASE("Cross terms are dropped before the information is inverted", "[pose_graph]") {
+  const Precision with =
+      precision_of_blocks(graph_of(planar_edge(0, 1, "4 0 3 4 1 9")).edges[0].covariance, 2);
+  CHECK(with.kappa == Approx(9.0));
+  CHECK(with.tau == Approx(4.0));
+  Matrix6 covariance = Matrix6::Zero();
+  covariance.diagonal() << 0.1, 0.1, 0.1, 0.2, 0.2, 0.2;
+  const Precision spatial = precision_of_blocks(covariance, 3);
+  CHECK(spatial.kappa == Approx(3.0 / (2.0 * 0.3)));
+  CHECK(spatial.tau == Approx(3.0 / 0.6));
+}
+
+TEST_CASE("Weights that are none are refused", "[pose_graph]") {
+  Matrix6 covariance = Matrix6::Identity();
+  covariance(0, 0) = GENERATE(0.0, -1.0, std::numeric_limits<double>::quiet_NaN(),
+                              std::numeric_limits<double>::infinity());
+  CHECK_THROWS_AS(precision_of_blocks(covariance, 3), std::invalid_argument);
+}
+
+TEST_CASE("Poses are dealt out in the order of their ids, the last robot takes the rest",
+          "[pose_graph]") {
+  // Vertices and edges out of order; ids with gaps.
+  std::string text = "VERTEX_SE2 7 0 0 0\nVERTEX_SE2 2 0 0 0\nVERTEX_SE2 3 0 0 0\n";
+  text += "VERTEX_SE2 20 0 0 0\nVERTEX_SE2 9 0 0 0\n";
+  text += planar_edge(20, 9) + planar_edge(2, 3) + planar_edge(9, 7) + planar_edge(3, 7);
+  const TeamGraph graph = deal_contiguously(graph_of(text), 2, "graph.g2o");
+  CHECK(graph.first == std::vector<Eigen::Index>{0, 2, 5});
+  std::vector<std::uint32_t> indices;
+  for (const KeyframeId& id : graph.ids) indices.push_back(id.index);
+  CHECK(indices == std::vector<std::uint32_t>{2, 3, 7, 9, 20});
+  CHECK(graph.edges[0].i == 4);
+  CHECK(graph.edges[0].j == 3);
+  CHECK(graph.robot_of(1) == 0);
+  CHECK(graph.robot_of(2) == 1);
+  CHECK(separators_of(graph, 0) == std::vector<Eigen::Index>{1});
+  CHECK(separators_of(graph, 1) == std::vector<Eigen::Index>{0});
+}
+
+TEST_CASE("Every edge belongs to one robot or to two, parallel ones all count", "[pose_graph]") {
+  const std::string text = planar_edge(0, 1) + planar_edge(0, 1) + planar_edge(1, 2) +
+                           planar_edge(2, 1) + planar_edge(2, 3);
+  const TeamGraph graph = deal_contiguously(graph_of(text), 2, "graph.g2o");
+  CHECK(graph.edges.size() == 5);
+  const RobotPart a = part_of(graph, 0);
+  const RobotPart b = part_of(graph, 1);
+  CHECK(a.own_edges.size() == 2);
+  CHECK(b.own_edges.size() == 1);
+  REQUIRE(a.edges_to.at(1).size() == 2);
+  REQUIRE(b.edges_to.at(0).size() == 2);
+  CHECK(a.edges_to.at(1)[0].from_own);
+  CHECK_FALSE(b.edges_to.at(0)[0].from_own);
+  CHECK(a.edges_to.at(1)[0].own == 1);
+  CHECK(b.edges_to.at(0)[0].own == 0);
+}
+
+TEST_CASE("Graphs that cannot be dealt out are refused with the reason", "[pose_graph]") {
+  const auto deal_out = [](const std::string& text, std::size_t robots) {
+    return deal_contiguously(graph_of(text), robots, "graph.g2o");
+  };
+  CHECK_THROWS_WITH(deal_out(planar_edge(0, 1), 3), Contains("2 poses") && Contains("3 robots"));
+  CHECK_THROWS_WITH(deal_out(planar_edge(0, 1), 0), Contains("0 robots"));
+  CHECK_THROWS_WITH(deal_out(planar_edge(0, 1) + planar_edge(2, 3), 1),
+                    Contains("not connected") && Contains("0:0") && Contains("0:2"));
+  CHECK_THROWS_WITH(deal_out("VERTEX_SE2 0 0 0 0\n" + planar_edge(0, 1), 1),
+                    Contains("edge 0:0 -> 0:1 names vertex 0:1"));
+  CHECK_THROWS_WITH(
+      deal_out("VERTEX_SE2 5 0 0 0\nVERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 0 0 0\n" + planar_edge(0, 1),
+               1),
+      Contains("not connected"));
+  CHECK_THROWS_WITH(deal_out(planar_edge(0, 1, "0 0 0 0 0 0"), 1),
+                    Contains("graph.g2o:1: information matrix is not positive definite"));
+  CHECK_THROWS_WITH(deal_out(planar_edge(0, 1, "nan 0 0 1 0 1"), 1), Contains("graph.g2o:1:"));
+}
+
+TEST_CASE("A partition gives every pose its robot", "[pose_graph]") {
+  const TemporaryFolder folder;
+  const auto file = folder.write("parts", "# vertex robot\n0 1\n1 0\n2 1\n");
+  const TeamGraph graph =
+      deal(graph_of(planar_edge(0, 1) + planar_edge(1, 2)), read_partition(file), "parts");
+  CHECK(graph.first == std::vector<Eigen::Index>{0, 1, 3});
+  CHECK(graph.ids[0].index == 1);
+  CHECK(graph.edges[0].i == 1);
+  CHECK(graph.edges[0].j == 0);
+}
+
+TEST_CASE("A partition that is none is refused with its line", "[pose_graph]") {
+  const TemporaryFolder folder;
+  const auto [text, message] =
+      GENERATE(table<std::string, std::string>({{"0 1 2\n", ":1: not two fields"},
+                                                {"0 0\nx 1\n", ":2: x is no vertex id"},
+                                                {"0 -1\n", ":1: -1 is no robot"},
+                                                {"0 0\n0 1\n", ":2: vertex 0 is given twice"}}));
+  CAPTURE(text);
+  CHECK_THROWS_WITH(read_partition(folder.write("parts", text)), Contains(message));
+  const G2oGraph graph = graph_of(planar_edge(0, 1));
+  CHECK_THROWS_WITH(deal(graph, {{{0, 0}, 0}}, "parts"), Contains("pose 0:1 is given to no robot"));
+  CHECK_THROWS_WITH(deal(graph, {{{0, 0}, 0}, {{0, 1}, 2}}, "parts"),
+                    Contains("robots must be 0 to 1"));
+}
+
+TEST_CASE("The tunnels' edges between robots count once", "[pose_graph]") {
+  const auto folder = shared_data("multi_robot/tunnels_8robots");
+  if (!folder) return;
+  const TeamGraph graph = read_team_folder(*folder);
+  CHECK(graph.robots() == 8);
+  CHECK(graph.poses() == 1255);
+  CHECK(graph.edges.size() == 1247 + 96 + 3548);
+}
+
+TEST_CASE("A folder that holds no team is refused", "[pose_graph]") {
+  const TemporaryFolder folder;
+  CHECK_THROWS_WITH(read_team_folder(folder.path()), Contains("no *.csv and no *.g2o"));
+  CHECK_THROWS_WITH(read_team_folder(folder.path() / "x"), Contains("is not a folder"));
+}
+
+}  // namespace km
