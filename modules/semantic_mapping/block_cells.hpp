@@ -12,8 +12,9 @@ namespace km {
 /// blocks above along each axis.
 class BlockCells {
  public:
-  /// Copies the values. The blocks must live as long as this.
-  BlockCells(VoxelBlock& block, BlockMap& map);
+  /// Copies the values. Voxels of weight up to `min_weight` count as not observed. The blocks must
+  /// live as long as this.
+  BlockCells(VoxelBlock& block, BlockMap& map, float min_weight);
 
   /// Cells of row (y, z), as bits by x, that the surface passes through: all corners observed, and
   /// of both signs.
@@ -41,7 +42,7 @@ class BlockCells {
   [[nodiscard]] static std::size_t row_of(int y, int z) {
     return static_cast<std::size_t>(y + kSide * z);
   }
-  void copy_row(int y, int z);
+  void copy_row(int y, int z, float min_weight);
 
   std::array<VoxelBlock*, 8> blocks_ = {};  // by offset: x + 2 y + 4 z; null: none
   std::array<std::array<float, kSide>, kSide * kSide> values_;

@@ -34,8 +34,11 @@ void mark_changed(VoxelBlock& block, KeyframeIndex since) {
 }  // namespace
 
 IncrementalMesh::IncrementalMesh(double voxel_size_m, const LabelModel& labels,
-                                 double min_label_probability)
-    : voxel_m_(voxel_size_m), label_model_(labels), min_label_probability_(min_label_probability) {}
+                                 double min_label_probability, double min_weight)
+    : voxel_m_(voxel_size_m),
+      label_model_(labels),
+      min_label_probability_(min_label_probability),
+      min_weight_(static_cast<float>(min_weight)) {}
 
 MeshUpdateReport IncrementalMesh::update(BlockMap& map) {
   std::vector<VoxelBlock*> blocks;
@@ -83,7 +86,7 @@ void IncrementalMesh::release_faces(VoxelBlock& block) {
 }
 
 void IncrementalMesh::mesh_block(VoxelBlock& block, BlockMap& map, MeshUpdateReport& report) {
-  const BlockCells cells(block, map);
+  const BlockCells cells(block, map, min_weight_);
   if (!cells.any()) return;
   std::array<std::uint32_t, MarchingCubes::kEdges> vertices;
   for (int z = 0; z < kBlockSide; ++z)

@@ -26,7 +26,9 @@ struct MeshUpdateReport {
 /// the rim of final faces, which move on with the blocks that are still in the map.
 class IncrementalMesh {
  public:
-  IncrementalMesh(double voxel_size_m, const LabelModel& labels, double min_label_probability);
+  /// No face where a voxel's weight is not above `min_weight`.
+  IncrementalMesh(double voxel_size_m, const LabelModel& labels, double min_label_probability,
+                  double min_weight);
 
   /// Meshes the blocks that changed, and those below them whose cells reach into them.
   MeshUpdateReport update(BlockMap& map);
@@ -80,6 +82,7 @@ class IncrementalMesh {
   double voxel_m_;
   LabelModel label_model_;
   double min_label_probability_;
+  float min_weight_;
 
   std::vector<Vertex> vertices_;
   std::vector<std::uint32_t> free_;          // places in vertices_

@@ -65,7 +65,8 @@ struct SemanticMapper::State {
       : config(checked(settings)),
         camera(its_camera),
         views(camera, config.min_range_m, config.max_range_m, palette),
-        mesh(config.voxel_size_m, model_of(config, palette), config.min_label_probability) {}
+        mesh(config.voxel_size_m, model_of(config, palette), config.min_label_probability,
+             config.min_weight) {}
 
   std::vector<Update> select(const DepthView& view, const BlockFusion& fusion,
                              const SE3& T_odom_cam, IntegrationReport& report);

@@ -1,5 +1,5 @@
 // The map of a recording with its TRUE poses: what the mapper can do where odometry is perfect.
-//   bench_recorded_mapping DATASET TRUTH OUTPUT.ply [VOXEL_M [RATE_HZ [stereo]]]
+//   bench_recorded_mapping DATASET TRUTH OUTPUT.ply [VOXEL_M [RATE_HZ [MIN_WEIGHT [stereo]]]]
 // DATASET: EuRoC/ASL folder with depth (or, with "stereo", a right camera) and labels; TRUTH: poses
 // of the body, TUM or EuRoC. Judge OUTPUT.ply by kimera_multi_evaluate mesh.
 
@@ -24,6 +24,7 @@ struct Task {
   std::string dataset, truth, output;
   double voxel_m = 0.1;
   double rate_hz = 5.0;
+  double min_weight = 0.0;
   bool stereo = false;
 };
 
@@ -39,6 +40,7 @@ void map_with_true_poses(const Task& task) {
                       .labels = LabelsFrom::kImages});
   SemanticMappingConfig config;
   config.voxel_size_m = task.voxel_m;
+  config.min_weight = task.min_weight;
   SemanticMapper mapper(config, sensor.camera(), reader.label_palette());
 
   constexpr double kJitter_s = 2e-3;
@@ -74,14 +76,16 @@ void map_with_true_poses(const Task& task) {
 
 int main(int argc, char** argv) {
   if (argc < 4) {
-    std::fprintf(stderr, "usage: %s DATASET TRUTH OUTPUT.ply [VOXEL_M [RATE_HZ [stereo]]]\n",
+    std::fprintf(stderr,
+                 "usage: %s DATASET TRUTH OUTPUT.ply [VOXEL_M [RATE_HZ [MIN_WEIGHT [stereo]]]]\n",
                  argv[0]);
     return 2;
   }
   km::Task task{argv[1], argv[2], argv[3]};
   if (argc > 4) task.voxel_m = std::atof(argv[4]);
   if (argc > 5) task.rate_hz = std::atof(argv[5]);
-  task.stereo = argc > 6 && std::string(argv[6]) == "stereo";
+  if (argc > 6) task.min_weight = std::atof(argv[6]);
+  task.stereo = argc > 7 && std::string(argv[7]) == "stereo";
   try {
     km::map_with_true_poses(task);
   } catch (const std::exception& error) {

@@ -201,6 +201,20 @@ TEST_CASE("The label seen more often wins, and a doubtful one is unknown", "[sem
   CHECK(inside > 100);
 }
 
+TEST_CASE("Surface is meshed once its weights are enough", "[semantic_mapping]") {
+  SemanticMappingConfig config = settings();
+  config.depth_sigma_per_m = 0.0;  // all weights are 1
+  config.min_weight = 2.5;
+  SemanticMapper mapper(config, small_camera(), two_classes());
+  for (KeyframeIndex looks = 1; looks <= 4; ++looks) {
+    REQUIRE(integrate(mapper, wall(2.0), at(0), looks));
+    mapper.update_mesh();
+    CAPTURE(looks);
+    CHECK((mapper.size().faces > 500) == (looks >= 3));
+    CHECK((mapper.size().faces == 0) == (looks < 3));
+  }
+}
+
 TEST_CASE("Carving removes what went away", "[semantic_mapping]") {
   SemanticMappingConfig config = settings(0.05);
   config.carving = GENERATE(true, false);

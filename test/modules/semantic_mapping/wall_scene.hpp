@@ -23,6 +23,7 @@ inline PinholeCamera small_camera() {
 
 inline SemanticMappingConfig settings(double voxel_m = 0.1) {
   SemanticMappingConfig config;
+  config.min_weight = 0.0;  // one frame is often all there is
   config.voxel_size_m = voxel_m;
   return config;
 }
