@@ -3,7 +3,6 @@
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCore>
 #include <algorithm>
-#include <set>
 #include <stdexcept>
 #include <string>
 
@@ -217,11 +216,10 @@ void EliminationPlan::order_and_fill() {
 }
 
 void EliminationPlan::find_kept_pairs() {
-  std::set<NodePair> found;
   const auto add = [&](int i, int j) {
     const int a = place_of_kept_[static_cast<std::size_t>(i)];
     const int b = place_of_kept_[static_cast<std::size_t>(j)];
-    found.insert({std::min(a, b), std::max(a, b)});
+    kept_pairs_.push_back({std::min(a, b), std::max(a, b)});
   };
   for (const Front& front : fronts_) {
     if (front.parent >= 0) continue;
@@ -231,7 +229,8 @@ void EliminationPlan::find_kept_pairs() {
   }
   for (const auto& [i, j] : pairs_)
     if (keep_[static_cast<std::size_t>(i)] && keep_[static_cast<std::size_t>(j)]) add(i, j);
-  kept_pairs_.assign(found.begin(), found.end());
+  std::sort(kept_pairs_.begin(), kept_pairs_.end());
+  kept_pairs_.erase(std::unique(kept_pairs_.begin(), kept_pairs_.end()), kept_pairs_.end());
 }
 
 }  // namespace km

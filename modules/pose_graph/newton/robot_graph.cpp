@@ -85,6 +85,7 @@ void RobotGraph::add_edges_between(const RobotEdges& robot, std::span<const Keyf
 }
 
 RobotGraph::RobotGraph(const RobotEdges& robot, std::span<const KeyframeId> cover) {
+  if (robot.poses < 1) refuse(robot.self, "it has no poses");
   for (Eigen::Index v = 0; v < robot.poses; ++v)
     ids_.push_back({robot.self, static_cast<KeyframeIndex>(v)});
   std::vector<bool> keep(ids_.size(), false);

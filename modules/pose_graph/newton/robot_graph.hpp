@@ -42,8 +42,9 @@ class RobotGraph {
 
   /// `cover` as from cover_links(), of the whole team. If it is empty the robot is alone, and keeps
   /// its middle pose.
-  /// Throws std::invalid_argument if an edge names a pose that is not there, if a measurement is
-  /// not finite or a precision not positive, or if an edge to a peer has no end in the cover.
+  /// Throws std::invalid_argument if there are no poses, if an edge names one that is not there, if
+  /// a measurement is not finite or a precision not positive, or if an edge to a peer has no end in
+  /// the cover.
   RobotGraph(const RobotEdges& edges, std::span<const KeyframeId> cover);
 
   [[nodiscard]] const std::vector<Edge>& edges() const { return edges_; }

@@ -68,6 +68,8 @@ class BitGraph {
   std::vector<std::uint64_t> bits_;
 };
 
+enum class State { kKept, kOffered, kOutdated, kEliminated };
+
 }  // namespace
 
 std::vector<bool> keep_sparse(std::vector<bool> keep, const std::vector<bool>& free_to_keep,
@@ -78,27 +80,45 @@ std::vector<bool> keep_sparse(std::vector<bool> keep, const std::vector<bool>& f
   const std::vector<int>& nodes = plan.kept();
   BitGraph graph(static_cast<int>(nodes.size()), plan.kept_pairs());
 
-  std::vector<int> growth(nodes.size(), 0);
+  // A node whose surroundings have changed is looked at again when its turn comes by its old
+  // growth, or when no other is left whose turn it is: after each elimination would be too often
+  // where everyone is everyone's neighbour.
+  std::vector<State> state(nodes.size(), State::kKept);
   std::priority_queue<std::pair<int, int>> queue;  // least growth first, then lowest node
-  const auto offer = [&](int v) {
-    const auto place = static_cast<std::size_t>(v);
-    if (keep[static_cast<std::size_t>(nodes[place])]) return;
-    growth[place] = graph.growth(v);
-    queue.emplace(-growth[place], -v);
+  const auto offer = [&](std::size_t v) {
+    state[v] = State::kOffered;
+    queue.emplace(-graph.growth(static_cast<int>(v)), -static_cast<int>(v));
   };
-  std::vector<bool> eliminated(nodes.size(), false);
-  for (std::size_t v = 0; v < nodes.size(); ++v) offer(static_cast<int>(v));
-  while (!queue.empty()) {
-    const auto [value, negative] = queue.top();
-    queue.pop();
-    const auto v = static_cast<std::size_t>(-negative);
-    if (eliminated[v] || -value != growth[v]) continue;  // an outdated entry
-    if (growth[v] > 0) break;
-    eliminated[v] = true;
-    for (const int u : graph.eliminate(-negative)) offer(u);
+  for (std::size_t v = 0; v < nodes.size(); ++v)
+    if (!keep[static_cast<std::size_t>(nodes[v])]) offer(v);
+  const auto eliminate = [&](int v) {
+    state[static_cast<std::size_t>(v)] = State::kEliminated;
+    for (const int u : graph.eliminate(v))
+      if (state[static_cast<std::size_t>(u)] == State::kOffered)
+        state[static_cast<std::size_t>(u)] = State::kOutdated;
+  };
+  bool progress = true;
+  while (progress) {
+    progress = false;
+    while (!queue.empty()) {
+      const auto [value, negative] = queue.top();
+      const auto v = static_cast<std::size_t>(-negative);
+      if (state[v] == State::kOutdated) {
+        queue.pop();
+        offer(v);
+        continue;
+      }
+      if (-value > 0) break;
+      queue.pop();
+      eliminate(-negative);
+      progress = true;
+    }
+    queue = {};
+    for (std::size_t v = 0; v < nodes.size(); ++v)
+      if (state[v] == State::kOffered || state[v] == State::kOutdated) offer(v);
   }
   for (std::size_t v = 0; v < nodes.size(); ++v)
-    if (!eliminated[v]) keep[static_cast<std::size_t>(nodes[v])] = true;
+    if (state[v] != State::kEliminated) keep[static_cast<std::size_t>(nodes[v])] = true;
   return keep;
 }
 
