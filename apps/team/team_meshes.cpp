@@ -1,6 +1,7 @@
 #include "apps/team/team_meshes.hpp"
 
 #include <exception>
+#include <iostream>
 #include <filesystem>
 #include <map>
 #include <span>
@@ -34,6 +35,9 @@ Meshes read_meshes(const TeamPlan& plan, const char* file, std::vector<std::stri
   return meshes;
 }
 
+// Of a city the table would else take longer than the run; kimera_multi_evaluate mesh takes more.
+constexpr std::size_t kMostSamples = 2'000'000;
+
 std::optional<MeshReport> compare(const LabelledMesh& truth, const Meshes& meshes,
                                   const SE3& T_truth_team, std::vector<std::string>& notes) try {
   if (meshes.empty()) return std::nullopt;
@@ -41,6 +45,7 @@ std::optional<MeshReport> compare(const LabelledMesh& truth, const Meshes& meshe
   for (const auto& [name, mesh] : meshes) inputs.push_back({name, mesh});
   MeshErrorOptions options;
   options.T_truth_estimate = T_truth_team;
+  options.max_samples = kMostSamples;
   return mesh_error(truth, inputs, options);
 } catch (const std::exception& error) {
   notes.push_back(std::string("meshes are not compared: ") + error.what());
@@ -97,6 +102,7 @@ TeamMeshes collect_meshes(const TeamPlan& plan, const SE3& T_truth_team,
   result.merged.transform(T_truth_team);
   if (plan.truth_mesh.empty() || before.empty()) return result;
   try {
+    std::cerr << "comparing the meshes with " << plan.truth_mesh.string() << " ...\n";
     const LabelledMesh truth = read_ply(plan.truth_mesh);
     result.odometry = compare(truth, before, T_truth_team, notes);
     result.optimized = compare(truth, after, T_truth_team, notes);
