@@ -1,8 +1,8 @@
 #include "apps/team/team_meshes.hpp"
 
 #include <exception>
-#include <iostream>
 #include <filesystem>
+#include <iostream>
 #include <map>
 #include <span>
 #include <utility>
