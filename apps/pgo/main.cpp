@@ -21,8 +21,9 @@ constexpr const char* kAbout =
     "FILE is a g2o file, 2D or 3D, dealt out to --robots robots, or a folder with one *.csv or\n"
     "*.g2o per robot. The cost is the chordal one without 1/2, weights as SE-Sync reads them:\n"
     "  F = sum kappa |R_j - R_i R_ij|^2 + tau |t_j - t_i - R_i t_ij|^2\n"
-    "All methods start from the chordal initialisation of the whole graph (local: from its "
-    "own).\n\n"
+    "All methods start from the chordal initialisation of the whole graph, timed apart (local: "
+    "from\n"
+    "each robot's own).\n\n"
     "Methods:\n"
     "  local             every robot alone; their frames joined by one closure each\n"
     "  dgs               two-stage distributed Gauss-Seidel (Choudhary et al., IJRR 2017)\n"
@@ -39,7 +40,7 @@ constexpr const char* kAbout =
     "round, summed, and of all. The certificate bounds how far any poses can lie below.\n"
     "Exit code: 0 if it ran, 1 for input that cannot be used.\n\n"
     "Examples:\n"
-    "  kimera_multi_pgo sphere2500.g2o --robots 5 --method rbcd --json out.json\n"
+    "  kimera_multi_pgo sphere2500.g2o --robots 5 --method newton --json out.json\n"
     "  kimera_multi_pgo tunnels_8robots --method rbcd --rounds 300 --plot gap.svg\n"
     "  kimera_multi_pgo manhattan.g2o --method centralized --output manhattan.tum";
 
@@ -92,6 +93,9 @@ void define(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_flag("--own-start", options.pgo.own_start,
                "newton: the team finds the chordal initialisation itself, in rounds that count");
+  app.add_flag("--verify", options.pgo.verify,
+               "rbcd: the team verifies its result itself, and goes on one rank higher if a\n"
+               "direction leads down");
   app.add_option("--optimum", options.optimum, "The optimum, if known: it is not computed then")
       ->check(CLI::PositiveNumber);
   app.add_option("--json", options.json, "Also write every round to this file, as JSON");
@@ -127,24 +131,32 @@ void check(Options& options, const CLI::App& app) {
     throw std::runtime_error("--over-relaxation is for --method rbcd with coloured schedule only");
   if (options.pgo.own_start && options.pgo.method != km::PgoMethod::kNewton)
     throw std::runtime_error("--own-start is for --method newton only");
+  if (options.pgo.verify && !rbcd && options.pgo.method != km::PgoMethod::kRbcdAccelerated)
+    throw std::runtime_error("--verify is for --method rbcd and rbcd-accelerated only");
   if (options.optimum > 0.0) options.pgo.optimum = options.optimum;
   for (const fs::path& file : {options.json, options.plot, options.output}) check_folder_of(file);
   if (!options.output.empty()) km::check_output_name(options.output);
 }
 
-km::TeamGraph read(const Options& options, const CLI::App& app) {
+km::TeamGraph read(const Options& options) {
   const bool own_partition = options.partition_name != "contiguous";
   if (fs::is_directory(options.file)) {
-    if (app.count("--robots") > 0 || own_partition)
-      throw std::runtime_error("--robots and --partition are for a single file, " +
-                               options.file.string() + " is a folder with one file per robot");
+    if (own_partition)
+      throw std::runtime_error("--partition is for a single file, " + options.file.string() +
+                               " is a folder with one file per robot");
     return km::read_team_folder(options.file);
   }
   const km::G2oGraph graph = km::read_g2o(options.file);
   if (!own_partition) return km::deal_contiguously(graph, options.robots, options.file.string());
-  if (app.count("--robots") > 0)
-    throw std::runtime_error("--robots: the number of robots is that of the --partition file");
   return km::deal(graph, km::read_partition(options.partition_name), options.partition_name);
+}
+
+km::TeamGraph read_and_check(const Options& options, const CLI::App& app) {
+  km::TeamGraph graph = read(options);
+  if (app.count("--robots") > 0 && graph.robots() != options.robots)
+    throw std::runtime_error("--robots " + std::to_string(options.robots) + ": there are " +
+                             std::to_string(graph.robots()) + " robots in the folder or partition");
+  return graph;
 }
 
 }  // namespace
@@ -159,7 +171,7 @@ int main(int argc, char** argv) try {
     return app.exit(error) == 0 ? 0 : 1;
   }
   check(options, app);
-  const km::TeamGraph graph = read(options, app);
+  const km::TeamGraph graph = read_and_check(options, app);
   const km::PgoRun run = km::run_pgo(graph, options.pgo, km::wire_meter());
   std::cout << km::pgo_text(graph, run);
   write(options.json, [&](std::ostream& out) { km::write_pgo_json(out, graph, run); });

@@ -53,18 +53,30 @@ std::string table(const PgoRun& run) {
   return align_columns(rows);
 }
 
+std::string verification_text(const TeamVerification& verification) {
+  const std::string verdict = verification.negative    ? "found a direction that leads down"
+                              : verification.converged ? "found no direction that leads down"
+                                                       : "came to no end";
+  return "the team's own verification " + verdict + " (" + std::to_string(verification.rounds) +
+         " rounds, " + bytes_text(static_cast<double>(verification.work.bytes)) + ", critical " +
+         fixed(verification.work.critical_path_s, 3) + " s, least curvature beyond the kernel " +
+         digits(verification.lambda_min, 3) + ")\n";
+}
+
 }  // namespace
 
 std::string pgo_text(const TeamGraph& graph, const PgoRun& run) {
   std::ostringstream text;
   text << to_string(run.method) << ": " << graph.poses() << " poses, " << graph.edges.size()
        << " edges, " << graph.robots() << (graph.robots() == 1 ? " robot\n" : " robots\n")
-       << table(run) << "optimum " << digits(run.optimum, 9) << ", rounded cost "
-       << digits(run.rounded_cost, 9) << ", rank " << run.rank << '\n';
+       << table(run) << "chordal start in " << fixed(run.start_s, 3) << " s, optimum "
+       << digits(run.optimum, 9) << ", rounded cost " << digits(run.rounded_cost, 9) << ", rank "
+       << run.rank << '\n';
   text << (run.certificate.certified ? "certified" : "not certified")
        << ": the cost lies above that of any poses by at most "
        << digits(std::max(run.certificate.relative_gap, 1e-12), 2) << " of itself (lambda_min "
        << digits(run.certificate.lambda_min, 3) << ")\n";
+  if (run.verification) text << verification_text(*run.verification);
   return text.str();
 }
 
@@ -92,6 +104,7 @@ void write_pgo_json(std::ostream& out, const TeamGraph& graph, const PgoRun& run
   json.field("certified", run.certificate.certified);
   json.field("rank", run.rank);
   json.field("optimum", run.optimum);
+  json.field("start_cpu_s", run.start_s);
   json.end_object();
 }
 

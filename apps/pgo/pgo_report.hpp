@@ -12,7 +12,7 @@ namespace km {
 
 /// {"poses", "edges", "robots", "method", "rounds": [{"cost", "gradient_norm", "bytes",
 /// "critical_path_s", "total_cpu_s"}], "rounded_cost", "lambda_min", "certified", "rank",
-/// "optimum"}. rounds[0] is the start; bytes and times are sums up to the round.
+/// "optimum", "start_cpu_s"}. rounds[0] is the start; bytes and times are sums up to the round.
 void write_pgo_json(std::ostream& out, const TeamGraph& graph, const PgoRun& run);
 
 /// SVG: the relative gap to the optimum against rounds, bytes and critical-path time.

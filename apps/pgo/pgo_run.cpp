@@ -1,35 +1,37 @@
 #include "apps/pgo/pgo_run.hpp"
 
 #include <Eigen/Eigenvalues>
-#include <algorithm>
 #include <memory>
 #include <stdexcept>
 
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/newton/newton_team.hpp"
 #include "modules/pose_graph/rounding.hpp"
-#include "modules/pose_graph/team/block_descent_team.hpp"
 #include "modules/pose_graph/team/central_team.hpp"
 #include "modules/pose_graph/team/gauss_seidel_team.hpp"
 #include "modules/pose_graph/team/local_team.hpp"
+#include "modules/pose_graph/team/team_staircase.hpp"
 
 namespace km {
 namespace {
 
+BlockDescentOptions descent_options(const PgoOptions& options) {
+  return {.schedule = options.greedy ? BlockSchedule::kGreedy : BlockSchedule::kColoured,
+          .max_over_relaxation = options.over_relaxation,
+          .accelerated = options.method == PgoMethod::kRbcdAccelerated};
+}
+
 std::unique_ptr<TeamSolver> make_solver(const TeamGraph& graph, const std::vector<SE3>& start,
                                         const PgoOptions& options) {
-  BlockDescentOptions descent{.max_over_relaxation = options.over_relaxation};
-  if (options.greedy) descent.schedule = BlockSchedule::kGreedy;
   switch (options.method) {
     case PgoMethod::kLocal:
       return std::make_unique<LocalTeam>(graph);
     case PgoMethod::kDgs:
       return std::make_unique<GaussSeidelTeam>(graph, start);
-    case PgoMethod::kRbcdAccelerated:
-      descent.accelerated = true;
-      [[fallthrough]];
     case PgoMethod::kRbcd:
-      return std::make_unique<BlockDescentTeam>(graph, lift(start, options.rank), descent);
+    case PgoMethod::kRbcdAccelerated:
+      return std::make_unique<BlockDescentTeam>(graph, lift(start, options.rank),
+                                                descent_options(options));
     case PgoMethod::kCentralized:
       return std::make_unique<CentralTeam>(graph, lift(start, 3));
     case PgoMethod::kNewton:
@@ -57,6 +59,23 @@ double optimum_of(const TeamGraph& graph, const std::vector<SE3>& start) {
   return staircase.cost();
 }
 
+// The method's own part of the run: rounds, poses, and what it has verified itself.
+void solve(const TeamGraph& graph, const std::vector<SE3>& start, const PgoOptions& options,
+           const TeamMeter& meter, PgoRun& run) {
+  if (options.verify) {
+    constexpr Eigen::Index kMaxRank = 10;
+    TeamStaircase staircase = run_team_staircase(
+        graph, lift(start, options.rank), descent_options(options), options.run, kMaxRank, meter);
+    run.rounds = std::move(staircase.rounds);
+    run.X = std::move(staircase.X);
+    run.verification = std::move(staircase.verification);
+    return;
+  }
+  const auto solver = make_solver(graph, start, options);
+  run.rounds = run_team(graph, *solver, options.run, meter);
+  run.X = team_poses(graph, *solver);
+}
+
 }  // namespace
 
 const char* to_string(PgoMethod method) {
@@ -78,24 +97,18 @@ const char* to_string(PgoMethod method) {
 }
 
 PgoRun run_pgo(const TeamGraph& graph, const PgoOptions& options, const TeamMeter& meter) {
-  const std::vector<SE3> start = chordal_initialisation(graph.poses(), graph.edges);
-  const auto solver = make_solver(graph, start, options);
   PgoRun run;
   run.method = options.method;
-  run.rounds = run_team(graph, *solver, options.run, meter);
-  run.X = team_poses(graph, *solver);
-  const QuadraticProblem whole(run.X.rows(), graph.poses(), graph.edges, {});
-  const auto* central = dynamic_cast<const CentralTeam*>(solver.get());
-  const bool known = central != nullptr && central->staircase().certificate();
-  run.certificate = known ? *central->staircase().certificate() : certify(whole, run.X);
+  const double begin_s = meter.cpu_s();
+  const std::vector<SE3> start = chordal_initialisation(graph.poses(), graph.edges);
+  run.start_s = meter.cpu_s() - begin_s;
+  solve(graph, start, options, meter, run);
+  run.certificate = certify(QuadraticProblem(run.X.rows(), graph.poses(), graph.edges, {}), run.X);
   run.rank = numerical_rank(run.X, graph.dimension);
   run.T_world_kf = round_to_poses(run.X, run.X.leftCols<4>());
   run.rounded_cost =
       QuadraticProblem(3, graph.poses(), graph.edges, {}).cost(lift(run.T_world_kf, 3));
-  if (options.optimum)
-    run.optimum = *options.optimum;
-  else
-    run.optimum = std::min(optimum_of(graph, start), known ? run.rounds.back().cost : 1e300);
+  run.optimum = options.optimum ? *options.optimum : optimum_of(graph, start);
   return run;
 }
 

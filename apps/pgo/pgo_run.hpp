@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "modules/pose_graph/certificate.hpp"
-#include "modules/pose_graph/team/team_solver.hpp"
+#include "modules/pose_graph/team/team_verification.hpp"
 
 namespace km {
 
@@ -20,18 +20,21 @@ struct PgoOptions {
   bool greedy = false;                 ///< rbcd only.
   double over_relaxation = 1.95;       ///< rbcd only, at most; 1: as published.
   bool own_start = false;              ///< newton only: the team finds the chordal start itself.
+  bool verify = false;                 ///< rbcd only: the staircase over the rank.
   std::optional<double> optimum = {};  ///< Computed if not given.
 };
 
 /// What one method did to one graph.
 struct PgoRun {
   PgoMethod method = PgoMethod::kRbcd;
+  double start_s = 0.0;           ///< CPU time of the chordal initialisation.
   std::vector<TeamRound> rounds;  ///< [0]: the start.
   LiftedPoses X;
   std::vector<SE3> T_world_kf;  ///< Rounded, in the frame of the first pose.
   double rounded_cost = 0.0;
-  double optimum = 0.0;  ///< The certified one; the least cost known if none is.
-  Certificate certificate;
+  double optimum = 0.0;     ///< The certified one; the least cost known if none is.
+  Certificate certificate;  ///< Central.
+  std::optional<TeamVerification> verification;  ///< Distributed, if asked for.
   Eigen::Index rank = 0;  ///< Numerical, of the rotations; 3 (2 in the plane): no relaxation left.
 };
 

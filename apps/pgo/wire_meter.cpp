@@ -1,6 +1,7 @@
 #include "apps/pgo/wire_meter.hpp"
 
 #include <ctime>
+#include <stdexcept>
 
 #include "modules/pose_graph/newton/newton_codec.hpp"
 #include "modules/pose_graph/pose_graph_codec.hpp"
@@ -21,7 +22,7 @@ std::size_t size_on_wire(const T& message) {
     const auto encoded = Codec<T>::encode(message);
     return serialized_size(Codec<T>::descriptor(), &encoded.wire);
   } else {
-    return 0;
+    throw std::logic_error("wire_meter: a message without a codec");
   }
 }
 

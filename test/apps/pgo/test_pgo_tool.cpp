@@ -1,0 +1,129 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+#include "apps/pgo/pgo_run.hpp"
+#include "apps/pgo/wire_meter.hpp"
+#include "modules/pose_graph/g2o_io.hpp"
+#include "test/support/command.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+using Catch::Contains;
+
+const std::string kTool = KM_BIN_DIR "/kimera_multi_pgo ";
+
+// A square driven twice in the plane, its second lap tied to the first.
+std::string square_g2o() {
+  std::string text;
+  const auto edge = [&](int i, int j, const char* measured) {
+    text += "EDGE_SE2 " + std::to_string(i) + ' ' + std::to_string(j) + ' ' + measured +
+            " 4 0 0 4 0 9\n";
+  };
+  for (int i = 0; i < 7; ++i) edge(i, i + 1, "1.02 0.01 1.58");
+  for (int i = 0; i < 4; ++i) edge(i, i + 4, "0.01 -0.02 0.005");
+  return text;
+}
+
+std::string text_of(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+}  // namespace
+
+TEST_CASE("Messages are measured as they would cross the network", "[pgo]") {
+  const TeamMeter meter = wire_meter();
+  PublicPoses poses;
+  poses.X = LiftedPoses::Zero(5, 0);
+  const std::size_t empty = meter.bytes(poses);
+  CHECK(empty > 0);
+  poses.keyframes = {0, 1, 2};
+  poses.X = LiftedPoses::Zero(5, 12);
+  CHECK(meter.bytes(poses) == empty + 3 * (4 + 20 * 4));  // an index and 20 floats each
+  CHECK(meter.cpu_s() >= 0.0);
+}
+
+TEST_CASE("Every method runs from the command line and says what it reached", "[pgo]") {
+  const TemporaryFolder folder;
+  const auto graph = folder.write("square.g2o", square_g2o());
+  const auto json = folder.path() / "out.json";
+  const std::string method =
+      GENERATE("local", "dgs", "rbcd", "rbcd-accelerated --verify", "newton", "centralized",
+               "rbcd --schedule greedy", "rbcd --over-relaxation 1");
+  CAPTURE(method);
+  const CommandResult result = run_command(kTool + graph.string() + " --robots 2 --method " +
+                                           method + " --json " + json.string());
+  CAPTURE(result.output);
+  REQUIRE(result.exit_code == 0);
+  CHECK_THAT(result.output, Contains("8 poses, 11 edges, 2 robots"));
+  const std::string written = text_of(json);
+  for (const char* key :
+       {"poses", "edges", "robots", "method", "rounds", "cost", "gradient_norm", "bytes",
+        "critical_path_s", "total_cpu_s", "rounded_cost", "lambda_min", "certified", "rank"})
+    CHECK_THAT(written, Contains(std::string("\"") + key + "\":"));
+}
+
+TEST_CASE("Poses and plot are written", "[pgo]") {
+  const TemporaryFolder folder;
+  const auto graph = folder.write("square.g2o", square_g2o());
+  const auto tum = folder.path() / "poses.tum";
+  const auto g2o = folder.path() / "poses.g2o";
+  const auto svg = folder.path() / "gap.svg";
+  for (const auto& output : {tum, g2o})
+    REQUIRE(run_command(kTool + graph.string() + " --method centralized --output " +
+                        output.string() + " --plot " + svg.string())
+                .exit_code == 0);
+  const std::string rows = text_of(tum);
+  CHECK(std::count(rows.begin(), rows.end(), '\n') == 8);
+  const G2oGraph written = read_g2o(g2o);
+  CHECK(written.vertices.size() == 8);
+  CHECK(written.edges.size() == 11);
+  CHECK_THAT(text_of(svg), Contains("<svg") && Contains("</svg>"));
+}
+
+TEST_CASE("What cannot be done is told with the reason", "[pgo]") {
+  const TemporaryFolder folder;
+  const std::string graph = folder.write("square.g2o", square_g2o()).string();
+  (void)folder.write("halves", "0 0\n1 0\n2 0\n3 0\n4 1\n5 1\n6 1\n7 1\n");
+  // FILE and PLACE stand for the graph and its folder.
+  const auto [pattern, message] = GENERATE(table<std::string, std::string>(
+      {{"FILE --robots 9", "8 poses, which cannot be dealt out to 9 robots"},
+       {"FILE --robots 2 --method centralized --schedule greedy", "--schedule greedy is for"},
+       {"FILE --method dgs --over-relaxation 1.5", "--over-relaxation is for"},
+       {"FILE --method dgs --verify", "--verify is for"},
+       {"FILE --json /nowhere/out.json", "there is no folder /nowhere"},
+       {"FILE --output poses.txt", "--output writes *.tum or *.g2o"},
+       {"FILE --partition FILE", "not two fields"},
+       {"FILE --robots 3 --partition PLACE/halves", "--robots 3: there are 2 robots"},
+       {"PLACE --partition FILE", "is a folder with one file per robot"},
+       {"PLACE/none.g2o", "none.g2o"},
+       {"FILE --method fastest", "fastest"}}));
+  const auto place = std::regex_replace(pattern, std::regex("PLACE"), folder.path().string());
+  const auto arguments = std::regex_replace(place, std::regex("FILE"), graph);
+  CAPTURE(arguments);
+  const CommandResult result = run_command(kTool + arguments);
+  CHECK(result.exit_code == 1);
+  CHECK_THAT(result.output, Contains(message));
+}
+
+TEST_CASE("A planar graph costs what it costs in the plane", "[pgo]") {
+  const auto file = shared_data("pose_graphs/2d/intel.g2o");
+  if (!file) return;
+  const CommandResult result =
+      run_command(kTool + file->string() + " --robots 5 --method centralized");
+  CAPTURE(result.output);
+  CHECK(result.exit_code == 0);
+  CHECK_THAT(result.output, Contains("optimum 52.3482273"));
+  CHECK_THAT(result.output, Contains("rank 2"));
+  CHECK_THAT(result.output, Contains("\ncertified"));
+}
+
+}  // namespace km
