@@ -106,6 +106,17 @@ std::vector<km::RobotRun> run_robots(const TeamOptions& options, const km::TeamP
   return runs;
 }
 
+// Names and colours of the labels beside the team's mesh: those of the first robot that has some.
+void copy_palette(const km::TeamPlan& plan) {
+  constexpr const char* kFile = "label_palette.csv";
+  for (const km::RobotPlan& robot : plan.robots) {
+    const fs::path own = plan.output / robot.name / kFile;
+    if (!fs::exists(own)) continue;
+    fs::copy_file(own, plan.output / kFile, fs::copy_options::overwrite_existing);
+    return;
+  }
+}
+
 int run(const TeamOptions& options) {
   const km::TeamPlan plan = make_plan(options);
   const km::TeamResult team = km::collect_results(
@@ -127,6 +138,7 @@ int run(const TeamOptions& options) {
   if (!team.meshes.merged.empty()) {
     const fs::path path = plan.output / "team_mesh.ply";
     km::write_ply(path, team.meshes.merged);
+    copy_palette(plan);
     std::cout << "The mesh of all robots"
               << (team.optimized ? ", in the frame of the truth: " : ": ") << path.string() << '\n';
   }
