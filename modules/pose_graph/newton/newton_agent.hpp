@@ -14,7 +14,7 @@
 namespace km {
 
 struct NewtonOptions {
-  double tolerance = 1e-10;  ///< Ends when a step promises less decrease, relative to the cost.
+  double tolerance = 1e-13;  ///< Ends when a step promises less decrease, relative to the cost.
   /// Second derivatives are computed anew, which costs an elimination and its bytes, when at the
   /// rate seen with the old ones more rounds than this would still be needed.
   double patience_rounds = 8.0;

@@ -125,9 +125,9 @@ TEST_CASE("the team ends at a minimum, the cost never rising", "[newton]") {
   for (std::size_t k = 1; k < rounds.size(); ++k)
     CHECK(rounds[k].cost <= rounds[k - 1].cost * (1.0 + 1e-12));
   CHECK(rounds.size() < 300);
-  // A decrease of 1e-10 of the cost is left at most; the gradient's square bounds it from below
+  // A decrease of 1e-13 of the cost is left at most; the gradient's square bounds it from below
   // with the largest curvature, some hundreds here.
-  CHECK(rounds.back().gradient_norm < std::sqrt(1e-10 * rounds.back().cost * 2e3));
+  CHECK(rounds.back().gradient_norm < std::sqrt(1e-13 * rounds.back().cost * 2e3));
   CHECK(*team.agent(0).cost() == Approx(rounds.back().cost).epsilon(1e-12));
 }
 
@@ -180,9 +180,9 @@ TEST_CASE("the result does not depend on the frame or on who is which robot", "[
   const auto c = poses_of(third, 4);
   CHECK(*third.agent(0).cost() == Approx(*first.agent(0).cost()).epsilon(1e-9));
   const SE3 T_a_c = a.front() * c.back().inverse();
-  // Both end within 1e-10 of the least cost: the square root of that in the poses.
+  // Both end within 1e-13 of the least cost: its square root, amplified, in the poses.
   for (std::size_t k = 0; k < a.size(); ++k)
-    CHECK((T_a_c * c[a.size() - 1 - k]).isApprox(a[k], 1e-3));
+    CHECK((T_a_c * c[a.size() - 1 - k]).isApprox(a[k], 1e-4));
 }
 
 TEST_CASE("the result does not depend on the order of messages", "[newton]") {
@@ -287,7 +287,7 @@ TEST_CASE("five robots reach the certified optimum of public graphs", "[newton]"
   const auto rounds = run_team(graph, team, {.max_rounds = 100}, {});
   // Files round their quaternions: below 1e-7 costs cannot be compared.
   CHECK(rounds.back().cost == Approx(known.optimum).epsilon(1e-7));
-  CHECK(rounds.size() <= 12);
+  CHECK(rounds.size() <= 15);
 }
 
 }  // namespace km
