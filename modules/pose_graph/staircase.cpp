@@ -11,7 +11,7 @@ namespace {
 constexpr double kRotationShift = 1e-4;
 // Convergence is superlinear: after a step that gains less than the first the poses are certified;
 // if that fails, further steps are tried, down to the second, before the rank is blamed.
-constexpr double kRelativeDecrease = 1e-7;
+constexpr double kRelativeDecrease = 3e-6;
 constexpr double kLeastRelativeDecrease = 1e-10;
 constexpr double kCgTolerance = 0.1;
 constexpr int kMaxCgIterations = 2000;
