@@ -7,6 +7,7 @@
 
 #include "apps/pgo/pgo_output.hpp"
 #include "apps/pgo/pgo_report.hpp"
+#include "apps/pgo/pgo_robust.hpp"
 #include "apps/pgo/wire_meter.hpp"
 #include "modules/pose_graph/team/team_graph_file.hpp"
 
@@ -34,6 +35,9 @@ constexpr const char* kAbout =
     "  centralized       the whole graph on one computer: Riemannian staircase of SE-Sync\n"
     "  newton            exact Newton steps of the whole team, one exchange each, by Schur\n"
     "                    complements onto public poses; stays at the rank of rigid poses\n\n"
+    "With --robust gnc the team first finds out which closures are false, by graduated\n"
+    "non-convexity over newton (weights and poses in turn, from its own start), and ends with the\n"
+    "optimum of those that it keeps.\n\n"
     "A round is one exchange of messages. The table says after how many rounds each gap to the\n"
     "certified optimum was reached (computed centrally unless given), what had been sent by then\n"
     "by all robots, a broadcast counting once, and the CPU time: of the slowest robot of each\n"
@@ -42,6 +46,7 @@ constexpr const char* kAbout =
     "Examples:\n"
     "  kimera_multi_pgo sphere2500.g2o --robots 5 --method newton --json out.json\n"
     "  kimera_multi_pgo tunnels_8robots --method rbcd --rounds 300 --plot gap.svg\n"
+    "  kimera_multi_pgo tunnels_8robots --robust gnc --barc 20 --rounds 300\n"
     "  kimera_multi_pgo manhattan.g2o --method centralized --output manhattan.tum";
 
 struct Options {
@@ -50,6 +55,8 @@ struct Options {
   std::size_t robots = 1;
   km::PgoOptions pgo;
   double optimum = 0.0;
+  bool robust = false;
+  km::GncAgentOptions gnc;
 };
 
 void define(CLI::App& app, Options& options) {
@@ -105,6 +112,28 @@ void define(CLI::App& app, Options& options) {
                  "Also write the rounded poses: *.tum (numbers of the poses as times) or *.g2o");
 }
 
+void define_robust(CLI::App& app, Options& options) {
+  app.add_option_function<std::string>(
+         "--robust", [&](const std::string&) { options.robust = true; },
+         "gnc: reject false closures; instead of --method")
+      ->check(CLI::IsMember({"gnc"}));
+  app.add_option("--barc", options.gnc.gnc.barc,
+                 "gnc: residual [sigma] up to which an edge is kept, sqrt of its cost; 0: where 99 "
+                 "%\nof Gaussian residuals lie, 4.10, in the plane 3.37")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--mu-step", options.gnc.gnc.mu_step,
+                 "gnc: factor between two updates of the weights, above 1; small is careful")
+      ->check(CLI::Range(1.01, 1e3))
+      ->capture_default_str();
+  app.add_flag(
+      "--noise-scale", options.gnc.gnc.estimate_scale,
+      "gnc: estimate from the residuals how many times larger the noise is than the graph\n"
+      "says, and multiply --barc by it");
+  app.add_flag("--reject-odometry", options.gnc.reject_odometry,
+               "gnc: steps of odometry inside a robot can be false, too");
+}
+
 void write(const fs::path& file, const auto& writer) {
   if (file.empty()) return;
   std::ofstream out(file);
@@ -122,7 +151,18 @@ void check_folder_of(const fs::path& file) {
                              folder.string());
 }
 
+void check_robust(const Options& options, const CLI::App& app) {
+  for (const char* name : {"--barc", "--mu-step", "--noise-scale", "--reject-odometry"})
+    if (!options.robust && app.count(name) > 0)
+      throw std::runtime_error(std::string(name) + " is for --robust gnc only");
+  for (const char* name : {"--method", "--rank", "--gradient", "--schedule", "--over-relaxation",
+                           "--own-start", "--verify", "--optimum", "--plot"})
+    if (options.robust && app.count(name) > 0)
+      throw std::runtime_error(std::string(name) + " does not go with --robust gnc");
+}
+
 void check(Options& options, const CLI::App& app) {
+  check_robust(options, app);
   const bool rbcd = options.pgo.method == km::PgoMethod::kRbcd;
   options.pgo.greedy = options.schedule == "greedy";
   if (options.pgo.greedy && !rbcd)
@@ -159,12 +199,29 @@ km::TeamGraph read_and_check(const Options& options, const CLI::App& app) {
   return graph;
 }
 
+void run_and_write_robust(const Options& options, const km::TeamGraph& graph) {
+  const km::RobustRun run =
+      km::run_robust(graph, options.gnc, options.pgo.run.max_rounds, km::wire_meter());
+  std::cout << km::robust_text(graph, run);
+  write(options.json, [&](std::ostream& out) { km::write_robust_json(out, graph, run); });
+  if (!options.output.empty()) km::write_poses(options.output, graph, run.T_world_kf);
+}
+
+void run_and_write(const Options& options, const km::TeamGraph& graph) {
+  const km::PgoRun run = km::run_pgo(graph, options.pgo, km::wire_meter());
+  std::cout << km::pgo_text(graph, run);
+  write(options.json, [&](std::ostream& out) { km::write_pgo_json(out, graph, run); });
+  write(options.plot, [&](std::ostream& out) { out << km::pgo_plot(run); });
+  if (!options.output.empty()) km::write_poses(options.output, graph, run.T_world_kf);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) try {
   CLI::App app(kAbout);
   Options options;
   define(app, options);
+  define_robust(app, options);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -172,11 +229,10 @@ int main(int argc, char** argv) try {
   }
   check(options, app);
   const km::TeamGraph graph = read_and_check(options, app);
-  const km::PgoRun run = km::run_pgo(graph, options.pgo, km::wire_meter());
-  std::cout << km::pgo_text(graph, run);
-  write(options.json, [&](std::ostream& out) { km::write_pgo_json(out, graph, run); });
-  write(options.plot, [&](std::ostream& out) { out << km::pgo_plot(run); });
-  if (!options.output.empty()) km::write_poses(options.output, graph, run.T_world_kf);
+  if (options.robust)
+    run_and_write_robust(options, graph);
+  else
+    run_and_write(options, graph);
   return 0;
 } catch (const std::exception& error) {
   std::cerr << "kimera_multi_pgo: " << error.what() << '\n';

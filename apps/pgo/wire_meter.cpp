@@ -5,6 +5,7 @@
 
 #include "modules/pose_graph/newton/newton_codec.hpp"
 #include "modules/pose_graph/pose_graph_codec.hpp"
+#include "modules/pose_graph/robust/gnc_codec.hpp"
 #include "runtime/dds/serialized_size.hpp"
 
 namespace km {

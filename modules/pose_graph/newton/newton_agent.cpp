@@ -22,6 +22,7 @@ NewtonAgent::NewtonAgent(RobotEdges edges, std::set<RobotId> team, int dimension
       team_(std::move(team)),
       dimension_(dimension),
       options_(options),
+      round_(options.first_round),
       accepted_(std::move(start)) {
   team_.insert(edges_.self);
   if (!accepted_.empty() && static_cast<Index>(accepted_.size()) != edges_.poses)
@@ -204,7 +205,7 @@ std::optional<NewtonShare> NewtonAgent::descend() {
   }
   const MatrixXd given = MatrixXd::Zero(tangent_size(dimension_), 1);
   const SeparatorSystem::Solution solution = separator_system_.solve(shares, given);
-  if (0.5 * solution.decrement <= options_.tolerance * cost) {
+  if (0.5 * solution.decrement <= options_.tolerance * cost + options_.absolute_tolerance) {
     phase_ = Phase::kDone;
     return std::nullopt;
   }

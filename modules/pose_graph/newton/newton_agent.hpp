@@ -15,10 +15,12 @@ namespace km {
 
 struct NewtonOptions {
   double tolerance = 1e-13;  ///< Ends when a step promises less decrease, relative to the cost.
+  double absolute_tolerance = 0.0;  ///< Or less than this: where nothing contradicts the cost is 0.
   /// Second derivatives are computed anew, which costs an elimination and its bytes, when at the
   /// rate seen with the old ones more rounds than this would still be needed.
   double patience_rounds = 8.0;
-  int max_backtracks = 12;  ///< In a row, each to a quarter of the step.
+  int max_backtracks = 12;        ///< In a row, each to a quarter of the step.
+  std::uint32_t first_round = 0;  ///< Number of the first exchange: tells solves in a row apart.
 };
 
 /// One robot's part in a distributed Newton method for pose graphs.

@@ -8,12 +8,14 @@
 
 #include "modules/pose_graph/newton/newton_messages.hpp"
 #include "modules/pose_graph/pgo_messages.hpp"
+#include "modules/pose_graph/robust/gnc_messages.hpp"
 
 namespace km {
 
 /// Every message that a method may send between robots. The same structs cross the network.
 using TeamMessage =
-    std::variant<PgoStatus, PgoSession, PublicPoses, CertificateShare, NewtonHello, NewtonShare>;
+    std::variant<PgoStatus, PgoSession, PublicPoses, CertificateShare, NewtonHello, NewtonShare,
+                 GncPoses, GncResiduals>;
 
 /// What the work of a team is measured with: modules read no clocks and know no wire format.
 struct TeamMeter {

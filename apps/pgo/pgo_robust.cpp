@@ -1,0 +1,96 @@
+#include "apps/pgo/pgo_robust.hpp"
+
+#include <ostream>
+#include <sstream>
+
+#include "apps/team/text_table.hpp"
+#include "modules/core/json_writer.hpp"
+#include "modules/pose_graph/robust/gnc_team.hpp"
+
+namespace km {
+namespace {
+
+// Kept ones of those edges that `counts` holds for.
+std::string kept_of(const RobustRun& run, const auto& counts) {
+  std::size_t kept = 0, all = 0;
+  for (std::size_t k = 0; k < run.kept.size(); ++k) {
+    if (!counts(k)) continue;
+    ++all;
+    if (run.kept[k]) ++kept;
+  }
+  return std::to_string(kept) + " of " + std::to_string(all);
+}
+
+}  // namespace
+
+RobustRun run_robust(const TeamGraph& graph, const GncAgentOptions& options, int max_rounds,
+                     const TeamMeter& meter) {
+  GncTeam team(graph, 3, {}, options);
+  RobustRun run;
+  run.rounds = run_team(graph, team, {.max_rounds = max_rounds}, meter);
+  run.odometry = odometry_edges(graph);
+  run.kept = team.kept();
+  const auto& schedule = team.agent(0).schedule();
+  run.barc = options.gnc.barc > 0.0 ? options.gnc.barc : default_barc(graph.dimension);
+  if (schedule) {
+    run.scale = schedule->scale();
+    run.updates = schedule->updates();
+  }
+  run.decided = team.agent(0).done();
+  for (std::size_t k = 0; k < graph.robots(); ++k)
+    for (const SE3& T : team.agent(k).poses()) run.T_world_kf.push_back(T);
+  return run;
+}
+
+std::string robust_text(const TeamGraph& graph, const RobustRun& run) {
+  const auto between = [&](std::size_t k) {
+    return graph.robot_of(graph.edges[k].i) != graph.robot_of(graph.edges[k].j);
+  };
+  const TeamWork& work = run.rounds.back().work;
+  std::ostringstream text;
+  text << "gnc: " << graph.poses() << " poses, " << graph.edges.size() << " edges, "
+       << graph.robots() << (graph.robots() == 1 ? " robot\n" : " robots\n") << "kept "
+       << kept_of(run, [&](std::size_t k) { return !run.odometry[k] && between(k); })
+       << " closures between robots, "
+       << kept_of(run, [&](std::size_t k) { return !run.odometry[k] && !between(k); })
+       << " inside a robot, "
+       << kept_of(run, [&](std::size_t k) { return static_cast<bool>(run.odometry[k]); })
+       << " steps of odometry\n"
+       << "threshold " << fixed(run.barc, 2) << " sigma, noise " << fixed(run.scale, 2)
+       << " times as large as the graph says\n"
+       << run.updates << " updates of the weights in " << run.rounds.size() - 1 << " rounds, "
+       << bytes_text(static_cast<double>(work.bytes)) << " sent, critical path "
+       << fixed(work.critical_path_s, 3) << " s, CPU " << fixed(work.total_cpu_s, 3) << " s\n";
+  if (!run.decided) text << "not decided: --rounds did not suffice\n";
+  return text.str();
+}
+
+void write_robust_json(std::ostream& out, const TeamGraph& graph, const RobustRun& run) {
+  JsonWriter json(out);
+  json.begin_object();
+  json.field("poses", graph.poses());
+  json.field("edges", graph.edges.size());
+  json.field("robots", graph.robots());
+  json.field("robust", "gnc");
+  json.field("barc", run.barc);
+  json.field("scale", run.scale);
+  json.field("updates", run.updates);
+  json.field("decided", run.decided);
+  std::vector<std::size_t> kept;
+  for (std::size_t k = 0; k < run.kept.size(); ++k)
+    if (run.kept[k]) kept.push_back(k);
+  json.array("kept", kept);
+  json.key("rounds");
+  json.begin_array();
+  for (const TeamRound& round : run.rounds) {
+    json.begin_object();
+    json.field("bytes", round.work.bytes);
+    json.field("critical_path_s", round.work.critical_path_s);
+    json.field("total_cpu_s", round.work.total_cpu_s);
+    json.end_object();
+  }
+  json.end_array();
+  json.end_object();
+}
+
+}  // namespace km

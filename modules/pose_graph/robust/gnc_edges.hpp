@@ -1,0 +1,23 @@
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "modules/pose_graph/newton/robot_graph.hpp"
+
+namespace km {
+
+/// A robot's edges, and which of them are odometry. Edges to a peer are in the same order as the
+/// peer has them.
+struct GncEdges {
+  RobotEdges edges;
+  std::vector<bool> own_odometry = {};
+  std::map<RobotId, std::vector<bool>> odometry_to = {};
+};
+
+/// Length of the residual of an edge, the square root of its cost: kappa |R_j - R_i R_ij|^2 + tau
+/// |t_j - t_i - R_i t_ij|^2 is, for small Gaussian noise with these weights, chi-squared.
+[[nodiscard]] double edge_residual(const SE3& T_world_i, const SE3& T_world_j, const SE3& T_i_j,
+                                   double kappa, double tau);
+
+}  // namespace km
