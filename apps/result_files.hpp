@@ -11,10 +11,14 @@ inline constexpr std::array kResultFiles = {
     "optimizer.csv", "traffic.csv",        "timing.csv",       "config.yaml",   "summary.json",
     "mesh.ply",      "mesh_optimized.ply", "label_palette.csv"};
 
+/// Folder of the meshes that other robots sent, robot<id>.ply each.
+inline constexpr const char* kPeerMeshes = "peer_meshes";
+
 /// Removes a robot's results from `folder`, so that those of an earlier run cannot be taken for
 /// those of one that fails. Throws std::filesystem::filesystem_error naming the file.
 inline void remove_results(const std::filesystem::path& folder) {
   for (const char* file : kResultFiles) std::filesystem::remove(folder / file);
+  std::filesystem::remove_all(folder / kPeerMeshes);
 }
 
 }  // namespace km

@@ -75,6 +75,7 @@ RobotConfig load_robot_config(const RobotOptions& options) {
   config.segmentation = layers.load<SegmentationConfig>();
   config.semantic_mapping = layers.load<SemanticMappingConfig>();
   config.mesh_deformation = layers.load<MeshDeformationConfig>();
+  config.mesh_chunks = layers.load<MeshChunksConfig>();
   layers.finish();
   config.effective = layers.effective();
   return config;

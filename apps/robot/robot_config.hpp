@@ -10,6 +10,7 @@
 #include "modules/dense_sensing/stereo_depth_config.hpp"
 #include "modules/loop_closure/keyframe_features_config.hpp"
 #include "modules/loop_closure/loop_closure_config.hpp"
+#include "modules/mesh/mesh_chunks_config.hpp"
 #include "modules/mesh_deformation/mesh_deformation_config.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"
 #include "modules/place_recognition/place_recognition_config.hpp"
@@ -41,6 +42,7 @@ struct RobotConfig {
   SegmentationConfig segmentation;
   SemanticMappingConfig semantic_mapping;
   MeshDeformationConfig mesh_deformation;
+  MeshChunksConfig mesh_chunks;
 
   std::string effective;  ///< As YAML: a file that gives this configuration again.
 };

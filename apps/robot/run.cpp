@@ -10,6 +10,7 @@
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/status_text.hpp"
 #include "apps/robot/wiring.hpp"
+#include "modules/mesh/ply_file.hpp"
 #include "modules/sensors/euroc_reader.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
@@ -181,6 +182,17 @@ RunSummary summarize(const RobotOptions& options, Robot& robot, double seconds, 
   return summary;
 }
 
+// What the others sent of their maps, as far as it arrived.
+void write_peer_meshes(const fs::path& folder, const TeamMeshNode& peers) {
+  for (const RobotMesh& peer : peers.snapshot()) {
+    if (peer.mesh.faces.empty()) continue;
+    make_output_folder(folder);
+    write_ply(folder / ("robot" + std::to_string(peer.robot) + ".ply"), peer.mesh);
+    log::info("robot") << "mesh of robot " << peer.robot << ": " << peer.mesh.faces.size()
+                       << " faces, in the frame of robot " << peer.anchor;
+  }
+}
+
 }  // namespace
 
 int run_robot(const RobotOptions& options, SignalWatch& signals) {
@@ -208,6 +220,8 @@ int run_robot(const RobotOptions& options, SignalWatch& signals) {
     write_results(options.output, record, summarize(options, robot, seconds, end));
     if (robot.mesh_files() != nullptr) robot.mesh_files()->finish(record.trajectory());
   });
+  if (robot.peer_meshes() != nullptr)
+    write_peer_meshes(options.output / kPeerMeshes, *robot.peer_meshes());
   write_timings(options.output / "timing.csv", robot);
   const Verdict verdict = verdict_of(end);
   say(options, end, verdict);

@@ -8,6 +8,8 @@
 #include "modules/loop_closure/keyframe_features_node.hpp"
 #include "modules/loop_closure/loop_closure_codec.hpp"
 #include "modules/loop_closure/loop_closure_node.hpp"
+#include "modules/mesh/mesh_chunks_node.hpp"
+#include "modules/mesh/mesh_codec.hpp"
 #include "modules/outlier_rejection/outlier_rejection_codec.hpp"
 #include "modules/outlier_rejection/pcm_node.hpp"
 #include "modules/place_recognition/place_recognition_codec.hpp"
@@ -42,6 +44,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     add_playback(config, options.rate, std::get<RecordedGraph>(std::move(input)));
   add_back_end(config);
   if (mapping) add_mesh_correction(config, options.output);
+  share_meshes(config.mesh_chunks);
   add_network();
   add_records();
   nodes_.push_back(bridge_);
@@ -95,6 +98,22 @@ void Robot::add_mesh_correction(const RobotConfig& config, const std::filesystem
   mesh_files_ = &add<MeshFilesNode>(false, folder,
                                     MeshFilesTopics{topics_.keyframe_odometry, topics_.trajectory,
                                                     topics_.maps, topics_.optimized_meshes});
+}
+
+// Others may hold the robot's map without having one themselves, and the other way round.
+void Robot::share_meshes(const MeshChunksConfig& config) {
+  if (config.publish && mesh_deformation_ != nullptr) {
+    auto& chunks =
+        add<MeshChunksNode>(false, config, identity_.robot, std::as_const(topics_.own_chunks));
+    topics_.optimized_meshes.subscribe([&chunks](const auto& optimized) {
+      chunks.offer(optimized->anchor, {optimized, &optimized->mesh});
+    });
+    bridge_->send(topics_.own_chunks, TopicKind::kState, TrafficCategory::kOther);
+  }
+  if (config.collect) {
+    peer_meshes_ = &add<TeamMeshNode>(false, topics_.peer_chunks);
+    bridge_->receive(topics_.peer_chunks, TopicKind::kState, TrafficCategory::kOther);
+  }
 }
 
 void Robot::add_playback(const RobotConfig& config, double rate, RecordedGraph graph) {

@@ -14,6 +14,7 @@
 #include "modules/core/frame.hpp"
 #include "modules/dense_sensing/dense_sensing_progress.hpp"
 #include "modules/loop_closure/keyframe_exchange.hpp"
+#include "modules/mesh/team_mesh_node.hpp"
 #include "modules/mesh_deformation/mesh_deformation_node.hpp"
 #include "modules/place_recognition/keyframe_bow.hpp"
 #include "modules/place_recognition/place_query.hpp"
@@ -43,6 +44,7 @@ struct Topics {
   Topic<DenseSensingProgress> dense_sensing_progress;
   Topic<MapMesh> maps;
   Topic<OptimizedMesh> optimized_meshes;
+  Topic<MeshChunk> own_chunks, peer_chunks;
   Topic<MappingProgress> mapping_progress;
   Topic<RelativePose> measured_closures;
   Topic<KeyframeBow> own_bows, peer_bows;
@@ -89,6 +91,8 @@ class Robot {
   [[nodiscard]] const SensorsNode* sensors() const { return sensors_; }  ///< Null without sensors.
   /// Null without mapping.
   [[nodiscard]] MeshFilesNode* mesh_files() { return mesh_files_; }
+  /// Null unless meshes of the other robots are collected.
+  [[nodiscard]] const TeamMeshNode* peer_meshes() const { return peer_meshes_; }
   /// True if another living robot has claimed this robot's id.
   [[nodiscard]] bool id_taken() const { return id_taken_; }
   [[nodiscard]] const NetworkInterface& interface() const { return participant_.interface(); }
@@ -104,6 +108,7 @@ class Robot {
   void add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
                    const MappingPlan& plan);
   void add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder);
+  void share_meshes(const MeshChunksConfig& config);
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_back_end(const RobotConfig& config);
   void add_network();
@@ -129,6 +134,7 @@ class Robot {
   RecorderNode* recorder_ = nullptr;
   MeshDeformationNode* mesh_deformation_ = nullptr;
   MeshFilesNode* mesh_files_ = nullptr;
+  TeamMeshNode* peer_meshes_ = nullptr;
   RobotStatusNode* status_ = nullptr;
   DdsBridge* bridge_ = nullptr;
   Supervisor supervisor_;  // last member: stops the nodes before what they use
