@@ -158,14 +158,14 @@ TEST_CASE("A small motion changes the picture by little", "[simulation][renderin
   CHECK(change < 0.25 * contrast);
 }
 
-// Largest difference between neighbours in the 3 x 3 pixels around one, along each axis.
+// Largest difference between neighbours in the 5 x 5 pixels around one, along each axis.
 Eigen::Vector2d steepest_near(const RenderedView& view, int x, int y) {
   Eigen::Vector2d steepest = Eigen::Vector2d::Zero();
   const auto difference = [&](int x0, int y0, int x1, int y1) {
     return std::abs(static_cast<double>(at(view, x1, y1) - at(view, x0, y0)));
   };
-  for (int i = -1; i <= 1; ++i) {
-    for (int j = -1; j <= 0; ++j) {
+  for (int i = -2; i <= 2; ++i) {
+    for (int j = -2; j <= 1; ++j) {
       steepest.x() = std::max(steepest.x(), difference(x + j, y + i, x + j + 1, y + i));
       steepest.y() = std::max(steepest.y(), difference(x + i, y + j, x + i, y + j + 1));
     }
@@ -182,8 +182,8 @@ double share_that_flickers(const RenderedView& a, const RenderedView& b,
   constexpr double kStep = 2.0 / 255.0;  // two grey levels: the texture's and the light's
   int flickering = 0;
   int count = 0;
-  for (int y = first_row; y < a.height - 1; ++y) {
-    for (int x = 1; x < a.width - 1; ++x, ++count) {
+  for (int y = first_row; y < a.height - 2; ++y) {
+    for (int x = 2; x < a.width - 2; ++x, ++count) {
       const std::size_t i = static_cast<std::size_t>(y * a.width + x);
       const Eigen::Vector2d slope = steepest_near(a, x, y).cwiseMax(steepest_near(b, x, y));
       const double change = std::abs(static_cast<double>(at(b, x, y) - at(a, x, y)));
@@ -244,12 +244,13 @@ TEST_CASE("Nothing flickers under a motion of a fraction of a pixel", "[simulati
       renderer.render(camera, make_pose(Eigen::Matrix3d::Identity(), eye + step), request);
   const std::vector<Eigen::Vector2d> motion = motion_of(a, camera, step);
   constexpr int kFirstRow = 125;  // the floor is 55 m away there, seen at 1.6 degrees
-  // Waves whose crest lies within the 3 x 3 pixels show less slope than they have.
-  CHECK(share_that_flickers(a, b, motion, kFirstRow) < 0.015);
-  // The bound is not idle: without filters many pixels break it.
+  // Long waves whose crest lies in the 5 x 5 pixels show less slope than they have: of 3 x 3 pixels
+  // 0.8 % break the bound, of 5 x 5 up to 0.3 %.
+  CHECK(share_that_flickers(a, b, motion, kFirstRow) < 0.005);
+  // The bound is not idle: without filters most pixels break it.
   const RenderedView raw_a = unfiltered(world, a, camera, eye);
   const RenderedView raw_b = unfiltered(world, b, camera, eye + step);
-  CHECK(share_that_flickers(raw_a, raw_b, motion, kFirstRow) > 0.1);
+  CHECK(share_that_flickers(raw_a, raw_b, motion, kFirstRow) > 0.3);
 }
 
 }  // namespace
