@@ -6,6 +6,7 @@
 #include <iostream>
 #include <map>
 
+#include "apps/output_file.hpp"
 #include "apps/pcm/closure_input.hpp"
 #include "apps/pcm/pcm_report.hpp"
 #include "apps/pcm/pcm_run.hpp"
@@ -118,22 +119,6 @@ std::ifstream opened(const fs::path& file) {
   return in;
 }
 
-void write(const fs::path& file, const auto& writer) {
-  std::ofstream out(file);
-  writer(out);
-  out.close();
-  if (!out) throw std::runtime_error(file.string() + ": cannot be written");
-}
-
-// Told before the work is done, not after.
-void check_folder_of(const fs::path& file) {
-  if (file.empty()) return;
-  const fs::path folder = fs::absolute(file).parent_path();
-  if (!fs::is_directory(folder))
-    throw std::runtime_error(file.string() + ": cannot be written, there is no folder " +
-                             folder.string());
-}
-
 km::KeyframePairs labels_beside(const fs::path& file) {
   const fs::path labels = file.string() + ".labels";
   if (!fs::exists(labels)) return {};
@@ -183,15 +168,15 @@ int main(int argc, char** argv) try {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 1;
   }
-  check_folder_of(options.json);
-  check_folder_of(options.plot);
+  km::check_output_folder(options.json);
+  km::check_output_folder(options.plot);
   options.selection.shuffle = !options.file_order;
   options.config.odometry_gate = !options.keep_contradicting;
   const std::vector<km::PcmRun> runs = run(options);
   if (!options.json.empty())
-    write(options.json, [&](std::ostream& out) { km::write_pcm_json(out, runs); });
+    km::write_output(options.json, [&](std::ostream& out) { km::write_pcm_json(out, runs); });
   if (!options.plot.empty())
-    write(options.plot, [&](std::ostream& out) { out << km::pcm_plot(runs); });
+    km::write_output(options.plot, [&](std::ostream& out) { out << km::pcm_plot(runs); });
   return 0;
 } catch (const std::exception& error) {
   std::cerr << "kimera_multi_pcm: " << error.what() << '\n';

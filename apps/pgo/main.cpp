@@ -5,6 +5,7 @@
 #include <iostream>
 #include <map>
 
+#include "apps/output_file.hpp"
 #include "apps/pgo/pgo_output.hpp"
 #include "apps/pgo/pgo_report.hpp"
 #include "apps/pgo/pgo_robust.hpp"
@@ -134,23 +135,6 @@ void define_robust(CLI::App& app, Options& options) {
                "gnc: steps of odometry inside a robot can be false, too");
 }
 
-void write(const fs::path& file, const auto& writer) {
-  if (file.empty()) return;
-  std::ofstream out(file);
-  writer(out);
-  out.close();
-  if (!out) throw std::runtime_error(file.string() + ": cannot be written");
-}
-
-// Told before the work is done, not after.
-void check_folder_of(const fs::path& file) {
-  if (file.empty()) return;
-  const fs::path folder = fs::absolute(file).parent_path();
-  if (!fs::is_directory(folder))
-    throw std::runtime_error(file.string() + ": cannot be written, there is no folder " +
-                             folder.string());
-}
-
 void check_robust(const Options& options, const CLI::App& app) {
   for (const char* name : {"--barc", "--mu-step", "--noise-scale", "--reject-odometry"})
     if (!options.robust && app.count(name) > 0)
@@ -174,7 +158,8 @@ void check(Options& options, const CLI::App& app) {
   if (options.pgo.verify && !rbcd && options.pgo.method != km::PgoMethod::kRbcdAccelerated)
     throw std::runtime_error("--verify is for --method rbcd and rbcd-accelerated only");
   if (options.optimum > 0.0) options.pgo.optimum = options.optimum;
-  for (const fs::path& file : {options.json, options.plot, options.output}) check_folder_of(file);
+  for (const fs::path& file : {options.json, options.plot, options.output})
+    km::check_output_folder(file);
   if (!options.output.empty()) km::check_output_name(options.output);
 }
 
@@ -203,15 +188,16 @@ void run_and_write_robust(const Options& options, const km::TeamGraph& graph) {
   const km::RobustRun run =
       km::run_robust(graph, options.gnc, options.pgo.run.max_rounds, km::wire_meter());
   std::cout << km::robust_text(graph, run);
-  write(options.json, [&](std::ostream& out) { km::write_robust_json(out, graph, run); });
+  km::write_output(options.json,
+                   [&](std::ostream& out) { km::write_robust_json(out, graph, run); });
   if (!options.output.empty()) km::write_poses(options.output, graph, run.T_world_kf);
 }
 
 void run_and_write(const Options& options, const km::TeamGraph& graph) {
   const km::PgoRun run = km::run_pgo(graph, options.pgo, km::wire_meter());
   std::cout << km::pgo_text(graph, run);
-  write(options.json, [&](std::ostream& out) { km::write_pgo_json(out, graph, run); });
-  write(options.plot, [&](std::ostream& out) { out << km::pgo_plot(run); });
+  km::write_output(options.json, [&](std::ostream& out) { km::write_pgo_json(out, graph, run); });
+  km::write_output(options.plot, [&](std::ostream& out) { out << km::pgo_plot(run); });
   if (!options.output.empty()) km::write_poses(options.output, graph, run.T_world_kf);
 }
 

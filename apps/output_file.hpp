@@ -1,0 +1,30 @@
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+
+namespace km {
+
+/// Writes `file` by `writer(std::ostream&)`; nothing if the name is empty. Throws
+/// std::runtime_error that names the file.
+inline void write_output(const std::filesystem::path& file, const auto& writer) {
+  if (file.empty()) return;
+  std::ofstream out(file);
+  writer(out);
+  out.close();
+  if (!out) throw std::runtime_error(file.string() + ": cannot be written");
+}
+
+/// Throws std::runtime_error if there is no folder to write `file` to (empty: none asked for): told
+/// before the work is done, not after.
+inline void check_output_folder(const std::filesystem::path& file) {
+  if (file.empty()) return;
+  const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
+  if (!std::filesystem::is_directory(folder))
+    throw std::runtime_error(file.string() + ": cannot be written, there is no folder " +
+                             folder.string());
+}
+
+}  // namespace km
