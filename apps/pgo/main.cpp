@@ -33,6 +33,8 @@ constexpr const char* kAbout =
     "over-relaxed;\n"
     "                    as published with --over-relaxation 1 or --schedule greedy\n"
     "  rbcd-accelerated  the same with Nesterov's acceleration and restarts\n"
+    "  rbcd-asynchronous all robots at once, on poses up to --max-delay rounds old; descends all\n"
+    "                    the same\n"
     "  centralized       the whole graph on one computer: Riemannian staircase of SE-Sync\n"
     "  newton            exact Newton steps of the whole team, one exchange each, by Schur\n"
     "                    complements onto public poses; stays at the rank of rigid poses\n\n"
@@ -66,6 +68,7 @@ void define(CLI::App& app, Options& options) {
       {"dgs", km::PgoMethod::kDgs},
       {"rbcd", km::PgoMethod::kRbcd},
       {"rbcd-accelerated", km::PgoMethod::kRbcdAccelerated},
+      {"rbcd-asynchronous", km::PgoMethod::kRbcdAsynchronous},
       {"centralized", km::PgoMethod::kCentralized},
       {"newton", km::PgoMethod::kNewton}};
   app.add_option("FILE", options.file, "Pose graph (*.g2o), or a folder with one file per robot")
@@ -95,9 +98,22 @@ void define(CLI::App& app, Options& options) {
                  "the largest gradient)")
       ->check(CLI::IsMember({"coloured", "greedy"}))
       ->capture_default_str();
-  app.add_option("--over-relaxation", options.pgo.over_relaxation,
-                 "rbcd, coloured: how far beyond the minimum of its block a robot may go")
+  app.add_option(
+         "--over-relaxation", options.pgo.over_relaxation,
+         "rbcd, coloured, and rbcd-asynchronous: how far beyond the minimum of its block a\n"
+         "robot may go")
       ->check(CLI::Range(1.0, 1.99))
+      ->capture_default_str();
+  app.add_option("--max-delay", options.pgo.asynchronous.max_delay,
+                 "rbcd-asynchronous: messages come up to so many rounds late, at random; a robot\n"
+                 "that knows less of a neighbour waits")
+      ->check(CLI::Range(0, 1000))
+      ->capture_default_str();
+  app.add_option("--loss", options.pgo.asynchronous.loss,
+                 "rbcd-asynchronous: this part of the messages is lost")
+      ->check(CLI::Range(0.0, 0.99))
+      ->capture_default_str();
+  app.add_option("--seed", options.pgo.asynchronous.seed, "rbcd-asynchronous: of delays and losses")
       ->capture_default_str();
   app.add_flag("--own-start", options.pgo.own_start,
                "newton: the team finds the chordal initialisation itself, in rounds that count");
@@ -139,8 +155,9 @@ void check_robust(const Options& options, const CLI::App& app) {
   for (const char* name : {"--barc", "--mu-step", "--noise-scale", "--reject-odometry"})
     if (!options.robust && app.count(name) > 0)
       throw std::runtime_error(std::string(name) + " is for --robust gnc only");
-  for (const char* name : {"--method", "--rank", "--gradient", "--schedule", "--over-relaxation",
-                           "--own-start", "--verify", "--optimum", "--plot"})
+  for (const char* name :
+       {"--method", "--rank", "--gradient", "--schedule", "--over-relaxation", "--max-delay",
+        "--loss", "--seed", "--own-start", "--verify", "--optimum", "--plot"})
     if (options.robust && app.count(name) > 0)
       throw std::runtime_error(std::string(name) + " does not go with --robust gnc");
 }
@@ -151,8 +168,13 @@ void check(Options& options, const CLI::App& app) {
   options.pgo.greedy = options.schedule == "greedy";
   if (options.pgo.greedy && !rbcd)
     throw std::runtime_error("--schedule greedy is for --method rbcd only");
-  if (app.count("--over-relaxation") > 0 && (!rbcd || options.pgo.greedy))
-    throw std::runtime_error("--over-relaxation is for --method rbcd with coloured schedule only");
+  const bool asynchronous = options.pgo.method == km::PgoMethod::kRbcdAsynchronous;
+  if (app.count("--over-relaxation") > 0 && !asynchronous && (!rbcd || options.pgo.greedy))
+    throw std::runtime_error(
+        "--over-relaxation is for --method rbcd with coloured schedule and rbcd-asynchronous only");
+  for (const char* name : {"--max-delay", "--loss", "--seed"})
+    if (!asynchronous && app.count(name) > 0)
+      throw std::runtime_error(std::string(name) + " is for --method rbcd-asynchronous only");
   if (options.pgo.own_start && options.pgo.method != km::PgoMethod::kNewton)
     throw std::runtime_error("--own-start is for --method newton only");
   if (options.pgo.verify && !rbcd && options.pgo.method != km::PgoMethod::kRbcdAccelerated)

@@ -21,6 +21,12 @@ BlockDescentOptions descent_options(const PgoOptions& options) {
           .accelerated = options.method == PgoMethod::kRbcdAccelerated};
 }
 
+AsynchronousOptions asynchronous_options(const PgoOptions& options) {
+  AsynchronousOptions result = options.asynchronous;
+  result.max_over_relaxation = options.over_relaxation;
+  return result;
+}
+
 std::unique_ptr<TeamSolver> make_solver(const TeamGraph& graph, const std::vector<SE3>& start,
                                         const PgoOptions& options) {
   switch (options.method) {
@@ -32,6 +38,9 @@ std::unique_ptr<TeamSolver> make_solver(const TeamGraph& graph, const std::vecto
     case PgoMethod::kRbcdAccelerated:
       return std::make_unique<BlockDescentTeam>(graph, lift(start, options.rank),
                                                 descent_options(options));
+    case PgoMethod::kRbcdAsynchronous:
+      return std::make_unique<AsynchronousTeam>(graph, lift(start, options.rank),
+                                                asynchronous_options(options));
     case PgoMethod::kCentralized:
       return std::make_unique<CentralTeam>(graph, lift(start, 3));
     case PgoMethod::kNewton:
@@ -88,6 +97,8 @@ const char* to_string(PgoMethod method) {
       return "rbcd";
     case PgoMethod::kRbcdAccelerated:
       return "rbcd-accelerated";
+    case PgoMethod::kRbcdAsynchronous:
+      return "rbcd-asynchronous";
     case PgoMethod::kCentralized:
       return "centralized";
     case PgoMethod::kNewton:

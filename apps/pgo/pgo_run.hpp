@@ -5,11 +5,20 @@
 #include <vector>
 
 #include "modules/pose_graph/certificate.hpp"
+#include "modules/pose_graph/team/asynchronous_team.hpp"
 #include "modules/pose_graph/team/team_verification.hpp"
 
 namespace km {
 
-enum class PgoMethod { kLocal, kDgs, kRbcd, kRbcdAccelerated, kCentralized, kNewton };
+enum class PgoMethod {
+  kLocal,
+  kDgs,
+  kRbcd,
+  kRbcdAccelerated,
+  kRbcdAsynchronous,
+  kCentralized,
+  kNewton
+};
 
 [[nodiscard]] const char* to_string(PgoMethod method);
 
@@ -17,11 +26,12 @@ struct PgoOptions {
   PgoMethod method = PgoMethod::kRbcd;
   Eigen::Index rank = 5;
   TeamRunOptions run = {.max_rounds = 100};
-  bool greedy = false;                 ///< rbcd only.
-  double over_relaxation = 1.95;       ///< rbcd only, at most; 1: as published.
-  bool own_start = false;              ///< newton only: the team finds the chordal start itself.
-  bool verify = false;                 ///< rbcd only: the staircase over the rank.
-  std::optional<double> optimum = {};  ///< Computed if not given.
+  bool greedy = false;            ///< rbcd only.
+  double over_relaxation = 1.95;  ///< rbcd and rbcd-asynchronous only, at most; 1: as published.
+  AsynchronousOptions asynchronous = {};  ///< rbcd-asynchronous only.
+  bool own_start = false;                 ///< newton only: the team finds the chordal start itself.
+  bool verify = false;                    ///< rbcd only: the staircase over the rank.
+  std::optional<double> optimum = {};     ///< Computed if not given.
 };
 
 /// What one method did to one graph.

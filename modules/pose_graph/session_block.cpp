@@ -102,20 +102,7 @@ void SessionBlock::align(const AlignmentTolerance& tolerance,
 
 TruncatedNewtonResult SessionBlock::update(const TruncatedNewtonOptions& options,
                                            double relaxation) {
-  if (fixed_changed_) problem_.set_fixed(fixed_);
-  fixed_changed_ = false;
-  TruncatedNewtonResult result = minimise(problem_, X_, options);
-  if (relaxation <= 1.0) {
-    X_ = result.X;
-    return result;
-  }
-  const LiftedPoses step = project_tangent(result.X, result.X - X_);
-  LiftedPoses beyond = retract(result.X, (relaxation - 1.0) * step);
-  const double cost = problem_.cost(beyond);
-  if (cost < result.initial_cost) {
-    result.X = std::move(beyond);
-    result.cost = cost;
-  }
+  TruncatedNewtonResult result = minimise_beyond(problem(), X_, options, relaxation);
   X_ = result.X;
   return result;
 }
@@ -136,10 +123,14 @@ void SessionBlock::offer(LiftedPoses X) {
   if (problem_.cost(X) < problem_.cost(X_)) X_ = std::move(X);
 }
 
-double SessionBlock::gradient_norm() {
+const QuadraticProblem& SessionBlock::problem() {
   if (fixed_changed_) problem_.set_fixed(fixed_);
   fixed_changed_ = false;
-  return project_tangent(X_, problem_.euclidean_gradient(X_)).norm();
+  return problem_;
+}
+
+double SessionBlock::gradient_norm() {
+  return project_tangent(X_, problem().euclidean_gradient(X_)).norm();
 }
 
 double SessionBlock::share_of_cost(const std::set<RobotId>& counted) const {

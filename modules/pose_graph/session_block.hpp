@@ -36,11 +36,7 @@ class SessionBlock {
   /// Precondition: at least one neighbour was set.
   void align(const AlignmentTolerance& tolerance, const TruncatedNewtonOptions& options);
 
-  /// Lowers the cost of the block, all neighbours fixed: towards its minimum, and beyond by
-  /// `relaxation` - 1 times the way if the cost there is still below that at the start. For an
-  /// exact minimum of a quadratic it is for every relaxation in (0, 2): successive over-relaxation,
-  /// by which a sweep gets over its slow modes in a fraction of the rounds (Ostrowski; Young,
-  /// "Iterative Solution of Large Linear Systems", 1971, Ch. 4).
+  /// Lowers the cost of the block, all neighbours fixed, by minimise_beyond().
   /// Precondition: all neighbours were set.
   TruncatedNewtonResult update(const TruncatedNewtonOptions& options, double relaxation);
 
@@ -61,6 +57,8 @@ class SessionBlock {
   void move_to(LiftedPoses X) { X_ = std::move(X); }
   /// Of the Riemannian gradient of the block. Precondition: all neighbours were set.
   [[nodiscard]] double gradient_norm();
+  /// The block's cost, neighbours as last heard.
+  [[nodiscard]] const QuadraticProblem& problem();
 
  private:
   struct Slots {

@@ -118,4 +118,18 @@ TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
   return result;
 }
 
+TruncatedNewtonResult minimise_beyond(const QuadraticProblem& problem, const LiftedPoses& X,
+                                      const TruncatedNewtonOptions& options, double relaxation) {
+  TruncatedNewtonResult result = minimise(problem, X, options);
+  if (relaxation <= 1.0) return result;
+  const LiftedPoses step = project_tangent(result.X, result.X - X);
+  LiftedPoses beyond = retract(result.X, (relaxation - 1.0) * step);
+  const double cost = problem.cost(beyond);
+  if (cost < result.initial_cost) {
+    result.X = std::move(beyond);
+    result.cost = cost;
+  }
+  return result;
+}
+
 }  // namespace km

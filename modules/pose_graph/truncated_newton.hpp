@@ -33,4 +33,14 @@ struct [[nodiscard]] TruncatedNewtonResult {
 [[nodiscard]] TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
                                              const TruncatedNewtonOptions& options);
 
+/// minimise(), and beyond the minimum by `relaxation` - 1 times the way to it if the cost there is
+/// still below that at the start. For an exact minimum of a quadratic it is for every relaxation in
+/// (0, 2): successive over-relaxation, by which sweeps over blocks get over their slow modes in a
+/// fraction of the rounds (Ostrowski; Young, "Iterative Solution of Large Linear Systems", 1971,
+/// Ch. 4). At most 1: plain minimise().
+[[nodiscard]] TruncatedNewtonResult minimise_beyond(const QuadraticProblem& problem,
+                                                    const LiftedPoses& X,
+                                                    const TruncatedNewtonOptions& options,
+                                                    double relaxation);
+
 }  // namespace km

@@ -57,7 +57,8 @@ TEST_CASE("Every method runs from the command line and says what it reached", "[
   const auto json = folder.path() / "out.json";
   const std::string method =
       GENERATE("local", "dgs", "rbcd", "rbcd-accelerated --verify", "newton", "centralized",
-               "rbcd --schedule greedy", "rbcd --over-relaxation 1");
+               "rbcd --schedule greedy", "rbcd --over-relaxation 1",
+               "rbcd-asynchronous --max-delay 2 --loss 0.1 --seed 4");
   CAPTURE(method);
   const CommandResult result = run_command(kTool + graph.string() + " --robots 2 --method " +
                                            method + " --json " + json.string());
@@ -99,6 +100,8 @@ TEST_CASE("What cannot be done is told with the reason", "[pgo]") {
        {"FILE --robots 2 --method centralized --schedule greedy", "--schedule greedy is for"},
        {"FILE --method dgs --over-relaxation 1.5", "--over-relaxation is for"},
        {"FILE --method dgs --verify", "--verify is for"},
+       {"FILE --max-delay 2", "--max-delay is for --method rbcd-asynchronous only"},
+       {"FILE --method rbcd-asynchronous --loss 1", "--loss"},
        {"FILE --json /nowhere/out.json", "there is no folder /nowhere"},
        {"FILE --output poses.txt", "--output writes *.tum or *.g2o"},
        {"FILE --partition FILE", "not two fields"},

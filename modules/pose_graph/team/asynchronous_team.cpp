@@ -1,0 +1,96 @@
+#include "modules/pose_graph/team/asynchronous_team.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+namespace km {
+namespace {
+
+// Of updates whose missed and concurrent changes are made up for; see the class comment.
+double weight_for(int max_delay) {
+  constexpr double kSurplus = 1.01;
+  return kSurplus * (1.0 + 2.0 * max_delay);
+}
+
+const AsynchronousOptions& checked(const AsynchronousOptions& options) {
+  if (options.max_delay < 0)
+    throw std::invalid_argument("AsynchronousTeam: max_delay " + std::to_string(options.max_delay) +
+                                " is negative");
+  if (!(options.loss >= 0.0 && options.loss < 1.0))
+    throw std::invalid_argument("AsynchronousTeam: loss " + std::to_string(options.loss) +
+                                " is not in [0, 1)");
+  return options;
+}
+
+}  // namespace
+
+AsynchronousTeam::AsynchronousTeam(const TeamGraph& graph, const LiftedPoses& start,
+                                   const AsynchronousOptions& options)
+    : options_(checked(options)), rng_(options.seed) {
+  for (std::size_t k = 0; k < graph.robots(); ++k) {
+    const RobotPart part = part_of(graph, k);
+    const LiftedPoses X = start.middleCols(4 * graph.first[k], 4 * part.poses);
+    Robot robot{
+        .block = ProximalBlock(X, part.own_edges, part.edges_to, weight_for(options.max_delay)),
+        .heard = {}};
+    for (const auto& [peer, edges] : part.edges_to) robot.heard.emplace(peer, 0);
+    robots_.push_back(std::move(robot));
+  }
+}
+
+bool AsynchronousTeam::step(RoundMeter& meter) {
+  ++round_;
+  deliver(meter);
+  const double relaxation =
+      growing_relaxation(static_cast<std::uint32_t>(round_) - 1, options_.max_over_relaxation);
+  for (std::size_t k = 0; k < robots_.size(); ++k) {
+    if (!may_move(robots_[k])) continue;
+    meter.run(k, [&] { (void)robots_[k].block.update(options_.block_update, relaxation); });
+    ++updates_;
+  }
+  for (std::size_t k = 0; k < robots_.size(); ++k) send(k, meter);
+  return true;
+}
+
+// Poses that were overtaken by newer ones are dropped.
+void AsynchronousTeam::deliver(RoundMeter& meter) {
+  for (const Letter& letter : letters_) {
+    if (letter.due > round_) continue;
+    Robot& receiver = robots_[letter.receiver];
+    const RobotId sender = letter.poses.sender.robot;
+    int& heard = receiver.heard.at(sender);
+    const int told = static_cast<int>(letter.poses.round);
+    if (told <= heard) continue;
+    heard = told;
+    meter.run(letter.receiver, [&] {
+      (void)receiver.block.block().set_neighbour(sender, letter.poses.keyframes,
+                                                 restore_stiefel(letter.poses.X));
+    });
+  }
+  std::erase_if(letters_, [&](const Letter& letter) { return letter.due <= round_; });
+}
+
+// Poses told in the round before lack nothing. In round 1 nobody moves, alone or not.
+bool AsynchronousTeam::may_move(const Robot& robot) const {
+  return round_ > 1 && std::all_of(robot.heard.begin(), robot.heard.end(), [&](const auto& entry) {
+           return entry.second > 0 && round_ - 1 - entry.second <= options_.max_delay;
+         });
+}
+
+// Also by a robot that has not moved: what it told before may be lost.
+void AsynchronousTeam::send(std::size_t k, RoundMeter& meter) {
+  Robot& robot = robots_[k];
+  PublicPoses poses{.sender = {.robot = static_cast<RobotId>(k)},
+                    .round = static_cast<std::uint32_t>(round_)};
+  poses.keyframes = robot.block.block().public_keyframes();
+  poses.X = meter.run(k, [&] { return robot.block.block().round_public_poses(); });
+  meter.sent(poses);
+  for (const auto& [peer, heard] : robot.heard) {
+    const bool lost = std::bernoulli_distribution(options_.loss)(rng_);
+    const int delay = std::uniform_int_distribution(0, options_.max_delay)(rng_);
+    if (!lost) letters_.push_back({round_ + 1 + delay, peer, poses});
+  }
+}
+
+}  // namespace km
