@@ -16,7 +16,8 @@ void write_tum(const std::filesystem::path& file, const std::vector<SE3>& T_worl
   for (std::size_t i = 0; i < T_world_kf.size(); ++i) {
     out << i;
     for (const double c : T_world_kf[i].translation()) out << ' ' << c;
-    for (const double c : Eigen::Quaterniond(T_world_kf[i].linear()).coeffs()) out << ' ' << c;
+    const Eigen::Quaterniond q(T_world_kf[i].linear());
+    for (const double c : q.coeffs()) out << ' ' << c;
     out << '\n';
   }
   out.close();

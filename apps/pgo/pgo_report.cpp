@@ -18,8 +18,10 @@ std::string digits(double value, int precision) {
   return text.str();
 }
 
+// Relative to the optimum, or to what rounding leaves of it where there is no noise.
 double gap(const PgoRun& run, const TeamRound& round) {
-  return (round.cost - run.optimum) / run.optimum;
+  constexpr double kNoCost = 1e-9;
+  return (round.cost - run.optimum) / std::max(run.optimum, kNoCost);
 }
 
 std::vector<std::string> row(const std::string& name, const PgoRun& run, std::size_t k) {

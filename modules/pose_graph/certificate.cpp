@@ -102,7 +102,7 @@ Certificate certify(const QuadraticProblem& problem, const LiftedPoses& X) {
                                                   static_cast<unsigned>(X.rows()));
   Certificate certificate;
   certificate.lambda_min = 1.0 / largest.value - factor.shift;
-  const double bound = problem.cost(best) + certificate.lambda_min * trace;
+  const double bound = std::max(0.0, problem.cost(best) + certificate.lambda_min * trace);
   const double scale = std::max(cost, kRounding * degree.x() * trace);
   certificate.relative_gap = std::max(0.0, (cost - bound) / scale);
   certificate.certified = certificate.relative_gap <= kCertifiedGap;

@@ -25,7 +25,7 @@ struct [[nodiscard]] Certificate {
 /// Bounds from below what any feasible point of any rank can cost, and with it how far feasible `X`
 /// lies above: with the translations eliminated, tr(Q Z) = tr(Lambda) + tr(S Z) >= tr(Lambda) +
 /// 3n lambda_min for every feasible Z, whose trace is 3n; at a critical point tr(Lambda) is the
-/// cost. S is taken at the best translations for the rotations of `X`.
+/// cost. Nothing costs less than 0. S is taken at the best translations for the rotations of `X`.
 ///
 /// S, shifted on the rotations until a sparse Cholesky factorisation finds it definite (the test of
 /// Rosen, "Accelerating Certifiable Estimation with Preconditioned Eigensolvers", RA-L 2022), gives

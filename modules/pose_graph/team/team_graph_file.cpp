@@ -119,6 +119,7 @@ TeamGraph deal(const G2oGraph& graph, const std::map<KeyframeId, std::size_t>& r
     poses_of_robot[robot->second].push_back(id);
   }
   if (poses_of_robot.empty()) throw std::runtime_error(file + ": no poses");
+  if (graph.edges.empty()) throw std::runtime_error(file + ": no edge, so nothing to optimise");
   if (poses_of_robot.rbegin()->first + 1 != poses_of_robot.size())
     throw std::runtime_error(file + ": robots must be 0 to " +
                              std::to_string(poses_of_robot.size() - 1) + " for " +
@@ -142,7 +143,8 @@ TeamGraph deal(const G2oGraph& graph, const std::map<KeyframeId, std::size_t>& r
 
 std::map<KeyframeId, std::size_t> read_partition(const std::filesystem::path& file) {
   std::ifstream in(file);
-  if (!in) throw std::runtime_error(file.string() + ": cannot be opened");
+  if (!in || std::filesystem::is_directory(file))
+    throw std::runtime_error(file.string() + ": cannot be opened");
   const std::string text(std::istreambuf_iterator<char>(in), {});
   std::map<KeyframeId, std::size_t> robot_of;
   for (const TextRow& row : split_rows(text)) {
