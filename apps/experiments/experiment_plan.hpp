@@ -1,0 +1,77 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "apps/experiments/experiment_config.hpp"
+#include "apps/experiments/step.hpp"
+
+namespace km {
+
+/// Where things are.
+struct ExperimentPaths {
+  std::filesystem::path programs;  ///< Folder of the other programs.
+  std::filesystem::path data;      ///< Recordings and results of the teams' runs.
+  std::filesystem::path results;
+  std::filesystem::path graphs;  ///< Recorded pose graphs.
+  std::filesystem::path euroc;   ///< EuRoC's recordings, see find_recorded_flight(); or empty.
+};
+
+/// Name, and what it is about.
+struct ExperimentName {
+  const char* name;
+  const char* about;
+};
+
+inline constexpr std::array kExperiments = {
+    ExperimentName{"pcm", "outlier rejection: time and clique against the size of the graph"},
+    ExperimentName{"trajectory", "errors and costs of local, distributed and central optimisation"},
+    ExperimentName{"resources", "bytes, rounds and seconds; what the robots' processors do"},
+    ExperimentName{"mesh", "error of the meshes before and after their correction"},
+    ExperimentName{"semantics", "right labels before and after the correction"}};
+
+/// Files of a world, as the steps make them.
+struct WorldFiles {
+  std::filesystem::path recordings;  ///< Folder with simulation.json, if the world is simulated.
+  std::filesystem::path team_file;
+  std::filesystem::path run;        ///< Results of the team, a folder per robot.
+  std::filesystem::path team_json;  ///< Its tables.
+  bool original = false;            ///< EuRoC's own images.
+};
+
+[[nodiscard]] WorldFiles world_files(const WorldConfig& world, const ExperimentPaths& paths);
+
+/// What a method makes of the graph of a world.
+struct PgoFiles {
+  std::filesystem::path json, poses;
+};
+
+[[nodiscard]] std::filesystem::path graph_folder(const WorldConfig& world,
+                                                 const ExperimentPaths& paths);
+[[nodiscard]] PgoFiles pgo_files(const WorldConfig& world, const PgoMethodConfig& method,
+                                 const ExperimentPaths& paths);
+
+struct PcmFiles {
+  std::filesystem::path json, plot;
+};
+[[nodiscard]] PcmFiles pcm_files(unsigned seed, const ExperimentPaths& paths);
+
+/// PNG of the meshes of all robots.
+[[nodiscard]] std::filesystem::path picture_file(const WorldConfig& world, bool corrected,
+                                                 const ExperimentPaths& paths);
+
+/// The steps of an experiment, each after those it needs. What is there decides how: recordings and
+/// team results that were made elsewhere are used as they are. Nothing is written.
+/// Precondition: `experiment` is one of kExperiments.
+[[nodiscard]] std::vector<Step> plan_experiment(const std::string& experiment,
+                                                const ExperimentConfig& config,
+                                                const ExperimentPaths& paths);
+
+/// Those of several experiments, common ones once.
+[[nodiscard]] std::vector<Step> plan_experiments(const std::vector<std::string>& experiments,
+                                                 const ExperimentConfig& config,
+                                                 const ExperimentPaths& paths);
+
+}  // namespace km

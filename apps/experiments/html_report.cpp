@@ -1,0 +1,196 @@
+#include <array>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <stdexcept>
+
+#include "apps/experiments/report_document.hpp"
+#include "modules/core/xml_text.hpp"
+
+namespace km {
+namespace {
+
+constexpr const char* kStyle = R"(
+:root { --ink: #1c2330; --soft: #68707d; --line: #e2e5ea; --accent: #1f5fa8; --band: #f6f8fa; }
+* { box-sizing: border-box; }
+body { margin: 0; color: var(--ink); background: #fff;
+  font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif; }
+main { max-width: 1120px; margin: 0 auto; padding: 48px 28px 96px; }
+h1 { font-size: 30px; line-height: 1.2; margin: 0 0 10px; letter-spacing: -.01em; }
+h2 { font-size: 22px; margin: 64px 0 12px; padding-top: 14px; border-top: 2px solid var(--ink); }
+p { max-width: 78ch; margin: 12px 0; }
+.lead { color: var(--soft); font-size: 17px; }
+nav { margin: 26px 0 0; padding: 14px 18px; background: var(--band); border-radius: 8px; }
+nav a { color: var(--accent); text-decoration: none; margin-right: 22px; white-space: nowrap; }
+nav a:hover { text-decoration: underline; }
+.scroll { overflow-x: auto; margin: 26px 0; }
+table { border-collapse: collapse; font-size: 14.5px; font-variant-numeric: tabular-nums; }
+caption { text-align: left; font-weight: 600; padding: 0 0 8px; max-width: 78ch; }
+th, td { padding: 6px 12px; text-align: right; white-space: nowrap; vertical-align: top; }
+th { font-weight: 600; color: var(--soft); vertical-align: bottom; }
+th:first-child, td:first-child { text-align: left; padding-left: 2px; }
+thead tr:last-child th { border-bottom: 1px solid var(--ink); }
+thead th.group { text-align: center; border-bottom: 1px solid var(--line); color: var(--ink); }
+tbody td { border-bottom: 1px solid var(--line); }
+tbody tr:hover { background: var(--band); }
+.paper { display: block; color: var(--soft); font-size: 12.5px; line-height: 1.3; }
+.best { font-weight: 700; }
+.met { color: #14713d; font-weight: 600; }
+.missed { color: #b3261e; font-weight: 600; }
+.wide td { white-space: normal; text-align: left; }
+.wide th { text-align: left; }
+.note { color: var(--soft); font-size: 13.5px; margin: -14px 0 26px; }
+.figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(300px, 1fr)); gap: 26px;
+  margin: 26px 0; }
+.figures.one { grid-template-columns: minmax(300px, 860px); }
+figure { margin: 0; }
+figure svg, figure img { width: 100%; height: auto; display: block; border: 1px solid var(--line);
+  border-radius: 6px; }
+figcaption { color: var(--soft); font-size: 13.5px; margin-top: 6px; }
+details { margin: 22px 0; border: 1px solid var(--line); border-radius: 8px; padding: 8px 14px; }
+summary { cursor: pointer; color: var(--accent); font-size: 14.5px; }
+details table { font-size: 12.5px; margin-top: 8px; }
+details td, details th { white-space: normal; text-align: left; }
+code { font: 12px/1.45 ui-monospace, "DejaVu Sans Mono", monospace; overflow-wrap: anywhere; }
+@media print { details { break-inside: auto; } nav { display: none; } tr { break-inside: avoid; } }
+)";
+
+std::string base64(const std::string& bytes) {
+  constexpr const char* kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      group = (group << 8) | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+    for (std::size_t k = 0; k < 4; ++k)
+      text += i + k > bytes.size() ? '=' : kDigits[(group >> (18 - 6 * k)) & 63];
+  }
+  return text;
+}
+
+std::string contents_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw std::runtime_error(file.string() + ": cannot be read");
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+// The value of an attribute of the document's first element; empty without it.
+std::string attribute(const std::string& svg, const std::string& name) {
+  const std::size_t end = svg.find('>');
+  const std::size_t at = svg.find(' ' + name + "=\"");
+  if (at == svg.npos || at > end) return {};
+  const std::size_t begin = at + name.size() + 3;
+  return svg.substr(begin, svg.find('"', begin) - begin);
+}
+
+// Drawings have a size of their own: with a view box they take that of the page.
+std::string scalable(std::string svg) {
+  const std::size_t begin = svg.find("<svg");
+  if (begin == svg.npos) return {};
+  svg.erase(0, begin);
+  if (attribute(svg, "viewBox").empty())
+    svg.insert(4, " viewBox=\"0 0 " + attribute(svg, "width") + ' ' + attribute(svg, "height") +
+                      "\" role=\"img\"");
+  return svg;
+}
+
+const char* style_class(ReportCell::Style style) {
+  constexpr std::array kClasses = {"", " class=\"best\"", " class=\"met\"", " class=\"missed\""};
+  return kClasses.at(static_cast<std::size_t>(style));
+}
+
+class HtmlWriter {
+ public:
+  void operator()(const ReportParagraph& paragraph) {
+    out_ << "<p>" << xml_escaped(paragraph.text) << "</p>\n";
+  }
+
+  void operator()(const ReportTable& table) {
+    out_ << "<div class=\"scroll\"><table>\n<caption>" << xml_escaped(table.caption)
+         << "</caption>\n<thead>\n";
+    if (!table.groups.empty()) {
+      out_ << "<tr>";
+      for (const ColumnGroup& group : table.groups)
+        out_ << "<th" << (group.title.empty() ? "" : " class=\"group\"") << " colspan=\""
+             << group.columns << "\">" << xml_escaped(group.title) << "</th>";
+      out_ << "</tr>\n";
+    }
+    out_ << "<tr>";
+    for (const std::string& column : table.columns)
+      out_ << "<th>" << xml_escaped(column) << "</th>";
+    out_ << "</tr>\n</thead>\n<tbody>\n";
+    for (const auto& row : table.rows) {
+      out_ << "<tr>";
+      for (const ReportCell& cell : row) write(cell);
+      out_ << "</tr>\n";
+    }
+    out_ << "</tbody>\n</table></div>\n";
+    if (!table.note.empty()) out_ << "<p class=\"note\">" << xml_escaped(table.note) << "</p>\n";
+  }
+
+  void operator()(const ReportFigures& row) {
+    out_ << "<div class=\"figures" << (row.figures.size() == 1 ? " one" : "") << "\">\n";
+    for (const ReportFigure& figure : row.figures) {
+      out_ << "<figure>\n";
+      if (!figure.svg.empty())
+        out_ << scalable(figure.svg);
+      else
+        out_ << "<img alt=\"" << xml_escaped(figure.caption) << "\" src=\"data:image/png;base64,"
+             << base64(contents_of(figure.png)) << "\"/>\n";
+      out_ << "<figcaption>" << xml_escaped(figure.caption) << "</figcaption>\n</figure>\n";
+    }
+    out_ << "</div>\n";
+  }
+
+  void operator()(const ReportProvenance& provenance) {
+    out_ << "<details><summary>How these numbers were obtained</summary>\n<table>\n<thead><tr>"
+            "<th>step</th><th>command</th><th>when</th><th>machine, commit</th></tr></thead>\n"
+            "<tbody>\n";
+    for (const auto& row : provenance.rows)
+      out_ << "<tr><td>" << xml_escaped(row.what) << "</td><td><code>" << xml_escaped(row.command)
+           << "</code></td><td>" << xml_escaped(row.when) << "</td><td>" << xml_escaped(row.machine)
+           << "</td></tr>\n";
+    out_ << "</tbody></table></details>\n";
+  }
+
+  void write(const ReportSection& section) {
+    out_ << "<section id=\"" << section.id << "\">\n<h2>" << xml_escaped(section.title)
+         << "</h2>\n";
+    for (const ReportBlock& block : section.blocks) std::visit(*this, block);
+    out_ << "</section>\n";
+  }
+
+  std::string text() const { return out_.str(); }
+
+ private:
+  void write(const ReportCell& cell) {
+    out_ << "<td" << style_class(cell.style) << '>' << xml_escaped(cell.text);
+    if (!cell.paper.empty())
+      out_ << "<span class=\"paper\">" << xml_escaped(cell.paper) << "</span>";
+    out_ << "</td>";
+  }
+
+  std::ostringstream out_;
+};
+
+}  // namespace
+
+std::string to_html(const ReportDocument& document) {
+  std::ostringstream out;
+  out << "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
+         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>"
+      << xml_escaped(document.title) << "</title>\n<style>" << kStyle
+      << "</style>\n</head>\n<body>\n<main>\n<h1>" << xml_escaped(document.title)
+      << "</h1>\n<p class=\"lead\">" << xml_escaped(document.lead) << "</p>\n<nav>";
+  for (const ReportSection& section : document.sections)
+    out << "<a href=\"#" << section.id << "\">" << xml_escaped(section.title) << "</a> ";
+  out << "</nav>\n";
+  HtmlWriter writer;
+  for (const ReportSection& section : document.sections) writer.write(section);
+  out << writer.text() << "</main>\n</body>\n</html>\n";
+  return out.str();
+}
+
+}  // namespace km

@@ -1,0 +1,167 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <exception>
+#include <filesystem>
+#include <iostream>
+
+#include "apps/experiments/report.hpp"
+#include "apps/experiments/run_steps.hpp"
+#include "apps/experiments/step_record.hpp"
+#include "apps/program_folder.hpp"
+#include "apps/team/text_table.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kAbout =
+    "The experiments of the Kimera-Multi paper: makes their inputs, runs the robots and the\n"
+    "optimisers, and writes every table and figure beside the paper's.\n\n"
+    "An experiment is a list of steps, each a command of another program of this system; `list`\n"
+    "shows them. A step is done once: its result is kept with the command, the time, the machine\n"
+    "and the commit, and made anew only if its command or its inputs change. Ctrl-C keeps what is\n"
+    "done; the same command goes on. Recordings and results of teams that are in --data already\n"
+    "are used as they are.\n\n"
+    "Configuration: config/experiments/*.yaml (worlds, seeds, methods).\n"
+    "Exit code: 0 if all is done, 1 for input that cannot be used, 3 if a step failed or lacks\n"
+    "something, 130 if it was stopped.\n\n"
+    "Examples:\n"
+    "  kimera_multi_experiments list\n"
+    "  kimera_multi_experiments run all --quick               # small, minutes on two cores\n"
+    "  kimera_multi_experiments run pcm --graphs ~/graphs     # manhattan.g2o is there\n"
+    "  kimera_multi_experiments run trajectory --euroc ~/euroc\n"
+    "  kimera_multi_experiments report\n\n"
+    "--euroc DIR is for the Vicon rooms: of V1_01 to V2_03 either the original folders, whose\n"
+    "images are then used, or only their true poses and inertial data (CSV, perhaps gzipped), on\n"
+    "which rooms are rendered.";
+
+struct Options {
+  fs::path data = "experiments_data", results, graphs, euroc, config;
+  fs::path programs = km::program_folder();
+  std::vector<std::string> names;
+  bool quick = false, again = false;
+};
+
+std::vector<std::string> all_names() {
+  std::vector<std::string> names;
+  for (const km::ExperimentName& experiment : km::kExperiments) names.emplace_back(experiment.name);
+  return names;
+}
+
+void define(CLI::App& app, Options& options) {
+  app.add_option("--data", options.data, "Recordings, and the results of teams on them")
+      ->capture_default_str();
+  app.add_option("--results", options.results, "Numbers, logs and the report (default: results)");
+  app.add_option("--graphs", options.graphs, "Recorded pose graphs (default: the folder of --data)")
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--euroc", options.euroc, "EuRoC's recordings, see above")
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--config", options.config, "Folder of the experiments' configuration")
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--programs", options.programs,
+                 "Folder of the other programs (default: this one's)")
+      ->check(CLI::ExistingDirectory);
+  app.add_flag("--quick", options.quick,
+               "Small versions of all: other data and results, in quick/ below the folders");
+}
+
+fs::path shipped_config() {
+  const fs::path program = km::program_folder();
+  for (const fs::path& place :
+       {fs::path("config/experiments"), program / "../../config/experiments",
+        program / "../share/kimera_multi/experiments"})
+    if (fs::is_directory(place)) return place.lexically_normal();
+  throw std::runtime_error("no config/experiments here or near the program; give --config");
+}
+
+km::ExperimentPaths paths_of(const Options& options) {
+  const fs::path below = options.quick ? "quick" : "";
+  const fs::path results = options.results.empty() ? "results" / below : options.results;
+  return {.programs = options.programs,
+          .data = (options.data / below).lexically_normal(),
+          .results = results,
+          .graphs = options.graphs.empty() ? options.data : options.graphs,
+          .euroc = options.euroc};
+}
+
+std::vector<std::string> chosen(const Options& options) {
+  const auto all = std::find(options.names.begin(), options.names.end(), "all");
+  return all == options.names.end() && !options.names.empty() ? options.names : all_names();
+}
+
+void list(const km::ExperimentConfig& config, const km::ExperimentPaths& paths) {
+  for (const km::ExperimentName& experiment : km::kExperiments) {
+    std::cout << experiment.name << ": " << experiment.about << '\n';
+    std::vector<std::vector<std::string>> rows{{"  step", "state", "last took"}};
+    std::string missing;
+    for (const km::Step& step : km::plan_experiment(experiment.name, config, paths)) {
+      const km::StepState state = km::state_of(step, paths.results);
+      const auto record = km::read_record(paths.results, step.name);
+      rows.push_back(
+          {"  " + step.name, km::to_string(state),
+           record && record->seconds > 0.0 ? km::fixed(record->seconds, 1) + " s" : "-"});
+      if (state == km::StepState::kMissing)
+        missing += "  " + step.name + ": " + step.missing + '\n';
+    }
+    std::cout << km::align_columns(rows) << missing << '\n';
+  }
+  std::cout << "data: " << paths.data.string() << ", results: " << paths.results.string() << '\n';
+}
+
+void print(const km::ReportSummary& summary) {
+  std::cout << "report: " << summary.html.string() << " and " << summary.markdown.string() << "; "
+            << summary.met << " of " << summary.targets << " numbers to reach are met\n";
+}
+
+int run(const Options& options, const km::ExperimentConfig& config,
+        const km::ExperimentPaths& paths) {
+  km::SignalWatch signals;
+  const std::vector<km::Step> steps = km::plan_experiments(chosen(options), config, paths);
+  km::StepDisplay display = km::StepDisplay::standard_output();
+  const km::StepsOutcome outcome =
+      km::run_steps(steps, paths.results, options.again, signals, display);
+  std::cout << outcome.made << " steps made, " << outcome.kept << " were done before\n";
+  for (const std::string& problem : outcome.problems) std::cerr << problem << '\n';
+  print(km::write_report(config, paths));
+  if (outcome.stopped) return 130;
+  return outcome.problems.empty() ? 0 : 3;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  CLI::App app(kAbout);
+  Options options;
+  define(app, options);
+  app.require_subcommand(1);
+  app.fallthrough();
+  auto* const list_command =
+      app.add_subcommand("list", "Shows the experiments, their steps, and what is done");
+  auto* const run_command = app.add_subcommand("run", "Does what is not done yet, then reports");
+  std::vector<std::string> names = all_names();
+  names.emplace_back("all");
+  run_command
+      ->add_option("NAME", options.names, "pcm, trajectory, resources, mesh, semantics, or all")
+      ->required()
+      ->check(CLI::IsMember(names));
+  run_command->add_flag("--again", options.again, "Also what is done");
+  app.add_subcommand("report", "Writes report.html and report.md of what there is");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 1;
+  }
+  const km::ExperimentPaths paths = paths_of(options);
+  const km::ExperimentConfig config = km::read_experiments(
+      options.config.empty() ? shipped_config() : options.config, options.quick);
+  if (list_command->parsed())
+    list(config, paths);
+  else if (run_command->parsed())
+    return run(options, config, paths);
+  else
+    print(km::write_report(config, paths));
+  return 0;
+} catch (const std::exception& error) {
+  std::cerr << "kimera_multi_experiments: " << error.what() << '\n';
+  return 1;
+}

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+namespace km {
+
+/// What Chang, Tian, How and Carlone, "Kimera-Multi: a System for Distributed Multi-Robot
+/// Metric-Semantic Simultaneous Localization and Mapping", ICRA 2021, report of one world.
+struct PaperWorld {
+  const char* world;  ///< As in config/experiments/worlds.yaml.
+  /// Table I, in the order local PGO, RBCD, RBCD stopped after 50 rounds, DGS, SE-Sync.
+  std::array<double, 5> ate_m;
+  std::array<double, 5> cost;
+  /// Table II.
+  int poses, edges;
+  double place_recognition_mb, verification_mb, pgo_mb, total_mb;
+  double images_mb, keypoints_mb;
+  int rbcd_rounds;
+  double rbcd_s, rbcd50_s, se_sync_s;
+};
+
+/// Table III: right labels before and after the correction of the mesh [%], of robots 0 to 2 and
+/// of all together.
+struct PaperLabels {
+  const char* world;
+  std::array<double, 4> before_percent, after_percent;
+};
+
+/// nullptr for a world that the paper has not.
+[[nodiscard]] const PaperWorld* paper_world(const std::string& world);
+[[nodiscard]] const PaperLabels* paper_labels(const std::string& world);
+
+/// Column of a method of config/experiments/trajectory.yaml in Table I, by its name.
+[[nodiscard]] std::optional<std::size_t> paper_column(const std::string& method);
+
+/// Absolute trajectory error of Kimera-VIO on a recording [m], as published by Rosinol et al.,
+/// "Kimera: an Open-Source Library for Real-Time Metric-Semantic Localization and Mapping", ICRA
+/// 2020; nullopt for recordings other than those of the Vicon rooms.
+[[nodiscard]] std::optional<double> published_odometry_error_m(const std::string& recording);
+
+}  // namespace km

@@ -1,0 +1,91 @@
+#include <fstream>
+#include <iterator>
+#include <list>
+#include <stdexcept>
+
+#include "apps/experiments/json_numbers.hpp"
+#include "apps/experiments/world_results.hpp"
+#include "apps/team/team_file.hpp"
+#include "modules/core/text_rows.hpp"
+#include "modules/evaluation/trajectory_error.hpp"
+#include "modules/evaluation/trajectory_file.hpp"
+#include "modules/evaluation/trajectory_plot.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Stamps of a robot's keyframes, in order.
+std::vector<Stamp> read_stamps(const fs::path& keyframes_csv) {
+  std::ifstream in(keyframes_csv, std::ios::binary);
+  if (!in) throw std::runtime_error(keyframes_csv.string() + ": cannot be read");
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  std::vector<Stamp> stamps;
+  for (const TextRow& row : split_rows(text))
+    if (row.fields.size() >= 3)
+      if (const auto stamp = parse_int64(row.fields[2])) stamps.push_back(*stamp);
+  return stamps;
+}
+
+// The solved poses are numbered robot by robot in the order of their ids, as TeamGraph is.
+std::vector<std::vector<StampedPose>> poses_of_robots(const std::vector<StampedPose>& poses,
+                                                      const std::vector<RobotPlan>& robots,
+                                                      const fs::path& run) {
+  std::map<RobotId, std::vector<StampedPose>> by_id;
+  for (const RobotPlan& robot : robots)
+    for (const Stamp stamp : read_stamps(run / robot.name / "keyframes.csv"))
+      by_id[robot.id].push_back({stamp, SE3::Identity()});
+  std::size_t count = 0;
+  for (auto& [id, own] : by_id)
+    for (StampedPose& pose : own)
+      if (count++ < poses.size()) pose.T = poses[count - 1].T;
+  if (count != poses.size())
+    throw std::runtime_error(run.string() + ": its robots have " + std::to_string(count) +
+                             " keyframes, the solved graph has " + std::to_string(poses.size()));
+  std::vector<std::vector<StampedPose>> in_order;
+  for (const RobotPlan& robot : robots) in_order.push_back(std::move(by_id[robot.id]));
+  return in_order;
+}
+
+// Error of the keyframes of all robots under one alignment, where the truth is known.
+void add_error(const WorldConfig& world, const PgoFiles& files, const ExperimentPaths& paths,
+               PgoNumbers& numbers) {
+  const WorldFiles places = world_files(world, paths);
+  const TeamPlan plan = read_team_file(places.team_file, {});
+  const auto estimates = poses_of_robots(read_trajectory(files.poses), plan.robots, places.run);
+  std::list<std::vector<StampedPose>> truths;  // what the inputs refer to stays where it is
+  std::vector<TrajectoryInput> inputs;
+  for (std::size_t r = 0; r < plan.robots.size(); ++r) {
+    if (plan.robots[r].truth.empty() || estimates[r].empty()) return;
+    truths.push_back(read_trajectory(plan.robots[r].truth));
+    inputs.push_back({plan.robots[r].name, truths.back(), estimates[r], std::nullopt});
+  }
+  const TeamError error = trajectory_error(inputs);
+  numbers.error_m = error.joint.position_m.rmse;
+  numbers.plot = plot_from_above(inputs, error);
+}
+
+}  // namespace
+
+PgoNumbers read_pgo_numbers(const WorldConfig& world, const PgoMethodConfig& method,
+                            const ExperimentPaths& paths) {
+  const PgoFiles files = pgo_files(world, method, paths);
+  const YAML::Node root = read_json(files.json);
+  const auto number = [&](const char* key) { return number_at(root, key).value_or(0.0); };
+  PgoNumbers numbers;
+  numbers.poses = static_cast<std::size_t>(number("poses"));
+  numbers.edges = static_cast<std::size_t>(number("edges"));
+  numbers.cost = number("rounded_cost");
+  numbers.optimum = number("optimum");
+  if (const YAML::Node rounds = root["rounds"]; rounds && rounds.size() > 0) {
+    const YAML::Node last = rounds[rounds.size() - 1];
+    numbers.rounds = rounds.size() - 1;  // the first is the start
+    numbers.bytes = number_at(last, "bytes").value_or(0.0);
+    numbers.seconds = number_at(last, "critical_path_s").value_or(0.0);
+  }
+  add_error(world, files, paths, numbers);
+  return numbers;
+}
+
+}  // namespace km

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/experiments/experiment_plan.hpp"
+#include "apps/experiments/report_document.hpp"
+#include "apps/experiments/step_record.hpp"
+#include "apps/experiments/world_results.hpp"
+
+namespace km {
+
+/// A number to reach.
+struct Target {
+  std::string what;      ///< "ATE of odometry".
+  std::string where;     ///< World or recording.
+  std::string wanted;    ///< "at most 0.08 m".
+  std::string measured;  ///< "0.029 m".
+  bool met = false;
+};
+
+/// What the report is made of: results that belong to the configuration as it is now. Worlds and
+/// graphs are read once.
+class ReportInput {
+ public:
+  /// Looks for what is there of all experiments.
+  ReportInput(const ExperimentConfig& config, const ExperimentPaths& paths);
+
+  [[nodiscard]] const ExperimentConfig& config() const { return config_; }
+  [[nodiscard]] const ExperimentPaths& paths() const { return paths_; }
+
+  /// True if the step's result is there and up to date.
+  [[nodiscard]] bool has(const std::string& step) const { return records_.contains(step); }
+
+  /// Worlds of `names` of whose team there are results, with these.
+  struct World {
+    const WorldConfig* config;
+    const WorldResults* results;
+  };
+  [[nodiscard]] std::vector<World> worlds(const std::vector<std::string>& names);
+
+  /// nullptr if the method's result is not there.
+  [[nodiscard]] const PgoNumbers* pgo(const WorldConfig& world, const PgoMethodConfig& method);
+
+  /// How the results of an experiment were made; of what is not there the reason.
+  [[nodiscard]] ReportProvenance provenance(const std::string& experiment) const;
+
+  std::vector<Target> targets;  ///< Collected by the sections.
+
+ private:
+  const ExperimentConfig& config_;
+  const ExperimentPaths& paths_;
+  std::map<std::string, StepRecord> records_;
+  std::map<std::string, WorldResults> worlds_;
+  std::map<std::string, PgoNumbers> pgo_;
+};
+
+/// "0.113", "-" for what is not there.
+[[nodiscard]] std::string number_text(const std::optional<double>& value, int decimals);
+
+/// Four significant digits without exponent up to a million: "1316", "90083", "0.05384".
+[[nodiscard]] std::string significant(double value);
+
+/// A command as a person would type it, without the program's folder.
+[[nodiscard]] std::string command_text(const std::vector<std::string>& command);
+
+}  // namespace km

@@ -1,0 +1,192 @@
+#include "apps/experiments/run_steps.hpp"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <ctime>
+#include <set>
+
+#include "apps/experiments/step_record.hpp"
+#include "apps/output_file.hpp"
+#include "apps/team/robot_process.hpp"
+#include "runtime/clock.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kPoll_ms = 100;
+
+std::string now_text() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M UTC", &utc);
+  return text;
+}
+
+class StepsRun {
+ public:
+  StepsRun(const std::vector<Step>& steps, const fs::path& results, bool again,
+           SignalWatch& signals, StepDisplay& display)
+      : steps_(steps), results_(results), again_(again), signals_(signals), display_(display) {
+    fs::create_directories(results / "logs");
+    for (const Step& step : steps) expected_s_.push_back(expected_s(step));
+  }
+
+  StepsOutcome run() {
+    for (std::size_t i = 0; i < steps_.size() && !outcome_.stopped; ++i) {
+      const Step& step = steps_[i];
+      if (const std::string* need = unmet_need(step)) {
+        fail(step, "not run, it needs " + *need);
+        continue;
+      }
+      const StepState state = state_of(step, results_);
+      if (state == StepState::kMissing)
+        fail(step, step.missing);
+      else if (state == StepState::kFound)
+        adopt(step);
+      else if (state == StepState::kDone && !again_)
+        ++outcome_.kept;
+      else
+        make(i);
+    }
+    return std::move(outcome_);
+  }
+
+ private:
+  // What it took last time, or what is thought of it; nothing if it is done.
+  double expected_s(const Step& step) {
+    const StepState state = state_of(step, results_);
+    if (state == StepState::kMissing) return 0.0;
+    const bool waits =
+        std::any_of(step.needs.begin(), step.needs.end(),
+                    [&](const std::string& need) { return pending_.contains(need); });
+    if ((state == StepState::kDone || state == StepState::kFound) && !again_ && !waits) return 0.0;
+    pending_.insert(step.name);
+    const auto record = read_record(results_, step.name);
+    return record && record->seconds > 0.0 ? record->seconds : step.expected_s;
+  }
+
+  const std::string* unmet_need(const Step& step) const {
+    const auto need = std::find_if(step.needs.begin(), step.needs.end(),
+                                   [&](const std::string& name) { return failed_.contains(name); });
+    return need == step.needs.end() ? nullptr : &*need;
+  }
+
+  void fail(const Step& step, const std::string& why) {
+    failed_.insert(step.name);
+    outcome_.problems.push_back(step.name + ": " + why);
+  }
+
+  void adopt(const Step& step) {
+    write_record(results_, {.step = step.name,
+                            .fingerprint = fingerprint_of(step),
+                            .command = {},
+                            .started = now_text(),
+                            .commit = built_commit(),
+                            .machine = this_machine()});
+    ++outcome_.kept;
+  }
+
+  // The record without a fingerprint says that what there is now is not the result.
+  void prepare(const Step& step, const StepRecord& begun) const {
+    write_record(results_, begun);
+    for (const fs::path& output : step.outputs)
+      if (output.has_parent_path()) fs::create_directories(output.parent_path());
+    for (const auto& [from, to] : step.copies) {
+      fs::create_directories(to.parent_path());
+      fs::copy_file(from, to, fs::copy_options::overwrite_existing);
+    }
+    for (const auto& [file, text] : step.writes) {
+      fs::create_directories(file.parent_path());
+      write_output(file, [&](std::ostream& out) { out << text; });
+    }
+  }
+
+  void make(std::size_t index) {
+    const Step& step = steps_[index];
+    double later_s = 0.0;
+    for (std::size_t k = index + 1; k < steps_.size(); ++k) later_s += expected_s_[k];
+    StepRecord record{.step = step.name,
+                      .command = step.command,
+                      .started = now_text(),
+                      .commit = built_commit(),
+                      .machine = this_machine()};
+    const double start_s = steady_now_s();
+    display_.start(index + 1, steps_.size(), step.title, expected_s_[index], later_s, start_s);
+    std::string problem;
+    try {
+      prepare(step, record);
+      record.fingerprint =
+          fingerprint_of(step);  // before: what changes meanwhile counts as changed
+      problem = run_command(step);
+    } catch (const std::exception& error) {
+      problem = error.what();
+    }
+    record.seconds = steady_now_s() - start_s;
+    if (problem.empty()) {
+      write_record(results_, record);
+      ++outcome_.made;
+    } else {
+      fail(step, problem);
+    }
+    display_.finish(problem.empty()    ? "done"
+                    : outcome_.stopped ? "stopped"
+                                       : "FAILED",
+                    steady_now_s());
+  }
+
+  // Empty if the program ended well and made its outputs.
+  std::string run_command(const Step& step) {
+    const fs::path log = results_ / "logs" / (step.name + ".log");
+    if (access(step.command.front().c_str(), X_OK) != 0)
+      return "no such program: " + step.command.front() + "; build it";
+    RobotProcess process(step.command, signals_.previous(), log);
+    std::string last_line;
+    while (!process.exit()) {
+      const auto fds = process.descriptors();
+      pollfd polled[] = {{fds[0], POLLIN, 0}, {fds[1], POLLIN, 0}};
+      poll(polled, 2, kPoll_ms);
+      for (std::string& line : process.read())
+        if (!line.empty()) last_line = std::move(line);
+      if (signals_.wait(0.0)) {
+        process.send(outcome_.stopped ? SIGKILL : SIGINT);
+        outcome_.stopped = true;
+      }
+      display_.update(last_line, steady_now_s());
+    }
+    if (outcome_.stopped) return "stopped; the same command goes on";
+    std::string problem;
+    if (!process.exit()->ok())
+      problem = to_string(*process.exit());
+    else
+      for (const fs::path& output : step.outputs)
+        if (problem.empty() && !fs::exists(output)) problem = "it made no " + output.string();
+    if (problem.empty()) return {};
+    for (const std::string& words : process.last_words()) problem += "\n    " + words;
+    return problem + "\n    (all it said: " + log.string() + ')';
+  }
+
+  const std::vector<Step>& steps_;
+  const fs::path& results_;
+  bool again_;
+  SignalWatch& signals_;
+  StepDisplay& display_;
+  std::vector<double> expected_s_;
+  std::set<std::string> pending_, failed_;  // names of steps
+  StepsOutcome outcome_;
+};
+
+}  // namespace
+
+StepsOutcome run_steps(const std::vector<Step>& steps, const fs::path& results, bool again,
+                       SignalWatch& signals, StepDisplay& display) {
+  return StepsRun(steps, results, again, signals, display).run();
+}
+
+}  // namespace km

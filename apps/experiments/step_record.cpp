@@ -1,0 +1,173 @@
+#include "apps/experiments/step_record.hpp"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <thread>
+
+#include "apps/output_file.hpp"
+#include "modules/core/json_writer.hpp"
+
+#include "commit.hpp"  // written by the build
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path record_file(const fs::path& results, const std::string& step) {
+  return results / "steps" / (step + ".json");
+}
+
+// FNV-1a (Fowler, Noll, Vo) over words of 8 bytes: it tells changes, it does not resist attacks.
+class Fingerprint {
+ public:
+  void add(const std::string& text) {
+    word(text.size());
+    bytes(text.data(), text.size());
+  }
+
+  void add_file(const fs::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    word(in ? 1 : 0);
+    std::vector<char> buffer(1 << 16);
+    while (in.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || in.gcount() > 0)
+      bytes(buffer.data(), static_cast<std::size_t>(in.gcount()));
+  }
+
+  std::string text() const {
+    char digits[17];
+    std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(hash_));
+    return digits;
+  }
+
+ private:
+  void word(std::uint64_t value) {
+    hash_ = (hash_ ^ value) * 0x100000001b3ULL;
+    hash_ ^= hash_ >> 32;  // high bits of a word would stay high
+  }
+  void bytes(const char* data, std::size_t size) {
+    for (std::size_t at = 0; at < size; at += sizeof(std::uint64_t)) {
+      std::uint64_t value = 0;
+      std::memcpy(&value, data + at, std::min(sizeof value, size - at));
+      word(value);
+    }
+    word(size);
+  }
+
+  std::uint64_t hash_ = 0xcbf29ce484222325ULL;
+};
+
+std::string line_value(const char* file, const std::string& key) {
+  std::ifstream in(file);
+  for (std::string line; std::getline(in, line);)
+    if (line.starts_with(key)) {
+      const std::size_t colon = line.find(':');
+      const std::size_t begin = line.find_first_not_of(" \t", colon + 1);
+      return begin == line.npos ? std::string() : line.substr(begin);
+    }
+  return {};
+}
+
+bool all_exist(const std::vector<fs::path>& files) {
+  return std::all_of(files.begin(), files.end(), [](const fs::path& f) { return fs::exists(f); });
+}
+
+}  // namespace
+
+Machine this_machine() {
+  Machine machine;
+  machine.processor = line_value("/proc/cpuinfo", "model name");
+  machine.cores = std::thread::hardware_concurrency();
+  machine.memory_gb =
+      1e-6 * 1.024 * std::strtod(line_value("/proc/meminfo", "MemTotal").c_str(), nullptr);
+  if (getloadavg(&machine.load, 1) != 1) machine.load = 0.0;
+  return machine;
+}
+
+std::string fingerprint_of(const Step& step) {
+  Fingerprint fingerprint;
+  for (std::size_t i = 0; i < step.command.size(); ++i)
+    fingerprint.add(i == 0 ? fs::path(step.command[0]).filename().string() : step.command[i]);
+  for (const auto& [file, text] : step.writes) fingerprint.add(text);
+  for (const fs::path& input : step.inputs) fingerprint.add_file(input);
+  return fingerprint.text();
+}
+
+std::optional<StepRecord> read_record(const fs::path& results, const std::string& step) try {
+  const fs::path file = record_file(results, step);
+  if (!fs::is_regular_file(file)) return std::nullopt;
+  const YAML::Node root = YAML::LoadFile(file.string());
+  const YAML::Node machine = root["machine"];
+  StepRecord record;
+  record.step = root["step"].as<std::string>();
+  record.fingerprint = root["fingerprint"].as<std::string>();
+  record.command = root["command"].as<std::vector<std::string>>();
+  record.started = root["started"].as<std::string>();
+  record.seconds = root["seconds"].as<double>();
+  record.commit = root["commit"].as<std::string>();
+  record.machine = {machine["processor"].as<std::string>(), machine["cores"].as<unsigned>(),
+                    machine["memory_gb"].as<double>(), machine["load"].as<double>()};
+  return record;
+} catch (const YAML::Exception&) {
+  return std::nullopt;  // cut short by a full disk, say: the step is done again
+}
+
+void write_record(const fs::path& results, const StepRecord& record) {
+  const fs::path file = record_file(results, record.step);
+  fs::create_directories(file.parent_path());
+  write_output(file, [&](std::ostream& out) {
+    JsonWriter json(out);
+    json.begin_object();
+    json.field("step", record.step);
+    json.field("fingerprint", record.fingerprint);
+    json.array("command", record.command);
+    json.field("started", record.started);
+    json.field("seconds", record.seconds);
+    json.field("commit", record.commit);
+    json.key("machine");
+    json.begin_object();
+    json.field("processor", record.machine.processor);
+    json.field("cores", record.machine.cores);
+    json.field("memory_gb", record.machine.memory_gb);
+    json.field("load", record.machine.load);
+    json.end_object();
+    json.end_object();
+  });
+}
+
+const char* to_string(StepState state) {
+  switch (state) {
+    case StepState::kDone:
+      return "done";
+    case StepState::kFound:
+      return "found";
+    case StepState::kOutdated:
+      return "outdated";
+    case StepState::kToDo:
+      return "to do";
+    case StepState::kMissing:
+      return "missing";
+  }
+  return "?";
+}
+
+StepState state_of(const Step& step, const fs::path& results) {
+  const auto record = read_record(results, step.name);
+  const bool made = all_exist(step.outputs);
+  if (made && record && record->fingerprint == fingerprint_of(step)) return StepState::kDone;
+  if (made && !record && step.adoptable) return StepState::kFound;
+  if (!step.missing.empty()) return StepState::kMissing;
+  return made && record ? StepState::kOutdated : StepState::kToDo;
+}
+
+std::string built_commit() {
+  return kCommit;
+}
+
+}  // namespace km

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/experiments/step.hpp"
+
+namespace km {
+
+/// The computer a step was run on.
+struct Machine {
+  std::string processor;  ///< "AMD EPYC".
+  unsigned cores = 0;
+  double memory_gb = 0.0;
+  double load = 0.0;  ///< Average of the last minute before the step.
+};
+
+/// This computer, now.
+[[nodiscard]] Machine this_machine();
+
+/// How the result of a step came about.
+struct StepRecord {
+  std::string step;
+  std::string fingerprint = {};      ///< Of the step when it was done, see fingerprint_of().
+  std::vector<std::string> command;  ///< Empty: the result was found, not made.
+  std::string started;               ///< "2026-11-20 14:58 UTC".
+  double seconds = 0.0;
+  std::string commit;  ///< Of this program.
+  Machine machine;
+};
+
+/// A text that changes with the command (without the folder of its program) and with the content of
+/// the inputs. An input that is not there counts as such.
+[[nodiscard]] std::string fingerprint_of(const Step& step);
+
+/// The record of a step in the folder of results; nullopt if there is none that can be read.
+[[nodiscard]] std::optional<StepRecord> read_record(const std::filesystem::path& results,
+                                                    const std::string& step);
+
+/// Throws std::runtime_error naming the file.
+void write_record(const std::filesystem::path& results, const StepRecord& record);
+
+enum class StepState {
+  kDone,      ///< Outputs are there and belong to this command and these inputs.
+  kFound,     ///< Outputs are there, made by somebody else, and may be used.
+  kOutdated,  ///< They belong to another command or other inputs.
+  kToDo,
+  kMissing,  ///< Something is missing that only a person can supply.
+};
+
+[[nodiscard]] const char* to_string(StepState state);
+
+/// Looks at the files only. An outdated step that needs none of the missing things is kOutdated.
+[[nodiscard]] StepState state_of(const Step& step, const std::filesystem::path& results);
+
+/// Commit that this program was built from, "unknown" outside a repository.
+[[nodiscard]] std::string built_commit();
+
+}  // namespace km

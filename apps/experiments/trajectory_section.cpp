@@ -1,0 +1,209 @@
+#include <algorithm>
+#include <cmath>
+
+#include "apps/experiments/paper_results.hpp"
+#include "apps/experiments/report_sections.hpp"
+#include "apps/team/text_table.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kMostRbcdGap_percent = 7.0;  // the paper's largest
+constexpr double kMostBestGap_percent = 0.01;
+constexpr double kMostDrift_percent = 0.5;
+
+const PgoMethodConfig* method_named(const ReportInput& input, const std::string& name) {
+  for (const PgoMethodConfig& method : input.config().methods)
+    if (method.name == name) return &method;
+  return nullptr;
+}
+
+ReportTable inputs_table(const std::vector<ReportInput::World>& worlds) {
+  ReportTable table{.caption = "The inputs",
+                    .columns = {"world", "robots", "images", "time of each [s]", "distance [m]",
+                                "closures kept", "of them true"}};
+  for (const auto& [config, results] : worlds) {
+    std::string times, distances;
+    for (const RobotNumbers& robot : results->robots) {
+      times += (times.empty() ? "" : ", ") + fixed(robot.recorded_s, 0);
+      distances += (distances.empty() ? "" : ", ") + fixed(robot.distance_m, 0);
+    }
+    table.rows.push_back({{config->title},
+                          {std::to_string(results->robots.size())},
+                          {results->images},
+                          {times},
+                          {distances},
+                          {number_text(results->closures, 0)},
+                          {number_text(results->true_closures, 0)}});
+  }
+  return table;
+}
+
+// The best distributed method stands out, as in the paper.
+void mark_best(std::vector<ReportCell>& row, const std::vector<double>& values) {
+  const auto best = std::min_element(values.begin(), values.end());
+  if (best != values.end() && std::isfinite(*best))
+    row[static_cast<std::size_t>(best - values.begin()) + 1].style = ReportCell::Style::kBest;
+}
+
+// One half of Table I: a value per world and method.
+ReportTable half_table(ReportInput& input, const std::vector<ReportInput::World>& worlds,
+                       bool error) {
+  ReportTable table{.caption = error ? "Table I: absolute trajectory error of the keyframes [m]"
+                                     : "Table I: cost of pose graph optimisation",
+                    .columns = {"world"}};
+  for (const PgoMethodConfig& method : input.config().methods)
+    table.columns.push_back(method.title);
+  for (const auto& world : worlds) {
+    const PaperWorld* const paper = paper_world(world.config->name);
+    std::vector<ReportCell> row{{world.config->title}};
+    std::vector<double> distributed;
+    for (const PgoMethodConfig& method : input.config().methods) {
+      const PgoNumbers* const pgo = input.pgo(*world.config, method);
+      const double value = pgo == nullptr ? NAN : error ? pgo->error_m.value_or(NAN) : pgo->cost;
+      ReportCell& cell = row.emplace_back(ReportCell{significant(value)});
+      if (const auto column = paper_column(method.name); paper != nullptr && column)
+        cell.paper = significant(error ? paper->ate_m[*column] : paper->cost[*column]);
+      const bool counts = method.name != "centralized" && std::isfinite(value);
+      distributed.push_back(counts ? value : INFINITY);
+    }
+    mark_best(row, distributed);
+    table.rows.push_back(std::move(row));
+  }
+  table.note = error ? "Of all robots under one alignment, rmse. The best distributed method is "
+                       "bold; the paper's centralised one is SE-Sync."
+                     : "Chordal cost of rigid poses without 1/2, weights as SE-Sync reads them. "
+                       "Costs of two worlds cannot be compared: they grow with the number of "
+                       "closures and with what these claim of their accuracy.";
+  return table;
+}
+
+ReportTable gap_table(ReportInput& input, const std::vector<ReportInput::World>& worlds) {
+  ReportTable table{.caption = "Cost above the centralised optimum [%]", .columns = {"world"}};
+  for (const PgoMethodConfig& method : input.config().methods)
+    if (method.name != "centralized") table.columns.push_back(method.title);
+  for (const auto& world : worlds) {
+    const PaperWorld* const paper = paper_world(world.config->name);
+    std::vector<ReportCell> row{{world.config->title}};
+    for (const PgoMethodConfig& method : input.config().methods) {
+      if (method.name == "centralized") continue;
+      const PgoNumbers* const pgo = input.pgo(*world.config, method);
+      ReportCell& cell = row.emplace_back(ReportCell{"-"});
+      if (pgo != nullptr) {
+        const double gap = 100.0 * (pgo->cost / pgo->optimum - 1.0);
+        cell.text = std::abs(gap) < 5e-6 ? "0.00000" : significant(gap);
+      }
+      if (const auto column = paper_column(method.name); paper != nullptr && column)
+        cell.paper = significant(100.0 * (paper->cost[*column] / paper->cost.back() - 1.0));
+    }
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+ReportFigures plots(ReportInput& input, const std::vector<ReportInput::World>& worlds) {
+  ReportFigures row;
+  for (const auto& world : worlds)
+    for (const char* name : {"local", "newton"}) {
+      const PgoMethodConfig* const method = method_named(input, name);
+      const PgoNumbers* const pgo = method == nullptr ? nullptr : input.pgo(*world.config, *method);
+      if (pgo == nullptr || pgo->plot.empty()) continue;
+      row.figures.push_back({.name = "trajectory-" + world.config->name + '-' + name,
+                             .caption = world.config->title + ", " + method->title +
+                                        ": keyframes from above, truth in grey.",
+                             .svg = pgo->plot});
+    }
+  return row;
+}
+
+ReportTable odometry_table(const std::vector<ReportInput::World>& worlds) {
+  ReportTable table{
+      .caption = "Odometry alone, and what the team makes of it",
+      .groups = {{"", 2}, {"odometry, aligned alone", 2}, {"in the team", 1}},
+      .columns = {"robot", "distance [m]", "ATE [m]", "ATE / distance [%]", "ATE [m]"}};
+  for (const auto& [config, results] : worlds)
+    for (const RobotNumbers& robot : results->robots) {
+      const auto published = published_odometry_error_m(robot.name);
+      std::optional<double> share;
+      if (robot.odometry_error_m && robot.distance_m > 0.0)
+        share = 100.0 * *robot.odometry_error_m / robot.distance_m;
+      table.rows.push_back({{config->title + ", " + robot.name},
+                            {fixed(robot.distance_m, 0)},
+                            {number_text(robot.odometry_error_m, 3),
+                             published ? fixed(*published, 2) : std::string()},
+                            {number_text(share, 3)},
+                            {number_text(robot.optimized_error_m, 3)}});
+    }
+  table.note = "Of every image, rmse. In grey: as published for Kimera-VIO on the original images.";
+  return table;
+}
+
+void add_optimisation_targets(ReportInput& input, const ReportInput::World& world) {
+  const auto pgo = [&](const char* name) {
+    const PgoMethodConfig* const method = method_named(input, name);
+    return method == nullptr ? nullptr : input.pgo(*world.config, *method);
+  };
+  const PgoNumbers* const local = pgo("local");
+  const PgoNumbers* const rbcd = pgo("rbcd");
+  const PaperWorld* const paper = paper_world(world.config->name);
+  if (local != nullptr && rbcd != nullptr && paper != nullptr && local->error_m && rbcd->error_m) {
+    const double ratio = *rbcd->error_m / *local->error_m;
+    const double wanted = paper->ate_m[1] / paper->ate_m[0];
+    input.targets.push_back({"ATE of RBCD over that of local PGO", world.config->title,
+                             "at most " + fixed(wanted, 2) + ", the paper's", fixed(ratio, 2),
+                             ratio <= wanted});
+  }
+  const auto gap = [&](const PgoNumbers* numbers, const char* what, double most_percent) {
+    if (numbers == nullptr) return;
+    const double percent = 100.0 * (numbers->cost / numbers->optimum - 1.0);
+    input.targets.push_back({std::string("cost of ") + what + " above the optimum",
+                             world.config->title, "at most " + significant(most_percent) + " %",
+                             significant(std::max(percent, 0.0)) + " %", percent <= most_percent});
+  };
+  gap(rbcd, "RBCD", kMostRbcdGap_percent);
+  gap(pgo("newton"), "our best", kMostBestGap_percent);
+}
+
+void add_odometry_targets(ReportInput& input, const ReportInput::World& world) {
+  for (const RobotNumbers& robot : world.results->robots) {
+    if (!robot.odometry_error_m) continue;
+    const std::string where = world.config->title + ", " + robot.name;
+    if (const auto most_m = published_odometry_error_m(robot.name)) {
+      input.targets.push_back({"ATE of odometry", where, "at most " + fixed(*most_m, 2) + " m",
+                               fixed(*robot.odometry_error_m, 3) + " m",
+                               *robot.odometry_error_m <= *most_m});
+    } else if (robot.distance_m > 0.0) {
+      const double percent = 100.0 * *robot.odometry_error_m / robot.distance_m;
+      input.targets.push_back({"ATE of odometry over the distance", where, "at most 0.5 %",
+                               fixed(percent, 3) + " %", percent <= kMostDrift_percent});
+    }
+  }
+}
+
+}  // namespace
+
+ReportSection trajectory_section(ReportInput& input) {
+  ReportSection section{.id = "trajectory", .title = "Trajectories", .blocks = {}};
+  const auto worlds = input.worlds(input.config().trajectory_worlds);
+  section.blocks.emplace_back(ReportParagraph{
+      "A team runs in each world. The pose graph it ends with, its odometry and the closures it "
+      "kept, is then solved from the same start by every method: local PGO joins the robots' own "
+      "solutions by one closure each; RBCD, RBCD stopped after 50 rounds, DGS and our distributed "
+      "Newton method see only their robot's part and the messages of the others; the centralised "
+      "one certifies its optimum. RBCD and DGS start from the chordal initialisation of the whole "
+      "graph, which is not counted; the Newton method's team finds its start itself."});
+  if (!worlds.empty()) {
+    section.blocks.emplace_back(inputs_table(worlds));
+    section.blocks.emplace_back(half_table(input, worlds, true));
+    section.blocks.emplace_back(half_table(input, worlds, false));
+    section.blocks.emplace_back(gap_table(input, worlds));
+    section.blocks.emplace_back(plots(input, worlds));
+    section.blocks.emplace_back(odometry_table(worlds));
+  }
+  for (const auto& world : worlds) add_optimisation_targets(input, world);
+  for (const auto& world : worlds) add_odometry_targets(input, world);
+  section.blocks.emplace_back(input.provenance("trajectory"));
+  return section;
+}
+
+}  // namespace km

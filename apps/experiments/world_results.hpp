@@ -1,0 +1,74 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/experiments/experiment_plan.hpp"
+
+namespace km {
+
+/// Error of a mesh, and its right labels; what was not measured is absent.
+struct MeshNumbers {
+  std::optional<double> error_m;         ///< The paper's: from every true point within reach.
+  std::optional<double> seen_error_m;    ///< Without true surface that no robot can have seen.
+  std::optional<double> labels_percent;  ///< Right ones, at the points of error_m.
+  std::optional<double> seen_labels_percent;
+};
+
+/// The same mesh as odometry built it, and after its correction.
+struct MeshPair {
+  MeshNumbers before, after;
+};
+
+/// What a robot did in a team's run.
+struct RobotNumbers {
+  std::string name;
+  double recorded_s = 0.0;  ///< Length of its recording.
+  double distance_m = 0.0;  ///< That it truly went; 0 without a truth.
+  std::size_t keyframes = 0;
+  std::optional<double> odometry_error_m, optimized_error_m;  ///< Absolute, rmse.
+  std::map<std::string, double> sent_bytes;                   ///< By category.
+  std::optional<double> keyframe_bytes;  ///< Mean size of a keyframe's message.
+  std::optional<double> processor_s;     ///< CPU time of the whole robot.
+  std::optional<double> peak_memory_mb;
+  std::map<std::string, double> module_s;  ///< Time in the steps of each module, waiting excluded.
+  MeshPair mesh;
+};
+
+/// A team's run in a world.
+struct WorldResults {
+  std::vector<RobotNumbers> robots;
+  std::optional<double> joint_error_m;            ///< Under one alignment.
+  MeshPair mesh;                                  ///< Of all robots together.
+  std::optional<double> closures, true_closures;  ///< Those kept.
+  std::string images;                             ///< "752x480, 90 s, seed 1".
+  std::size_t image_pixels = 0;                   ///< Of one camera.
+
+  [[nodiscard]] std::size_t keyframes() const;
+  /// Sum over the robots [MB]; nothing for a category that none sent.
+  [[nodiscard]] double sent_mb(const std::string& category) const;
+};
+
+/// Reads the team's tables and what the robots left. Throws std::runtime_error naming the file that
+/// is missing or not what it should be.
+[[nodiscard]] WorldResults read_world_results(const WorldConfig& world,
+                                              const ExperimentPaths& paths);
+
+/// What a method of optimisation made of the team's graph.
+struct PgoNumbers {
+  std::size_t poses = 0, edges = 0, rounds = 0;
+  double cost = 0.0;     ///< Of rigid poses.
+  double optimum = 0.0;  ///< The certified one.
+  double bytes = 0.0;
+  double seconds = 0.0;           ///< CPU time of the slowest robot of each round, summed.
+  std::optional<double> error_m;  ///< Absolute trajectory error of all keyframes, rmse.
+  std::string plot;               ///< SVG from above.
+};
+
+/// Throws std::runtime_error, as above.
+[[nodiscard]] PgoNumbers read_pgo_numbers(const WorldConfig& world, const PgoMethodConfig& method,
+                                          const ExperimentPaths& paths);
+
+}  // namespace km
