@@ -102,8 +102,14 @@ void define(CLI::App& app, Options& options) {
   app.add_option("FILE", options.file, "Pose graph (*.g2o) or consistency graph (*.txt)")
       ->required()
       ->check(CLI::ExistingFile);
-  app.add_option("--search", options.searches, "exact, incremental or batch; several are compared")
-      ->transform(CLI::CheckedTransformer(methods).description(""))
+  app.add_option_function<std::vector<std::string>>(
+         "--search",
+         [&options, methods](const std::vector<std::string>& names) {
+           options.searches.clear();
+           for (const std::string& name : names) options.searches.push_back(methods.at(name));
+         },
+         "exact, incremental or batch; several are compared")
+      ->check(CLI::IsMember(methods).description(""))
       ->default_str("exact");
   define_closures(app, options);
   define_pcm(app, options);
@@ -111,6 +117,19 @@ void define(CLI::App& app, Options& options) {
                  "Also write every addition to this file, as JSON; an array for several searches");
   app.add_option("--plot", options.plot,
                  "Also draw time and size of the clique against vertices, as SVG");
+}
+
+// What is about closures means nothing to a graph of which nothing else is known.
+void check(const Options& options, const CLI::App& app) {
+  km::check_output_folder(options.json);
+  km::check_output_folder(options.plot);
+  if (options.file.extension() != ".txt") return;
+  for (const char* name :
+       {"--outliers", "--closures", "--outlier-range", "--seed", "--file-order", "--confidence",
+        "--odometry-noise-scale", "--closure-noise-scale", "--keep-contradicting"})
+    if (app.count(name) > 0)
+      throw std::runtime_error(std::string(name) + " needs a pose graph, " + options.file.string() +
+                               " is a consistency graph");
 }
 
 std::ifstream opened(const fs::path& file) {
@@ -141,9 +160,6 @@ std::vector<km::PcmRun> run(const Options& options) {
     return runs;
   };
   if (options.file.extension() == ".txt") {
-    if (options.selection.outliers > 0 || options.selection.keep > 0)
-      throw std::runtime_error("--outliers and --closures need a pose graph, " +
-                               options.file.string() + " is a consistency graph");
     std::ifstream in = opened(options.file);
     return runs_of(km::read_consistency_rows(in, options.file.string()));
   }
@@ -168,8 +184,7 @@ int main(int argc, char** argv) try {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 1;
   }
-  km::check_output_folder(options.json);
-  km::check_output_folder(options.plot);
+  check(options, app);
   options.selection.shuffle = !options.file_order;
   options.config.odometry_gate = !options.keep_contradicting;
   const std::vector<km::PcmRun> runs = run(options);

@@ -77,8 +77,11 @@ void define(CLI::App& app, Options& options) {
   app.add_option("--robots", options.robots, "Number of robots that a single file is dealt out to")
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();
-  app.add_option("--method", options.pgo.method, "See above")
-      ->transform(CLI::CheckedTransformer(methods).description(""))
+  app.add_option_function<std::string>(
+         "--method",
+         [&options, methods](const std::string& name) { options.pgo.method = methods.at(name); },
+         "See above")
+      ->check(CLI::IsMember(methods).description(""))
       ->default_str("rbcd");
   app.add_option("--rank", options.pgo.rank, "Of the relaxation; centralized finds its own")
       ->check(CLI::Range(3, 10))

@@ -112,7 +112,12 @@ TeamGraph deal(const G2oGraph& graph, const std::map<KeyframeId, std::size_t>& r
                const std::string& file) {
   TeamGraph team{.dimension = graph.dimension};
   std::map<std::size_t, std::vector<KeyframeId>> poses_of_robot;
-  for (const KeyframeId& id : poses_of(graph, file)) {
+  const std::set<KeyframeId> poses = poses_of(graph, file);
+  for (const auto& [id, robot] : robot_of)
+    if (!poses.contains(id))
+      throw std::runtime_error(file + ": robot " + std::to_string(robot) + " is given pose " +
+                               to_string(id) + ", which the graph lacks");
+  for (const KeyframeId& id : poses) {
     const auto robot = robot_of.find(id);
     if (robot == robot_of.end())
       throw std::runtime_error(file + ": pose " + to_string(id) + " is given to no robot");

@@ -26,7 +26,8 @@ namespace km {
 [[nodiscard]] TeamGraph deal_contiguously(const G2oGraph& graph, std::size_t robots,
                                           const std::string& file);
 
-/// The same with the robot of every pose given; robots are 0 to N - 1, none without a pose.
+/// The same with the robot of every pose given, and of no others; robots are 0 to N - 1, none
+/// without a pose.
 [[nodiscard]] TeamGraph deal(const G2oGraph& graph,
                              const std::map<KeyframeId, std::size_t>& robot_of,
                              const std::string& file);

@@ -43,12 +43,13 @@ TEST_CASE("The tool says what is wrong with its input", "[pcm]") {
   };
   fails_with("", "FILE is required");
   fails_with("missing.g2o", "missing.g2o");
-  fails_with(graph + " --search best", "best");
+  fails_with(graph + " --search best", "best not in {batch,exact,incremental}");
   fails_with(graph + " --confidence 2", "--confidence");
   fails_with(graph + " --outliers -1", "--outliers");
   fails_with(bad, "bad.txt:3: neighbour 7");
   fails_with(other, "neither .g2o nor .txt");
-  fails_with(graph + " --outliers 10", "--outliers");
+  fails_with(graph + " --outliers 10", "--outliers needs a pose graph");
+  fails_with(graph + " --confidence 0.9", "--confidence needs a pose graph");
   fails_with(graph + " --json " + (folder.path() / "no/out.json").string(), "cannot be written");
 }
 

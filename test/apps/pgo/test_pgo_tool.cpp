@@ -116,6 +116,7 @@ TEST_CASE("What cannot be done is told with the reason", "[pgo]") {
   const TemporaryFolder folder;
   const std::string graph = folder.write("square.g2o", square_g2o()).string();
   (void)folder.write("lone.g2o", "VERTEX_SE2 0 0 0 0\n");
+  (void)folder.write("others", "0 0\n1 0\n2 0\n3 0\n4 1\n5 1\n6 1\n7 1\n8 1\n");
   (void)folder.write("halves", "0 0\n1 0\n2 0\n3 0\n4 1\n5 1\n6 1\n7 1\n");
   // FILE and PLACE stand for the graph and its folder.
   const auto [pattern, message] = GENERATE(table<std::string, std::string>(
@@ -134,7 +135,8 @@ TEST_CASE("What cannot be done is told with the reason", "[pgo]") {
        {"FILE --robots 3 --partition PLACE/halves", "--robots 3: there are 2 robots"},
        {"PLACE --partition FILE", "is a folder with one file per robot"},
        {"PLACE/none.g2o", "none.g2o"},
-       {"FILE --method fastest", "fastest"}}));
+       {"FILE --partition PLACE/others", "robot 1 is given pose 0:8, which the graph lacks"},
+       {"FILE --method fastest", "fastest not in {centralized,dgs,local"}}));
   const auto place = std::regex_replace(pattern, std::regex("PLACE"), folder.path().string());
   const auto arguments = std::regex_replace(place, std::regex("FILE"), graph);
   CAPTURE(arguments);
