@@ -17,6 +17,7 @@
 #include "modules/place_recognition/vocabulary_file.hpp"
 #include "modules/pose_graph/pose_graph_codec.hpp"
 #include "modules/pose_graph/pose_graph_node.hpp"
+#include "modules/pose_graph/solver_message_codec.hpp"
 #include "modules/semantic_mapping/semantic_mapping_node.hpp"
 #include "modules/vio/vio_node.hpp"
 #include "runtime/dds/robot_status_codec.hpp"
@@ -137,9 +138,9 @@ void Robot::add_back_end(const RobotConfig& config) {
       false, config.pose_graph, PgoPeer{identity_.robot, identity_.boot},
       PoseGraphTopics{topics_.keyframe_odometry, topics_.closures, topics_.own_inlier_sets,
                       topics_.peer_inlier_sets, bridge_->peers().events(), topics_.peer_pgo_status,
-                      topics_.peer_pgo_sessions, topics_.peer_poses, topics_.own_pgo_status,
-                      topics_.own_pgo_sessions, topics_.own_poses, topics_.trajectory,
-                      topics_.progress});
+                      topics_.peer_pgo_sessions, topics_.peer_poses, topics_.peer_exchanges,
+                      topics_.own_pgo_status, topics_.own_pgo_sessions, topics_.own_poses,
+                      topics_.own_exchanges, topics_.trajectory, topics_.progress});
 }
 
 // What crosses between robots, and how: the kinds of topic are those of runtime/dds/topic_kind.hpp.
@@ -164,6 +165,8 @@ void Robot::add_network() {
   dds.receive(t.peer_pgo_sessions, kState, kPoseGraphOptimization);
   dds.send(t.own_poses, kState, kPoseGraphOptimization);
   dds.receive(t.peer_poses, kState, kPoseGraphOptimization);
+  dds.send(t.own_exchanges, kState, kPoseGraphOptimization);
+  dds.receive(t.peer_exchanges, kState, kPoseGraphOptimization);
   dds.send(t.own_status, kStatus, kOther);
   dds.receive(t.peer_status, kStatus, kOther);
   dds.peers().events().subscribe([this](const auto& event) {

@@ -21,6 +21,7 @@
 #include "modules/pose_graph/graph_playback_node.hpp"
 #include "modules/pose_graph/pgo_messages.hpp"
 #include "modules/pose_graph/recorded_graph.hpp"
+#include "modules/pose_graph/solver_message.hpp"
 #include "modules/semantic_mapping/mapping_progress.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/sensors_node.hpp"
@@ -60,6 +61,7 @@ struct Topics {
   Topic<PgoStatus> own_pgo_status, peer_pgo_status;
   Topic<PgoSession> own_pgo_sessions, peer_pgo_sessions;
   Topic<PublicPoses> own_poses, peer_poses;
+  Topic<SolverMessage> own_exchanges, peer_exchanges;
   Topic<Trajectory> trajectory;
   Topic<OptimizerProgress> progress;
   Topic<RobotStatus> own_status, peer_status;

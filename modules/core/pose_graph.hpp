@@ -84,9 +84,9 @@ struct Trajectory {
 struct OptimizerProgress {
   RobotId anchor = 0;
   std::vector<RobotId> members;  ///< Robots that optimise together, ascending.
-  std::uint32_t round = 0;       ///< Rounds in all: in one, every member updates its block once.
+  std::uint32_t round = 0;       ///< Rounds in all: in one, every member sends once.
   double cost = 0.0;             ///< Team cost, chordal without 1/2.
-  double gradient_norm = 0.0;    ///< Riemannian, of the team.
+  double gradient_norm = 0.0;    ///< Of the team: Riemannian, or (newton) its Newton decrement.
   double seconds = 0.0;          ///< Time spent optimising.
   bool settled = false;          ///< Nothing left to improve with what is known.
 };

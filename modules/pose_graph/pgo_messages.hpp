@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "modules/core/ids.hpp"
+#include "modules/pose_graph/pgo_method.hpp"
 #include "modules/pose_graph/stiefel.hpp"
 
 namespace km {
@@ -44,6 +45,7 @@ struct PgoStatus {
   std::uint32_t keyframes = 0;
   std::uint32_t revision = 0;  ///< Grows with its own keyframes and intra-robot closures.
   std::vector<EdgeSetOffer> offers = {};
+  PgoMethod method = PgoMethod::kRbcd;  ///< Its configuration's; only equal ones go together.
   bool operator==(const PgoStatus&) const = default;
 };
 
@@ -83,25 +85,28 @@ struct SessionPlan {
 struct PgoSession {
   PgoSessionId id;
   SessionPlan plan;
+  PgoMethod method = PgoMethod::kRbcd;
   std::uint32_t rank = 0;
   std::uint32_t max_rounds = 0;  ///< 0: no limit.
   RobotId anchor = 0;            ///< Its keyframe 0 is the origin of `world`.
-  LiftedPoses anchor_pose = {};  ///< r x 4 if the anchor is no longer a member, else empty.
+  /// r x 4 if the anchor is no longer a member, and at the end of exchanges; else empty.
+  LiftedPoses anchor_pose = {};
   std::uint32_t round = 0;       ///< Last round that all members have finished.
   double cost = 0.0;             ///< Team cost after it.
-  double gradient_norm = 0.0;    ///< Of the blocks, each before its update in that round.
+  double gradient_norm = 0.0;    ///< See OptimizerProgress.
   bool finished = false;         ///< Members stop.
 };
 
-/// Poses of one robot that its peers' edges end on, and keyframe 0, after one of its updates.
+/// Poses of one robot that its peers' edges end on, and keyframe 0, after one of its updates, or,
+/// where the session is solved by exchanges, before (round 0) and after them (round 1).
 struct PublicPoses {
   PgoPeer sender;
   PgoSessionId session = {};
   PgoFrame frame = {};
   std::uint32_t frame_version = 0;  ///< As in PgoStatus: whichever message has more is newer.
   std::uint32_t round = 0;          ///< 0: before the first update.
-  double cost = 0.0;                ///< Share: own edges, and those to earlier members.
-  double squared_gradient = 0.0;    ///< Of the block before this update.
+  double cost = 0.0;                ///< Share of rbcd: own edges, and those to earlier members.
+  double squared_gradient = 0.0;    ///< Of the block before this update of rbcd.
   std::vector<std::uint32_t> keyframes = {};  ///< Ascending, 0 first.
   LiftedPoses X = {};                         ///< r x 4 per keyframe, single precision.
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "runtime/dds/wire_sequence.hpp"
@@ -19,6 +20,12 @@ PgoPeer from_wire(const km_wire_PgoPeer& wire) {
 
 PgoPeer writer_of(const km_wire_Header& header) {
   return {header.robot, header.boot};
+}
+
+std::optional<PgoMethod> method_of(std::uint8_t wire) {
+  const auto method = static_cast<PgoMethod>(wire);
+  const bool known = method == PgoMethod::kRbcd || method == PgoMethod::kNewton;
+  return known ? std::optional(method) : std::nullopt;
 }
 
 bool is_rank(std::uint32_t rank) {
@@ -39,6 +46,7 @@ Codec<PgoStatus>::Encoded Codec<PgoStatus>::encode(const PgoStatus& status) {
   encoded.wire.frame_version = status.frame_version;
   encoded.wire.keyframes = status.keyframes;
   encoded.wire.revision = status.revision;
+  encoded.wire.method = static_cast<std::uint8_t>(status.method);
   borrow(encoded.wire.offers, encoded.offers);
   return encoded;
 }
@@ -48,12 +56,15 @@ Decoded<PgoStatus> Codec<PgoStatus>::decode(const Wire& wire) {
   if (wire.robot != wire.header.robot) return Result::refuse("written by another robot");
   const auto offers = elements_of(wire.offers, 8 * kMaxTeam);
   if (!offers) return Result::refuse("offers are missing or too many");
+  const auto method = method_of(wire.method);
+  if (!method) return Result::refuse("unknown method");
   PgoStatus status{.sender = writer_of(wire.header),
                    .frame = from_wire(wire.frame),
                    .frame_version = wire.frame_version,
                    .keyframes = wire.keyframes,
                    .revision = wire.revision,
-                   .offers = {}};
+                   .offers = {},
+                   .method = *method};
   for (const km_wire_EdgeSetOffer& offer : *offers) {
     if (offer.edges == 0 || offer.peer == wire.robot)
       return Result::refuse("an offer without edges or to its own robot");
@@ -82,6 +93,7 @@ Codec<PgoSession>::Encoded Codec<PgoSession>::encode(const PgoSession& session) 
   wire.cost = session.cost;
   wire.gradient_norm = session.gradient_norm;
   wire.finished = session.finished;
+  wire.method = static_cast<std::uint8_t>(session.method);
   borrow(wire.members, encoded.members);
   borrow(wire.pairs, encoded.pairs);
   borrow(wire.anchor_pose, encoded.anchor_pose);
@@ -101,12 +113,16 @@ Decoded<PgoSession> Codec<PgoSession>::decode(const Wire& wire) {
   if (!anchor_pose->empty() && anchor_pose->size() != 4 * wire.rank)
     return Result::refuse("the anchor's pose does not have the session's rank");
 
+  const auto method = method_of(wire.method);
+  if (!method) return Result::refuse("unknown method");
+
   PgoSession session{.id = {writer_of(wire.header), wire.session}, .plan = {}};
   session.plan.frame = from_wire(wire.frame);
   for (const km_wire_SessionMember& member : *members)
     session.plan.members.push_back({from_wire(member.peer), member.revision});
   for (const km_wire_SessionPair& pair : *pairs)
     session.plan.pairs.push_back({pair.a, pair.b, {pair.set_version, pair.hash}});
+  session.method = *method;
   session.rank = wire.rank;
   session.max_rounds = wire.max_rounds;
   session.anchor = wire.anchor;

@@ -21,7 +21,7 @@ template <>
 struct Codec<PgoStatus> {
   using Wire = km_wire_PgoStatus;
   static constexpr const char* kTopic = "pgo_status";
-  static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::uint16_t kVersion = 2;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_PgoStatus_desc; }
 
   struct Encoded {
@@ -37,7 +37,7 @@ template <>
 struct Codec<PgoSession> {
   using Wire = km_wire_PgoSession;
   static constexpr const char* kTopic = "pgo_sessions";
-  static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::uint16_t kVersion = 2;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_PgoSession_desc; }
 
   struct Encoded {
@@ -50,7 +50,7 @@ struct Codec<PgoSession> {
   static Decoded<PgoSession> decode(const Wire& wire);
 };
 
-/// Written by the robot whose poses they are; single precision is exact, see RbcdAgent. Poses
+/// Written by the robot whose poses they are; single precision is exact, see PgoAgent. Poses
 /// are checked for numbers and shape here, for feasibility by the agent.
 template <>
 struct Codec<PublicPoses> {

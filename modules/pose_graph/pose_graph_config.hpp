@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "modules/core/config.hpp"
+#include "modules/pose_graph/pgo_method.hpp"
 
 namespace km {
 
@@ -11,24 +12,32 @@ namespace km {
 struct PoseGraphConfig {
   static constexpr const char* kSection = "pose_graph";
 
+  /// How a session is solved; the same on all robots. Measured in README.md beside this file.
+  PgoMethod method = PgoMethod::kNewton;
+
   /// Rank r of the relaxation; the same on all robots.
   int rank = 5;
 
-  /// Rounds after which a session ends even if it has not converged; 0: no limit. The paper's
-  /// early stopping is 50.
+  /// Rounds (newton: exchanges) after which a session ends even if it has not converged; 0: no
+  /// limit. The paper's early stopping is 50.
   int max_rounds = 0;
 
-  /// A session has converged when a round lowers the team's cost by less than this part of it.
+  /// newton: what a robot may send on average [kB/s]. The next session waits until the last one is
+  /// paid for, half a minute at most; robots that need little optimise as often as they like.
+  double exchange_budget_kb_s = 50.0;
+
+  /// rbcd: a session has converged when a round lowers the team's cost by less than this part of
+  /// it.
   double min_relative_decrease = 1e-7;
 
-  /// Rounds that a session is given before new keyframes or closures replace it by the next.
+  /// rbcd: rounds that a session is given before new keyframes or closures replace it by the next.
   int min_rounds_per_session = 10;
 
-  /// Newton steps of one block update, and products with the Hessian in each.
+  /// rbcd: Newton steps of one block update, and products with the Hessian in each.
   int max_newton_steps = 3;
   int max_cg_iterations = 50;
 
-  /// How far a block update may go at most, the minimum of the block being 1, see
+  /// rbcd: how far a block update may go at most, the minimum of the block being 1, see
   /// SessionBlock::update(): it grows from 1.5 towards this over the rounds of a session.
   double max_over_relaxation = 1.95;
 
@@ -45,16 +54,20 @@ struct PoseGraphConfig {
   double status_period_s = 1.0;
 
   void visit_fields(auto& visitor) {
+    visitor.field("method", method, {{"newton", PgoMethod::kNewton}, {"rbcd", PgoMethod::kRbcd}},
+                  "of a session, the same on all robots");
     visitor.field("rank", rank, {3, 10}, "rank of the relaxation, the same on all robots");
     visitor.field("max_rounds", max_rounds, {0, 1000000}, "rounds per session, 0: no limit");
+    visitor.field("exchange_budget_kb_s", exchange_budget_kb_s, {0.1, 1e6},
+                  "[kB/s] newton: a robot's mean, paid for by waiting between sessions");
     visitor.field("min_relative_decrease", min_relative_decrease, {0.0, 0.1},
-                  "of the team's cost in a round: less is convergence");
+                  "rbcd: of the team's cost in a round: less is convergence");
     visitor.field("min_rounds_per_session", min_rounds_per_session, {0, 1000},
-                  "before new measurements open the next session");
-    visitor.field("max_newton_steps", max_newton_steps, {1, 100}, "per block update");
-    visitor.field("max_cg_iterations", max_cg_iterations, {1, 10000}, "per Newton step");
+                  "rbcd: before new measurements open the next session");
+    visitor.field("max_newton_steps", max_newton_steps, {1, 100}, "rbcd: per block update");
+    visitor.field("max_cg_iterations", max_cg_iterations, {1, 10000}, "rbcd: per Newton step");
     visitor.field("max_over_relaxation", max_over_relaxation, {1.0, 1.99},
-                  "1: to the block's minimum");
+                  "rbcd; 1: to the block's minimum");
     visitor.field("alignment_rotation_rad", alignment_rotation_rad, {1e-3, std::numbers::pi},
                   "[rad] agreement of closures on a new robot's frame");
     visitor.field("alignment_translation_m", alignment_translation_m, {1e-3, 1e4}, "[m] the same");

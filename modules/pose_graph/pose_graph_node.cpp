@@ -25,6 +25,7 @@ Overloaded(Handlers...) -> Overloaded<Handlers...>;  // Clang before 17 does not
 PoseGraphNode::PoseGraphNode(const PoseGraphConfig& config, PgoPeer self,
                              const PoseGraphTopics& topics)
     : topics_(topics),
+      method_(config.method),
       agent_(config, self),
       worker_(
           kQueue, Overflow::kBlock, [this](const Input& input) { step(input, steady_now_s()); },
@@ -40,6 +41,7 @@ PoseGraphNode::PoseGraphNode(const PoseGraphConfig& config, PgoPeer self,
   topics.peer_status.subscribe(post);
   topics.peer_sessions.subscribe(post);
   topics.peer_poses.subscribe(post);
+  topics.peer_exchanges.subscribe(post);
 }
 
 void PoseGraphNode::start() {
@@ -73,14 +75,15 @@ void PoseGraphNode::take(const Input& input) {
       [&](const Topic<Closure>::Message& m) { (void)agent_.add(*m); },
       [&](const Topic<InlierSet>::Message& m) { (void)agent_.add(*m); },
       [&](const Topic<PeerEvent>::Message& m) { take_peer_event(*m); },
-      [&](const Topic<PgoStatus>::Message& m) {
-        if (!agent_.receive(*m)) refuse("status", m->sender.robot);
-      },
+      [&](const Topic<PgoStatus>::Message& m) { take_status(*m); },
       [&](const Topic<PgoSession>::Message& m) {
         if (!agent_.receive(*m)) refuse("session", m->id.coordinator.robot);
       },
       [&](const Topic<PublicPoses>::Message& m) {
         if (!agent_.receive(*m)) refuse("poses", m->sender.robot);
+      },
+      [&](const Topic<SolverMessage>::Message& m) {
+        if (!agent_.receive(m)) refuse("exchange", m->sender.robot);
       },
   };
   std::visit(take_in, input);
@@ -101,6 +104,15 @@ void PoseGraphNode::take_peer_event(const PeerEvent& event) {
   }
 }
 
+void PoseGraphNode::take_status(const PgoStatus& status) {
+  if (agent_.receive(status)) return;
+  if (status.method == method_) return refuse("status", status.sender.robot);
+  log::limited(log::Level::kWarn, name(), "method" + std::to_string(status.sender.robot))
+      << "robot " << status.sender.robot << " optimises by '" << to_string(status.method)
+      << "', this one by '" << to_string(method_)
+      << "': not together, until pose_graph.method is the same";
+}
+
 void PoseGraphNode::refuse(const char* kind, RobotId from) const {
   log::limited(log::Level::kWarn, name(), kind + std::to_string(from))
       << kind << " of robot " << from << " refused: of a former process of it, or not usable";
@@ -109,6 +121,8 @@ void PoseGraphNode::refuse(const char* kind, RobotId from) const {
 void PoseGraphNode::publish(PgoOutput output) const {
   if (output.session) topics_.sessions.publish(std::move(*output.session));
   if (output.poses) topics_.poses.publish(std::move(*output.poses));
+  for (const SolverMessagePtr& message : output.exchange) topics_.exchanges.publish(message);
+  if (output.notice) log::limited(log::Level::kWarn, name(), "notice") << *output.notice;
   if (output.status) topics_.status.publish(std::move(*output.status));
   if (output.trajectory) topics_.trajectory.publish(std::move(*output.trajectory));
   if (output.progress) topics_.progress.publish(std::move(*output.progress));

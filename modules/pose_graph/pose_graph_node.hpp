@@ -5,7 +5,7 @@
 #include <string_view>
 #include <variant>
 
-#include "modules/pose_graph/rbcd_agent.hpp"
+#include "modules/pose_graph/pgo_agent.hpp"
 #include "runtime/dds/peer_table.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
@@ -24,17 +24,19 @@ struct PoseGraphTopics {
   Topic<PgoStatus>& peer_status;             ///< In.
   Topic<PgoSession>& peer_sessions;          ///< In.
   Topic<PublicPoses>& peer_poses;            ///< In.
+  Topic<SolverMessage>& peer_exchanges;      ///< In.
   const Topic<PgoStatus>& status;            ///< Out, to all robots: state, key robot.
   const Topic<PgoSession>& sessions;         ///< Out, to all robots: state, key robot.
   const Topic<PublicPoses>& poses;           ///< Out, to all robots: state, key robot.
+  const Topic<SolverMessage>& exchanges;     ///< Out, to all robots: state, keys robot and slot.
   const Topic<Trajectory>& trajectory;       ///< Out.
   const Topic<OptimizerProgress>& progress;  ///< Out.
 };
 
-/// One robot's part of distributed pose graph optimisation: an RbcdAgent on its thread.
+/// One robot's part of distributed pose graph optimisation: an PgoAgent on its thread.
 ///
-/// Inputs are taken in as they come; optimisation goes on by single block updates while none is
-/// waiting, so that a heavy graph delays a message by one update at most.
+/// Inputs are taken in as they come; optimisation goes on by single block updates or exchanges
+/// while none is waiting, so that a heavy graph delays a message by one of them at most.
 class PoseGraphNode final : public Node {
  public:
   /// `self` as the participant announces it. Throws ConfigError if `config` is out of bounds.
@@ -50,10 +52,10 @@ class PoseGraphNode final : public Node {
   /// Time passes. Always null: as a plain struct among pointers it sets off a false alarm of
   /// GCC 12.
   using Tick = std::shared_ptr<const struct TickTag>;
-  using Input =
-      std::variant<Tick, Topic<KeyframeOdometry>::Message, Topic<Closure>::Message,
-                   Topic<InlierSet>::Message, Topic<PeerEvent>::Message, Topic<PgoStatus>::Message,
-                   Topic<PgoSession>::Message, Topic<PublicPoses>::Message>;
+  using Input = std::variant<Tick, Topic<KeyframeOdometry>::Message, Topic<Closure>::Message,
+                             Topic<InlierSet>::Message, Topic<PeerEvent>::Message,
+                             Topic<PgoStatus>::Message, Topic<PgoSession>::Message,
+                             Topic<PublicPoses>::Message, Topic<SolverMessage>::Message>;
 
   /// Handles one input synchronously at time `now_s`. The thread calls only this; so can tests.
   void step(const Input& input, double now_s);
@@ -61,11 +63,13 @@ class PoseGraphNode final : public Node {
  private:
   void take(const Input& input);
   void take_peer_event(const PeerEvent& event);
+  void take_status(const PgoStatus& status);
   void refuse(const char* kind, RobotId from) const;
   void publish(PgoOutput output) const;
 
   const PoseGraphTopics topics_;
-  RbcdAgent agent_;
+  const PgoMethod method_;
+  PgoAgent agent_;
   Worker<Input> worker_;
   Periodic ticks_;  // last member: stops before the worker it posts to
 };

@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-#include "modules/pose_graph/rbcd_agent.hpp"
+#include "modules/pose_graph/pgo_agent.hpp"
 
 namespace km {
 
@@ -25,10 +25,10 @@ class PgoTeam {
  public:
   explicit PgoTeam(NetworkConditions network = {}) : network_(network), rng_(network.seed) {}
 
-  RbcdAgent& add(PgoPeer peer, const PoseGraphConfig& config) {
+  PgoAgent& add(PgoPeer peer, const PoseGraphConfig& config) {
     Robot& robot = robots_[peer.robot];
     robot.peer = peer;
-    robot.agent = std::make_unique<RbcdAgent>(config, peer);
+    robot.agent = std::make_unique<PgoAgent>(config, peer);
     for (auto& [id, other] : robots_) {
       if (id == peer.robot) continue;
       other.agent->peer_alive(peer);
@@ -68,7 +68,7 @@ class PgoTeam {
     }
   }
 
-  RbcdAgent& agent(RobotId robot) { return *robots_.at(robot).agent; }
+  PgoAgent& agent(RobotId robot) { return *robots_.at(robot).agent; }
   const Trajectory* trajectory(RobotId robot) const {
     const auto& trajectory = robots_.at(robot).trajectory;
     return trajectory ? &*trajectory : nullptr;
@@ -96,13 +96,14 @@ class PgoTeam {
     return true;
   }
 
-  std::function<void(RobotId)> on_update;  ///< After every update that sends poses.
+  std::function<void(RobotId)> on_update;  ///< After every update that sends something of it.
+  std::vector<std::string> notices;
 
  private:
-  using Message = std::variant<PgoStatus, PgoSession, PublicPoses>;
+  using Message = std::variant<PgoStatus, PgoSession, PublicPoses, SolverMessagePtr>;
   struct Robot {
     PgoPeer peer;
-    std::unique_ptr<RbcdAgent> agent;
+    std::unique_ptr<PgoAgent> agent;
     std::optional<Trajectory> trajectory;
     OptimizerProgress progress;
   };
@@ -117,9 +118,11 @@ class PgoTeam {
       more = output.more;
       if (output.trajectory) robot.trajectory = std::move(output.trajectory);
       if (output.progress) robot.progress = std::move(*output.progress);
-      if (output.poses && on_update) on_update(robot.peer.robot);
+      if (output.notice) notices.push_back(*output.notice);
+      if ((output.poses || !output.exchange.empty()) && on_update) on_update(robot.peer.robot);
       if (output.session) broadcast(robot, std::move(*output.session));
       if (output.poses) broadcast(robot, std::move(*output.poses));
+      for (SolverMessagePtr& message : output.exchange) broadcast(robot, std::move(message));
       if (output.status) broadcast(robot, std::move(*output.status));
     }
   }
@@ -128,6 +131,8 @@ class PgoTeam {
     const auto message = std::make_shared<const Message>(std::move(content));
     if (const auto* poses = std::get_if<PublicPoses>(message.get()))
       bytes_ += 84 + 84 * poses->keyframes.size();  // index and 20 floats each
+    if (const auto* exchanged = std::get_if<SolverMessagePtr>(message.get()))
+      bytes_ += approximate_bytes(**exchanged);
     std::uniform_real_distribution<double> uniform(0.0, 1.0);
     for (const auto& [id, robot] : robots_) {
       if (id == from.peer.robot) continue;
@@ -144,7 +149,7 @@ class PgoTeam {
   void deliver() {
     while (!in_flight_.empty() && in_flight_.begin()->first <= now_s_) {
       const Delivery delivery = in_flight_.extract(in_flight_.begin()).mapped();
-      RbcdAgent& agent = *robots_.at(delivery.to).agent;
+      PgoAgent& agent = *robots_.at(delivery.to).agent;
       std::visit([&](const auto& message) { (void)agent.receive(message); }, *delivery.message);
     }
   }

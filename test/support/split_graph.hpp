@@ -85,7 +85,7 @@ inline Closure make_closure(const RelativePose& measured) {
 }
 
 /// Gives an agent the odometry of its robot.
-inline void feed_odometry(RbcdAgent& agent, RobotId robot, const SplitGraph& graph) {
+inline void feed_odometry(PgoAgent& agent, RobotId robot, const SplitGraph& graph) {
   KeyframeOdometry first;
   first.id = {robot, 0};
   (void)agent.add(first);
@@ -94,7 +94,7 @@ inline void feed_odometry(RbcdAgent& agent, RobotId robot, const SplitGraph& gra
 }
 
 /// Gives an agent all its measurements, with every closure an inlier.
-inline void feed(RbcdAgent& agent, RobotId robot, const SplitGraph& graph) {
+inline void feed(PgoAgent& agent, RobotId robot, const SplitGraph& graph) {
   feed_odometry(agent, robot, graph);
   for (const RelativePose& e : graph.closures) (void)agent.add(make_closure(e));
   for (const auto& [other, count] : graph.keyframes)

@@ -205,6 +205,7 @@ std::optional<NewtonShare> NewtonAgent::descend() {
   }
   const MatrixXd given = MatrixXd::Zero(tangent_size(dimension_), 1);
   const SeparatorSystem::Solution solution = separator_system_.solve(shares, given);
+  decrement_ = solution.decrement;
   if (0.5 * solution.decrement <= options_.tolerance * cost + options_.absolute_tolerance) {
     phase_ = Phase::kDone;
     return std::nullopt;

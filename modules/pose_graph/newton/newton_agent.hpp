@@ -71,6 +71,8 @@ class NewtonAgent {
   [[nodiscard]] const std::vector<SE3>& poses() const { return accepted_; }
   /// Team cost there; nullopt before it is known.
   [[nodiscard]] std::optional<double> cost() const { return cost_; }
+  /// g^T H^-1 g at the last poses that a step was found from: twice the decrease it promised.
+  [[nodiscard]] double decrement() const { return decrement_; }
 
  private:
   enum class Phase { kHello, kRotations, kTranslations, kDescent, kDone };
@@ -116,6 +118,7 @@ class NewtonAgent {
   TeamStep step_;
   std::vector<SE3> accepted_;
   std::optional<double> cost_;
+  double decrement_ = 0.0;
   int backtracks_ = 0;  // in a row
   // Of the present second derivatives:
   bool all_gauss_newton_ = true;          // on all robots

@@ -34,6 +34,7 @@ void SeparatorSystem::learn_pattern(const NewtonShares& shares) {
         refuse(robot, "couples what it does not keep");
       const int a = member.kept[static_cast<std::size_t>(i)];
       const int b = member.kept[static_cast<std::size_t>(j)];
+      if (a == b) refuse(robot, "keeps a pose twice");
       pairs.push_back({std::min(a, b), std::max(a, b)});
       member.transposed.push_back(a > b);
     }

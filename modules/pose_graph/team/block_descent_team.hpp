@@ -10,7 +10,7 @@ namespace km {
 
 enum class BlockSchedule {
   /// Robots without common edges have one colour and update together; colours take turns. What
-  /// RbcdAgent comes to when all messages take equally long.
+  /// PgoAgent comes to when all messages take equally long.
   kColoured,
   /// The robot with the largest gradient norm updates, the others tell theirs again: two exchanges
   /// in each round (Tian et al., TRO 2021).

@@ -25,13 +25,15 @@ PgoStatus some_status() {
           .frame_version = 21,
           .keyframes = 12,
           .revision = 34,
-          .offers = {{3, 5, {2, 99}}, {65535, 1, {1, 1}}}};
+          .offers = {{3, 5, {2, 99}}, {65535, 1, {1, 1}}},
+          .method = PgoMethod::kNewton};
 }
 
 PgoSession some_session(bool with_anchor) {
   PgoSession session{.id = {{700, 8}, 5}, .plan = {.frame = {3, 77}, .members = {}, .pairs = {}}};
   session.plan.members = {{{700, 8}, 1}, {{3, 9}, 2}};
   session.plan.pairs = {{3, 700, {4, 0xffffffffffffffffU}}};
+  session.method = PgoMethod::kNewton;
   session.rank = 5;
   session.max_rounds = 50;
   session.anchor = 3;
@@ -71,6 +73,7 @@ TEST_CASE("a session comes back as it was sent", "[pose_graph][codec]") {
   REQUIRE(decoded.value);
   CHECK(decoded.value->id == session.id);
   CHECK(decoded.value->plan == session.plan);
+  CHECK(decoded.value->method == PgoMethod::kNewton);
   CHECK(decoded.value->rank == 5);
   CHECK(decoded.value->max_rounds == 50);
   CHECK(decoded.value->anchor == 3);
@@ -112,6 +115,9 @@ TEST_CASE("messages that cannot be meant are refused", "[pose_graph][codec]") {
     SECTION("offer without edges") {
       encoded.offers[0].edges = 0;
     }
+    SECTION("method") {
+      wire.method = 250;
+    }
     SECTION("no buffer") {
       wire.offers._buffer = nullptr;
     }
@@ -130,6 +136,9 @@ TEST_CASE("messages that cannot be meant are refused", "[pose_graph][codec]") {
     }
     SECTION("rank") {
       wire.rank = GENERATE(0U, 2U, 11U);
+    }
+    SECTION("method") {
+      wire.method = 250;
     }
     SECTION("anchor of another rank") {
       wire.anchor_pose._length = 12;

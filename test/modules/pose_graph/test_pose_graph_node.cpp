@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "modules/pose_graph/pose_graph_node.hpp"
+#include "test/support/captured_log.hpp"
 #include "test/support/patience.hpp"
 #include "test/support/split_graph.hpp"
 
@@ -13,7 +14,8 @@ namespace {
 
 // One robot's node with its topics.
 struct Robot {
-  explicit Robot(PgoPeer peer) : self(peer), node({}, peer, topics()) {
+  explicit Robot(PgoPeer peer, PgoMethod method = PgoMethod::kNewton)
+      : self(peer), node({.method = method}, peer, topics()) {
     trajectory.subscribe([this](const auto& message) {
       const std::lock_guard lock(mutex);
       latest = *message;
@@ -23,14 +25,15 @@ struct Robot {
 
   PoseGraphTopics topics() {
     return {odometry,    closures,      inlier_sets, peer_inlier_sets, peer_events,
-            peer_status, peer_sessions, peer_poses,  status,           sessions,
-            poses,       trajectory,    progress};
+            peer_status, peer_sessions, peer_poses,  peer_exchanges,   status,
+            sessions,    poses,         exchanges,   trajectory,       progress};
   }
 
   void hears(Robot& other) {
     other.status.subscribe([this](const auto& m) { peer_status.publish(m); });
     other.sessions.subscribe([this](const auto& m) { peer_sessions.publish(m); });
     other.poses.subscribe([this](const auto& m) { peer_poses.publish(m); });
+    other.exchanges.subscribe([this](const auto& m) { peer_exchanges.publish(m); });
   }
 
   void meet(const Robot& other) {
@@ -69,6 +72,7 @@ struct Robot {
   Topic<PgoStatus> peer_status, status;
   Topic<PgoSession> peer_sessions, sessions;
   Topic<PublicPoses> peer_poses, poses;
+  Topic<SolverMessage> peer_exchanges, exchanges;
   Topic<Trajectory> trajectory;
   Topic<OptimizerProgress> progress;
   std::mutex mutex;
@@ -96,9 +100,11 @@ constexpr double kSinglePrecision_m = 1e-5;
 }  // namespace
 
 TEST_CASE("two nodes on their threads end in one frame", "[pose_graph][node]") {
+  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
+  CAPTURE(to_string(method));
   const SplitGraph graph = parallel_lines();
-  Robot two({2, 11});
-  Robot nine({9, 12});
+  Robot two({2, 11}, method);
+  Robot nine({9, 12}, method);
   two.hears(nine);
   nine.hears(two);
   two.node.start();
@@ -138,6 +144,15 @@ TEST_CASE("a node alone publishes its own trajectory and status", "[pose_graph][
   CHECK(nine.latest->anchor == 9);
   CHECK(nine.latest->T_world_kf.size() == 5);
   CHECK(statuses == 5);  // each is due: two seconds have passed
+}
+
+TEST_CASE("a robot with another method is named and left alone", "[pose_graph][node]") {
+  Robot two({2, 11}, PgoMethod::kNewton);
+  const CapturedLog log;
+  const PgoStatus status{.sender = {9, 12}, .frame = {9, 12}, .method = PgoMethod::kRbcd};
+  for (int k = 0; k < 20; ++k) two.node.step(std::make_shared<const PgoStatus>(status), 1.0);
+  CHECK(log.lines().size() == 1);
+  CHECK_THAT(log.text(), Catch::Contains("robot 9 optimises by 'rbcd', this one by 'newton'"));
 }
 
 TEST_CASE("a configuration out of bounds is refused", "[pose_graph][node]") {

@@ -1,13 +1,16 @@
 #include <algorithm>
 #include <utility>
 
-#include "modules/pose_graph/rbcd_agent.hpp"
+#include "modules/pose_graph/pgo_agent.hpp"
 
 namespace km {
 namespace {
 
 // A session that has not moved for so many status periods is replaced.
 constexpr double kHopelessPeriods = 10.0;
+
+// However much was sent, new measurements wait no longer than this [s].
+constexpr double kLongestWait_s = 30.0;
 
 // The same work, in whatever order and frame.
 bool same_graph(const SessionPlan& x, const SessionPlan& y) {
@@ -23,7 +26,7 @@ bool has_lost_member(const SessionPlan& session, const SessionPlan& now) {
 }
 
 // Also of hostile origin: nothing that joining relies on is taken for granted.
-bool well_formed(const PgoSession& session, int rank) {
+bool well_formed(const PgoSession& session, int rank, PgoMethod method) {
   std::set<RobotId> robots;
   for (const SessionMember& member : session.plan.members) robots.insert(member.peer.robot);
   const auto known_pair = [&](const SessionPair& pair) {
@@ -35,6 +38,7 @@ bool well_formed(const PgoSession& session, int rank) {
       anchor.size() == 0 || (anchor.rows() == rank && anchor.cols() == 4 && anchor.allFinite() &&
                              stiefel_error(anchor) <= 1e-3);
   return session.rank == static_cast<std::uint32_t>(rank) &&
+         (session.method == method || session.method == PgoMethod::kRbcd) &&
          robots.size() == session.plan.members.size() && !robots.empty() &&
          *robots.begin() == session.id.coordinator.robot &&
          std::all_of(pairs.begin(), pairs.end(), known_pair) && anchor_fits;
@@ -42,7 +46,7 @@ bool well_formed(const PgoSession& session, int rank) {
 
 }  // namespace
 
-SessionPlan RbcdAgent::make_plan() const {
+SessionPlan PgoAgent::make_plan() const {
   std::map<RobotId, PgoStatus> statuses{{self_.robot, make_status()}};
   for (const auto& [robot, peer] : peers_) {
     if (!peer.alive || !peer.status) continue;
@@ -54,7 +58,7 @@ SessionPlan RbcdAgent::make_plan() const {
   return plan_session(statuses, self_.robot);
 }
 
-void RbcdAgent::coordinate(PgoOutput& output) {
+void PgoAgent::coordinate(PgoOutput& output) {
   if (std::exchange(plan_outdated_, false)) {
     plan_ = make_plan();
     if (const auto session = std::exchange(waiting_, std::nullopt)) join_or_wait(*session);
@@ -68,19 +72,43 @@ void RbcdAgent::coordinate(PgoOutput& output) {
   session_sent_s_ = now_s_;
 }
 
-bool RbcdAgent::should_open() const {
+PgoMethod PgoAgent::method_for(const SessionPlan& plan) const {
+  const auto is_fixed = [&](const EdgeSetOffer& offer) {
+    const auto peer = peers_.find(offer.peer);
+    return !plan.has_member(offer.peer) && peer != peers_.end() && peer->second.poses &&
+           peer->second.poses->frame == plan.frame;
+  };
+  // Robots that have gone stay where they are: only the sweep knows poses that do not move.
+  const auto ends_on_fixed = [&](const SessionMember& member) {
+    const auto offers =
+        member.peer == self_ ? graph_.offers() : peers_.at(member.peer.robot).status->offers;
+    return std::any_of(offers.begin(), offers.end(), is_fixed);
+  };
+  const bool any_fixed = std::any_of(plan.members.begin(), plan.members.end(), ends_on_fixed);
+  return any_fixed ? PgoMethod::kRbcd : config_.method;
+}
+
+bool PgoAgent::paid_for() const {
+  const double price_s =
+      static_cast<double>(running_->bytes_sent) / (1e3 * config_.exchange_budget_kb_s);
+  return now_s_ - running_->moved_s >= std::min(price_s, kLongestWait_s);
+}
+
+bool PgoAgent::should_open() const {
   if (!running_) return true;
   const PgoSession& session = running_->session;
   const double still_s = now_s_ - running_->moved_s;
   const bool stalled = still_s > kHopelessPeriods * config_.status_period_s;
   if (same_graph(session.plan, plan_)) return stalled && !session.finished;
-  return session.finished || stalled || session.id.coordinator != self_ ||
-         has_lost_member(session.plan, plan_) ||
+  if (session.id.coordinator != self_ || has_lost_member(session.plan, plan_)) return true;
+  if (running_->exchange) return session.finished ? paid_for() : stalled;
+  return session.finished || stalled ||
          session.round >= static_cast<std::uint32_t>(config_.min_rounds_per_session);
 }
 
-void RbcdAgent::open_session() {
+void PgoAgent::open_session() {
   PgoSession session{.id = {self_, ++sessions_opened_}, .plan = plan_};
+  session.method = method_for(plan_);
   session.rank = static_cast<std::uint32_t>(config_.rank);
   session.max_rounds = static_cast<std::uint32_t>(config_.max_rounds);
   session.anchor = coordinator_of(plan_);
@@ -93,7 +121,7 @@ void RbcdAgent::open_session() {
   announce_session_ = join(session);
 }
 
-bool RbcdAgent::accepts(const PgoSession& session) const {
+bool PgoAgent::accepts(const PgoSession& session) const {
   if (!running_) return true;
   const PgoSessionId& running = running_->session.id;
   if (session.id.coordinator == running.coordinator) return running.number < session.id.number;
@@ -101,8 +129,9 @@ bool RbcdAgent::accepts(const PgoSession& session) const {
   return orphaned || session.id.coordinator.robot <= running.coordinator.robot;
 }
 
-bool RbcdAgent::receive(const PgoSession& session) {
-  if (present(session.id.coordinator) == nullptr || !well_formed(session, config_.rank))
+bool PgoAgent::receive(const PgoSession& session) {
+  if (present(session.id.coordinator) == nullptr ||
+      !well_formed(session, config_.rank, config_.method))
     return false;
   const auto& members = session.plan.members;
   const auto self = std::find_if(members.begin(), members.end(),
@@ -117,20 +146,22 @@ bool RbcdAgent::receive(const PgoSession& session) {
   return true;
 }
 
-void RbcdAgent::join_or_wait(const PgoSession& session) {
+void PgoAgent::join_or_wait(const PgoSession& session) {
   if (!accepts(session)) return;
   // Its coordinator must be known to be connected to this robot, and its edges be at hand.
   const bool connected = plan_.has_member(session.id.coordinator.robot);
   if (!connected || !join(session)) waiting_ = session;
 }
 
-void RbcdAgent::follow(const PgoSession& session) {
+void PgoAgent::follow(const PgoSession& session) {
   PgoSession& running = running_->session;
   publish_due_ |= session.finished && !running.finished;
+  running.finished |= session.finished;
+  if (session.finished) running.anchor_pose = session.anchor_pose;
+  if (session.round < running.round) return;  // late
   running.round = session.round;
   running.cost = session.cost;
   running.gradient_norm = session.gradient_norm;
-  running.finished |= session.finished;
 }
 
 }  // namespace km

@@ -60,6 +60,7 @@ TEST_CASE("eight robots in tunnels end in one frame at the centralised optimum",
   const SplitGraph graph = consistent_tunnels(*folder);
   const double optimum = solve_centrally(graph.whole()).cost;
   PoseGraphConfig config;
+  config.method = PgoMethod::kRbcd;
   config.max_rounds = 254;  // dpgo's for a gap of 1e-2
   PgoTeam team;
   double cost = std::numeric_limits<double>::infinity();

@@ -1,4 +1,4 @@
-#include "modules/pose_graph/rbcd_agent.hpp"
+#include "modules/pose_graph/pgo_agent.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -23,30 +23,39 @@ bool well_formed(const PublicPoses& poses, int rank) {
          std::isfinite(poses.squared_gradient);
 }
 
+// Nobody speaks for another robot.
+bool speaks_for_itself(const SolverMessage& message) {
+  const auto of_sender = [&](const auto& content) {
+    if constexpr (requires { content.robot; }) return content.robot == message.sender.robot;
+    return true;
+  };
+  return std::visit(of_sender, message.content);
+}
+
 }  // namespace
 
-RbcdAgent::RbcdAgent(const PoseGraphConfig& config, PgoPeer self)
+PgoAgent::PgoAgent(const PoseGraphConfig& config, PgoPeer self)
     : config_(checked(config)), self_(self), graph_(self.robot), frame_(self) {}
 
-bool RbcdAgent::add(const KeyframeOdometry& keyframe) {
+bool PgoAgent::add(const KeyframeOdometry& keyframe) {
   const bool taken = graph_.add(keyframe);
   plan_outdated_ |= taken;
   return taken;
 }
 
-bool RbcdAgent::add(const Closure& closure) {
+bool PgoAgent::add(const Closure& closure) {
   const bool taken = graph_.add(closure);
   plan_outdated_ |= taken;
   return taken;
 }
 
-bool RbcdAgent::add(const InlierSet& set) {
+bool PgoAgent::add(const InlierSet& set) {
   const bool taken = graph_.add(set);
   plan_outdated_ |= taken;
   return taken;
 }
 
-void RbcdAgent::peer_alive(PgoPeer peer) {
+void PgoAgent::peer_alive(PgoPeer peer) {
   if (peer.robot == self_.robot) return;
   Peer& entry = peers_.try_emplace(peer.robot, Peer{.boot = peer.boot}).first->second;
   if (entry.boot != peer.boot) {
@@ -57,26 +66,27 @@ void RbcdAgent::peer_alive(PgoPeer peer) {
   plan_outdated_ = true;
 }
 
-void RbcdAgent::peer_lost(RobotId robot) {
+void PgoAgent::peer_lost(RobotId robot) {
   const auto known = peers_.find(robot);
   if (known == peers_.end()) return;
   known->second.alive = false;
   plan_outdated_ = true;
 }
 
-const RbcdAgent::Peer* RbcdAgent::present(PgoPeer peer) const {
+const PgoAgent::Peer* PgoAgent::present(PgoPeer peer) const {
   const auto known = peers_.find(peer.robot);
   const bool is = known != peers_.end() && known->second.alive && known->second.boot == peer.boot;
   return is ? &known->second : nullptr;
 }
 
-RbcdAgent::Peer* RbcdAgent::sender_of_message(PgoPeer peer) {
+PgoAgent::Peer* PgoAgent::sender_of_message(PgoPeer peer) {
   if (peer.robot == self_.robot) return nullptr;
   Peer& entry = peers_.try_emplace(peer.robot, Peer{.boot = peer.boot}).first->second;
   return entry.boot == peer.boot ? &entry : nullptr;
 }
 
-bool RbcdAgent::receive(const PgoStatus& status) {
+bool PgoAgent::receive(const PgoStatus& status) {
+  if (status.method != config_.method) return false;
   Peer* sender = sender_of_message(status.sender);
   if (sender == nullptr) return false;
   sender->status = status;
@@ -84,7 +94,7 @@ bool RbcdAgent::receive(const PgoStatus& status) {
   return true;
 }
 
-bool RbcdAgent::receive(PublicPoses poses) {
+bool PgoAgent::receive(PublicPoses poses) {
   if (!well_formed(poses, config_.rank)) return false;
   Peer* sender = sender_of_message(poses.sender);
   if (sender == nullptr) return false;
@@ -99,7 +109,20 @@ bool RbcdAgent::receive(PublicPoses poses) {
   return true;
 }
 
-PgoOutput RbcdAgent::step(double now_s) {
+bool PgoAgent::receive(const SolverMessagePtr& message) {
+  Peer* sender = sender_of_message(message->sender);
+  if (sender == nullptr || !speaks_for_itself(*message)) return false;
+  SolverMessagePtr& kept = sender->exchange[slot_of(message->sequence)];
+  const bool stale = kept && kept->session.coordinator == message->session.coordinator &&
+                     std::pair(message->session.number, message->sequence) <
+                         std::pair(kept->session.number, kept->sequence);
+  if (stale) return true;
+  kept = message;
+  take_in(message);
+  return true;
+}
+
+PgoOutput PgoAgent::step(double now_s) {
   now_s_ = now_s;
   PgoOutput output;
   if (graph_.keyframes() == 0) return output;
@@ -110,11 +133,12 @@ PgoOutput RbcdAgent::step(double now_s) {
   return output;
 }
 
-PgoStatus RbcdAgent::make_status() const {
-  return {self_, frame_, frame_version_, graph_.keyframes(), graph_.revision(), graph_.offers()};
+PgoStatus PgoAgent::make_status() const {
+  return {self_,           frame_,        frame_version_, graph_.keyframes(), graph_.revision(),
+          graph_.offers(), config_.method};
 }
 
-void RbcdAgent::send_status(PgoOutput& output) {
+void PgoAgent::send_status(PgoOutput& output) {
   const double age_s = now_s_ - status_sent_s_;
   if (age_s < kEarlyStatus * config_.status_period_s) return;
   PgoStatus status = make_status();
@@ -125,8 +149,13 @@ void RbcdAgent::send_status(PgoOutput& output) {
   output.status = std::move(status);
 }
 
-std::optional<Eigen::MatrixXd> RbcdAgent::pose_of_anchor(RobotId anchor) const {
-  if (anchor == self_.robot) return block_->X().leftCols<4>();
+std::optional<Eigen::MatrixXd> PgoAgent::pose_of_anchor(RobotId anchor) const {
+  if (running_ && running_->exchange && running_->session.finished &&
+      anchor == running_->session.anchor && running_->session.anchor_pose.cols() == 4)
+    return running_->session.anchor_pose;
+  // What the others know it as: then all are in one frame to the last digit.
+  if (anchor == self_.robot)
+    return sent_poses_ ? restore_stiefel(sent_poses_->X.leftCols<4>()) : block_->X().leftCols<4>();
   const auto peer = peers_.find(anchor);
   if (peer != peers_.end() && peer->second.poses && peer->second.poses->frame == frame_)
     return peer->second.poses->X.leftCols<4>();
@@ -135,21 +164,30 @@ std::optional<Eigen::MatrixXd> RbcdAgent::pose_of_anchor(RobotId anchor) const {
   return std::nullopt;
 }
 
-void RbcdAgent::publish(PgoOutput& output) {
+// True while it is not known where the anchor, which moves, too, is after the last exchange.
+bool PgoAgent::awaits_anchor() const {
+  const PgoSession& session = running_->session;
+  if (!running_->exchange || session.finished) return false;
+  const bool moves =
+      session.anchor != self_.robot && running_->position_of.contains(session.anchor);
+  return *running_->round > 0 || (moves && poses_in_session(session.anchor, 0) == nullptr);
+}
+
+void PgoAgent::publish(PgoOutput& output) {
   const bool running = running_ && !running_->session.finished;
   if (!block_ || !publish_due_ || (running && now_s_ - published_s_ < config_.publish_period_s))
     return;
   const bool in_frame = running_ && running_->round;
   const RobotId anchor = in_frame ? running_->session.anchor : self_.robot;
   const auto pose = pose_of_anchor(anchor);
-  if (!pose) return;  // it comes with the anchor's poses
+  if (!pose || (in_frame && awaits_anchor())) return;
   publish_due_ = false;
   published_s_ = now_s_;
   output.trajectory = Trajectory{self_.robot, anchor, round_to_poses(block_->X(), *pose)};
   output.progress = make_progress();
 }
 
-OptimizerProgress RbcdAgent::make_progress() const {
+OptimizerProgress PgoAgent::make_progress() const {
   OptimizerProgress progress{.anchor = self_.robot, .members = {self_.robot}};
   progress.round = total_rounds_;
   progress.seconds = optimising_s_;
@@ -161,11 +199,11 @@ OptimizerProgress RbcdAgent::make_progress() const {
   progress.cost = session.cost;
   progress.gradient_norm = session.gradient_norm;
   progress.seconds += running_->moved_s - running_->started_s;
-  progress.settled = session.finished && holds_all(session.plan);
+  progress.settled = session.finished && !publish_due_ && holds_all(session.plan);
   return progress;
 }
 
-bool RbcdAgent::holds_all(const SessionPlan& plan) const {
+bool PgoAgent::holds_all(const SessionPlan& plan) const {
   if (plan.members[running_->position_of.at(self_.robot)].revision != graph_.revision())
     return false;
   std::optional<RobotId> last;

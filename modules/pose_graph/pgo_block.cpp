@@ -1,18 +1,19 @@
 #include <algorithm>
+#include <utility>
 
 #include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/rbcd_agent.hpp"
+#include "modules/pose_graph/pgo_agent.hpp"
 
 namespace km {
 namespace {
 
-// After so many status periods without an update a member sends its last poses again.
+// After so many status periods without an update a member sends its last messages again.
 constexpr double kStalledPeriods = 3.0;
 constexpr int kAlignmentSteps = 10;  // Newton steps of the first solution beside aligned peers
 
 }  // namespace
 
-std::optional<RbcdAgent::EdgesTo> RbcdAgent::edges_in(const SessionPlan& plan) const {
+std::optional<PgoAgent::EdgesTo> PgoAgent::edges_in(const SessionPlan& plan) const {
   EdgesTo edges;
   for (const SessionPair& pair : plan.pairs) {
     if (pair.a != self_.robot && pair.b != self_.robot) continue;
@@ -24,7 +25,7 @@ std::optional<RbcdAgent::EdgesTo> RbcdAgent::edges_in(const SessionPlan& plan) c
   return edges;
 }
 
-RbcdAgent::EdgesTo RbcdAgent::edges_to_absent(const SessionPlan& plan) const {
+PgoAgent::EdgesTo PgoAgent::edges_to_absent(const SessionPlan& plan) const {
   EdgesTo edges;
   for (const auto& [robot, peer] : peers_) {
     const auto* of_peer = graph_.newest_edges(robot);
@@ -39,7 +40,7 @@ RbcdAgent::EdgesTo RbcdAgent::edges_to_absent(const SessionPlan& plan) const {
   return edges;
 }
 
-LiftedPoses RbcdAgent::extended_poses() const {
+LiftedPoses PgoAgent::extended_poses() const {
   const Eigen::Index known = block_ ? pose_count(block_->X()) : 0;
   LiftedPoses X(config_.rank, 4 * Eigen::Index{graph_.keyframes()});
   X.leftCols(4 * known) = block_ ? block_->X() : LiftedPoses(config_.rank, 0);
@@ -50,7 +51,7 @@ LiftedPoses RbcdAgent::extended_poses() const {
   return X;
 }
 
-void RbcdAgent::start_block(const SessionPlan& plan, EdgesTo edges, const EdgesTo& absent) {
+void PgoAgent::start_block(const SessionPlan& plan, EdgesTo edges, const EdgesTo& absent) {
   edges.insert(absent.begin(), absent.end());
   const std::vector<BlockEdge> own_edges = graph_.own_edges();
   block_.emplace(extended_poses(), own_edges, edges);
@@ -67,14 +68,19 @@ void RbcdAgent::start_block(const SessionPlan& plan, EdgesTo edges, const EdgesT
   }
 }
 
-bool RbcdAgent::join(const PgoSession& session) {
+bool PgoAgent::join(const PgoSession& session) {
   const SessionPlan& plan = session.plan;
   auto edges = edges_in(plan);
   if (!edges) return false;
   const EdgesTo absent = edges_to_absent(plan);
+  std::optional<Exchange> exchange;
+  if (session.method != PgoMethod::kRbcd)
+    exchange.emplace(Exchange{
+        .edges = {self_.robot, Eigen::Index{graph_.keyframes()}, graph_.own_edges(), *edges}});
   start_block(plan, std::move(*edges), absent);
   if (running_) optimising_s_ += running_->moved_s - running_->started_s;
   Running& running = running_.emplace(Running{.session = session});
+  running.exchange = std::move(exchange);
   running.started_s = running.moved_s = running.sent_s = now_s_;
   for (std::size_t k = 0; k < plan.members.size(); ++k)
     running.position_of[plan.members[k].peer.robot] = k;
@@ -92,7 +98,7 @@ bool RbcdAgent::join(const PgoSession& session) {
   return true;
 }
 
-const PublicPoses* RbcdAgent::poses_in_session(RobotId robot, std::uint32_t round) const {
+const PublicPoses* PgoAgent::poses_in_session(RobotId robot, std::uint32_t round) const {
   const auto peer = peers_.find(robot);
   const bool found = peer != peers_.end() && peer->second.poses &&
                      peer->second.poses->session == running_->session.id &&
@@ -100,7 +106,7 @@ const PublicPoses* RbcdAgent::poses_in_session(RobotId robot, std::uint32_t roun
   return found ? &*peer->second.poses : nullptr;
 }
 
-bool RbcdAgent::hear_neighbours() {
+bool PgoAgent::hear_neighbours() {
   const std::size_t position = running_->position_of.at(self_.robot);
   bool any = false;
   for (const RobotId robot : block_->neighbours()) {
@@ -116,80 +122,69 @@ bool RbcdAgent::hear_neighbours() {
   return any || running_->round;
 }
 
-void RbcdAgent::advance(PgoOutput& output) {
+void PgoAgent::advance(PgoOutput& output) {
   if (!running_ || running_->session.finished) return;
-  const PgoSession& session = running_->session;
-  const bool in_frame = frame_ == session.plan.frame || running_->position_of.at(self_.robot) == 0;
-  if (!running_->round && in_frame) {
-    return enter_frame(output);
+  if (!running_->round) return align(output);
+  if (running_->exchange) return exchange(output);
+  sweep(output);
+}
+
+void PgoAgent::align(PgoOutput& output) {
+  const PgoFrame& frame = running_->session.plan.frame;
+  if (frame_ != frame && running_->position_of.at(self_.robot) != 0) {
+    if (!hear_neighbours()) return repeat_if_silent(output);
+    const TruncatedNewtonOptions options{.max_iterations = kAlignmentSteps,
+                                         .max_cg_iterations = config_.max_cg_iterations};
+    block_->align({config_.alignment_rotation_rad, config_.alignment_translation_m}, options);
   }
-  const bool stopped =
-      running_->round && session.max_rounds > 0 && *running_->round >= session.max_rounds;
-  if (stopped || !hear_neighbours()) {
-    const double silent_s = now_s_ - running_->sent_s;
-    if (sent_poses_ && silent_s > kStalledPeriods * config_.status_period_s) {
-      output.poses = sent_poses_;
-      running_->sent_s = now_s_;
-    }
-    return;
-  }
-  TruncatedNewtonOptions options{.max_iterations = config_.max_newton_steps,
-                                 .max_cg_iterations = config_.max_cg_iterations};
-  if (running_->round) {
-    const double relaxation = relaxation_of(*running_->round, session.plan.members.size());
-    const auto result = block_->update(options, relaxation);
-    ++*running_->round;
-    ++total_rounds_;
-    return finish_update(result.initial_gradient_norm * result.initial_gradient_norm, output);
-  }
-  options.max_iterations = kAlignmentSteps;
-  block_->align({config_.alignment_rotation_rad, config_.alignment_translation_m}, options);
   enter_frame(output);
 }
 
-void RbcdAgent::enter_frame(PgoOutput& output) {
+void PgoAgent::enter_frame(PgoOutput& output) {
   const PgoFrame& frame = running_->session.plan.frame;
   if (frame_ != frame) ++frame_version_;
   frame_ = frame;
   running_->round = 0;
   plan_outdated_ = true;
-  finish_update(0.0, output);
+  // Members after this one may not be in the frame yet: nobody has a share of the cost.
+  send_poses(running_->exchange ? rounded_public_poses() : block_->round_public_poses(), 0.0, 0.0,
+             output);
 }
 
-double RbcdAgent::relaxation_of(std::uint32_t round, std::size_t members) const {
-  if (members == 1) return 1.0;
-  return growing_relaxation(round, config_.max_over_relaxation);
+LiftedPoses PgoAgent::rounded_public_poses() const {
+  const std::vector<std::uint32_t>& keyframes = block_->public_keyframes();
+  LiftedPoses rounded(config_.rank, 4 * static_cast<Eigen::Index>(keyframes.size()));
+  for (std::size_t k = 0; k < keyframes.size(); ++k)
+    rounded.middleCols<4>(4 * static_cast<Eigen::Index>(k)) =
+        block_->X().middleCols<4>(4 * Eigen::Index{keyframes[k]}).cast<float>().cast<double>();
+  return rounded;
 }
 
-void RbcdAgent::finish_update(double squared_gradient, PgoOutput& output) {
+void PgoAgent::send_poses(LiftedPoses rounded, double cost, double squared_gradient,
+                          PgoOutput& output) {
   PublicPoses poses{.sender = self_, .session = running_->session.id, .frame = frame_};
   poses.frame_version = frame_version_;
   poses.round = *running_->round;
+  poses.cost = cost;
   poses.squared_gradient = squared_gradient;
   poses.keyframes = block_->public_keyframes();
-  poses.X = block_->round_public_poses();
-  // In round 0 members after this one may not be in the frame yet; the share counts none of them.
-  poses.cost = running_->round == 0U ? 0.0 : block_->share_of_cost(running_->counted);
+  poses.X = std::move(rounded);
   running_->moved_s = running_->sent_s = now_s_;
-  count_share(poses);
   publish_due_ = true;
   output.more = true;
-  if (running_->session.plan.members.size() == 1) return;
-  sent_poses_ = poses;
-  output.poses = std::move(poses);
+  if (running_->session.plan.members.size() > 1) {
+    running_->bytes_sent += 4 * (poses.keyframes.size() + static_cast<std::size_t>(poses.X.size()));
+    sent_poses_ = output.poses = poses;
+  }
+  count_share(poses);
 }
 
-void RbcdAgent::count_share(const PublicPoses& poses) {
-  if (!ledger_ || poses.session != running_->session.id || poses.round == 0) return;
-  if (!ledger_->record(poses.sender.robot, poses.round, poses.cost, poses.squared_gradient)) return;
-  PgoSession& session = running_->session;
-  session.round = ledger_->last()->round;
-  session.cost = ledger_->last()->cost;
-  session.gradient_norm = ledger_->last()->gradient_norm;
-  const auto decrease = ledger_->relative_decrease();
-  session.finished = (session.max_rounds > 0 && session.round >= session.max_rounds) ||
-                     (decrease && *decrease < config_.min_relative_decrease);
-  announce_session_ |= session.finished;
+void PgoAgent::repeat_if_silent(PgoOutput& output) {
+  if (now_s_ - running_->sent_s <= kStalledPeriods * config_.status_period_s) return;
+  running_->sent_s = now_s_;
+  output.poses = sent_poses_;
+  for (const SolverMessagePtr& message : running_->last_sent)
+    if (message) output.exchange.push_back(message);
 }
 
 }  // namespace km

@@ -1,54 +1,13 @@
 #include <catch2/catch.hpp>
 
 #include "test/support/pgo_team.hpp"
-#include "test/support/split_graph.hpp"
+#include "test/support/random_team.hpp"
 
 namespace km {
 namespace {
 
 constexpr double kHour_s = 3600.0;
 constexpr double kTolerance = 1e-4;  // of the cost, relative
-
-// Robots that walk around each other in a box, with closures between those in `pairs`.
-SplitGraph random_team(unsigned seed, const std::vector<RobotId>& ids, std::uint32_t keyframes,
-                       const std::vector<std::pair<RobotId, RobotId>>& pairs) {
-  std::mt19937 rng(seed);
-  const Matrix6 covariance = covariance_of({.kappa = 2500.0, .tau = 100.0});
-  const auto measure = [&](const SE3& T_a, const SE3& T_b) {
-    const SE3 exact = T_a.inverse() * T_b;
-    const Eigen::Vector3d phi = 0.02 * random_vector<3>(rng);
-    const Eigen::Vector3d t = 0.1 * random_vector<3>(rng);
-    const Eigen::AngleAxisd R(phi.norm(), phi.normalized());
-    return exact * make_pose(R.toRotationMatrix(), t);
-  };
-  SplitGraph graph;
-  std::map<RobotId, std::vector<SE3>> truth;
-  for (const RobotId id : ids) {
-    graph.keyframes[id] = keyframes;
-    SE3 T = random_pose(rng, 5.0);
-    for (std::uint32_t i = 0; i < keyframes; ++i) {
-      truth[id].push_back(T);
-      const Eigen::Vector3d phi = 0.3 * random_vector<3>(rng);
-      const Eigen::AngleAxisd R(phi.norm(), phi.normalized());
-      T = T * make_pose(R.toRotationMatrix(), {1.0, 0.0, 0.0});
-    }
-    for (std::uint32_t i = 0; i + 1 < keyframes; ++i)
-      graph.odometry.push_back(
-          {{id, i}, {id, i + 1}, measure(truth[id][i], truth[id][i + 1]), covariance});
-  }
-  std::uniform_int_distribution<std::uint32_t> any(1, keyframes - 1);
-  std::set<ClosureId> drawn;
-  for (const auto& [a, b] : pairs)
-    for (int k = 0; k < 8; ++k) {
-      const std::uint32_t i = any(rng);
-      const KeyframeId from{k % 2 == 0 ? a : b, i};
-      const KeyframeId to{k % 2 == 0 ? b : a, any(rng)};
-      if (!drawn.insert({from, to}).second) continue;
-      const SE3 T = measure(truth[from.robot][from.index], truth[to.robot][to.index]);
-      graph.closures.push_back({from, to, T, covariance});
-    }
-  return graph;
-}
 
 const std::vector<RobotId> kIds{50, 7, 1200, 33};
 const std::vector<std::pair<RobotId, RobotId>> kRing{{7, 33}, {33, 50}, {50, 1200}, {7, 1200}};
@@ -57,8 +16,15 @@ double optimum_of(const SplitGraph& graph) {
   return solve_centrally(graph.whole()).cost;
 }
 
-void add(PgoTeam& team, const SplitGraph& graph, RobotId robot, std::uint64_t boot = 1) {
-  feed(team.add({robot, boot}, {}), robot, graph);
+PoseGraphConfig config_of(PgoMethod method) {
+  PoseGraphConfig config;
+  config.method = method;
+  return config;
+}
+
+void add(PgoTeam& team, const SplitGraph& graph, RobotId robot, PgoMethod method,
+         std::uint64_t boot = 1) {
+  feed(team.add({robot, boot}, config_of(method)), robot, graph);
 }
 
 void check_common_frame(PgoTeam& team, const SplitGraph& graph, RobotId anchor) {
@@ -82,13 +48,15 @@ bool settle(PgoTeam& team) {
 }  // namespace
 
 TEST_CASE("measurements may come in any order", "[pose_graph][agent]") {
+  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
+  CAPTURE(to_string(method));
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   const SplitGraph graph = random_team(seed, kIds, 12, kRing);
   std::mt19937 rng(seed);
   PgoTeam team;
   for (const RobotId robot : kIds) {
-    RbcdAgent& agent = team.add({robot, 1}, {});
+    PgoAgent& agent = team.add({robot, 1}, config_of(method));
     for (const auto& [other, count] : graph.keyframes)
       (void)agent.add(inlier_set(graph, std::min(robot, other), std::max(robot, other)));
     auto closures = graph.closures;
@@ -103,10 +71,12 @@ TEST_CASE("measurements may come in any order", "[pose_graph][agent]") {
 }
 
 TEST_CASE("a team keeps up with robots that are still moving", "[pose_graph][agent]") {
+  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
+  CAPTURE(to_string(method));
   const SplitGraph graph = random_team(4, kIds, 30, kRing);
   PgoTeam team({.max_delay_s = 0.01});
   for (const RobotId robot : kIds) {
-    RbcdAgent& agent = team.add({robot, 1}, {});
+    PgoAgent& agent = team.add({robot, 1}, config_of(method));
     KeyframeOdometry first;
     first.id = {robot, 0};
     (void)agent.add(first);
@@ -135,23 +105,27 @@ TEST_CASE("a team keeps up with robots that are still moving", "[pose_graph][age
 }
 
 TEST_CASE("a late robot is taken in", "[pose_graph][agent]") {
+  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
+  CAPTURE(to_string(method));
   const SplitGraph graph = random_team(5, kIds, 12, kRing);
   const RobotId late = GENERATE(RobotId{7}, RobotId{1200});
   CAPTURE(late);
   PgoTeam team;
   for (const RobotId robot : kIds)
-    if (robot != late) add(team, graph, robot);
+    if (robot != late) add(team, graph, robot, method);
   REQUIRE(settle(team));
-  add(team, graph, late);
+  add(team, graph, late, method);
   REQUIRE(settle(team));
   check_optimal(team, graph, 7);
 }
 
 TEST_CASE("two teams that meet become one", "[pose_graph][agent]") {
+  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
+  CAPTURE(to_string(method));
   const SplitGraph graph = random_team(6, kIds, 12, kRing);
   PgoTeam team;
   for (const RobotId robot : kIds) {
-    RbcdAgent& agent = team.add({robot, 1}, {});
+    PgoAgent& agent = team.add({robot, 1}, config_of(method));
     feed_odometry(agent, robot, graph);
     for (const RelativePose& e : graph.closures) (void)agent.add(make_closure(e));
   }
@@ -173,12 +147,14 @@ TEST_CASE("two teams that meet become one", "[pose_graph][agent]") {
 }
 
 TEST_CASE("the others go on when a robot is lost, in the frame they had", "[pose_graph][agent]") {
+  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
+  CAPTURE(to_string(method));
   const RobotId gone = GENERATE(RobotId{7}, RobotId{33}, RobotId{1200});
   const int after_updates = GENERATE(1, 9, 30, 1000);
   CAPTURE(gone, after_updates);
   const SplitGraph graph = random_team(7, kIds, 12, kRing);
   PgoTeam team({.max_delay_s = 0.005});
-  for (const RobotId robot : kIds) add(team, graph, robot);
+  for (const RobotId robot : kIds) add(team, graph, robot, method);
   int updates = 0;
   team.on_update = [&](RobotId) { ++updates; };
   (void)team.run(kHour_s, [&] { return updates >= after_updates || team.all_settled(); });
@@ -200,12 +176,14 @@ TEST_CASE("the others go on when a robot is lost, in the frame they had", "[pose
 }
 
 TEST_CASE("a robot that was out of reach is taken in again", "[pose_graph][agent]") {
+  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
+  CAPTURE(to_string(method));
   const RobotId away = GENERATE(RobotId{7}, RobotId{50});
   const int after_updates = GENERATE(5, 20, 1000);
   CAPTURE(away, after_updates);
   const SplitGraph graph = random_team(8, kIds, 12, kRing);
   PgoTeam team({.max_delay_s = 0.005});
-  for (const RobotId robot : kIds) add(team, graph, robot);
+  for (const RobotId robot : kIds) add(team, graph, robot, method);
   int updates = 0;
   team.on_update = [&](RobotId) { ++updates; };
   (void)team.run(kHour_s, [&] { return updates >= after_updates || team.all_settled(); });
@@ -217,15 +195,17 @@ TEST_CASE("a robot that was out of reach is taken in again", "[pose_graph][agent
 }
 
 TEST_CASE("a restarted robot starts anew and is taken in", "[pose_graph][agent]") {
+  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
+  CAPTURE(to_string(method));
   const RobotId restarted = GENERATE(RobotId{7}, RobotId{50});
   CAPTURE(restarted);
   const SplitGraph graph = random_team(9, kIds, 12, kRing);
   PgoTeam team({.max_delay_s = 0.005});
-  for (const RobotId robot : kIds) add(team, graph, robot);
+  for (const RobotId robot : kIds) add(team, graph, robot, method);
   (void)team.run(0.05);
   team.remove(restarted);
   (void)team.run(0.5);
-  add(team, graph, restarted, 2);
+  add(team, graph, restarted, method, 2);
   for (const RobotId robot : kIds)  // closures with the new process are found again
     if (robot != restarted) feed(team.agent(robot), robot, graph);
   REQUIRE(settle(team));
@@ -233,8 +213,10 @@ TEST_CASE("a restarted robot starts anew and is taken in", "[pose_graph][agent]"
 }
 
 TEST_CASE("early stopping ends a session after its rounds", "[pose_graph][agent]") {
+  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
+  CAPTURE(to_string(method));
   const SplitGraph graph = random_team(10, kIds, 30, kRing);
-  PoseGraphConfig config;
+  PoseGraphConfig config = config_of(method);
   config.max_rounds = 5;
   config.min_relative_decrease = 0.0;
   PgoTeam team;
@@ -245,13 +227,15 @@ TEST_CASE("early stopping ends a session after its rounds", "[pose_graph][agent]
 }
 
 TEST_CASE("messages that lie are refused or do no lasting harm", "[pose_graph][agent]") {
+  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
+  CAPTURE(to_string(method));
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
   const SplitGraph graph = random_team(11, kIds, 12, kRing);
   PgoTeam team;
-  for (const RobotId robot : kIds) add(team, graph, robot);
-  RbcdAgent& victim = team.agent(33);
+  for (const RobotId robot : kIds) add(team, graph, robot, method);
+  PgoAgent& victim = team.agent(33);
   victim.peer_alive({666, 1});
   std::uniform_int_distribution<std::uint32_t> any(0, 20);
   PublicPoses poses{.sender = {666, 1}, .keyframes = {0}, .X = lifted_identity(5)};
@@ -273,6 +257,7 @@ TEST_CASE("messages that lie are refused or do no lasting harm", "[pose_graph][a
   for (int k = 0; k < 200; ++k) {
     PgoStatus status{
         .sender = {666, 1}, .frame = {7, 1}, .keyframes = any(rng), .revision = any(rng)};
+    status.method = method;
     status.offers.push_back({33, any(rng) + 1, {any(rng), any(rng)}});
     CHECK(victim.receive(status));
     PgoSession session{.id = {{666, 1}, any(rng)},
@@ -295,6 +280,8 @@ TEST_CASE("messages that lie are refused or do no lasting harm", "[pose_graph][a
 }
 
 TEST_CASE("after any history of links the team ends at the optimum", "[pose_graph][agent]") {
+  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
+  CAPTURE(to_string(method));
   const unsigned seed = GENERATE(range(1U, 21U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -306,7 +293,7 @@ TEST_CASE("after any history of links the team ends at the optimum", "[pose_grap
   for (int event = 0; event < 40; ++event) {
     const RobotId robot = kIds[any(rng)];
     if (started.insert(robot).second)
-      feed_odometry(team.add({robot, 1}, {}), robot, graph);
+      feed_odometry(team.add({robot, 1}, config_of(method)), robot, graph);
     else if (fed.insert(robot).second)
       feed(team.agent(robot), robot, graph);
     else if (away.insert(robot).second)
@@ -317,7 +304,7 @@ TEST_CASE("after any history of links the team ends at the optimum", "[pose_grap
   }
   for (const RobotId robot : away) team.reconnect(robot);
   for (const RobotId robot : kIds)
-    if (!started.contains(robot)) (void)team.add({robot, 1}, {});
+    if (!started.contains(robot)) (void)team.add({robot, 1}, config_of(method));
   for (const RobotId robot : kIds) feed(team.agent(robot), robot, graph);
   REQUIRE(team.run(60.0, [&] { return team.all_settled(); }));
   check_optimal(team, graph, 7);

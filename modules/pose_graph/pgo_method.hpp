@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cstdint>
+
+namespace km {
+
+/// How the members of a session come to its solution. The values are those on the wire.
+enum class PgoMethod : std::uint8_t {
+  kRbcd = 0,    ///< Riemannian block-coordinate descent: robots update their blocks in turn.
+  kNewton = 1,  ///< Newton's method on the whole team's graph, see NewtonAgent.
+};
+
+/// As in configuration files.
+[[nodiscard]] constexpr const char* to_string(PgoMethod method) {
+  return method == PgoMethod::kNewton ? "newton" : "rbcd";
+}
+
+}  // namespace km

@@ -1,0 +1,24 @@
+#include "modules/pose_graph/session_solver.hpp"
+
+#include <stdexcept>
+#include <utility>
+
+#include "modules/pose_graph/newton/newton_session_solver.hpp"
+
+namespace km {
+
+std::unique_ptr<SessionSolver> make_session_solver(PgoMethod method, RobotEdges edges,
+                                                   std::set<RobotId> members,
+                                                   std::vector<SE3> start) {
+  switch (method) {
+    case PgoMethod::kNewton:
+      return std::make_unique<NewtonSessionSolver>(std::move(edges), std::move(members),
+                                                   std::move(start));
+    case PgoMethod::kRbcd:
+      break;
+  }
+  throw std::invalid_argument(std::string("make_session_solver: '") + to_string(method) +
+                              "' does not go by exchanges");
+}
+
+}  // namespace km

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <solver.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "modules/pose_graph/newton/newton_codec.hpp"
+#include "modules/pose_graph/solver_message.hpp"
+#include "runtime/dds/codec.hpp"
+
+namespace km {
+
+/// Written by the robot whose message it is; what is inside is checked by its own codec. A large
+/// one travels in the fragments that DDS makes of it, of which only lost ones are sent again.
+template <>
+struct Codec<SolverMessage> {
+  using Wire = km_wire_SolverMessage;
+  static constexpr const char* kTopic = "pgo_exchanges";
+  static constexpr std::uint16_t kVersion = 1;
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_SolverMessage_desc; }
+
+  struct Encoded {
+    Wire wire{};
+    Codec<NewtonHello>::Encoded hello;
+    Codec<NewtonShare>::Encoded share;
+    std::vector<km_wire_NewtonHello> newton_hello;
+    std::vector<km_wire_NewtonShare> newton_share;
+  };
+  static Encoded encode(const SolverMessage& message);
+  static Decoded<SolverMessage> decode(const Wire& wire);
+};
+
+}  // namespace km
