@@ -45,12 +45,12 @@ bool Vio::due(const OdometryState& state, const StereoFrame& frame) const {
 void Vio::hand_on_first(const OdometryState& state, const Frame& frame, VioResult& result) {
   KeyframeOdometry keyframe;
   keyframe.stamp = state.stamp;
-  keyframe.T_odom_kf = state.T_odom_body;
-  keyframe.T_previous_kf = state.T_odom_body;
+  keyframe.T_odom_kf = T_chain_odom_ * state.T_odom_body;
+  keyframe.T_previous_kf = keyframe.T_odom_kf;
   keyframe.id = {robot_, 0};
   if (last_keyframe_) {  // a new start
     keyframe.id.index = last_keyframe_->id.index + 1;
-    keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * state.T_odom_body;
+    keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * keyframe.T_odom_kf;
     keyframe.covariance = restart_covariance();
   }
   last_keyframe_ = keyframe;
@@ -64,7 +64,8 @@ void Vio::hand_on(const OdometryState& state, const Frame& frame, VioResult& res
   keyframe.id = {robot_, last_keyframe_->id.index + 1};
   keyframe.stamp = state.stamp;
   keyframe.T_previous_kf =
-      relative ? relative->T : last_keyframe_->T_odom_kf.inverse() * state.T_odom_body;
+      relative ? relative->T
+               : last_keyframe_->T_odom_kf.inverse() * T_chain_odom_ * state.T_odom_body;
   keyframe.covariance = restart_covariance();
   if (relative) {
     const double dt = seconds_between(last_keyframe_->stamp, state.stamp);

@@ -169,6 +169,10 @@ TEST_CASE("A gap in the inertial samples leads to a new start from the last pose
   const SE3 jump = before.states.back().T_odom_body.inverse() * after.states.front().T_odom_body;
   CHECK(jump.translation().norm() < 5e-3);
   CHECK(angle_of(jump.linear()) < 5e-3);
+  // The chain of keyframes makes the same step as live odometry, from which it has moved away.
+  const SE3 chain_jump =
+      before.frames.back().T_odom_body.inverse() * after.frames.front().T_odom_body;
+  CHECK((chain_jump.matrix() - jump.matrix()).norm() < 1e-9);
   // The step across the gap is known to be uncertain.
   REQUIRE_FALSE(after.keyframes.empty());
   CHECK(after.keyframes.front().id.index == before.keyframes.back().id.index + 1);
