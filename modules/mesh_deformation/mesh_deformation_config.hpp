@@ -17,7 +17,7 @@ struct MeshDeformationConfig {
 
   /// Surface seen at times that lie further apart than this many keyframes belongs to different
   /// visits: it may be close in space but moves on its own.
-  int time_window_keyframes = 50;
+  int time_window_keyframes = 15;
 
   /// Keyframes that hold a node, of those that saw it.
   int keyframes_per_node = 4;

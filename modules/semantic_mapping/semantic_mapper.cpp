@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <opencv2/core/utility.hpp>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -86,6 +87,8 @@ struct SemanticMapper::State {
   MeshUpdateReport unreported;  // of blocks that became final
   std::uint64_t frame = 0;
   KeyframeIndex keyframe = 0;
+  std::optional<Eigen::Vector3d> camera_at;  // last one
+  double way_m = 0.0;                        // of the camera
   bool labelled = false;
 };
 
@@ -102,6 +105,7 @@ std::vector<SemanticMapper::State::Update> SemanticMapper::State::select(
   for (VoxelBlock* block : near.blocks) {
     if (view.labelled && block->labels == nullptr)
       block->labels = std::make_unique<std::array<VoxelLabels, kBlockVoxels>>();
+    block->last_seen_m = way_m;
     updates.push_back({block, true, false});
   }
   if (!config.carving) return updates;
@@ -148,10 +152,9 @@ void SemanticMapper::State::finalise(const std::vector<VoxelBlock*>& blocks) {
 }
 
 void SemanticMapper::State::leave_window(IntegrationReport& report) {
-  const auto window = static_cast<KeyframeIndex>(config.window_keyframes);
   std::vector<VoxelBlock*> old;
   for (const auto& block : map.blocks())
-    if (keyframe - block->last_seen > window) old.push_back(block.get());
+    if (way_m - block->last_seen_m > config.window_m) old.push_back(block.get());
   report.blocks_finalised += old.size();
   if (!old.empty()) finalise(old);
 }
@@ -209,6 +212,9 @@ IntegrationReport SemanticMapper::integrate(const DepthImage& depth, const Label
   state.keyframe = keyframe;
   state.labelled |= labels != nullptr;
   ++state.frame;
+  state.way_m +=
+      (T_odom_cam.translation() - state.camera_at.value_or(T_odom_cam.translation())).norm();
+  state.camera_at = T_odom_cam.translation();
   const DepthView& view = state.views.make(depth, labels);
   report.pixels = view.with_depth;
   report.labels_outside = view.labels_outside;

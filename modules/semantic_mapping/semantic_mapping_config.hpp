@@ -44,9 +44,11 @@ struct SemanticMappingConfig {
   /// Vertices whose best label is less probable than this are unknown (0).
   double min_label_probability = 0.0;
 
-  /// A block of voxels whose surface was not seen for so many keyframes becomes final mesh and is
-  /// forgotten: who comes back maps the place anew, with its own keyframes.
-  int window_keyframes = 50;
+  /// A block of voxels whose surface was not seen while the camera went so far [m] becomes final
+  /// mesh and is forgotten: who comes back maps the place anew, with its own keyframes. On that way
+  /// odometry should drift by less than a voxel; what differs by more cannot be parted again once
+  /// it is fused.
+  double window_m = 20.0;
 
   /// Blocks of 8 x 8 x 8 voxels kept at most (8.5 kB each, 15 kB where there is surface); beyond it
   /// those unseen for longest become final mesh.
@@ -64,7 +66,7 @@ struct SemanticMappingConfig {
     visitor.field("min_weight", min_weight, {0.0, 10000.0}, "of meshed surface");
     visitor.field("label_confidence", label_confidence, {0.5, 0.9999}, "that a label is right");
     visitor.field("min_label_probability", min_label_probability, {0.0, 1.0}, "less is unknown");
-    visitor.field("window_keyframes", window_keyframes, {1, 1000000}, "unseen so long: final");
+    visitor.field("window_m", window_m, {0.1, 1e6}, "[m] of way unseen: final");
     visitor.field("max_blocks", max_blocks, {64, 4000000}, "of 8 x 8 x 8 voxels");
   }
 };

@@ -59,6 +59,7 @@ struct VoxelBlock {
 
   std::uint64_t selected_in = 0;    ///< Number of the last frame in which it was chosen.
   KeyframeIndex last_seen = 0;      ///< When surface was last seen in it.
+  double last_seen_m = 0.0;         ///< Way of the camera until it was last chosen for surface.
   KeyframeIndex changed_since = 0;  ///< Of the changes not yet meshed, the first.
   bool changed = false;             ///< Since it was last meshed.
 };

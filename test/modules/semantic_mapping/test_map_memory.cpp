@@ -40,7 +40,7 @@ TEST_CASE("A frame seen again keeps every vertex and its first keyframe", "[sema
 TEST_CASE("What left the window is final, and a revisit makes vertices of its own",
           "[semantic_mapping]") {
   SemanticMappingConfig config = settings();
-  config.window_keyframes = 5;
+  config.window_m = 5.0;
   SemanticMapper mapper(config, small_camera(), two_classes());
   for (KeyframeIndex i = 0; i < 3; ++i) REQUIRE(integrate(mapper, wall(2.03), at(0), i));
   mapper.update_mesh();
@@ -54,7 +54,7 @@ TEST_CASE("What left the window is final, and a revisit makes vertices of its ow
   for (KeyframeIndex i = 10; i < 12; ++i) REQUIRE(integrate(mapper, wall(2.08), at(0), i));
   mapper.update_mesh();
   const MapMesh last = mapper.mesh();
-  CHECK(mapper.size().final_faces == first.mesh.faces.size());
+  CHECK(mapper.size().final_faces == 2 * first.mesh.faces.size());  // here, and 20 m away
   REQUIRE(std::includes(last.ids.begin(), last.ids.end(), first.ids.begin(), first.ids.end()));
   std::size_t anew = 0;
   for (std::size_t i = 0, old = 0; i < last.ids.size(); ++i) {
@@ -74,7 +74,7 @@ TEST_CASE("What left the window is final, and a revisit makes vertices of its ow
 // Along a wall with a window shorter than the way: rim edges away from the wall's own border.
 TEST_CASE("Mesh that became final on the way has no cracks", "[semantic_mapping]") {
   SemanticMappingConfig config = settings();
-  config.window_keyframes = 4;
+  config.window_m = 0.6;
   const KeyframeIndex meshed_every = GENERATE(1U, 7U, 100U);
   CAPTURE(meshed_every);
   SemanticMapper mapper(config, small_camera(), two_classes());
