@@ -33,14 +33,20 @@ WorldConfig read_world(YamlSource& source, const std::string& name, const YAML::
   WorldConfig world;
   world.name = name;
   world.title = keys.get<std::string>("title", "a text").value_or(name);
-  if (const auto file = keys.get<std::string>("simulation", "a path"); file && !file->empty()) {
-    world.simulation = (source.file.parent_path() / *file).lexically_normal();
-    if (!fs::is_regular_file(world.simulation))
-      source.problem(keys.child("simulation"), "no such file: " + world.simulation.string());
-  }
+  const auto file = [&](const char* key) -> fs::path {
+    const auto text = keys.get<std::string>(key, "a path");
+    if (!text || text->empty()) return {};
+    const fs::path path = (source.file.parent_path() / *text).lexically_normal();
+    if (!fs::is_regular_file(path))
+      source.problem(keys.child(key), "no such file: " + path.string());
+    return path;
+  };
+  world.simulation = file("simulation");
+  world.original_config = file("original_config");
   world.simulate = texts(keys, "simulate");
   world.robots = keys.require<Texts>("robots", kTexts);
-  if (world.robots.empty()) source.problem(node, "robots is empty");
+  if (const YAML::Node robots = keys.child("robots"); robots && world.robots.empty())
+    source.problem(robots, "robots is empty");
   world.flights = keys.get<bool>("flights", "true or false").value_or(false);
   world.team = texts(keys, "team");
   world.robot = texts(keys, "robot");
@@ -76,8 +82,10 @@ PcmExperiment read_pcm(YamlSource source, bool quick) {
   for (const std::string& search : pcm.searches)
     if (search != "exact" && search != "incremental" && search != "batch")
       source.problem(keys.child("searches"), search + " is not exact, incremental or batch");
-  if (pcm.searches.empty()) source.problem(keys.child("searches"), "searches is empty");
-  if (pcm.seeds.empty()) source.problem(keys.child("seeds"), "seeds is empty");
+  for (const auto& [key, empty] :
+       {std::pair{"searches", pcm.searches.empty()}, std::pair{"seeds", pcm.seeds.empty()}})
+    if (const YAML::Node node = keys.child(key); node && node.IsSequence() && empty)
+      source.problem(node, std::string(key) + " is empty");
   keys.finish();
   return pcm;
 }

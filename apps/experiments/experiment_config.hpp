@@ -16,17 +16,18 @@ struct ExperimentConfigError : std::runtime_error {
 
 /// A world, the recordings that robots make in it, and how a team is run on them.
 struct WorldConfig {
-  std::string name;                   ///< Of its files; known ones are compared with the paper.
-  std::string title;                  ///< "City".
-  std::filesystem::path simulation;   ///< Options file of kimera_multi_simulate; may be empty.
-  std::vector<std::string> simulate;  ///< More options of kimera_multi_simulate.
-  std::vector<std::string> robots;    ///< Their names, in the order of their ids.
-  bool flights = false;               ///< The robots move as EuRoC's recordings of their names.
-  std::vector<std::string> team;      ///< Options of kimera_multi_team.
-  std::vector<std::string> robot;     ///< Options of every robot.
-  std::vector<std::string> picture;   ///< Options of kimera_multi_evaluate render.
-  double simulate_s = 600.0;          ///< How long simulating takes, roughly, for the time left.
-  double team_s = 300.0;              ///< Likewise the team.
+  std::string name;                       ///< Of its files; known ones are compared with the paper.
+  std::string title;                      ///< "City".
+  std::filesystem::path simulation;       ///< Options file of kimera_multi_simulate; may be empty.
+  std::vector<std::string> simulate;      ///< More options of kimera_multi_simulate.
+  std::vector<std::string> robots;        ///< Their names, in the order of their ids.
+  bool flights = false;                   ///< The robots move as EuRoC's recordings of their names.
+  std::filesystem::path original_config;  ///< Of robots on EuRoC's own images; may be empty.
+  std::vector<std::string> team;          ///< Options of kimera_multi_team.
+  std::vector<std::string> robot;         ///< Options of every robot.
+  std::vector<std::string> picture;       ///< Options of kimera_multi_evaluate render.
+  double simulate_s = 600.0;  ///< How long simulating takes, roughly, for the time left.
+  double team_s = 300.0;      ///< Likewise the team.
 };
 
 /// Clique search against the size of the graph.

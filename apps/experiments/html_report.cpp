@@ -33,19 +33,20 @@ thead tr:last-child th { border-bottom: 1px solid var(--ink); }
 thead th.group { text-align: center; border-bottom: 1px solid var(--line); color: var(--ink); }
 tbody td { border-bottom: 1px solid var(--line); }
 tbody tr:hover { background: var(--band); }
-.paper { display: block; color: var(--soft); font-size: 12.5px; line-height: 1.3; }
+.paper { display: block; color: var(--soft); font-size: 12.5px; font-weight: 400; line-height: 1.3; }
 .best { font-weight: 700; }
 .met { color: #14713d; font-weight: 600; }
 .missed { color: #b3261e; font-weight: 600; }
-.wide td { white-space: normal; text-align: left; }
-.wide th { text-align: left; }
+.words td, .words th { text-align: left; }
 .note { color: var(--soft); font-size: 13.5px; margin: -14px 0 26px; }
-.figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(300px, 1fr)); gap: 26px;
+.figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(400px, 1fr)); gap: 26px;
   margin: 26px 0; }
 .figures.one { grid-template-columns: minmax(300px, 860px); }
 figure { margin: 0; }
 figure svg, figure img { width: 100%; height: auto; display: block; border: 1px solid var(--line);
   border-radius: 6px; }
+figure svg { max-height: 520px; padding: 8px; }
+.figures.one svg { max-height: none; }
 figcaption { color: var(--soft); font-size: 13.5px; margin-top: 6px; }
 details { margin: 22px 0; border: 1px solid var(--line); border-radius: 8px; padding: 8px 14px; }
 summary { cursor: pointer; color: var(--accent); font-size: 14.5px; }
@@ -108,8 +109,8 @@ class HtmlWriter {
   }
 
   void operator()(const ReportTable& table) {
-    out_ << "<div class=\"scroll\"><table>\n<caption>" << xml_escaped(table.caption)
-         << "</caption>\n<thead>\n";
+    out_ << "<div class=\"scroll\"><table" << (table.words ? " class=\"words\"" : "")
+         << ">\n<caption>" << xml_escaped(table.caption) << "</caption>\n<thead>\n";
     if (!table.groups.empty()) {
       out_ << "<tr>";
       for (const ColumnGroup& group : table.groups)

@@ -36,7 +36,8 @@ class MarkdownWriter {
     out_ << "**" << table.caption << "**\n\n|";
     for (const std::string& title : headings(table)) out_ << ' ' << in_cell(title) << " |";
     out_ << "\n|";
-    for (std::size_t c = 0; c < table.columns.size(); ++c) out_ << (c == 0 ? " --- |" : " ---: |");
+    for (std::size_t c = 0; c < table.columns.size(); ++c)
+      out_ << (c == 0 || table.words ? " --- |" : " ---: |");
     out_ << '\n';
     for (const auto& row : table.rows) {
       out_ << '|';

@@ -51,7 +51,7 @@ double sum_s(const SearchRun& run) {
 
 ReportTable table_of(const std::vector<SearchRun>& runs, unsigned seed) {
   ReportTable table{
-      .caption = "Fig. 3 as numbers: search time and clique against vertices, seed " +
+      .caption = "Fig. 5 as numbers: search time and clique against vertices, seed " +
                  std::to_string(seed),
       .groups = {{"", 1}, {"search of one addition [ms]", runs.size()}, {"clique", runs.size()}},
       .columns = {"vertices"}};

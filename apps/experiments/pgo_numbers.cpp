@@ -66,6 +66,18 @@ void add_error(const WorldConfig& world, const PgoFiles& files, const Experiment
   numbers.plot = plot_from_above(inputs, error);
 }
 
+// The first of the rounds is the start.
+void add_rounds(const YAML::Node& rounds, PgoNumbers& numbers) {
+  if (!rounds || !rounds.IsSequence() || rounds.size() == 0) return;
+  const auto cost = [&](std::size_t k) { return number_at(rounds[k], "cost").value_or(0.0); };
+  const double finished = (1.0 + PgoNumbers::kFinishedGap) * cost(rounds.size() - 1);
+  std::size_t k = 0;
+  while (k + 1 < rounds.size() && cost(k) > finished) ++k;
+  numbers.rounds = k;
+  numbers.bytes = number_at(rounds[k], "bytes").value_or(0.0);
+  numbers.seconds = number_at(rounds[k], "critical_path_s").value_or(0.0);
+}
+
 }  // namespace
 
 PgoNumbers read_pgo_numbers(const WorldConfig& world, const PgoMethodConfig& method,
@@ -78,12 +90,7 @@ PgoNumbers read_pgo_numbers(const WorldConfig& world, const PgoMethodConfig& met
   numbers.edges = static_cast<std::size_t>(number("edges"));
   numbers.cost = number("rounded_cost");
   numbers.optimum = number("optimum");
-  if (const YAML::Node rounds = root["rounds"]; rounds && rounds.size() > 0) {
-    const YAML::Node last = rounds[rounds.size() - 1];
-    numbers.rounds = rounds.size() - 1;  // the first is the start
-    numbers.bytes = number_at(last, "bytes").value_or(0.0);
-    numbers.seconds = number_at(last, "critical_path_s").value_or(0.0);
-  }
+  add_rounds(root["rounds"], numbers);
   add_error(world, files, paths, numbers);
   return numbers;
 }

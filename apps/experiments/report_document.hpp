@@ -27,6 +27,7 @@ struct ReportTable {
   std::vector<std::string> columns;      ///< Of the first, too: it names the rows.
   std::vector<std::vector<ReportCell>> rows = {};
   std::string note = {};
+  bool words = false;  ///< Columns are text, not numbers: to the left.
 };
 
 struct ReportParagraph {

@@ -66,17 +66,18 @@ std::string number_text(const std::optional<double>& value, int decimals) {
   return value ? fixed(*value, decimals) : "-";
 }
 
-std::string significant(double value) {
+std::string significant(double value, int digits) {
   if (!std::isfinite(value)) return "-";
   const double magnitude = std::abs(value);
-  const int digits = magnitude > 0.0 ? static_cast<int>(std::floor(std::log10(magnitude))) : 0;
-  if (digits < -4 || digits > 6) {
-    std::ostringstream text;
-    text.precision(2);
-    text << value;
-    return text.str();
-  }
-  return fixed(value, std::max(0, 3 - digits));
+  if (magnitude < 1e-5) return magnitude < 1e-12 ? "0" : "< 0.00001";
+  const int before = static_cast<int>(std::floor(std::log10(magnitude)));
+  return fixed(value, std::max(0, digits - 1 - before));
+}
+
+std::string paper_text(double value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
 }
 
 std::string command_text(const std::vector<std::string>& command) {

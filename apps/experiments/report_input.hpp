@@ -60,8 +60,11 @@ class ReportInput {
 /// "0.113", "-" for what is not there.
 [[nodiscard]] std::string number_text(const std::optional<double>& value, int decimals);
 
-/// Four significant digits without exponent up to a million: "1316", "90083", "0.05384".
-[[nodiscard]] std::string significant(double value);
+/// `digits` significant digits, without exponent from 1e-5 to 1e6: "1316", "0.0538", "< 0.00001".
+[[nodiscard]] std::string significant(double value, int digits = 3);
+
+/// A value of the paper as it stands there: "0.455", "168532", "97".
+[[nodiscard]] std::string paper_text(double value);
 
 /// A command as a person would type it, without the program's folder.
 [[nodiscard]] std::string command_text(const std::vector<std::string>& command);

@@ -12,6 +12,11 @@ constexpr double kMostRbcdGap_percent = 7.0;  // the paper's largest
 constexpr double kMostBestGap_percent = 0.01;
 constexpr double kMostDrift_percent = 0.5;
 
+// Rounding leaves the cost of the optimum itself a hair below or above.
+double gap_percent(const PgoNumbers& numbers) {
+  return std::max(0.0, 100.0 * (numbers.cost / numbers.optimum - 1.0));
+}
+
 const PgoMethodConfig* method_named(const ReportInput& input, const std::string& name) {
   for (const PgoMethodConfig& method : input.config().methods)
     if (method.name == name) return &method;
@@ -61,9 +66,9 @@ ReportTable half_table(ReportInput& input, const std::vector<ReportInput::World>
     for (const PgoMethodConfig& method : input.config().methods) {
       const PgoNumbers* const pgo = input.pgo(*world.config, method);
       const double value = pgo == nullptr ? NAN : error ? pgo->error_m.value_or(NAN) : pgo->cost;
-      ReportCell& cell = row.emplace_back(ReportCell{significant(value)});
+      ReportCell& cell = row.emplace_back(ReportCell{significant(value, error ? 3 : 5)});
       if (const auto column = paper_column(method.name); paper != nullptr && column)
-        cell.paper = significant(error ? paper->ate_m[*column] : paper->cost[*column]);
+        cell.paper = paper_text(error ? paper->ate_m[*column] : paper->cost[*column]);
       const bool counts = method.name != "centralized" && std::isfinite(value);
       distributed.push_back(counts ? value : INFINITY);
     }
@@ -89,12 +94,9 @@ ReportTable gap_table(ReportInput& input, const std::vector<ReportInput::World>&
       if (method.name == "centralized") continue;
       const PgoNumbers* const pgo = input.pgo(*world.config, method);
       ReportCell& cell = row.emplace_back(ReportCell{"-"});
-      if (pgo != nullptr) {
-        const double gap = 100.0 * (pgo->cost / pgo->optimum - 1.0);
-        cell.text = std::abs(gap) < 5e-6 ? "0.00000" : significant(gap);
-      }
+      if (pgo != nullptr) cell.text = significant(gap_percent(*pgo), 2);
       if (const auto column = paper_column(method.name); paper != nullptr && column)
-        cell.paper = significant(100.0 * (paper->cost[*column] / paper->cost.back() - 1.0));
+        cell.paper = significant(100.0 * (paper->cost[*column] / paper->cost.back() - 1.0), 2);
     }
     table.rows.push_back(std::move(row));
   }
@@ -155,10 +157,10 @@ void add_optimisation_targets(ReportInput& input, const ReportInput::World& worl
   }
   const auto gap = [&](const PgoNumbers* numbers, const char* what, double most_percent) {
     if (numbers == nullptr) return;
-    const double percent = 100.0 * (numbers->cost / numbers->optimum - 1.0);
+    const double percent = gap_percent(*numbers);
     input.targets.push_back({std::string("cost of ") + what + " above the optimum",
-                             world.config->title, "at most " + significant(most_percent) + " %",
-                             significant(std::max(percent, 0.0)) + " %", percent <= most_percent});
+                             world.config->title, "at most " + paper_text(most_percent) + " %",
+                             significant(percent, 2) + " %", percent <= most_percent});
   };
   gap(rbcd, "RBCD", kMostRbcdGap_percent);
   gap(pgo("newton"), "our best", kMostBestGap_percent);

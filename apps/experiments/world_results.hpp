@@ -56,13 +56,17 @@ struct WorldResults {
 [[nodiscard]] WorldResults read_world_results(const WorldConfig& world,
                                               const ExperimentPaths& paths);
 
-/// What a method of optimisation made of the team's graph.
+/// What a method of optimisation made of the team's graph. It counts as finished in the first round
+/// whose cost is within kFinishedGap of its last; a limit on rounds says nothing about the method.
 struct PgoNumbers {
-  std::size_t poses = 0, edges = 0, rounds = 0;
-  double cost = 0.0;     ///< Of rigid poses.
-  double optimum = 0.0;  ///< The certified one.
-  double bytes = 0.0;
-  double seconds = 0.0;           ///< CPU time of the slowest robot of each round, summed.
+  static constexpr double kFinishedGap = 1e-6;  ///< Relative.
+
+  std::size_t poses = 0, edges = 0;
+  std::size_t rounds = 0;  ///< Until finished.
+  double bytes = 0.0;      ///< Sent by all robots until then.
+  double seconds = 0.0;    ///< CPU time of the slowest robot of each round until then, summed.
+  double cost = 0.0;       ///< Of rigid poses in the end.
+  double optimum = 0.0;    ///< The certified one.
   std::optional<double> error_m;  ///< Absolute trajectory error of all keyframes, rmse.
   std::string plot;               ///< SVG from above.
 };

@@ -62,10 +62,15 @@ Step simulate_step(const WorldConfig& world, const ExperimentPaths& paths) {
   return step;
 }
 
-// A team on EuRoC's own folders.
+// A team on EuRoC's own folders. They have no labels, and no true mesh to compare with.
 std::string original_team_file(const WorldConfig& world, const ExperimentPaths& paths) {
   YAML::Emitter out;
-  out << YAML::BeginMap << YAML::Key << "robots" << YAML::Value << YAML::BeginSeq;
+  out << YAML::BeginMap;
+  if (!world.original_config.empty())
+    out << YAML::Key << "config" << YAML::Value << fs::absolute(world.original_config).string();
+  out << YAML::Key << "arguments" << YAML::Value << YAML::Flow
+      << std::vector<std::string>{"--set", "mapping.mode=metric"} << YAML::Key << "robots"
+      << YAML::Value << YAML::BeginSeq;
   for (std::size_t i = 0; i < world.robots.size(); ++i) {
     const RecordedFlightFiles flight = find_recorded_flight(paths.euroc, world.robots[i]);
     out << YAML::BeginMap << YAML::Key << "id" << YAML::Value << i << YAML::Key << "name"

@@ -14,8 +14,10 @@ struct YamlSource {
   std::filesystem::path file;
   std::string& problems;  ///< A line each; of several files.
 
+  /// At the node, or of the file if there is none.
   void problem(const YAML::Node& at, const std::string& text) {
-    problems += file.string() + " line " + std::to_string(at.Mark().line + 1) + ": " + text + '\n';
+    const std::string line = at ? " line " + std::to_string(at.Mark().line + 1) : "";
+    problems += file.string() + line + ": " + text + '\n';
   }
 };
 

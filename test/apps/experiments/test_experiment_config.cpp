@@ -1,0 +1,73 @@
+#include <catch2/catch.hpp>
+#include <string>
+
+#include "apps/experiments/experiment_config.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+using Catch::Contains;
+namespace fs = std::filesystem;
+
+// The shipped configuration, to be spoiled.
+struct SpoiledConfig {
+  TemporaryFolder folder;
+  SpoiledConfig() { fs::copy("config", folder.path(), fs::copy_options::recursive); }
+  fs::path experiments() const { return folder.path() / "experiments"; }
+  std::string problems() const {
+    try {
+      const auto config = read_experiments(experiments(), false);
+      return {};
+    } catch (const ExperimentConfigError& error) {
+      return error.what();
+    }
+  }
+};
+
+TEST_CASE("The shipped experiments are the paper's", "[experiments]") {
+  const ExperimentConfig config = read_experiments("config/experiments", false);
+  CHECK(config.trajectory_worlds == std::vector<std::string>{"city", "camp", "v1", "v2"});
+  CHECK(config.pcm.outliers == 1000);
+  CHECK(config.methods.size() == 6);
+  CHECK(config.world("v1").flights);
+  CHECK(config.world("v2").robots == std::vector<std::string>{"V2_01", "V2_02", "V2_03"});
+}
+
+TEST_CASE("Quick keys replace those beside them", "[experiments]") {
+  const ExperimentConfig config = read_experiments("config/experiments", true);
+  CHECK(config.pcm.outliers < 1000);
+  CHECK(config.pcm.searches.size() == 3);
+  CHECK_FALSE(config.world("v1").flights);
+  CHECK(config.trajectory_worlds.size() == 2);
+}
+
+TEST_CASE("What is wrong with the configuration is named by file, line and key", "[experiments]") {
+  const SpoiledConfig config;
+  REQUIRE(config.problems().empty());
+  config.folder.write("experiments/pcm.yaml",
+                      "graph: g.g2o\nseeds: [1]\nsearches: [exact, clever]\noutlier: 3\n");
+  CHECK_THAT(config.problems(), Contains("pcm.yaml line 3: clever is not exact") &&
+                                    Contains("pcm.yaml line 4: unknown key outlier"));
+  config.folder.write("experiments/pcm.yaml", "graph: g.g2o\nseeds: many\n");
+  CHECK_THAT(config.problems(), Contains("pcm.yaml line 2: seeds is not a list of numbers") &&
+                                    Contains("searches is missing"));
+  config.folder.write("experiments/pcm.yaml", "graph: [\n");
+  CHECK_THAT(config.problems(), Contains("pcm.yaml line 2:"));
+}
+
+TEST_CASE("Worlds that are not there are named", "[experiments]") {
+  const SpoiledConfig config;
+  config.folder.write("experiments/mesh.yaml", "worlds: [city, moon]\n");
+  config.folder.write("experiments/worlds.yaml",
+                      "city: {robots: [a], simulation: ../simulation/none.toml, rate: 2}\n");
+  CHECK_THAT(config.problems(), Contains("mesh.yaml line 1: no world moon") &&
+                                    Contains("worlds.yaml line 1") && Contains("none.toml") &&
+                                    Contains("unknown key rate") &&
+                                    Contains("trajectory.yaml line 3: no world camp"));
+  fs::remove(config.experiments() / "mesh.yaml");
+  CHECK_THAT(config.problems(), Contains("mesh.yaml: no such file"));
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,92 @@
+#include <catch2/catch.hpp>
+#include <sstream>
+#include <string>
+
+#include "test/support/command.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+using Catch::Contains;
+namespace fs = std::filesystem;
+
+const std::string kTool = std::string(KM_BIN_DIR) + "/kimera_multi_experiments ";
+
+// Twice around a regular polygon: every pose of the second round closes a loop with the first.
+std::string polygon_graph() {
+  constexpr int kCorners = 20;
+  std::ostringstream g2o;
+  const auto edge = [&](int from, int to, double x, double angle) {
+    g2o << "EDGE_SE2 " << from << ' ' << to << ' ' << x << " 0 " << angle
+        << " 100 0 0 100 0 1000\n";
+  };
+  for (int i = 0; i < 2 * kCorners; ++i) g2o << "VERTEX_SE2 " << i << " 0 0 0\n";
+  for (int i = 1; i < 2 * kCorners; ++i) edge(i - 1, i, 1.0, 6.283185307 / kCorners);
+  for (int i = 0; i < kCorners; ++i) edge(i, i + kCorners, 0.0, 0.0);
+  return g2o.str();
+}
+
+// The shipped configuration with a small graph, in folders of its own.
+struct Laboratory {
+  TemporaryFolder folder;
+  Laboratory() {
+    fs::copy("config", folder.path() / "config", fs::copy_options::recursive);
+    folder.write("config/experiments/pcm.yaml",
+                 "graph: polygon.g2o\noutliers: 1000\nseeds: [1, 2]\nsearches: [batch, exact]\n"
+                 "quick: {outliers: 30}\n");
+    folder.write("graphs/polygon.g2o", polygon_graph());
+  }
+  CommandResult run(const std::string& arguments) const {
+    const std::string root = folder.path().string();
+    return run_command(kTool + arguments + " --quick --config " + root +
+                       "/config/experiments --graphs " + root + "/graphs --data " + root +
+                       "/data --results " + root + "/results");
+  }
+};
+
+TEST_CASE("The quick pcm experiment runs, reports, and is not run twice", "[experiments]") {
+  const Laboratory laboratory;
+  const CommandResult first = laboratory.run("run pcm");
+  CAPTURE(first.output);
+  REQUIRE(first.exit_code == 0);
+  CHECK_THAT(first.output, Contains("[1/2] consistent closures, seed 1: done in") &&
+                               Contains("2 steps made, 0 were done before"));
+  const std::string page = laboratory.folder.read("results/report.html");
+  CHECK_THAT(page, Contains("search time and clique against vertices, seed 2") &&
+                       Contains("--outliers 30") && Contains("exact search: clique against batch"));
+  CHECK_THAT(laboratory.folder.read("results/report.md"), Contains("figures/pcm-1.svg"));
+  CHECK_THAT(laboratory.folder.read("results/figures/pcm-1.svg"), Catch::StartsWith("<svg"));
+  const CommandResult second = laboratory.run("run pcm");
+  CHECK_THAT(second.output, Contains("0 steps made, 2 were done before"));
+  CHECK_THAT(laboratory.run("list").output, Contains("pcm-1") && Contains("done"));
+
+  const std::string pcm = laboratory.folder.read("config/experiments/pcm.yaml");
+  laboratory.folder.write("config/experiments/pcm.yaml", pcm + "closures: 10\n");
+  CHECK_THAT(laboratory.run("list").output, Contains("outdated"));
+  CHECK_THAT(laboratory.run("run pcm").output, Contains("2 steps made"));
+}
+
+TEST_CASE("The tool says what is wrong or missing", "[experiments]") {
+  const Laboratory laboratory;
+  const auto fails_with = [&](const std::string& arguments, int code, const std::string& message) {
+    const CommandResult result = laboratory.run(arguments);
+    CAPTURE(arguments, result.output);
+    CHECK(result.exit_code == code);
+    CHECK_THAT(result.output, Contains(message));
+  };
+  fails_with("", 1, "subcommand is required");
+  fails_with("run tea", 1, "tea");
+  fails_with("run", 1, "NAME is required");
+  fails_with("report --programs " + laboratory.folder.path().string() + "/none", 1, "--programs");
+  fails_with("run pcm --programs " + laboratory.folder.path().string(), 3, "no such program");
+  fs::remove(laboratory.folder.path() / "graphs/polygon.g2o");
+  fails_with("run pcm", 3, "--graphs says where it is");
+  laboratory.folder.write("graphs/polygon.g2o", "VERTEX_SE2 0 0 0\n");
+  fails_with("run pcm", 3, "polygon.g2o:1");
+  laboratory.folder.write("config/experiments/mesh.yaml", "wolds: [city]\n");
+  fails_with("list", 1, "mesh.yaml line 1: unknown key wolds");
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,160 @@
+#include <catch2/catch.hpp>
+#include <sstream>
+#include <string>
+
+#include "apps/experiments/run_steps.hpp"
+#include "apps/experiments/step_record.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+using Catch::Contains;
+
+// Runs steps in a folder of their own.
+struct Workshop {
+  TemporaryFolder folder;
+  SignalWatch signals;
+  std::ostringstream shown;
+
+  std::string path(const std::string& name) const { return (folder.path() / name).string(); }
+
+  // Appends a line to NAME.out each time it is run.
+  Step step(const std::string& name, const std::string& more = "true") const {
+    return {.name = name,
+            .title = name,
+            .command = {"/bin/sh", "-c", "echo ran >> " + path(name + ".out") + "; " + more},
+            .outputs = {path(name + ".out")}};
+  }
+
+  StepsOutcome run(const std::vector<Step>& steps, bool again = false) {
+    StepDisplay display(shown, false, 80);
+    return run_steps(steps, folder.path() / "results", again, signals, display);
+  }
+
+  long runs(const std::string& name) const {
+    const std::string text = folder.read(name + ".out");
+    return std::count(text.begin(), text.end(), '\n');
+  }
+};
+
+TEST_CASE("A step is run once, and again if asked for", "[experiments]") {
+  Workshop workshop;
+  const std::vector<Step> steps{workshop.step("a"), workshop.step("b")};
+  const StepsOutcome first = workshop.run(steps);
+  CHECK(first.made == 2);
+  CHECK(first.problems.empty());
+  const StepsOutcome second = workshop.run(steps);
+  CHECK(second.made == 0);
+  CHECK(second.kept == 2);
+  CHECK(workshop.runs("a") == 1);
+  CHECK(workshop.run(steps, true).made == 2);
+  CHECK(workshop.runs("b") == 2);
+  CHECK_THAT(workshop.shown.str(), Contains("[2/2] b: done in"));
+}
+
+TEST_CASE("A step is run again if its command or the content of an input changes",
+          "[experiments]") {
+  Workshop workshop;
+  Step step = workshop.step("a");
+  step.inputs = {workshop.folder.write("input.txt", "1")};
+  REQUIRE(workshop.run({step}).made == 1);
+  workshop.folder.write("input.txt", "1");  // newer, with the same content
+  CHECK(workshop.run({step}).made == 0);
+  workshop.folder.write("input.txt", "2");
+  CHECK(state_of(step, workshop.folder.path() / "results") == StepState::kOutdated);
+  CHECK(workshop.run({step}).made == 1);
+  step.command.back() += " # another";
+  CHECK(workshop.run({step}).made == 1);
+  step.writes = {{workshop.path("file.yaml"), "text\n"}};
+  CHECK(workshop.run({step}).made == 1);
+  CHECK(workshop.folder.read("file.yaml") == "text\n");
+  std::filesystem::remove(workshop.path("a.out"));
+  CHECK(workshop.run({step}).made == 1);
+}
+
+TEST_CASE("A failed step says why, and holds up only those that need it", "[experiments]") {
+  Workshop workshop;
+  Step needs = workshop.step("needs");
+  needs.needs = {"bad"};
+  Step needs_more = workshop.step("needs_more");
+  needs_more.needs = {"needs"};
+  const std::vector<Step> steps{workshop.step("bad", "echo out of tape >&2; exit 7"), needs,
+                                needs_more, workshop.step("free")};
+  const StepsOutcome outcome = workshop.run(steps);
+  CHECK(outcome.made == 1);
+  REQUIRE(outcome.problems.size() == 3);
+  CHECK_THAT(outcome.problems[0], Contains("bad: exit code 7") && Contains("out of tape") &&
+                                      Contains("results/logs/bad.log"));
+  CHECK_THAT(outcome.problems[1], Contains("needs: not run, it needs bad"));
+  CHECK_THAT(outcome.problems[2], Contains("it needs needs"));
+  CHECK(workshop.runs("free") == 1);
+  CHECK(workshop.run(steps).problems.size() == 3);  // it was not taken for done
+  CHECK(workshop.runs("bad") == 2);
+}
+
+TEST_CASE("A program that is missing, or leaves nothing, is a failure", "[experiments]") {
+  Workshop workshop;
+  Step missing = workshop.step("missing");
+  missing.command = {workshop.path("no_program")};
+  Step idle = workshop.step("idle");
+  idle.command = {"/bin/true"};
+  Step lacking = workshop.step("lacking");
+  lacking.missing = "no recordings";
+  const StepsOutcome outcome = workshop.run({missing, idle, lacking});
+  REQUIRE(outcome.problems.size() == 3);
+  CHECK_THAT(outcome.problems[0], Contains("no such program") && Contains("no_program"));
+  CHECK_THAT(outcome.problems[1], Contains("it made no") && Contains("idle.out"));
+  CHECK_THAT(outcome.problems[2], Contains("no recordings"));
+}
+
+TEST_CASE("Results made elsewhere are taken as they are, those of a broken run are not",
+          "[experiments]") {
+  Workshop workshop;
+  Step step = workshop.step("recordings");
+  step.adoptable = true;
+  workshop.folder.write("recordings.out", "made elsewhere\n");
+  const StepsOutcome outcome = workshop.run({step});
+  CHECK(outcome.kept == 1);
+  CHECK(workshop.folder.read("recordings.out") == "made elsewhere\n");
+  const auto record = read_record(workshop.folder.path() / "results", "recordings");
+  REQUIRE(record);
+  CHECK(record->command.empty());
+
+  Step broken = workshop.step("broken", "exit 1");
+  broken.adoptable = true;
+  CHECK(workshop.run({broken}).problems.size() == 1);
+  CHECK(state_of(broken, workshop.folder.path() / "results") != StepState::kFound);
+}
+
+TEST_CASE("A signal ends the running step and begins no other", "[experiments]") {
+  Workshop workshop;
+  const std::vector<Step> steps{workshop.step("done"),
+                                workshop.step("long", "kill -INT $PPID; exec sleep 600"),
+                                workshop.step("later")};
+  const StepsOutcome outcome = workshop.run(steps);
+  CHECK(outcome.stopped);
+  CHECK(outcome.made == 1);
+  CHECK(workshop.runs("done") == 1);
+  CHECK(workshop.runs("later") == 0);
+  const auto results = workshop.folder.path() / "results";
+  CHECK(state_of(steps[0], results) == StepState::kDone);
+  CHECK(state_of(steps[1], results) == StepState::kOutdated);  // its output is there, but not whole
+}
+
+TEST_CASE("A record keeps how a result was made", "[experiments]") {
+  Workshop workshop;
+  const Step step = workshop.step("a", "echo '\"quoted\"'");
+  REQUIRE(workshop.run({step}).made == 1);
+  const auto record = read_record(workshop.folder.path() / "results", "a");
+  REQUIRE(record);
+  CHECK(record->command == step.command);
+  CHECK(record->fingerprint == fingerprint_of(step));
+  CHECK(record->machine.cores > 0);
+  CHECK_FALSE(record->machine.processor.empty());
+  CHECK_FALSE(record->commit.empty());
+  CHECK_THAT(record->started, Contains("UTC"));
+}
+
+}  // namespace
+}  // namespace km
