@@ -33,7 +33,8 @@ thead tr:last-child th { border-bottom: 1px solid var(--ink); }
 thead th.group { text-align: center; border-bottom: 1px solid var(--line); color: var(--ink); }
 tbody td { border-bottom: 1px solid var(--line); }
 tbody tr:hover { background: var(--band); }
-.paper { display: block; color: var(--soft); font-size: 12.5px; font-weight: 400; line-height: 1.3; }
+.paper { display: block; color: var(--soft); font-size: 12.5px; font-weight: 400;
+  line-height: 1.3; }
 .best { font-weight: 700; }
 .met { color: #14713d; font-weight: 600; }
 .missed { color: #b3261e; font-weight: 600; }

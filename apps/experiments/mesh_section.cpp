@@ -53,10 +53,10 @@ ReportTable error_table(const std::vector<ReportInput::World>& worlds) {
       table.rows.push_back(std::move(row));
     }
   table.note =
-      "Mean distance from the points of the true mesh, 1000 a square metre where they are "
-      "at most 20 millions, to the nearest of the estimated one, after ICP of all together; only "
-      "true points within 0.5 m of it count. The right half leaves out true surface past "
-      "the mesh's rim or behind it.";
+      "Mean distance from points of the true mesh, up to 1000 a square metre and two millions in "
+      "all, to the nearest of the estimated one, after ICP of all together; only true points "
+      "within 0.5 m of it count. The right half leaves out true surface past the mesh's rim or "
+      "behind it.";
   return table;
 }
 
@@ -161,8 +161,8 @@ ReportSection mesh_section(ReportInput& input) {
     const auto& [before, after] = world.results->mesh;
     add_target(input, world, "error of the merged mesh", centimetres(before.error_m),
                centimetres(after.error_m), " cm", true);
-    add_target(input, world, "the same without what no robot saw", centimetres(before.seen_error_m),
-               centimetres(after.seen_error_m), " cm", true);
+    add_target(input, world, "error of the merged mesh, without what no robot saw",
+               centimetres(before.seen_error_m), centimetres(after.seen_error_m), " cm", true);
   }
   section.blocks.emplace_back(input.provenance("mesh"));
   return section;

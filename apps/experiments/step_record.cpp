@@ -160,6 +160,8 @@ const char* to_string(StepState state) {
 StepState state_of(const Step& step, const fs::path& results) {
   const auto record = read_record(results, step.name);
   const bool made = all_exist(step.outputs);
+  // What was made elsewhere does not depend on the command that would have made it.
+  if (made && record && record->command.empty() && step.adoptable) return StepState::kDone;
   if (made && record && record->fingerprint == fingerprint_of(step)) return StepState::kDone;
   if (made && !record && step.adoptable) return StepState::kFound;
   if (!step.missing.empty()) return StepState::kMissing;

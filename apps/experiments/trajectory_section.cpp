@@ -44,11 +44,14 @@ ReportTable inputs_table(const std::vector<ReportInput::World>& worlds) {
   return table;
 }
 
-// The best distributed method stands out, as in the paper.
+// The best distributed method stands out, as in the paper; with it those that read the same.
 void mark_best(std::vector<ReportCell>& row, const std::vector<double>& values) {
   const auto best = std::min_element(values.begin(), values.end());
-  if (best != values.end() && std::isfinite(*best))
-    row[static_cast<std::size_t>(best - values.begin()) + 1].style = ReportCell::Style::kBest;
+  if (best == values.end() || !std::isfinite(*best)) return;
+  const std::string text = row[static_cast<std::size_t>(best - values.begin()) + 1].text;
+  for (std::size_t k = 0; k < values.size(); ++k)
+    if (std::isfinite(values[k]) && row[k + 1].text == text)
+      row[k + 1].style = ReportCell::Style::kBest;
 }
 
 // One half of Table I: a value per world and method.

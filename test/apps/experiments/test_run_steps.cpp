@@ -120,6 +120,8 @@ TEST_CASE("Results made elsewhere are taken as they are, those of a broken run a
   const auto record = read_record(workshop.folder.path() / "results", "recordings");
   REQUIRE(record);
   CHECK(record->command.empty());
+  step.command.back() += " # another";
+  CHECK(workshop.run({step}).kept == 1);
 
   Step broken = workshop.step("broken", "exit 1");
   broken.adoptable = true;
