@@ -65,10 +65,18 @@ std::string team_yaml(const SimulationOptions& options) {
       "# The robots of these recordings:\n"
       "#   kimera_multi_team --config team.yaml --output results\n"
       "truth_mesh: world.ply\n";
+  std::vector<std::string> settings;
   if (options.depth)
-    text += std::string("arguments: [--set, mapping.mode=") +
-            (options.labels ? "semantic" : "metric") + "]\n";
-  text += "robots:\n";
+    settings.push_back(std::string("mapping.mode=") + (options.labels ? "semantic" : "metric"));
+  if (!options.is_recorded()) {
+    text +=
+        "# Simulated sensors are as their calibration says: odometry drifts less than the "
+        "default.\n";
+    settings.insert(settings.end(), {"vio.drift_rotation=2e-4", "vio.drift_translation=0.002"});
+  }
+  for (std::size_t i = 0; i < settings.size(); ++i)
+    text += (i == 0 ? "arguments: [--set, " : ", --set, ") + settings[i];
+  text += settings.empty() ? "robots:\n" : "]\nrobots:\n";
   for (std::size_t i = 0; i < options.names.size(); ++i) {
     const std::string& name = options.names[i];
     text += "  - id: " + std::to_string(i) + "\n    name: \"" + name + "\"\n    dataset: \"" +

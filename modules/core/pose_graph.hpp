@@ -26,6 +26,7 @@ struct LoopCandidate {
   KeyframeId query;
   KeyframeId match;
   double similarity = 0.0;  ///< Normalised score of the bag of words.
+  int support = 1;          ///< See PlaceCandidate.
 };
 
 /// Identity of a loop closure. The direction counts: a pair of keyframes measured once from each

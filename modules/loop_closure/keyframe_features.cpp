@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 #include <opencv2/features2d.hpp>
 #include <optional>
 #include <stdexcept>
@@ -75,6 +76,16 @@ std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> corners, std::size_t 
   return best;
 }
 
+std::vector<int> by_response(const std::vector<cv::KeyPoint>& corners) {
+  std::vector<int> order(corners.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return corners[static_cast<std::size_t>(a)].response >
+           corners[static_cast<std::size_t>(b)].response;
+  });
+  return order;
+}
+
 }  // namespace
 
 KeyframeFeatureExtractor::KeyframeFeatureExtractor(const StereoRig& rig,
@@ -106,7 +117,7 @@ KeyframeFeatures KeyframeFeatureExtractor::extract(const StereoFrame& frame) con
 
   KeyframeFeatures features = without_images();
   std::vector<Eigen::Vector2f> pixels, bearings;
-  for (int i = 0; i < descriptors.rows; ++i) {
+  for (const int i : by_response(corners)) {  // OpenCV has sorted them by octave
     const cv::KeyPoint& corner = corners[static_cast<std::size_t>(i)];
     const std::optional<Eigen::Vector2d> bearing =
         rig_.cameras[0].unproject({corner.pt.x, corner.pt.y});
@@ -137,6 +148,20 @@ std::vector<float> KeyframeFeatureExtractor::inverse_depths(
         *inverse_depth <= 1.0 / config_.min_depth_m)
       result[i] = static_cast<float>(*inverse_depth);
   }
+  return result;
+}
+
+KeyframeFeatures reduced(const KeyframeFeatures& features, std::size_t count) {
+  if (features.keypoints.size() <= count) return features;
+  KeyframeFeatures result = features;
+  result.keypoints.clear();
+  result.descriptors.clear();
+  for (const bool with_depth : {true, false})
+    for (std::size_t i = 0; i < features.keypoints.size() && result.keypoints.size() < count; ++i) {
+      if ((features.keypoints[i].inverse_depth > 0.0F) != with_depth) continue;
+      result.keypoints.push_back(features.keypoints[i]);
+      result.descriptors.push_back(features.descriptors[i]);
+    }
   return result;
 }
 

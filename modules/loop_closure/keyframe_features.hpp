@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <vector>
@@ -14,8 +15,8 @@ namespace km {
 
 /// Makes of a frame what place recognition and verification work on: ORB keypoints of the left
 /// image, evenly spread, with depth where the right image or the depth image gives one (Rublee et
-/// al., "ORB: an efficient alternative to SIFT or SURF", ICCV 2011). Const members are safe to call
-/// from several threads.
+/// al., "ORB: an efficient alternative to SIFT or SURF", ICCV 2011), the strongest first. Const
+/// members are safe to call from several threads.
 class KeyframeFeatureExtractor {
  public:
   /// Throws ConfigError if `config` is out of bounds, std::invalid_argument if the rig cannot be
@@ -38,5 +39,9 @@ class KeyframeFeatureExtractor {
   StereoRig rig_;
   std::optional<EpipolarMatcher> stereo_;  // absent with an RGB-D rig
 };
+
+/// The first `count` keypoints, those with a known depth before all others: enough to verify a
+/// closure with, at a part of the bytes.
+[[nodiscard]] KeyframeFeatures reduced(const KeyframeFeatures& features, std::size_t count);
 
 }  // namespace km

@@ -48,6 +48,20 @@ struct LoopClosureConfig {
   /// Requests under way to one peer at a time; the others wait.
   int max_outstanding_requests = 8;
 
+  /// A peer's keyframe is not asked for near a verified closure: with both keyframes of the
+  /// candidate at most so many keyframes from those of the closure. Grows up to this with the
+  /// number of closures, see RequestEconomy; 0: ask for all.
+  int max_link_separation = 16;
+
+  /// Nor is one asked for so near to another that was; 0: ask for all.
+  int attempt_separation = 2;
+
+  /// Of candidates whose like have failed n times, one in this times n is asked for; 0: all.
+  double failure_patience = 1.0;
+
+  /// Keypoints of a keyframe that a peer is sent at most, 40 bytes each.
+  int reply_keypoints = 400;
+
   /// Keyframes of peers kept for further candidates; each takes about 50 kB.
   int cached_keyframes = 500;
 
@@ -73,6 +87,13 @@ struct LoopClosureConfig {
                   "[m] per axis, in every covariance");
     visitor.field("request_timeout_s", request_timeout_s, {0.01, 3600.0}, "[s] then repeated");
     visitor.field("max_outstanding_requests", max_outstanding_requests, {1, 1000}, "per peer");
+    visitor.field("max_link_separation", max_link_separation, {0, 1000},
+                  "keyframes around a closure not asked for; 0: ask for all");
+    visitor.field("attempt_separation", attempt_separation, {0, 1000},
+                  "keyframes around one asked for; 0: ask for all");
+    visitor.field("failure_patience", failure_patience, {0.0, 100.0},
+                  "candidates passed over per failure of their like; 0: none");
+    visitor.field("reply_keypoints", reply_keypoints, {50, 100000}, "sent to a peer, 40 B each");
     visitor.field("cached_keyframes", cached_keyframes, {1, 1000000}, "of peers, 50 kB each");
     visitor.field("seed", seed, {0U, ~0U}, "of the sampling");
   }

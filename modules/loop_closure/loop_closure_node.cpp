@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "modules/loop_closure/keyframe_features.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 
@@ -23,6 +24,8 @@ LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
       verifier_(config),
       peers_(static_cast<std::size_t>(config.cached_keyframes)),
       requests_(config.request_timeout_s, config.max_outstanding_requests),
+      economy_(config),
+      reply_keypoints_(static_cast<std::size_t>(config.reply_keypoints)),
       worker_(
           kQueueCapacity, Overflow::kBlock,
           [this](const Input& input) {
@@ -60,11 +63,11 @@ void LoopClosureNode::step(const std::shared_ptr<const Keyframe>& own_keyframe) 
 }
 
 void LoopClosureNode::step(const std::shared_ptr<const LoopCandidate>& candidate) {
-  accept({{candidate->match, candidate->query}, candidate->similarity, std::nullopt, false});
+  accept({{candidate->match, candidate->query}, candidate->similarity, candidate->support});
 }
 
 void LoopClosureNode::step(const std::shared_ptr<const RelativePose>& measured_closure) {
-  accept({{measured_closure->from, measured_closure->to}, 0.0, *measured_closure, false});
+  accept({.id = {measured_closure->from, measured_closure->to}, .measured = *measured_closure});
 }
 
 void LoopClosureNode::step(const std::shared_ptr<const KeyframeRequest>& request) {
@@ -78,7 +81,9 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeRequest>& request
   reply.keyframe.odometry.id = request->keyframe;
   if (const auto own = own_.find(request->keyframe); own != own_.end()) {
     reply.found = true;
-    reply.keyframe = *own->second;
+    reply.keyframe.odometry = own->second->odometry;
+    reply.keyframe.stamp = own->second->stamp;
+    reply.keyframe.features = reduced(own->second->features, reply_keypoints_);
   }
   topics_.own_replies.publish(Addressed<KeyframeReply>{
       request->requester, std::make_shared<const KeyframeReply>(std::move(reply))});
@@ -131,14 +136,30 @@ LoopClosureNode::KeyframePtr LoopClosureNode::find(const KeyframeId& id) {
 }
 
 // Goes on with what is there; waits for what is not, a peer's keyframe by asking for it.
-void LoopClosureNode::advance(const Work& work) {
+// True if that led to a closure.
+bool LoopClosureNode::advance(const Work& work) {
   const KeyframePtr from = find(work.id.from);
   const KeyframePtr to = find(work.id.to);
   if (from && to) return complete(work, *from, *to);
   // The own one first: without it the other would only fill the cache.
   const KeyframeId& missing = from ? work.id.to : work.id.from;
+  if (missing.robot != self_) {
+    ask_for(missing, work);
+  } else {
+    waiting_[missing].push_back(work);
+  }
+  return false;
+}
+
+void LoopClosureNode::ask_for(const KeyframeId& missing, const Work& work) {
+  const bool under_way = waiting_.contains(missing);
+  if (!under_way && !work.measured) {
+    const auto verdict = economy_.judge({work.id.to, work.id.from, work.similarity, work.support});
+    if (verdict != RequestEconomy::Verdict::kAsk)
+      return report(work, ClosureStage::kCandidate, to_string(verdict));
+  }
   waiting_[missing].push_back(work);
-  if (missing.robot != self_) requests_.want(missing);
+  requests_.want(missing);
 }
 
 void LoopClosureNode::arrived(const KeyframePtr& keyframe) {
@@ -146,10 +167,12 @@ void LoopClosureNode::arrived(const KeyframePtr& keyframe) {
   if (found == waiting_.end()) return;
   const std::vector<Work> works = std::move(found->second);
   waiting_.erase(found);
-  for (const Work& work : works) advance(work);
+  bool verified = false;
+  for (const Work& work : works) verified |= advance(work);
+  if (keyframe->odometry.id.robot != self_) economy_.conclude(keyframe->odometry.id, verified);
 }
 
-void LoopClosureNode::complete(const Work& work, const Keyframe& from, const Keyframe& to) {
+bool LoopClosureNode::complete(const Work& work, const Keyframe& from, const Keyframe& to) {
   Closure closure{.from = from.odometry,
                   .to = to.odometry,
                   .T_from_to = SE3::Identity(),
@@ -162,14 +185,18 @@ void LoopClosureNode::complete(const Work& work, const Keyframe& from, const Key
     closure.covariance = work.measured->covariance;
   } else {
     numbers = verifier_.verify(from.features, to.features);
-    if (numbers.status != VerificationStatus::kAccepted)
-      return report(work, ClosureStage::kReceived, to_string(numbers.status), numbers);
+    if (numbers.status != VerificationStatus::kAccepted) {
+      report(work, ClosureStage::kReceived, to_string(numbers.status), numbers);
+      return false;
+    }
+    if (to.odometry.id.robot != self_) economy_.link(work.id);
     closure.T_from_to = numbers.T_from_to;
     closure.covariance = numbers.covariance;
     closure.inliers = numbers.inliers;
   }
   report(work, ClosureStage::kVerified, {}, numbers);
   topics_.own_closures.publish(std::move(closure));
+  return true;
 }
 
 void LoopClosureNode::report(const Work& work, ClosureStage stage, std::string reason,

@@ -16,6 +16,7 @@
 #include "modules/loop_closure/keyframe_cache.hpp"
 #include "modules/loop_closure/keyframe_exchange.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
+#include "modules/loop_closure/request_economy.hpp"
 #include "modules/loop_closure/verifier.hpp"
 #include "runtime/dds/bridge.hpp"
 #include "runtime/node.hpp"
@@ -46,8 +47,9 @@ struct LoopClosureTick {
 
 /// Turns candidates into verified closures (Tian et al., "Kimera-Multi", Sec. III-A): gets the
 /// keyframes of peers from their owners, verifies, and publishes. A candidate is never given up for
-/// want of an answer. Measured closures go the same way, but need only the odometry of the other
-/// end. Serves the peers' requests for own keyframes.
+/// want of an answer, but not every one is worth asking for (see RequestEconomy). Measured closures
+/// go the same way, but need only the odometry of the other end. Serves the peers' requests for own
+/// keyframes.
 ///
 /// A closure starts at an own keyframe: `from` is the candidate's match, `to` its query. Each pair
 /// is verified once here; its other robot may find and verify it as well, with the ends exchanged.
@@ -83,15 +85,17 @@ class LoopClosureNode final : public Node {
   struct Work {
     ClosureId id;
     double similarity = 0.0;
-    std::optional<RelativePose> measured;  ///< Empty: to be verified.
-    bool requested = false;                ///< The other end has been asked for.
+    int support = 1;                            ///< See LoopCandidate.
+    std::optional<RelativePose> measured = {};  ///< Empty: to be verified.
+    bool requested = false;                     ///< The other end has been asked for.
   };
 
   void accept(const Work& work);
-  void advance(const Work& work);
+  bool advance(const Work& work);
+  void ask_for(const KeyframeId& missing, const Work& work);
   void arrived(const KeyframePtr& keyframe);
   KeyframePtr find(const KeyframeId& id);
-  void complete(const Work& work, const Keyframe& from, const Keyframe& to);
+  bool complete(const Work& work, const Keyframe& from, const Keyframe& to);
   void report(const Work& work, ClosureStage stage, std::string reason = {},
               const Verification& numbers = {}) const;
   void send_due_requests();
@@ -102,6 +106,8 @@ class LoopClosureNode final : public Node {
   std::map<KeyframeId, KeyframePtr> own_;
   KeyframeCache peers_;
   KeyframeRequests requests_;
+  RequestEconomy economy_;
+  const std::size_t reply_keypoints_;
   std::map<KeyframeId, std::vector<Work>> waiting_;  // for this keyframe
   std::set<ClosureId> known_;                        // candidates and measured closures seen
   double now_s_ = 0.0;

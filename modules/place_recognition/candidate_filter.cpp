@@ -8,6 +8,20 @@
 
 namespace km {
 
+namespace {
+
+constexpr std::size_t kBeside = 3;
+
+void count_support(std::vector<PlaceCandidate>& candidates) {
+  for (PlaceCandidate& one : candidates)
+    one.support = static_cast<int>(
+        std::count_if(candidates.begin(), candidates.end(), [&](const PlaceCandidate& other) {
+          return std::max(one.index, other.index) - std::min(one.index, other.index) <= kBeside;
+        }));
+}
+
+}  // namespace
+
 CandidateFilter::CandidateFilter(const PlaceRecognitionConfig& config, std::size_t words)
     : config_(checked(config)), database_(words) {}
 
@@ -65,6 +79,7 @@ std::vector<PlaceCandidate> CandidateFilter::choose(const std::vector<BowMatch>&
     if (is_new_place)
       chosen.push_back({match.index, static_cast<double>(match.score) / normalizer});
   }
+  count_support(chosen);
   return chosen;
 }
 

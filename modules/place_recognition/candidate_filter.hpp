@@ -13,6 +13,7 @@ namespace km {
 struct PlaceCandidate {
   std::size_t index = 0;    ///< In order of add().
   double similarity = 0.0;  ///< Normalised, see CandidateFilter.
+  int support = 1;          ///< Of the candidates, those within 3 keyframes of this one.
 };
 
 enum class SearchStatus {

@@ -66,9 +66,11 @@ void PlaceRecognitionNode::step(const KeyframeBow& peer_bow) {
 }
 
 void PlaceRecognitionNode::publish(const KeyframeId& query, CandidateSearch search) const {
-  for (const auto& [index, similarity] : search.candidates)
-    topics_.candidates.publish(
-        LoopCandidate{.query = query, .match = own_ids_[index], .similarity = similarity});
+  for (const PlaceCandidate& found : search.candidates)
+    topics_.candidates.publish(LoopCandidate{.query = query,
+                                             .match = own_ids_[found.index],
+                                             .similarity = found.similarity,
+                                             .support = found.support});
   topics_.queries.publish(PlaceQuery{query, PlaceQueryStatus::kSearched, std::move(search)});
 }
 

@@ -73,6 +73,32 @@ TEST_CASE("keypoints of an RGB-D frame have the depth of their pixel", "[loop_cl
   CHECK(holes > 20);
 }
 
+TEST_CASE("A reduced keyframe has its first keypoints, those with depth before the others",
+          "[loop_closure]") {
+  KeyframeFeatures features;
+  features.focal_px = 200.0;
+  for (int i = 0; i < 6; ++i) {
+    features.keypoints.push_back({.bearing = Eigen::Vector2f(0.1F * static_cast<float>(i), 0.0F),
+                                  .inverse_depth = i % 3 == 0 ? 0.0F : 0.5F,  // none for 0 and 3
+                                  .octave = 0});
+    features.descriptors.emplace_back().fill(static_cast<std::uint8_t>(i));
+  }
+  const auto numbers = [&](std::size_t count) {
+    const KeyframeFeatures some = reduced(features, count);
+    CHECK(some.focal_px == 200.0);
+    REQUIRE(some.keypoints.size() == some.descriptors.size());
+    std::vector<int> result;
+    for (std::size_t i = 0; i < some.keypoints.size(); ++i) {
+      result.push_back(some.descriptors[i][0]);
+      CHECK(some.keypoints[i].bearing.x() == 0.1F * static_cast<float>(result.back()));
+    }
+    return result;
+  };
+  CHECK(numbers(2) == std::vector<int>{1, 2});
+  CHECK(numbers(5) == std::vector<int>{1, 2, 4, 5, 0});
+  CHECK(numbers(6) == std::vector<int>{0, 1, 2, 3, 4, 5});
+}
+
 TEST_CASE("depths that are not trusted, or not there, are none", "[loop_closure]") {
   const StereoRig rig = rgbd_rig(test_camera(), 0.08);
   KeyframeFeaturesConfig config;

@@ -1,4 +1,5 @@
 #include <catch2/catch.hpp>
+#include <map>
 
 #include "modules/place_recognition/candidate_filter.hpp"
 #include "test/modules/place_recognition/toy_vocabulary.hpp"
@@ -93,6 +94,17 @@ TEST_CASE("The best candidates are kept, one per place", "[place_recognition]") 
     CHECK(indices == std::vector<std::size_t>{1, 0, 2});
   else
     CHECK(indices == std::vector<std::size_t>{1, 3, 4});
+}
+
+TEST_CASE("Candidates support each other when they are neighbours", "[place_recognition]") {
+  CandidateFilter filter({}, kWords);
+  const BowVector view = toy_vector({1, 2, 3, 4});
+  const BowVector other = toy_vector({7, 8});
+  for (int i = 0; i < 12; ++i) filter.add(i == 1 || i == 7 || i == 10 ? view : other, at_s(i));
+  std::map<std::size_t, int> support;
+  for (const PlaceCandidate& candidate : filter.search(view, &view).candidates)
+    support[candidate.index] = candidate.support;
+  CHECK(support == std::map<std::size_t, int>{{1, 1}, {7, 2}, {10, 2}});
 }
 
 TEST_CASE("The filter refuses what it cannot use and stays as it was", "[place_recognition]") {
