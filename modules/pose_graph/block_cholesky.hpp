@@ -2,12 +2,14 @@
 
 #include <Eigen/SparseCholesky>
 #include <optional>
+#include <vector>
 
 namespace km {
 
 /// Sparse Cholesky factorisation of a symmetric positive definite matrix, for many right-hand sides
 /// of a few rows each: rows of the right-hand side are kept side by side in memory, so that one
-/// pass over the factor serves all of them.
+/// pass over the factor serves all of them. Columns of the factor with the same rows below them,
+/// as the four of a pose mostly have, are kept and used together.
 class BlockCholesky {
  public:
   /// Factorises `A`, of which the lower triangle is read.
@@ -22,10 +24,26 @@ class BlockCholesky {
   [[nodiscard]] Eigen::MatrixXd solve_rows(const Eigen::MatrixXd& B) const;
 
  private:
-  explicit BlockCholesky(const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>>& llt)
-      : L_(llt.matrixL()), P_(llt.permutationP()) {}
+  // Columns first to first + width - 1 of L, each with all rows from its diagonal to the last of
+  // them, and the same rows below.
+  struct Panel {
+    int first = 0;
+    int width = 0;
+    std::size_t rows = 0;     // first of those below in rows_
+    std::size_t below = 0;    // their number
+    std::size_t entries = 0;  // in values_: the triangle column by column, then row by row below
+  };
 
-  Eigen::SparseMatrix<double> L_;
+  explicit BlockCholesky(const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>>& llt);
+
+  template <int kRank, int kCols>
+  void forward(const Panel& panel, Eigen::MatrixXd& B) const;
+  template <int kRank, int kCols>
+  void backward(const Panel& panel, Eigen::MatrixXd& B) const;
+
+  std::vector<Panel> panels_;
+  std::vector<int> rows_;
+  std::vector<double> values_;
   Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> P_;  // P A P^T = L L^T
 };
 
