@@ -13,6 +13,7 @@ void RunRecord::add(const KeyframeOdometry& keyframe) {
 }
 
 void RunRecord::add(const Keyframe& keyframe) {
+  keypoints_ += keyframe.features.keypoints.size();
   std::vector<double> depths_m;
   for (const Keypoint& keypoint : keyframe.features.keypoints)
     if (keypoint.has_depth()) depths_m.push_back(1.0 / static_cast<double>(keypoint.inverse_depth));

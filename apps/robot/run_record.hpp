@@ -49,6 +49,9 @@ class RunRecord {
   /// Median depth of a keyframe's keypoints in its left camera [m]; 0: unknown.
   [[nodiscard]] double median_depth_m(std::uint32_t keyframe) const;
 
+  /// Keypoints of all keyframes.
+  [[nodiscard]] std::size_t keypoints() const { return keypoints_; }
+
   /// Absent where mapping is off, or no frame has come yet.
   [[nodiscard]] const std::optional<DenseSensingProgress>& dense_sensing() const {
     return dense_sensing_;
@@ -105,6 +108,7 @@ class RunRecord {
   std::vector<StampedPose> odometry_;
   std::vector<KeyframeOdometry> keyframes_;          // without their images
   std::map<std::uint32_t, double> median_depths_m_;  // by keyframe
+  std::size_t keypoints_ = 0;
   std::map<ClosureId, Closure> closures_;
   std::map<std::pair<RobotId, RobotId>, InlierSet> inlier_sets_;
   std::map<ClosureId, ClosureOutcome> outcomes_;
