@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <csignal>
 #include <ctime>
+#include <deque>
+#include <map>
+#include <optional>
 #include <set>
 
 #include "apps/experiments/step_record.hpp"
@@ -19,6 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kPoll_ms = 100;
+constexpr std::size_t kLastLines = 12;
 
 std::string now_text() {
   const std::time_t now = std::time(nullptr);
@@ -41,8 +45,9 @@ class StepsRun {
   StepsOutcome run() {
     for (std::size_t i = 0; i < steps_.size() && !outcome_.stopped; ++i) {
       const Step& step = steps_[i];
-      if (const std::string* need = unmet_need(step)) {
-        fail(step, "not run, it needs " + *need);
+      if (const auto failure = failure_before(step)) {
+        failure_of_[step.name] = *failure;
+        held_up_[*failure] += (held_up_[*failure].empty() ? "" : ", ") + step.name;
         continue;
       }
       const StepState state = state_of(step, results_);
@@ -55,6 +60,8 @@ class StepsRun {
       else
         make(i);
     }
+    for (const auto& [failure, steps] : held_up_)
+      outcome_.problems.push_back("not run, as " + failure + " is not done: " + steps);
     return std::move(outcome_);
   }
 
@@ -72,14 +79,16 @@ class StepsRun {
     return record && record->seconds > 0.0 ? record->seconds : step.expected_s;
   }
 
-  const std::string* unmet_need(const Step& step) const {
-    const auto need = std::find_if(step.needs.begin(), step.needs.end(),
-                                   [&](const std::string& name) { return failed_.contains(name); });
-    return need == step.needs.end() ? nullptr : &*need;
+  // The step whose failure holds up `step`.
+  std::optional<std::string> failure_before(const Step& step) const {
+    for (const std::string& need : step.needs)
+      if (const auto found = failure_of_.find(need); found != failure_of_.end())
+        return found->second;
+    return std::nullopt;
   }
 
   void fail(const Step& step, const std::string& why) {
-    failed_.insert(step.name);
+    failure_of_[step.name] = step.name;
     outcome_.problems.push_back(step.name + ": " + why);
   }
 
@@ -147,18 +156,19 @@ class StepsRun {
     if (access(step.command.front().c_str(), X_OK) != 0)
       return "no such program: " + step.command.front() + "; build it";
     RobotProcess process(step.command, signals_.previous(), log);
-    std::string last_line;
+    std::deque<std::string> last_lines;
     while (!process.exit()) {
       const auto fds = process.descriptors();
       pollfd polled[] = {{fds[0], POLLIN, 0}, {fds[1], POLLIN, 0}};
       poll(polled, 2, kPoll_ms);
       for (std::string& line : process.read())
-        if (!line.empty()) last_line = std::move(line);
+        if (!line.empty()) last_lines.push_back(std::move(line));
+      while (last_lines.size() > kLastLines) last_lines.pop_front();
       if (signals_.wait(0.0)) {
         process.send(outcome_.stopped ? SIGKILL : SIGINT);
         outcome_.stopped = true;
       }
-      display_.update(last_line, steady_now_s());
+      display_.update(last_lines.empty() ? "" : last_lines.back(), steady_now_s());
     }
     if (outcome_.stopped) return "stopped; the same command goes on";
     std::string problem;
@@ -168,7 +178,9 @@ class StepsRun {
       for (const fs::path& output : step.outputs)
         if (problem.empty() && !fs::exists(output)) problem = "it made no " + output.string();
     if (problem.empty()) return {};
-    for (const std::string& words : process.last_words()) problem += "\n    " + words;
+    // Not every program says what is wrong on standard error.
+    for (const auto& words : process.last_words().empty() ? last_lines : process.last_words())
+      problem += "\n    " + words;
     return problem + "\n    (all it said: " + log.string() + ')';
   }
 
@@ -178,7 +190,9 @@ class StepsRun {
   SignalWatch& signals_;
   StepDisplay& display_;
   std::vector<double> expected_s_;
-  std::set<std::string> pending_, failed_;  // names of steps
+  std::set<std::string> pending_;                  // steps that will be run, for the time left
+  std::map<std::string, std::string> failure_of_;  // step: the one whose failure holds it up
+  std::map<std::string, std::string> held_up_;     // that one: the names of those it holds up
   StepsOutcome outcome_;
 };
 

@@ -15,7 +15,7 @@ namespace km {
 struct StepsOutcome {
   std::size_t made = 0;               ///< Run now.
   std::size_t kept = 0;               ///< Done before, or found.
-  std::vector<std::string> problems;  ///< Of each that is not done: why, with its last lines.
+  std::vector<std::string> problems;  ///< Why steps are not done, with the last lines of programs.
   bool stopped = false;               ///< By a signal; what was done is kept.
 };
 

@@ -83,14 +83,20 @@ TEST_CASE("A failed step says why, and holds up only those that need it", "[expe
                                 needs_more, workshop.step("free")};
   const StepsOutcome outcome = workshop.run(steps);
   CHECK(outcome.made == 1);
-  REQUIRE(outcome.problems.size() == 3);
+  REQUIRE(outcome.problems.size() == 2);
   CHECK_THAT(outcome.problems[0], Contains("bad: exit code 7") && Contains("out of tape") &&
                                       Contains("results/logs/bad.log"));
-  CHECK_THAT(outcome.problems[1], Contains("needs: not run, it needs bad"));
-  CHECK_THAT(outcome.problems[2], Contains("it needs needs"));
+  CHECK(outcome.problems[1] == "not run, as bad is not done: needs, needs_more");
   CHECK(workshop.runs("free") == 1);
-  CHECK(workshop.run(steps).problems.size() == 3);  // it was not taken for done
+  CHECK(workshop.run(steps).problems.size() == 2);  // it was not taken for done
   CHECK(workshop.runs("bad") == 2);
+}
+
+TEST_CASE("A program that complains on standard output is heard", "[experiments]") {
+  Workshop workshop;
+  const StepsOutcome outcome = workshop.run({workshop.step("bad", "echo robot1 failed; exit 3")});
+  REQUIRE(outcome.problems.size() == 1);
+  CHECK_THAT(outcome.problems[0], Contains("bad: exit code 3\n    robot1 failed"));
 }
 
 TEST_CASE("A program that is missing, or leaves nothing, is a failure", "[experiments]") {
