@@ -1,5 +1,7 @@
 #include "apps/robot/results.hpp"
 
+#include <sys/resource.h>
+
 #include <cinttypes>
 #include <cstdio>
 #include <fstream>
@@ -126,6 +128,20 @@ void write_map_counts(JsonWriter& json, const RunRecord& record) {
   json.end_object();
 }
 
+// What all threads of the robot took so far.
+void write_process(JsonWriter& json) {
+  rusage usage{};
+  if (getrusage(RUSAGE_SELF, &usage) != 0) return;
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  json.key("process");
+  json.begin_object();
+  json.field("cpu_s", seconds(usage.ru_utime) + seconds(usage.ru_stime));
+  json.field("peak_memory_bytes", 1024 * usage.ru_maxrss);
+  json.end_object();
+}
+
 void write_summary(const fs::path& file, const RunRecord& record, const RunSummary& summary) {
   RunRecord::StageCounts total;
   for (const auto& [peer, counts] : record.stages_per_peer()) {
@@ -140,6 +156,7 @@ void write_summary(const fs::path& file, const RunRecord& record, const RunSumma
   json.field("robot", record.robot());
   json.field("name", summary.name);
   json.field("keyframes", record.keyframes().size());
+  json.field("keypoints", record.keypoints());
   json.field("frames", summary.frames);
   json.field("frames_skipped", summary.frames_skipped);
   json.key("closures");
@@ -163,6 +180,7 @@ void write_summary(const fs::path& file, const RunRecord& record, const RunSumma
   json.begin_object();
   for (const auto& [category, bytes] : summary.traffic_bytes) json.field(category, bytes);
   json.end_object();
+  write_process(json);
   json.field("seconds", summary.seconds);
   json.field("exit_reason", summary.exit_reason);
   json.end_object();
