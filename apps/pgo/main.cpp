@@ -39,7 +39,7 @@ constexpr const char* kAbout =
     "  newton            exact Newton steps of the whole team, one exchange each, by Schur\n"
     "                    complements onto public poses; stays at the rank of rigid poses\n\n"
     "With --robust gnc the team first finds out which closures are false, by graduated\n"
-    "non-convexity over newton (weights and poses in turn, from its own start), and ends with the\n"
+    "non-convexity (weights, and a step of newton, in turn, from odometry), and ends with the\n"
     "optimum of those that it keeps.\n\n"
     "A round is one exchange of messages. The table says after how many rounds each gap to the\n"
     "certified optimum was reached (computed centrally unless given), what had been sent by then\n"
@@ -63,14 +63,14 @@ struct Options {
 };
 
 void define(CLI::App& app, Options& options) {
-  const std::map<std::string, km::PgoMethod> methods{
-      {"local", km::PgoMethod::kLocal},
-      {"dgs", km::PgoMethod::kDgs},
-      {"rbcd", km::PgoMethod::kRbcd},
-      {"rbcd-accelerated", km::PgoMethod::kRbcdAccelerated},
-      {"rbcd-asynchronous", km::PgoMethod::kRbcdAsynchronous},
-      {"centralized", km::PgoMethod::kCentralized},
-      {"newton", km::PgoMethod::kNewton}};
+  const std::map<std::string, km::SolveMethod> methods{
+      {"local", km::SolveMethod::kLocal},
+      {"dgs", km::SolveMethod::kDgs},
+      {"rbcd", km::SolveMethod::kRbcd},
+      {"rbcd-accelerated", km::SolveMethod::kRbcdAccelerated},
+      {"rbcd-asynchronous", km::SolveMethod::kRbcdAsynchronous},
+      {"centralized", km::SolveMethod::kCentralized},
+      {"newton", km::SolveMethod::kNewton}};
   app.add_option("FILE", options.file, "Pose graph (*.g2o), or a folder with one file per robot")
       ->required()
       ->check(CLI::ExistingPath);
@@ -167,20 +167,20 @@ void check_robust(const Options& options, const CLI::App& app) {
 
 void check(Options& options, const CLI::App& app) {
   check_robust(options, app);
-  const bool rbcd = options.pgo.method == km::PgoMethod::kRbcd;
+  const bool rbcd = options.pgo.method == km::SolveMethod::kRbcd;
   options.pgo.greedy = options.schedule == "greedy";
   if (options.pgo.greedy && !rbcd)
     throw std::runtime_error("--schedule greedy is for --method rbcd only");
-  const bool asynchronous = options.pgo.method == km::PgoMethod::kRbcdAsynchronous;
+  const bool asynchronous = options.pgo.method == km::SolveMethod::kRbcdAsynchronous;
   if (app.count("--over-relaxation") > 0 && !asynchronous && (!rbcd || options.pgo.greedy))
     throw std::runtime_error(
         "--over-relaxation is for --method rbcd with coloured schedule and rbcd-asynchronous only");
   for (const char* name : {"--max-delay", "--loss", "--seed"})
     if (!asynchronous && app.count(name) > 0)
       throw std::runtime_error(std::string(name) + " is for --method rbcd-asynchronous only");
-  if (options.pgo.own_start && options.pgo.method != km::PgoMethod::kNewton)
+  if (options.pgo.own_start && options.pgo.method != km::SolveMethod::kNewton)
     throw std::runtime_error("--own-start is for --method newton only");
-  if (options.pgo.verify && !rbcd && options.pgo.method != km::PgoMethod::kRbcdAccelerated)
+  if (options.pgo.verify && !rbcd && options.pgo.method != km::SolveMethod::kRbcdAccelerated)
     throw std::runtime_error("--verify is for --method rbcd and rbcd-accelerated only");
   if (options.optimum > 0.0) options.pgo.optimum = options.optimum;
   for (const fs::path& file : {options.json, options.plot, options.output})

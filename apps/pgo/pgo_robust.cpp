@@ -5,7 +5,7 @@
 
 #include "apps/team/text_table.hpp"
 #include "modules/core/json_writer.hpp"
-#include "modules/pose_graph/robust/gnc_team.hpp"
+#include "modules/pose_graph/robust/staged_gnc_team.hpp"
 
 namespace km {
 namespace {
@@ -25,7 +25,7 @@ std::string kept_of(const RobustRun& run, const auto& counts) {
 
 RobustRun run_robust(const TeamGraph& graph, const GncAgentOptions& options, int max_rounds,
                      const TeamMeter& meter) {
-  GncTeam team(graph, 3, {}, options);
+  StagedGncTeam team(graph, 3, options);
   RobustRun run;
   run.rounds = run_team(graph, team, {.max_rounds = max_rounds}, meter);
   run.odometry = odometry_edges(graph);
@@ -34,9 +34,10 @@ RobustRun run_robust(const TeamGraph& graph, const GncAgentOptions& options, int
   run.barc = options.gnc.barc > 0.0 ? options.gnc.barc : default_barc(graph.dimension);
   if (schedule) {
     run.scale = schedule->scale();
-    run.updates = schedule->updates();
   }
-  run.decided = team.agent(0).done();
+  run.updates = team.updates();
+  run.isolated = team.isolated();
+  run.decided = team.done();
   for (std::size_t k = 0; k < graph.robots(); ++k)
     for (const SE3& T : team.agent(k).poses()) run.T_world_kf.push_back(T);
   return run;
@@ -61,6 +62,8 @@ std::string robust_text(const TeamGraph& graph, const RobustRun& run) {
        << run.updates << " updates of the weights in " << run.rounds.size() - 1 << " rounds, "
        << bytes_text(static_cast<double>(work.bytes)) << " sent, critical path "
        << fixed(work.critical_path_s, 3) << " s, CPU " << fixed(work.total_cpu_s, 3) << " s\n";
+  if (run.isolated > 0)
+    text << run.isolated << " closures have none beside them that agrees: heard in the end only\n";
   if (!run.decided) text << "not decided: --rounds did not suffice\n";
   return text.str();
 }
@@ -75,6 +78,7 @@ void write_robust_json(std::ostream& out, const TeamGraph& graph, const RobustRu
   json.field("barc", run.barc);
   json.field("scale", run.scale);
   json.field("updates", run.updates);
+  json.field("isolated", run.isolated);
   json.field("decided", run.decided);
   std::vector<std::size_t> kept;
   for (std::size_t k = 0; k < run.kept.size(); ++k)

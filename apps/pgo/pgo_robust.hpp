@@ -19,7 +19,8 @@ struct RobustRun {
   double barc = 0.0;
   double scale = 1.0;
   int updates = 0;
-  bool decided = false;  ///< Else the rounds did not suffice.
+  std::size_t isolated = 0;  ///< Closures that stood aside at first, see StagedGncTeam.
+  bool decided = false;      ///< Else the rounds did not suffice.
 };
 
 /// Throws std::invalid_argument if options or graph are not usable.
@@ -28,8 +29,9 @@ struct RobustRun {
 
 [[nodiscard]] std::string robust_text(const TeamGraph& graph, const RobustRun& run);
 
-/// {"poses", "edges", "robots", "robust", "barc", "scale", "updates", "decided", "kept": [indices
-/// of edges], "rounds": [{"bytes", "critical_path_s", "total_cpu_s"}]}; sums up to the round.
+/// {"poses", "edges", "robots", "robust", "barc", "scale", "updates", "isolated", "decided",
+/// "kept": [indices of edges], "rounds": [{"bytes", "critical_path_s", "total_cpu_s"}]}; sums up to
+/// the round.
 void write_robust_json(std::ostream& out, const TeamGraph& graph, const RobustRun& run);
 
 }  // namespace km

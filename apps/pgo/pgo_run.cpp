@@ -18,7 +18,7 @@ namespace {
 BlockDescentOptions descent_options(const PgoOptions& options) {
   return {.schedule = options.greedy ? BlockSchedule::kGreedy : BlockSchedule::kColoured,
           .max_over_relaxation = options.over_relaxation,
-          .accelerated = options.method == PgoMethod::kRbcdAccelerated};
+          .accelerated = options.method == SolveMethod::kRbcdAccelerated};
 }
 
 AsynchronousOptions asynchronous_options(const PgoOptions& options) {
@@ -30,20 +30,20 @@ AsynchronousOptions asynchronous_options(const PgoOptions& options) {
 std::unique_ptr<TeamSolver> make_solver(const TeamGraph& graph, const std::vector<SE3>& start,
                                         const PgoOptions& options) {
   switch (options.method) {
-    case PgoMethod::kLocal:
+    case SolveMethod::kLocal:
       return std::make_unique<LocalTeam>(graph);
-    case PgoMethod::kDgs:
+    case SolveMethod::kDgs:
       return std::make_unique<GaussSeidelTeam>(graph, start);
-    case PgoMethod::kRbcd:
-    case PgoMethod::kRbcdAccelerated:
+    case SolveMethod::kRbcd:
+    case SolveMethod::kRbcdAccelerated:
       return std::make_unique<BlockDescentTeam>(graph, lift(start, options.rank),
                                                 descent_options(options));
-    case PgoMethod::kRbcdAsynchronous:
+    case SolveMethod::kRbcdAsynchronous:
       return std::make_unique<AsynchronousTeam>(graph, lift(start, options.rank),
                                                 asynchronous_options(options));
-    case PgoMethod::kCentralized:
+    case SolveMethod::kCentralized:
       return std::make_unique<CentralTeam>(graph, lift(start, 3));
-    case PgoMethod::kNewton:
+    case SolveMethod::kNewton:
       return std::make_unique<NewtonTeam>(
           graph, options.rank, options.own_start ? LiftedPoses() : lift(start, options.rank),
           NewtonOptions{});
@@ -87,21 +87,21 @@ void solve(const TeamGraph& graph, const std::vector<SE3>& start, const PgoOptio
 
 }  // namespace
 
-const char* to_string(PgoMethod method) {
+const char* to_string(SolveMethod method) {
   switch (method) {
-    case PgoMethod::kLocal:
+    case SolveMethod::kLocal:
       return "local";
-    case PgoMethod::kDgs:
+    case SolveMethod::kDgs:
       return "dgs";
-    case PgoMethod::kRbcd:
+    case SolveMethod::kRbcd:
       return "rbcd";
-    case PgoMethod::kRbcdAccelerated:
+    case SolveMethod::kRbcdAccelerated:
       return "rbcd-accelerated";
-    case PgoMethod::kRbcdAsynchronous:
+    case SolveMethod::kRbcdAsynchronous:
       return "rbcd-asynchronous";
-    case PgoMethod::kCentralized:
+    case SolveMethod::kCentralized:
       return "centralized";
-    case PgoMethod::kNewton:
+    case SolveMethod::kNewton:
       return "newton";
   }
   return "?";

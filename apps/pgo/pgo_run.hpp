@@ -10,7 +10,7 @@
 
 namespace km {
 
-enum class PgoMethod {
+enum class SolveMethod {
   kLocal,
   kDgs,
   kRbcd,
@@ -20,10 +20,10 @@ enum class PgoMethod {
   kNewton
 };
 
-[[nodiscard]] const char* to_string(PgoMethod method);
+[[nodiscard]] const char* to_string(SolveMethod method);
 
 struct PgoOptions {
-  PgoMethod method = PgoMethod::kRbcd;
+  SolveMethod method = SolveMethod::kRbcd;
   Eigen::Index rank = 5;
   TeamRunOptions run = {.max_rounds = 100};
   bool greedy = false;            ///< rbcd only.
@@ -36,7 +36,7 @@ struct PgoOptions {
 
 /// What one method did to one graph.
 struct PgoRun {
-  PgoMethod method = PgoMethod::kRbcd;
+  SolveMethod method = SolveMethod::kRbcd;
   double start_s = 0.0;           ///< CPU time of the chordal initialisation.
   std::vector<TeamRound> rounds;  ///< [0]: the start.
   LiftedPoses X;
