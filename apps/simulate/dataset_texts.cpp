@@ -68,6 +68,8 @@ std::string team_yaml(const SimulationOptions& options) {
   std::vector<std::string> settings;
   if (options.depth)
     settings.push_back(std::string("mapping.mode=") + (options.labels ? "semantic" : "metric"));
+  if (options.depth && options.world == WorldKind::kViconRoom)
+    settings.push_back("semantic_mapping.voxel_size_m=0.05");
   if (!options.is_recorded()) {
     text +=
         "# Simulated sensors are as their calibration says: odometry drifts less than the "

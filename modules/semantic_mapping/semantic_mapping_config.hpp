@@ -48,7 +48,7 @@ struct SemanticMappingConfig {
   /// mesh and is forgotten: who comes back maps the place anew, with its own keyframes. On that way
   /// odometry should drift by less than a voxel; what differs by more cannot be parted again once
   /// it is fused.
-  double window_m = 20.0;
+  double window_m = 8.0;
 
   /// Blocks of 8 x 8 x 8 voxels kept at most (8.5 kB each, 15 kB where there is surface); beyond it
   /// those unseen for longest become final mesh.
