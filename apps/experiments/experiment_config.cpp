@@ -140,6 +140,7 @@ ExperimentConfig read_experiments(const fs::path& folder, bool quick) {
   std::string problems;
   const auto source = [&](const char* name) { return YamlSource{folder / name, problems}; };
   ExperimentConfig config;
+  config.quick = quick;
   config.worlds = read_worlds(source("worlds.yaml"), quick);
   config.pcm = read_pcm(source("pcm.yaml"), quick);
   read_trajectory(source("trajectory.yaml"), quick, config);

@@ -48,6 +48,7 @@ struct PgoMethodConfig {
 
 /// What the files in config/experiments/ say.
 struct ExperimentConfig {
+  bool quick = false;  ///< Small versions of the experiments.
   std::vector<WorldConfig> worlds;
   PcmExperiment pcm;
   std::vector<std::string> trajectory_worlds;  ///< Names in `worlds`, as those below.

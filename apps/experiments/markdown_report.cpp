@@ -57,8 +57,8 @@ class MarkdownWriter {
   void operator()(const ReportProvenance& provenance) {
     out_ << "<details><summary>How these numbers were obtained</summary>\n\n";
     for (const auto& row : provenance.rows)
-      out_ << "- " << row.what << ": `" << row.command << "`; " << row.when << "; " << row.machine
-           << '\n';
+      out_ << "- " << row.what << ": `" << row.command << "`; " << row.when
+           << (row.machine.empty() ? "" : "; ") << row.machine << '\n';
     out_ << "\n</details>\n\n";
   }
 

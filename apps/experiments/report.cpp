@@ -17,9 +17,15 @@ constexpr const char* kLead =
     "program. Our value stands first, the paper's in grey below it (in brackets in the Markdown). "
     "Worlds are like the paper's in kind, not the same: compare ratios before values.";
 
+constexpr const char* kQuick =
+    " These are the small versions (--quick), to see that all works: their numbers say little "
+    "about "
+    "the paper's.";
+
 ReportDocument make_document(ReportInput& input) {
   ReportDocument document{
       .title = "Kimera-Multi: the paper's experiments", .lead = kLead, .sections = {}};
+  if (input.config().quick) document.lead += kQuick;
   std::vector<ReportSection> sections;
   for (const auto& section :
        {pcm_section, trajectory_section, resources_section, mesh_section, semantics_section})

@@ -54,7 +54,8 @@ TEST_CASE("The quick pcm experiment runs, reports, and is not run twice", "[expe
                                Contains("2 steps made, 0 were done before"));
   const std::string page = laboratory.folder.read("results/report.html");
   CHECK_THAT(page, Contains("search time and clique against vertices, seed 2") &&
-                       Contains("--outliers 30") && Contains("exact search: clique against batch"));
+                       Contains("--outliers 30") && Contains("small versions") &&
+                       Contains("exact search: clique against batch"));
   CHECK_THAT(laboratory.folder.read("results/report.md"), Contains("figures/pcm-1.svg"));
   CHECK_THAT(laboratory.folder.read("results/figures/pcm-1.svg"), Catch::StartsWith("<svg"));
   const CommandResult second = laboratory.run("run pcm");
