@@ -86,9 +86,10 @@ PgoAgent::Peer* PgoAgent::sender_of_message(PgoPeer peer) {
 }
 
 bool PgoAgent::receive(const PgoStatus& status) {
-  if (status.method != config_.method) return false;
   Peer* sender = sender_of_message(status.sender);
   if (sender == nullptr) return false;
+  sender->other_method = status.method != config_.method;
+  if (sender->other_method) return false;
   sender->status = status;
   plan_outdated_ = true;
   return true;
@@ -117,6 +118,10 @@ bool PgoAgent::receive(const SolverMessagePtr& message) {
                      std::pair(message->session.number, message->sequence) <
                          std::pair(kept->session.number, kept->sequence);
   if (stale) return true;
+  const bool repeated =
+      kept && kept->session == message->session && kept->sequence == message->sequence;
+  if (!repeated && running_ && message->session == running_->session.id)
+    running_->bytes[message->sender.robot] += approximate_bytes(*message);
   kept = message;
   take_in(message);
   return true;
@@ -211,7 +216,8 @@ bool PgoAgent::holds_all(const SessionPlan& plan) const {
     const bool newest = offer.peer != last;
     last = offer.peer;
     const auto peer = peers_.find(offer.peer);
-    if (!newest || peer == peers_.end() || !peer->second.alive) continue;
+    if (!newest || peer == peers_.end() || !peer->second.alive || peer->second.other_method)
+      continue;
     const SessionPair pair{std::min(self_.robot, offer.peer), std::max(self_.robot, offer.peer),
                            offer.id};
     if (std::find(plan.pairs.begin(), plan.pairs.end(), pair) == plan.pairs.end()) return false;

@@ -92,6 +92,7 @@ class PgoAgent {
   struct Peer {
     std::uint64_t boot = 0;
     bool alive = false;
+    bool other_method = false;  // than configured here: nothing will come of its edges
     std::optional<PgoStatus> status = {};
     std::optional<PublicPoses> poses = {};  // the newest
     LastTwo exchange = {};
@@ -107,11 +108,11 @@ class PgoAgent {
   struct Running {
     PgoSession session;
     std::map<RobotId, std::size_t> position_of = {};
-    std::optional<std::uint32_t> round = {};  // own; nullopt until the block is in the frame
-    std::set<RobotId> counted = {};           // members before this one, and absent neighbours
-    std::optional<Exchange> exchange = {};    // nullopt: kRbcd, or given up
-    LastTwo last_sent = {};                   // of the exchange
-    std::size_t bytes_sent = 0;               // poses and exchanges, repetitions not counted
+    std::optional<std::uint32_t> round = {};    // own; nullopt until the block is in the frame
+    std::set<RobotId> counted = {};             // members before this one, and absent neighbours
+    std::optional<Exchange> exchange = {};      // nullopt: kRbcd, or given up
+    LastTwo last_sent = {};                     // of the exchange
+    std::map<RobotId, std::size_t> bytes = {};  // sent for it, as far as heard, each once
     double started_s = 0.0;
     double moved_s = 0.0;  // last update
     double sent_s = 0.0;   // last update or repetition of its poses

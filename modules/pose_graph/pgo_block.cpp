@@ -173,7 +173,8 @@ void PgoAgent::send_poses(LiftedPoses rounded, double cost, double squared_gradi
   publish_due_ = true;
   output.more = true;
   if (running_->session.plan.members.size() > 1) {
-    running_->bytes_sent += 4 * (poses.keyframes.size() + static_cast<std::size_t>(poses.X.size()));
+    running_->bytes[self_.robot] +=
+        4 * (poses.keyframes.size() + static_cast<std::size_t>(poses.X.size()));
     sent_poses_ = output.poses = poses;
   }
   count_share(poses);

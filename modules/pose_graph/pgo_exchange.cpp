@@ -56,7 +56,7 @@ void PgoAgent::send(SolverContent content, PgoOutput& output) {
   running_->moved_s = running_->sent_s = now_s_;
   take_in(message);
   if (running_->session.plan.members.size() == 1) return;
-  running_->bytes_sent += approximate_bytes(*message);
+  running_->bytes[self_.robot] += approximate_bytes(*message);
   output.exchange.push_back(message);
 }
 
@@ -66,7 +66,6 @@ void PgoAgent::advance_solver(PgoOutput& output) {
   try {
     next = exchange.solver->advance();
   } catch (const std::exception& e) {
-    send(SolverGivesUp(), output);
     return give_up(output, e.what());
   }
   ++total_rounds_;
@@ -99,6 +98,7 @@ void PgoAgent::give_up(PgoOutput& output, const std::string& why) {
                   std::to_string(session.id.coordinator.robot) + " goes on by '" +
                   to_string(PgoMethod::kRbcd) + "' instead of '" + to_string(session.method) +
                   "': " + why;
+  send(SolverGivesUp(), output);  // also after another one: who has not heard that hears this
   running_->exchange.reset();
   running_->session.round = 0;
   (void)block_->round_public_poses();  // to what round 0 has told

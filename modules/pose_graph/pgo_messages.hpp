@@ -91,10 +91,10 @@ struct PgoSession {
   RobotId anchor = 0;            ///< Its keyframe 0 is the origin of `world`.
   /// r x 4 if the anchor is no longer a member, and at the end of exchanges; else empty.
   LiftedPoses anchor_pose = {};
-  std::uint32_t round = 0;       ///< Last round that all members have finished.
-  double cost = 0.0;             ///< Team cost after it.
-  double gradient_norm = 0.0;    ///< See OptimizerProgress.
-  bool finished = false;         ///< Members stop.
+  std::uint32_t round = 0;     ///< Last round that all members have finished.
+  double cost = 0.0;           ///< Team cost after it.
+  double gradient_norm = 0.0;  ///< See OptimizerProgress.
+  bool finished = false;       ///< Members stop.
 };
 
 /// Poses of one robot that its peers' edges end on, and keyframe 0, after one of its updates, or,

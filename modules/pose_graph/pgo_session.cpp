@@ -89,8 +89,9 @@ PgoMethod PgoAgent::method_for(const SessionPlan& plan) const {
 }
 
 bool PgoAgent::paid_for() const {
-  const double price_s =
-      static_cast<double>(running_->bytes_sent) / (1e3 * config_.exchange_budget_kb_s);
+  std::size_t most = 0;
+  for (const auto& [robot, bytes] : running_->bytes) most = std::max(most, bytes);
+  const double price_s = static_cast<double>(most) / (1e3 * config_.exchange_budget_kb_s);
   return now_s_ - running_->moved_s >= std::min(price_s, kLongestWait_s);
 }
 

@@ -24,7 +24,7 @@ struct PoseGraphConfig {
 
   /// newton: what a robot may send on average [kB/s]. The next session waits until the last one is
   /// paid for, half a minute at most; robots that need little optimise as often as they like.
-  double exchange_budget_kb_s = 50.0;
+  double exchange_budget_kb_s = 20.0;
 
   /// rbcd: a session has converged when a round lowers the team's cost by less than this part of
   /// it.

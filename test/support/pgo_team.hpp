@@ -97,6 +97,8 @@ class PgoTeam {
   }
 
   std::function<void(RobotId)> on_update;  ///< After every update that sends something of it.
+  /// Sees every message of an exchange, and may put another one in its place.
+  std::function<SolverMessagePtr(const SolverMessagePtr&)> on_exchange;
   std::vector<std::string> notices;
 
  private:
@@ -122,7 +124,8 @@ class PgoTeam {
       if ((output.poses || !output.exchange.empty()) && on_update) on_update(robot.peer.robot);
       if (output.session) broadcast(robot, std::move(*output.session));
       if (output.poses) broadcast(robot, std::move(*output.poses));
-      for (SolverMessagePtr& message : output.exchange) broadcast(robot, std::move(message));
+      for (const SolverMessagePtr& message : output.exchange)
+        broadcast(robot, on_exchange ? on_exchange(message) : message);
       if (output.status) broadcast(robot, std::move(*output.status));
     }
   }
