@@ -6,51 +6,15 @@
 #include <fstream>
 #include <iostream>
 #include <limits>
-#include <map>
 
-#include "test/support/pose_graph_problems.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/system/team_result.hpp"
 #include "test/system/team_run.hpp"
 
 namespace km {
 namespace {
 
 constexpr int kRobots = 8;
-
-/// The files of all robots as one graph, and the poses they ended with.
-struct TeamGraph {
-  WholeGraph graph;
-  std::vector<SE3> poses;
-};
-
-TeamGraph read_team(const TemporaryFolder& folder) {
-  std::vector<G2oGraph> parts;
-  std::map<KeyframeId, Eigen::Index> index_of;
-  TeamGraph team;
-  for (int i = 0; i < kRobots; ++i) {
-    parts.push_back(read_g2o(folder.path() / ("robot" + std::to_string(i)) / "pose_graph.g2o"));
-    for (const G2oVertex& vertex : parts.back().vertices) {
-      index_of[vertex.id] = team.graph.poses++;
-      team.poses.push_back(vertex.T_world_kf);
-    }
-  }
-  for (RobotId robot = 0; robot < kRobots; ++robot)
-    for (const RelativePose& edge : parts[robot].edges)
-      if (edge.from.robot == robot)  // an edge between two robots is in the files of both
-        team.graph.edges.push_back(block_edge(index_of.at(edge.from), index_of.at(edge.to), edge));
-  return team;
-}
-
-double cost_of(const WholeGraph& graph, const std::vector<SE3>& poses) {
-  double cost = 0.0;
-  for (const BlockEdge& edge : graph.edges) {
-    const auto block = [&](Eigen::Index i) -> Eigen::MatrixXd {
-      return poses[static_cast<std::size_t>(i)].matrix().topRows<3>();
-    };
-    cost += edge_cost(block(edge.i), block(edge.j), edge.T_i_j, edge.kappa, edge.tau);
-  }
-  return cost;
-}
 
 /// RMSE of the positions after one rigid alignment [m].
 double position_rmse(const std::vector<SE3>& poses, const LiftedPoses& optimum) {
@@ -95,7 +59,7 @@ TEST_CASE("Eight processes bring the tunnels graph into one frame", "[system][sl
     CHECK(robot["pgo"]["members"].size() == kRobots);
     CHECK(robot["pgo"]["anchor"].as<int>() == 0);
   }
-  const TeamGraph team = read_team(folder);
+  const TeamResult team = read_team(folder.path(), kRobots);
   CHECK(team.poses.size() == 1255);
   CHECK(team.graph.edges.size() > 1247 + 2000);  // odometry, and most of the good closures
 
