@@ -51,4 +51,13 @@ inline SplitGraph random_team(unsigned seed, const std::vector<RobotId>& ids,
   return graph;
 }
 
+/// A team with scattered ids, and pairs that hold it together in two ways.
+inline const std::vector<RobotId> kIds{50, 7, 1200, 33};
+inline const std::vector<std::pair<RobotId, RobotId>> kRing{
+    {7, 33}, {33, 50}, {50, 1200}, {7, 1200}};
+
+inline double optimum_of(const SplitGraph& graph) {
+  return solve_centrally(graph.whole()).cost;
+}
+
 }  // namespace km

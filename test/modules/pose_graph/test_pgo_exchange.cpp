@@ -6,8 +6,6 @@ namespace km {
 namespace {
 
 constexpr double kHour_s = 3600.0;
-const std::vector<RobotId> kIds{50, 7, 1200, 33};
-const std::vector<std::pair<RobotId, RobotId>> kRing{{7, 33}, {33, 50}, {50, 1200}, {7, 1200}};
 
 bool settle(PgoTeam& team) {
   return team.run(kHour_s, [&] { return team.all_settled(); });
@@ -34,10 +32,6 @@ std::map<RobotId, LiftedPoses> present_poses(PgoTeam& team) {
   std::map<RobotId, LiftedPoses> poses;
   for (const RobotId robot : kIds) poses[robot] = *team.agent(robot).lifted_poses();
   return poses;
-}
-
-double optimum_of(const SplitGraph& graph) {
-  return solve_centrally(graph.whole()).cost;
 }
 
 }  // namespace

@@ -9,13 +9,6 @@ namespace {
 constexpr double kHour_s = 3600.0;
 constexpr double kTolerance = 1e-4;  // of the cost, relative
 
-const std::vector<RobotId> kIds{50, 7, 1200, 33};
-const std::vector<std::pair<RobotId, RobotId>> kRing{{7, 33}, {33, 50}, {50, 1200}, {7, 1200}};
-
-double optimum_of(const SplitGraph& graph) {
-  return solve_centrally(graph.whole()).cost;
-}
-
 PoseGraphConfig config_of(PgoMethod method) {
   PoseGraphConfig config;
   config.method = method;
