@@ -108,6 +108,13 @@ RobotGraph::RobotGraph(const RobotEdges& robot, std::span<const KeyframeId> cove
   plan_ = std::make_shared<const EliminationPlan>(std::move(keep), pairs);
 }
 
+void RobotGraph::set_precisions(std::span<const BlockEdge> own) {
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    edges_[k].kappa = own[k].kappa;
+    edges_[k].tau = own[k].tau;
+  }
+}
+
 std::vector<KeyframeId> RobotGraph::kept() const {
   std::vector<KeyframeId> kept;
   for (const int node : plan_->kept()) kept.push_back(id(node));

@@ -47,6 +47,10 @@ class RobotGraph {
   /// the cover.
   RobotGraph(const RobotEdges& edges, std::span<const KeyframeId> cover);
 
+  /// Takes the precisions of the robot's own edges from `own`, which lists the same edges. Here they
+  /// may be zero: the pattern of the plan stays.
+  void set_precisions(std::span<const BlockEdge> own);
+
   [[nodiscard]] const std::vector<Edge>& edges() const { return edges_; }
   [[nodiscard]] int nodes() const { return plan_->nodes(); }
   [[nodiscard]] const std::shared_ptr<const EliminationPlan>& plan() const { return plan_; }

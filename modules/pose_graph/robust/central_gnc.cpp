@@ -29,7 +29,7 @@ std::vector<SE3> minimise_from(const TeamGraph& graph, std::vector<BlockEdge> ed
 
 }  // namespace
 
-CentralGnc gnc_centrally(const TeamGraph& graph, const GncAgentOptions& options,
+CentralGnc gnc_centrally(const TeamGraph& graph, const GncAgentOptions& options, double tolerance,
                          std::vector<SE3> start) {
   const std::vector<bool> odometry = odometry_edges(graph);
   std::vector<std::size_t> edge_of;  // of each candidate
@@ -68,7 +68,7 @@ CentralGnc gnc_centrally(const TeamGraph& graph, const GncAgentOptions& options,
       edges.back().tau *= weights[k];
     }
     poses = minimise_from(graph, std::move(edges), poses,
-                          schedule.decided() ? kFinalTolerance : options.tolerance);
+                          schedule.decided() ? kFinalTolerance : tolerance);
   }
   CentralGnc result{.kept = std::vector<bool>(graph.edges.size(), true),
                     .T_world_kf = std::move(poses),

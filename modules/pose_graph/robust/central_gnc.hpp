@@ -19,6 +19,6 @@ struct [[nodiscard]] CentralGnc {
 /// Starts from the chordal initialisation with all edges, unless poses are given. Throws
 /// std::invalid_argument if edges are not usable.
 CentralGnc gnc_centrally(const TeamGraph& graph, const GncAgentOptions& options,
-                         std::vector<SE3> start = {});
+                         double tolerance = 1e-3, std::vector<SE3> start = {});
 
 }  // namespace km

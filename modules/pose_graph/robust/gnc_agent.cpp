@@ -1,6 +1,7 @@
 #include "modules/pose_graph/robust/gnc_agent.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -8,162 +9,173 @@
 namespace km {
 namespace {
 
-// Rounds of the solve before update u count from u times this: late shares are recognised.
-constexpr std::uint32_t kRoundsPerSolve = 1U << 16U;
+using Eigen::Index;
 
-// Second derivatives of a problem that is left half solved are not worth a second exchange.
-constexpr double kPatience = 1e9;
-
-// [sigma^2], of the whole team's cost: no decision hangs on it.
-constexpr double kNegligible = 1e-9;
-
-// No step promises a decrease by this multiple of the cost.
-constexpr double kChordalOnly = 1e30;
+constexpr double kShorten = 0.25;
+constexpr double kRounding = 1e-13;  // of the cost: a smaller increase is none
+constexpr int kMaxBacktracks = 8;
+// Of the residual: what conjugate gradients, where they are needed, have to reach.
+constexpr double kAccuracy = 0.1;
+constexpr double kFinalAccuracy = 1e-3;
+constexpr double kNegligible = 1e-9;     // [sigma^2], of the whole team's cost
+constexpr double kPatienceRounds = 8.0;  // see NewtonOptions
 
 }  // namespace
 
-GncAgent::GncAgent(GncEdges edges, std::set<RobotId> team, int dimension,
-                   const GncAgentOptions& options, std::vector<SE3> start)
-    : edges_(std::move(edges)),
-      team_(std::move(team)),
-      dimension_(dimension),
-      options_(options),
-      poses_(std::move(start)) {
-  check(options_.gnc);
-  team_.insert(edges_.edges.self);
-  bool fits = edges_.own_odometry.size() == edges_.edges.own.size();
-  for (const auto& [peer, list] : edges_.edges.to)
-    fits = fits && edges_.odometry_to[peer].size() == list.size();
-  if (!fits) throw std::invalid_argument("GncAgent: flags and edges differ in number");
-  if (!poses_.empty() && static_cast<Eigen::Index>(poses_.size()) != edges_.edges.poses)
-    throw std::invalid_argument("GncAgent: " + std::to_string(poses_.size()) + " start poses for " +
-                                std::to_string(edges_.edges.poses));
-}
-
-NewtonHello GncAgent::hello() const {
-  const RobotId self = edges_.edges.self;
-  NewtonHello hello{.robot = self};
-  std::set<KeyframeIndex> poses;
-  for (const bool odometry : {false, true})  // candidates first
-    for (const auto& [peer, list] : edges_.edges.to)
-      for (std::size_t k = 0; k < list.size(); ++k) {
-        poses.insert(list[k].own);
-        if (peer > self && edges_.odometry_to.at(peer)[k] == odometry)
-          hello.links.push_back({{self, list[k].own}, {peer, list[k].other}});
-      }
-  hello.poses.assign(poses.begin(), poses.end());
-  if (!poses_.empty())
-    for (const KeyframeIndex k : hello.poses) hello.T_world_pose.push_back(poses_[k]);
-  return hello;
-}
-
-void GncAgent::receive(const NewtonHello& hello) {
+void GncAgent::receive(const GncHello& hello) {
   if (team_.contains(hello.robot)) hellos_.try_emplace(hello.robot, hello);
 }
 
-void GncAgent::receive(const GncPoses& poses) {
-  if (!team_.contains(poses.robot) || poses.update < update_) return;
-  public_poses_[poses.update].try_emplace(poses.robot, poses);
+void GncAgent::receive(std::shared_ptr<const GncShare> share) {
+  if (done() || share->round < round_ || !team_.contains(share->robot)) return;
+  shares_[share->round].try_emplace(share->robot, std::move(share));
 }
 
-void GncAgent::receive(const GncResiduals& residuals) {
-  if (!team_.contains(residuals.robot) || residuals.update < update_) return;
-  residuals_[residuals.update].try_emplace(residuals.robot, residuals);
-}
-
-void GncAgent::receive(std::shared_ptr<const NewtonShare> share) {
-  const std::uint32_t solve = share->round / kRoundsPerSolve;
-  if (solver_ && solve == update_)
-    solver_->receive(std::move(share));
-  else if (solve > update_ || (solve == update_ && !solver_))
-    early_.push_back(std::move(share));
+void GncAgent::leave(RobotId robot) {
+  if (team_.contains(robot)) phase_ = Phase::kDone;
 }
 
 bool GncAgent::ready() const {
-  const auto complete = [&](const auto& messages) {
-    const auto found = messages.find(update_);
-    return found != messages.end() && found->second.size() == team_.size();
-  };
-  switch (phase_) {
-    case Phase::kHello:
-      return hellos_.size() == team_.size();
-    case Phase::kSolve:
-      return solver_->ready();
-    case Phase::kPoses:
-      return complete(public_poses_);
-    case Phase::kResiduals:
-      return complete(residuals_);
-    case Phase::kDone:
-      return false;
-  }
-  return false;
+  if (done()) return false;
+  if (phase_ == Phase::kHello) return hellos_.size() == team_.size();
+  const auto shares = shares_.find(round_);
+  return shares != shares_.end() && shares->second.size() == team_.size();
 }
 
-std::optional<GncAgent::Message> GncAgent::advance() {
+std::optional<GncShare> GncAgent::advance() {
   if (!ready()) return std::nullopt;
-  switch (phase_) {
-    case Phase::kHello:
-      if (poses_.empty()) return start_solve();
-      for (const auto& [robot, hello] : hellos_)
-        public_poses_[update_].try_emplace(robot, GncPoses{robot, update_, hello.T_world_pose});
-      [[fallthrough]];
-    case Phase::kPoses:
-      phase_ = Phase::kResiduals;
-      return residuals();
-    case Phase::kResiduals:
-      return update();
-    case Phase::kSolve:
-      return continue_solve(solver_->advance());
-    case Phase::kDone:
-      break;
+  std::optional<GncShare> next;
+  if (phase_ == Phase::kHello) {
+    meet();
+    phase_ = Phase::kRounds;
+    next = share(true);
+  } else {
+    for (const auto& [robot, told] : shares_.at(round_))
+      if (told->schur.block() > 0) system_->set_part(robot, told->schur);
+    next = step_on();
   }
-  return std::nullopt;
+  shares_.erase(round_);
+  ++round_;
+  if (next) next->round = round_;
+  return next;
 }
 
-std::optional<GncAgent::Message> GncAgent::update() {
-  if (!schedule_) make_schedule();
-  std::vector<float> all;
-  for (const auto& [robot, told] : residuals_.at(update_))
-    all.insert(all.end(), told.residuals.begin(), told.residuals.end());
-  (void)schedule_->update(all);
-  ++update_;
-  public_poses_.erase(public_poses_.begin(), public_poses_.lower_bound(update_ - 1));
-  residuals_.erase(residuals_.begin(), residuals_.lower_bound(update_));
-  return start_solve();
+GncShare GncAgent::share(bool fresh) {
+  decided_told_ = schedule_->decided();
+  fresh = fresh || (decided_told_ && !full_told_) || block_.stale();
+  std::optional<Curvature> curvature;
+  if (fresh) curvature = decided_told_ ? Curvature::kFull : Curvature::kGaussNewton;
+  full_told_ = decided_told_;
+  GncShare share = block_.share(candidate_.own, curvature);
+  share.base_cost = told_cost(base_);
+  share.cost = told_cost(candidate_);
+  share.residuals = inside_residuals(candidate_.own);
+  return share;
 }
 
-std::optional<GncAgent::Message> GncAgent::start_solve() {
-  NewtonOptions newton;
-  newton.first_round = update_ * kRoundsPerSolve;
-  newton.absolute_tolerance = kNegligible;
-  if (!schedule_ || !schedule_->decided()) {
-    newton.tolerance = schedule_ ? options_.tolerance : kChordalOnly;
-    newton.patience_rounds = kPatience;
+// Of its own edges and of those to robots with higher ids: from these numbers all decide alike.
+double GncAgent::told_cost(const Poses& poses) const {
+  const std::vector<double> residuals = graph_->residuals(poses.all_public);
+  double cost = block_.cost(poses.own);
+  for (std::size_t k = 0; k < residuals.size(); ++k)
+    if (graph_->links()[k].a == edges_.edges.self)
+      cost += link_weights_[k] * residuals[k] * residuals[k];
+  return cost;
+}
+
+std::optional<GncShare> GncAgent::step_on() {
+  double base_cost = 0.0, cost = 0.0;
+  std::vector<float> inside;
+  for (const auto& [robot, told] : shares_.at(round_)) {
+    base_cost += told->base_cost;
+    cost += told->cost;
+    inside.insert(inside.end(), told->residuals.begin(), told->residuals.end());
   }
-  solver_.emplace(weighted_edges(), team_, dimension_, newton, poses_);
-  for (const auto& [robot, hello] : hellos_) solver_->receive(weighted_hello(hello));
-  for (auto& share : std::exchange(early_, {})) receive(std::move(share));
-  phase_ = Phase::kSolve;
-  return continue_solve(solver_->advance());
-}
-
-std::optional<GncAgent::Message> GncAgent::continue_solve(std::optional<NewtonShare> share) {
-  if (share) return std::move(*share);
-  if (!solver_->done()) return std::nullopt;
-  poses_ = solver_->poses();
-  if (schedule_ && schedule_->decided()) {
-    phase_ = Phase::kDone;
-    return std::nullopt;
+  if (!at_base_ && !(cost <= base_cost * (1.0 + kRounding) + kNegligible)) return go_back();
+  if (!at_base_) retried_ = false;
+  base_ = candidate_;
+  backtracks_ = 0;
+  const bool final_weights = decided_told_;
+  if (all_in_ > 0)
+    --all_in_;
+  else if (!schedule_->decided() && !std::exchange(hold_weights_, false))
+    update_weights(inside);
+  at_base_ = false;
+  const PublicSystem::Solution solution = solve();
+  if (final_weights) {
+    if (0.5 * solution.decrement <= options_.tolerance * cost + kNegligible) {
+      phase_ = Phase::kDone;
+      return std::nullopt;
+    }
+    if (worth_refreshing(solution.decrement, cost)) return share_at_base();
   }
-  phase_ = Phase::kPoses;
-  return public_poses();
+  const Index first = graph_->first(edges_.edges.self);
+  step_ = {.nodes = block_.substitute_back(
+               solution.x.middleCols(first, graph_->sizes().at(edges_.edges.self))),
+           .separators = solution.x};
+  remove_drift(step_, base_.own, base_.all_public);
+  take_step(1.0);
+  return share(false);
 }
 
-GncPoses GncAgent::public_poses() const {
-  GncPoses message{.robot = edges_.edges.self, .update = update_};
-  for (const KeyframeIndex k : hellos_.at(edges_.edges.self).poses)
-    message.T_world_pose.push_back(poses_[k]);
-  return message;
+PublicSystem::Solution GncAgent::solve() {
+  system_->factorise(base_.all_public, link_weights_,
+                     decided_told_ ? Curvature::kFull : Curvature::kGaussNewton);
+  const Index block = tangent_size(dimension_);
+  Eigen::VectorXd reduced = Eigen::VectorXd::Zero(block * graph_->nodes());
+  double decrement = 0.0;
+  for (const auto& [robot, told] : shares_.at(round_)) {
+    const Index size = block * graph_->sizes().at(robot);
+    if (told->reduced.size() != size)
+      throw std::invalid_argument("GncAgent: robot " + std::to_string(robot) + " told " +
+                                  std::to_string(told->reduced.size()) + " right-hand sides of " +
+                                  std::to_string(size));
+    reduced.segment(block * graph_->first(robot), size) = told->reduced;
+    decrement += told->decrement;
+  }
+  PublicSystem::Solution solution =
+      system_->solve(reduced, decided_told_ ? kFinalAccuracy : kAccuracy);
+  solution.decrement += decrement;
+  return solution;
+}
+
+void GncAgent::take_step(double scale) {
+  candidate_ = {moved(base_.own, step_.nodes, scale),
+                moved(base_.all_public, step_.separators, scale)};
+}
+
+std::optional<GncShare> GncAgent::go_back() {
+  ++backtracks_;
+  if (backtracks_ > kMaxBacktracks) {
+    if (decided_told_) {
+      phase_ = Phase::kDone;
+      return std::nullopt;
+    }
+    retried_ = false;
+    return share_at_base();  // with the next weights, the next step may succeed
+  }
+  if (backtracks_ == 2 && !retried_) {
+    hold_weights_ = retried_ = true;
+    return share_at_base();
+  }
+  take_step(std::pow(kShorten, backtracks_));
+  return share(false);
+}
+
+GncShare GncAgent::share_at_base() {
+  candidate_ = base_;
+  at_base_ = true;
+  last_decrement_.reset();
+  return share(true);
+}
+
+bool GncAgent::worth_refreshing(double decrement, double cost) {
+  const std::optional<double> before = std::exchange(last_decrement_, decrement);
+  if (!before) return false;
+  const double rate = decrement / *before;
+  if (!(rate < 1.0)) return true;
+  const double left = std::log(decrement / (2.0 * options_.tolerance * cost)) / -std::log(rate);
+  return left > kPatienceRounds;
 }
 
 }  // namespace km

@@ -1,159 +1,147 @@
 #include "modules/pose_graph/robust/gnc_agent.hpp"
 
-// Which edge a robot decides, by what number, and what follows for the weighted problem.
+// How a GncAgent meets its team, and which weight belongs to which edge.
 
 #include <algorithm>
 #include <iterator>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace km {
 namespace {
 
-std::size_t count_closures(const std::vector<bool>& odometry, std::size_t end) {
-  return static_cast<std::size_t>(
-      std::count(odometry.begin(), odometry.begin() + static_cast<std::ptrdiff_t>(end), false));
-}
-
-std::size_t count_closures(const std::vector<bool>& odometry) {
-  return count_closures(odometry, odometry.size());
-}
+// At a start by odometry nothing speaks against odometry. If that may be false, all edges are first
+// heard alike.
+constexpr int kAllInSteps = 8;
 
 }  // namespace
 
-const SE3& GncAgent::told_pose(RobotId robot, KeyframeIndex pose) const {
-  const auto& poses = hellos_.at(robot).poses;
-  const auto& told = public_poses_.at(update_).at(robot).T_world_pose;
-  const auto found = std::lower_bound(poses.begin(), poses.end(), pose);
-  const auto place = static_cast<std::size_t>(found - poses.begin());
-  if (found == poses.end() || *found != pose || place >= told.size())
-    throw std::invalid_argument("GncAgent: nobody told pose " + to_string(KeyframeId{robot, pose}));
-  return told[place];
-}
-
-std::size_t GncAgent::index_of(RobotId robot) const {
-  return static_cast<std::size_t>(std::distance(team_.begin(), team_.find(robot)));
-}
-
-GncResiduals GncAgent::residuals() const {
-  const RobotEdges& edges = edges_.edges;
-  GncResiduals message{.robot = edges.self, .update = update_};
-  for (auto to = edges.to.upper_bound(edges.self); to != edges.to.end(); ++to)
-    for (std::size_t k = 0; k < to->second.size(); ++k) {
-      if (edges_.odometry_to.at(to->first)[k]) continue;
-      const InterEdge& e = to->second[k];
-      const SE3& own = poses_[e.own];
-      const SE3& other = told_pose(to->first, e.other);
-      message.residuals.push_back(static_cast<float>(edge_residual(
-          e.from_own ? own : other, e.from_own ? other : own, e.T_from_to, e.kappa, e.tau)));
-    }
-  message.between = static_cast<std::uint32_t>(message.residuals.size());
+GncAgent::GncAgent(GncEdges edges, std::set<RobotId> team, int dimension,
+                   const GncAgentOptions& options, std::vector<SE3> start, bool common_frame)
+    : edges_(std::move(edges)),
+      team_(std::move(team)),
+      dimension_(dimension),
+      options_(options),
+      common_frame_(common_frame && !start.empty()),
+      block_(edges_.edges, dimension) {
+  check(options_.gnc);
+  team_.insert(edges_.edges.self);
+  bool fits = edges_.own_odometry.size() == edges_.edges.own.size();
+  for (const auto& [peer, list] : edges_.edges.to)
+    fits = fits && edges_.odometry_to[peer].size() == list.size();
+  if (!fits) throw std::invalid_argument("GncAgent: flags and edges differ in number");
+  if (!start.empty() && static_cast<Eigen::Index>(start.size()) != edges_.edges.poses)
+    throw std::invalid_argument("GncAgent: " + std::to_string(start.size()) + " start poses for " +
+                                std::to_string(edges_.edges.poses));
+  base_.own = start.empty() ? start_from_odometry(edges_) : std::move(start);
   for (const bool odometry : {false, true}) {
-    for (std::size_t k = 0; k < edges.own.size(); ++k) {
-      if (edges_.own_odometry[k] != odometry || (odometry && !options_.reject_odometry)) continue;
-      const BlockEdge& e = edges.own[k];
-      message.residuals.push_back(static_cast<float>(
-          edge_residual(poses_[static_cast<std::size_t>(e.i)],
-                        poses_[static_cast<std::size_t>(e.j)], e.T_i_j, e.kappa, e.tau)));
-    }
-    if (!odometry)
-      message.inside = static_cast<std::uint32_t>(message.residuals.size()) - message.between;
+    for (std::size_t k = 0; k < edges_.own_odometry.size(); ++k)
+      if (edges_.own_odometry[k] == odometry && (!odometry || options_.reject_odometry))
+        inside_.push_back(k);
+    if (!odometry) closures_ = inside_.size();
   }
-  return message;
+}
+
+GncHello GncAgent::hello() const {
+  const RobotId self = edges_.edges.self;
+  GncHello hello{.robot = self,
+                 .poses = block_.public_poses(),
+                 .common_frame = common_frame_,
+                 .pairs = block_.pairs(),
+                 .closures = static_cast<std::uint32_t>(closures_),
+                 .residuals = inside_residuals(base_.own)};
+  for (const KeyframeIndex k : hello.poses) hello.T_start_pose.push_back(base_.own[k]);
+  for (auto to = edges_.edges.to.upper_bound(self); to != edges_.edges.to.end(); ++to)
+    for (std::size_t k = 0; k < to->second.size(); ++k) {
+      const InterEdge& e = to->second[k];
+      hello.links.push_back({.own = e.own,
+                             .other = {to->first, e.other},
+                             .odometry = edges_.odometry_to.at(to->first)[k],
+                             .from_own = e.from_own,
+                             .T_from_to = e.T_from_to,
+                             .kappa = e.kappa,
+                             .tau = e.tau});
+    }
+  return hello;
+}
+
+void GncAgent::meet() {
+  graph_ = std::make_shared<const PublicGraph>(hellos_);
+  for (const auto& [peer, list] : edges_.edges.to)
+    if (graph_->link_count(edges_.edges.self, peer) != list.size())
+      throw std::invalid_argument("GncAgent: robots " + std::to_string(edges_.edges.self) +
+                                  " and " + std::to_string(peer) + " do not have the same edges");
+  system_.emplace(graph_, dimension_);
+  const std::map<RobotId, SE3> T_world_start = align_starts(hellos_, *graph_);
+  for (SE3& T : base_.own) T = T_world_start.at(edges_.edges.self) * T;
+  std::vector<float> inside;
+  for (const auto& [robot, hello] : hellos_) {
+    for (const SE3& T : hello.T_start_pose) base_.all_public.push_back(T_world_start.at(robot) * T);
+    inside.insert(inside.end(), hello.residuals.begin(), hello.residuals.end());
+  }
+  candidate_ = base_;
+  make_schedule();
+  link_weights_.assign(graph_->links().size(), 1.0);
+  if (options_.reject_odometry)
+    all_in_ = kAllInSteps;
+  else
+    update_weights(inside);
 }
 
 void GncAgent::make_schedule() {
+  const auto index_of = [&](RobotId robot) {
+    return static_cast<RobotId>(std::distance(team_.begin(), team_.find(robot)));
+  };
   std::vector<GncCandidate> candidates;
   std::vector<GncCandidate> joined;
-  for (const auto& [robot, told] : residuals_.at(update_)) {
-    const std::vector<PublicLink>& links = hellos_.at(robot).links;
-    const auto self = static_cast<RobotId>(index_of(robot));
-    if (told.between > links.size() || told.between + told.inside > told.residuals.size())
-      throw std::invalid_argument("GncAgent: robot " + std::to_string(robot) +
-                                  " counts more closures than it has");
-    deciders_[robot] = {candidates.size(), told.between};
-    for (std::size_t k = 0; k < links.size(); ++k) {
-      if (!team_.contains(links[k].b.robot))
-        throw std::invalid_argument("GncAgent: robot " + std::to_string(robot) +
-                                    " has a link to a robot outside the team");
-      const GncCandidate pair{self, static_cast<RobotId>(index_of(links[k].b.robot))};
-      (k < told.between ? candidates : joined).push_back(pair);
-    }
-    const std::size_t inside_end = told.between + told.inside;
-    for (std::size_t k = told.between; k < told.residuals.size(); ++k)
-      candidates.push_back({self, self, k >= inside_end});
+  for (const PublicGraph::Link& link : graph_->links()) {
+    candidate_of_link_.push_back(link.odometry ? -1 : static_cast<int>(candidates.size()));
+    (link.odometry ? joined : candidates).push_back({index_of(link.a), index_of(link.b)});
+  }
+  for (const auto& [robot, hello] : hellos_) {
+    if (robot == edges_.edges.self) first_inside_ = candidates.size();
+    for (std::size_t k = 0; k < hello.residuals.size(); ++k)
+      candidates.push_back({index_of(robot), index_of(robot), k >= hello.closures});
   }
   schedule_.emplace(std::move(candidates), team_.size(), std::move(joined), options_.gnc,
                     dimension_);
 }
 
-std::optional<std::size_t> GncAgent::own_candidate(std::size_t edge) const {
-  if (!schedule_) return std::nullopt;
-  const std::vector<bool>& odometry = edges_.own_odometry;
-  const Decider& self = deciders_.at(edges_.edges.self);
-  const std::size_t closures_before = count_closures(odometry, edge);
-  const std::size_t first = self.first + self.between;
-  if (!odometry[edge]) return first + closures_before;
-  if (!options_.reject_odometry) return std::nullopt;
-  return first + count_closures(odometry) + edge - closures_before;
+std::vector<float> GncAgent::inside_residuals(const std::vector<SE3>& own) const {
+  std::vector<float> residuals;
+  for (const std::size_t k : inside_)
+    residuals.push_back(static_cast<float>(block_.residual(k, own)));
+  return residuals;
 }
 
-std::optional<std::size_t> GncAgent::candidate(RobotId peer, std::size_t edge) const {
-  const std::vector<bool>& odometry = edges_.odometry_to.at(peer);
-  if (!schedule_ || odometry[edge]) return std::nullopt;
-  const RobotId self = edges_.edges.self;
-  const Decider& decider = deciders_.at(std::min(self, peer));
-  const auto& links = hellos_.at(std::min(self, peer)).links;
-  const auto end = links.begin() + static_cast<std::ptrdiff_t>(decider.between);
-  const auto to_higher = [&](const PublicLink& link) {
-    return link.b.robot == std::max(self, peer);
-  };
-  const auto first = std::find_if(links.begin(), end, to_higher);
-  const std::size_t place = count_closures(odometry, edge);
-  if (static_cast<std::size_t>(std::count_if(first, end, to_higher)) != count_closures(odometry))
-    throw std::invalid_argument("GncAgent: robots " + std::to_string(self) + " and " +
-                                std::to_string(peer) + " do not have the same edges");
-  return decider.first + static_cast<std::size_t>(first - links.begin()) + place;
+void GncAgent::update_weights(const std::vector<float>& inside) {
+  const std::vector<double> between = graph_->residuals(base_.all_public);
+  std::vector<float> residuals;
+  for (std::size_t k = 0; k < between.size(); ++k)
+    if (candidate_of_link_[k] >= 0) residuals.push_back(static_cast<float>(between[k]));
+  residuals.insert(residuals.end(), inside.begin(), inside.end());
+  (void)schedule_->update(residuals);
+  link_weights_.assign(between.size(), 1.0);
+  for (std::size_t k = 0; k < between.size(); ++k)
+    if (candidate_of_link_[k] >= 0)
+      link_weights_[k] = schedule_->weight(static_cast<std::size_t>(candidate_of_link_[k]));
+  std::vector<double> own(edges_.edges.own.size(), 1.0);
+  for (std::size_t k = 0; k < inside_.size(); ++k)
+    own[inside_[k]] = schedule_->weight(first_inside_ + k);
+  block_.weigh(own);
 }
 
 bool GncAgent::kept_own(std::size_t edge) const {
-  const auto k = own_candidate(edge);
-  return !k || schedule_->kept(*k);
+  const auto found = std::find(inside_.begin(), inside_.end(), edge);
+  if (!schedule_ || found == inside_.end()) return true;
+  return schedule_->kept(first_inside_ + static_cast<std::size_t>(found - inside_.begin()));
 }
 
 bool GncAgent::kept(RobotId peer, std::size_t edge) const {
-  const auto k = candidate(peer, edge);
-  return !k || schedule_->kept(*k);
-}
-
-RobotEdges GncAgent::weighted_edges() const {
-  const auto weight_of = [&](const std::optional<std::size_t>& k) {
-    return k ? schedule_->weight(*k) : 1.0;
-  };
-  const auto add = [](auto& list, auto edge, double weight) {
-    if (weight == 0.0) return;
-    edge.kappa *= weight;
-    edge.tau *= weight;
-    list.push_back(edge);
-  };
-  RobotEdges weighted{.self = edges_.edges.self, .poses = edges_.edges.poses};
-  for (std::size_t k = 0; k < edges_.edges.own.size(); ++k)
-    add(weighted.own, edges_.edges.own[k], weight_of(own_candidate(k)));
-  for (const auto& [peer, list] : edges_.edges.to)
-    for (std::size_t k = 0; k < list.size(); ++k)
-      add(weighted.to[peer], list[k], weight_of(candidate(peer, k)));
-  return weighted;
-}
-
-NewtonHello GncAgent::weighted_hello(const NewtonHello& hello) const {
-  if (!schedule_) return hello;
-  NewtonHello weighted{.robot = hello.robot, .poses = hello.poses};
-  const Decider& decider = deciders_.at(hello.robot);
-  for (std::size_t k = 0; k < hello.links.size(); ++k)
-    if (k >= decider.between || schedule_->weight(decider.first + k) > 0.0)
-      weighted.links.push_back(hello.links[k]);
-  weighted.T_world_pose = public_poses_.at(update_ - 1).at(hello.robot).T_world_pose;
-  return weighted;
+  if (!schedule_) return true;
+  const int k = candidate_of_link_[graph_->link(edges_.edges.self, peer, edge)];
+  return k < 0 || schedule_->kept(static_cast<std::size_t>(k));
 }
 
 }  // namespace km

@@ -11,39 +11,47 @@
 
 namespace km {
 
-// Bound on what a message may claim.
+// Bounds on what a message may claim.
 inline constexpr std::size_t kMaxGncEntries = 1U << 20U;
+inline constexpr std::size_t kMaxGncPairs = 1U << 19U;
 
 /// Written by the robot itself.
 template <>
-struct Codec<GncPoses> {
-  using Wire = km_wire_GncPoses;
-  static constexpr const char* kTopic = "gnc_poses";
+struct Codec<GncHello> {
+  using Wire = km_wire_GncHello;
+  static constexpr const char* kTopic = "gnc_hello";
   static constexpr std::uint16_t kVersion = 1;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_GncPoses_desc; }
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_GncHello_desc; }
 
   struct Encoded {
     Wire wire{};
-    std::vector<km_wire_Pose> T_world_pose;
+    std::vector<km_wire_GncLink> links;
+    std::vector<std::uint32_t> poses;
+    std::vector<km_wire_Pose> T_start_pose;
+    std::vector<km_wire_GncPair> pairs;
+    std::vector<float> residuals;
   };
-  static Encoded encode(const GncPoses& poses);
-  static Decoded<GncPoses> decode(const Wire& wire);
+  static Encoded encode(const GncHello& hello);
+  static Decoded<GncHello> decode(const Wire& wire);
 };
 
 /// Written by the robot itself.
 template <>
-struct Codec<GncResiduals> {
-  using Wire = km_wire_GncResiduals;
-  static constexpr const char* kTopic = "gnc_residuals";
+struct Codec<GncShare> {
+  using Wire = km_wire_GncShare;
+  static constexpr const char* kTopic = "gnc_share";
   static constexpr std::uint16_t kVersion = 1;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_GncResiduals_desc; }
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_GncShare_desc; }
 
   struct Encoded {
     Wire wire{};
+    std::vector<double> reduced;
+    std::vector<double> diagonal;
+    std::vector<double> coupling;
     std::vector<float> residuals;
   };
-  static Encoded encode(const GncResiduals& residuals);
-  static Decoded<GncResiduals> decode(const Wire& wire);
+  static Encoded encode(const GncShare& share);
+  static Decoded<GncShare> decode(const Wire& wire);
 };
 
 }  // namespace km

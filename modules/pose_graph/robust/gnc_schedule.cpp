@@ -128,7 +128,11 @@ bool GncSchedule::update(std::span<const float> residuals) {
   ++updates_;
   const bool hard = mu_ >= kHardMu;
   if (hard) ++hard_updates_;
-  decided_ = (hard && (weights_ == before || hard_updates_ >= kHardUpdates)) ||
+  const bool binary = std::all_of(weights_.begin(), weights_.end(), [](double w) {
+    return w == 0.0 || w == 1.0 || w == kJointWeight;
+  });
+  decided_ = (binary && weights_ == before) ||
+             (hard && (weights_ == before || hard_updates_ >= kHardUpdates)) ||
              updates_ >= options_.max_updates;
   return true;
 }

@@ -12,7 +12,7 @@ namespace km {
 /// [sigma] can be brought below a threshold c, "barc", stay.
 struct GncOptions {
   double barc = 0.0;     ///< Largest residual of an inlier [sigma]; 0: default_barc().
-  double mu_step = 2.0;  ///< Factor by which the surrogate comes closer to the truncated cost, > 1.
+  double mu_step = 1.4;  ///< Factor by which the surrogate comes closer to the truncated cost, > 1.
   /// Sigmas are taken `scale` times as large as the graph says, where `scale` is what makes the
   /// (weighted) median of the candidates' residuals that of Gaussian noise.
   bool estimate_scale = false;

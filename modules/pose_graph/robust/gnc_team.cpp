@@ -5,7 +5,6 @@
 #include <set>
 #include <stdexcept>
 #include <string>
-#include <type_traits>
 #include <utility>
 
 #include "modules/pose_graph/chordal.hpp"
@@ -55,57 +54,41 @@ GncTeam::GncTeam(const TeamGraph& graph, Eigen::Index rank, const LiftedPoses& s
   for (std::size_t k = 0; k < graph.robots(); ++k) team.insert(static_cast<RobotId>(k));
   const std::vector<bool> odometry = odometry_edges(graph);
   for (std::size_t k = 0; k < graph.robots(); ++k) {
-    std::vector<SE3> poses(static_cast<std::size_t>(graph.poses_of(k)), SE3::Identity());
-    blocks_.push_back(lift(poses, rank));
-    poses.clear();
-    if (start.size() > 0) {
-      blocks_.back() = start.middleCols(4 * graph.first[k], 4 * graph.poses_of(k));
-      poses = round_to_poses(blocks_.back(), lifted_identity(rank));
-    }
+    std::vector<SE3> poses;
+    if (start.size() > 0)
+      poses = round_to_poses(start.middleCols(4 * graph.first[k], 4 * graph.poses_of(k)),
+                             lifted_identity(rank));
     agents_.emplace_back(edges_of(graph, k, odometry), team, graph.dimension, options,
                          std::move(poses));
+    blocks_.push_back(lift(agents_[k].poses(), rank));
   }
-}
-
-void GncTeam::deliver(const GncAgent::Message& message, RoundMeter& meter) {
-  if (const auto* share = std::get_if<NewtonShare>(&message)) {
-    meter.sent(*share);
-    const auto shared = std::make_shared<const NewtonShare>(*share);
-    for (GncAgent& agent : agents_) agent.receive(shared);
-    return;
-  }
-  std::visit(
-      [&](const auto& content) {
-        if constexpr (!std::is_same_v<std::decay_t<decltype(content)>, NewtonShare>) {
-          meter.sent(content);
-          for (GncAgent& agent : agents_) agent.receive(content);
-        }
-      },
-      message);
 }
 
 bool GncTeam::step(RoundMeter& meter) {
   if (!met_) {
     met_ = true;
-    std::vector<NewtonHello> hellos;
+    std::vector<GncHello> hellos;
     for (std::size_t k = 0; k < agents_.size(); ++k) {
       hellos.push_back(meter.run(k, [&] { return agents_[k].hello(); }));
       meter.sent(hellos.back());
     }
     for (GncAgent& agent : agents_)
-      for (const NewtonHello& hello : hellos) agent.receive(hello);
+      for (const GncHello& hello : hellos) agent.receive(hello);
     return true;
   }
   bool worked = false;
-  std::vector<GncAgent::Message> messages;
+  std::vector<std::shared_ptr<const GncShare>> shares;
   for (std::size_t k = 0; k < agents_.size(); ++k) {
     if (!agents_[k].ready()) continue;
     worked = true;
-    auto message = meter.run(k, [&] { return agents_[k].advance(); });
-    if (!agents_[k].poses().empty()) blocks_[k] = lift(agents_[k].poses(), rank_);
-    if (message) messages.push_back(std::move(*message));
+    auto share = meter.run(k, [&] { return agents_[k].advance(); });
+    blocks_[k] = lift(agents_[k].poses(), rank_);
+    if (!share) continue;
+    meter.sent(*share);
+    shares.push_back(std::make_shared<const GncShare>(std::move(*share)));
   }
-  for (const GncAgent::Message& message : messages) deliver(message, meter);
+  for (GncAgent& agent : agents_)
+    for (const auto& share : shares) agent.receive(share);
   return worked;
 }
 

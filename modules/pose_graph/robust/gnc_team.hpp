@@ -14,8 +14,9 @@ namespace km {
 /// GncAgents of a whole team in one process.
 class GncTeam : public TeamSolver {
  public:
-  /// `start` as for NewtonTeam; if given, residuals are first measured there. Throws
-  /// std::invalid_argument as NewtonTeam does.
+  /// `start` is r x 4n in the numbering of `graph`, poses lifted as by lift(); empty: every robot
+  /// starts from its odometry. Throws std::invalid_argument if the shape is not that, the rank is
+  /// below 3, or as GncAgent does.
   GncTeam(const TeamGraph& graph, Eigen::Index rank, const LiftedPoses& start,
           const GncAgentOptions& options);
 
@@ -28,8 +29,6 @@ class GncTeam : public TeamSolver {
   [[nodiscard]] std::vector<bool> kept() const;
 
  private:
-  void deliver(const GncAgent::Message& message, RoundMeter& meter);
-
   TeamGraph graph_;
   Eigen::Index rank_;
   std::vector<GncAgent> agents_;

@@ -15,7 +15,7 @@ namespace km {
 /// Every message that a method may send between robots. The same structs cross the network.
 using TeamMessage =
     std::variant<PgoStatus, PgoSession, PublicPoses, CertificateShare, NewtonHello, NewtonShare,
-                 GncPoses, GncResiduals>;
+                 GncHello, GncShare>;
 
 /// What the work of a team is measured with: modules read no clocks and know no wire format.
 struct TeamMeter {

@@ -9,6 +9,8 @@
 namespace km {
 namespace {
 
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
 template <typename T>
 typename Codec<T>::Encoded written(const T& message) {
   auto encoded = Codec<T>::encode(message);
@@ -22,14 +24,47 @@ bool refused(const T& message) {
   return !Codec<T>::decode(encoded.wire).value;
 }
 
-GncPoses some_poses() {
+GncHello some_hello() {
   std::mt19937 rng(1);
-  return {.robot = 3, .update = 7, .T_world_pose = {random_pose(rng), random_pose(rng)}};
+  GncHello hello{.robot = 3,
+                 .poses = {2, 5},
+                 .T_start_pose = {random_pose(rng), random_pose(rng)},
+                 .common_frame = true,
+                 .pairs = {{0, 1}},
+                 .closures = 1,
+                 .residuals = {0.5F, 30.0F}};
+  hello.links.push_back({.own = 2,
+                         .other = {4, 7},
+                         .odometry = false,
+                         .from_own = true,
+                         .T_from_to = random_pose(rng),
+                         .kappa = 100.0,
+                         .tau = 4.0});
+  hello.links.push_back(hello.links[0]);
+  hello.links.back().other = {9, 0};
+  hello.links.back().odometry = true;
+  hello.links.back().from_own = false;
+  return hello;
 }
 
-GncResiduals some_residuals() {
-  return {
-      .robot = 3, .update = 7, .between = 2, .inside = 1, .residuals = {0.5F, 0.0F, 30.0F, 2.0F}};
+GncShare some_share() {
+  std::mt19937 rng(2);
+  GncShare share{.robot = 3,
+                 .round = 4,
+                 .base_cost = 2.5,
+                 .cost = 1.5,
+                 .decrement = 0.25,
+                 .block = 3,
+                 .residuals = {0.5F, 0.0F, 30.0F}};
+  share.reduced = random_vector<6>(rng);
+  share.schur = BlockMatrix::zero(3, 2, 1);
+  for (int k = 0; k < 2; ++k) {
+    Eigen::Matrix3d M;
+    M << random_vector<3>(rng), random_vector<3>(rng), random_vector<3>(rng);
+    share.schur.at(k) = M + M.transpose();  // symmetric to the last bit
+    share.schur.between(0) = M;
+  }
+  return share;
 }
 
 // One byte of what a peer writes is changed; lengths and pointers are the deserializer's.
@@ -44,101 +79,127 @@ void spoil(std::vector<T>& list, std::mt19937& rng) {
 }  // namespace
 
 TEST_CASE("GNC's messages come back from the wire", "[gnc]") {
-  const GncPoses poses = some_poses();
-  const auto encoded = written(poses);
-  const auto decoded = Codec<GncPoses>::decode(encoded.wire);
+  const GncHello hello = some_hello();
+  const auto encoded = written(hello);
+  const auto decoded = Codec<GncHello>::decode(encoded.wire);
   REQUIRE(decoded.value);
-  CHECK(decoded.value->robot == poses.robot);
-  CHECK(decoded.value->update == poses.update);
-  REQUIRE(decoded.value->T_world_pose.size() == 2);
-  for (std::size_t k = 0; k < 2; ++k)
-    CHECK(decoded.value->T_world_pose[k].isApprox(poses.T_world_pose[k], 1e-14));
-
-  const GncResiduals residuals = some_residuals();
-  const auto encoded_residuals = written(residuals);
-  const auto back = Codec<GncResiduals>::decode(encoded_residuals.wire);
-  REQUIRE(back.value);
-  CHECK(back.value->robot == residuals.robot);
-  CHECK(back.value->update == residuals.update);
-  CHECK(back.value->between == residuals.between);
-  CHECK(back.value->inside == residuals.inside);
-  CHECK(back.value->residuals == residuals.residuals);
-}
-
-TEST_CASE("a robot without public poses or closures has something to tell all the same", "[gnc]") {
-  CHECK_FALSE(refused(GncPoses{.robot = 1}));
-  CHECK_FALSE(refused(GncResiduals{.robot = 1}));
-}
-
-TEST_CASE("poses between updates that make no sense are refused", "[gnc]") {
-  CHECK_FALSE(refused(some_poses()));
-  GncPoses poses = some_poses();
-  poses.T_world_pose[1].translation().x() = std::numeric_limits<double>::quiet_NaN();
-  CHECK(refused(poses));
-  auto foreign = written(some_poses());
-  foreign.wire.header.robot = 8;
-  CHECK_FALSE(Codec<GncPoses>::decode(foreign.wire).value);
-  auto stretched = written(some_poses());
-  for (double& x : stretched.T_world_pose[0].q) x *= 2.0;
-  CHECK_FALSE(Codec<GncPoses>::decode(stretched.wire).value);
-  auto missing = written(some_poses());
-  missing.wire.T_world_pose._buffer = nullptr;
-  CHECK_FALSE(Codec<GncPoses>::decode(missing.wire).value);
-  auto long_list = written(some_poses());
-  long_list.wire.T_world_pose._length = kMaxGncEntries + 1;
-  CHECK_FALSE(Codec<GncPoses>::decode(long_list.wire).value);
-}
-
-TEST_CASE("residuals that make no sense are refused", "[gnc]") {
-  CHECK_FALSE(refused(some_residuals()));
-  for (const float bad :
-       {-1.0F, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
-    CAPTURE(bad);
-    GncResiduals residuals = some_residuals();
-    residuals.residuals[1] = bad;
-    CHECK(refused(residuals));
+  CHECK(decoded.value->robot == hello.robot);
+  CHECK(decoded.value->poses == hello.poses);
+  CHECK(decoded.value->common_frame == hello.common_frame);
+  CHECK(decoded.value->pairs == hello.pairs);
+  CHECK(decoded.value->closures == hello.closures);
+  CHECK(decoded.value->residuals == hello.residuals);
+  REQUIRE(decoded.value->T_start_pose.size() == 2);
+  REQUIRE(decoded.value->links.size() == 2);
+  for (std::size_t k = 0; k < 2; ++k) {
+    CHECK(decoded.value->T_start_pose[k].isApprox(hello.T_start_pose[k], 1e-14));
+    const GncLink& link = decoded.value->links[k];
+    CHECK(link.own == hello.links[k].own);
+    CHECK(link.other == hello.links[k].other);
+    CHECK(link.odometry == hello.links[k].odometry);
+    CHECK(link.from_own == hello.links[k].from_own);
+    CHECK(link.T_from_to.isApprox(hello.links[k].T_from_to, 1e-14));
+    CHECK(link.kappa == hello.links[k].kappa);
+    CHECK(link.tau == hello.links[k].tau);
   }
-  GncResiduals residuals = some_residuals();
-  residuals.inside = 3;
-  CHECK(refused(residuals));
-  residuals = some_residuals();
-  residuals.between = std::numeric_limits<std::uint32_t>::max();  // the sum must not wrap around
-  residuals.inside = 2;
-  CHECK(refused(residuals));
-  auto foreign = written(some_residuals());
+
+  GncShare share = some_share();
+  if (GENERATE(false, true)) share.schur = {};
+  const auto encoded_share = written(share);
+  const auto back = Codec<GncShare>::decode(encoded_share.wire);
+  REQUIRE(back.value);
+  CHECK(back.value->robot == share.robot);
+  CHECK(back.value->round == share.round);
+  CHECK(back.value->base_cost == share.base_cost);
+  CHECK(back.value->cost == share.cost);
+  CHECK(back.value->decrement == share.decrement);
+  CHECK(back.value->block == share.block);
+  CHECK(back.value->reduced == share.reduced);
+  CHECK(back.value->schur.diagonal == share.schur.diagonal);
+  CHECK(back.value->schur.coupling == share.schur.coupling);
+  CHECK(back.value->residuals == share.residuals);
+}
+
+TEST_CASE("GNC's hellos that make no sense are refused", "[gnc]") {
+  CHECK_FALSE(refused(some_hello()));
+  const auto spoiled = [](auto&& spoil) {
+    GncHello hello = some_hello();
+    spoil(hello);
+    return hello;
+  };
+  CHECK(refused(spoiled([](GncHello& h) { h.T_start_pose[1].translation().x() = kNaN; })));
+  CHECK(refused(spoiled([](GncHello& h) { h.T_start_pose.pop_back(); })));
+  CHECK(refused(spoiled([](GncHello& h) { h.poses = {5, 2}; })));
+  CHECK(refused(spoiled([](GncHello& h) { h.poses = {5, 5}; })));
+  CHECK(refused(spoiled([](GncHello& h) { h.pairs[0] = {1, 1}; })));
+  CHECK(refused(spoiled([](GncHello& h) { h.pairs[0] = {0, 2}; })));
+  CHECK(refused(spoiled([](GncHello& h) { h.closures = 3; })));
+  CHECK(refused(spoiled([](GncHello& h) { h.residuals[0] = -1.0F; })));
+  CHECK(refused(spoiled([](GncHello& h) { h.links[0].other.robot = 2; })));
+  CHECK(refused(spoiled([](GncHello& h) { h.links[0].kappa = 0.0; })));
+  CHECK(refused(spoiled([](GncHello& h) { h.links[0].tau = kNaN; })));
+  CHECK(refused(spoiled([](GncHello& h) { h.links[0].T_from_to.translation().x() = kNaN; })));
+  auto foreign = written(some_hello());
   foreign.wire.header.robot = 8;
-  CHECK_FALSE(Codec<GncResiduals>::decode(foreign.wire).value);
-  auto long_list = written(some_residuals());
-  long_list.wire.residuals._length = kMaxGncEntries + 1;
-  CHECK_FALSE(Codec<GncResiduals>::decode(long_list.wire).value);
+  CHECK_FALSE(Codec<GncHello>::decode(foreign.wire).value);
+  auto missing = written(some_hello());
+  missing.wire.links._buffer = nullptr;
+  CHECK_FALSE(Codec<GncHello>::decode(missing.wire).value);
+  auto long_list = written(some_hello());
+  long_list.wire.T_start_pose._length = kMaxGncEntries + 1;
+  CHECK_FALSE(Codec<GncHello>::decode(long_list.wire).value);
+}
+
+TEST_CASE("GNC's shares that make no sense are refused", "[gnc]") {
+  CHECK_FALSE(refused(some_share()));
+  const auto spoiled = [](auto&& spoil) {
+    GncShare share = some_share();
+    spoil(share);
+    return share;
+  };
+  CHECK(refused(spoiled([](GncShare& s) { s.reduced(0) = kNaN; })));
+  CHECK(refused(spoiled([](GncShare& s) { s.cost = kNaN; })));
+  CHECK(refused(spoiled([](GncShare& s) { s.base_cost = kNaN; })));
+  CHECK(refused(spoiled([](GncShare& s) { s.block = 7; })));
+  CHECK(refused(spoiled([](GncShare& s) { s.block = 0; })));
+  CHECK(refused(spoiled([](GncShare& s) { s.reduced.conservativeResize(5); })));
+  CHECK(refused(spoiled([](GncShare& s) { s.reduced.conservativeResize(3); })));
+  CHECK(refused(spoiled([](GncShare& s) { s.schur.diagonal.resize(3, 0); })));
+  CHECK(refused(spoiled([](GncShare& s) { s.schur.coupling(0, 0) = kNaN; })));
+  CHECK(refused(spoiled([](GncShare& s) { s.residuals[1] = -1.0F; })));
+  auto foreign = written(some_share());
+  foreign.wire.header.robot = 8;
+  CHECK_FALSE(Codec<GncShare>::decode(foreign.wire).value);
 }
 
 TEST_CASE("GNC's messages with a spoiled byte are refused or usable", "[gnc]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
-  std::uniform_int_distribution<std::uint32_t> number;
   int accepted = 0, turned_down = 0;
   for (int trial = 0; trial < 300; ++trial) {
-    auto poses = written(some_poses());
-    spoil(poses.T_world_pose, rng);
-    const auto decoded_poses = Codec<GncPoses>::decode(poses.wire);
-    ++(decoded_poses.value ? accepted : turned_down);
-    if (decoded_poses.value)
-      for (const SE3& T : decoded_poses.value->T_world_pose) {
+    auto hello = written(some_hello());
+    spoil(hello.T_start_pose, rng);
+    spoil(hello.pairs, rng);
+    const auto decoded = Codec<GncHello>::decode(hello.wire);
+    ++(decoded.value ? accepted : turned_down);
+    if (decoded.value) {
+      for (const SE3& T : decoded.value->T_start_pose) {
         CHECK(T.matrix().allFinite());
         CHECK((T.linear().transpose() * T.linear()).isIdentity(1e-9));
       }
-    auto residuals = written(some_residuals());
-    spoil(residuals.residuals, rng);
-    residuals.wire.between = number(rng) >> (trial % 32);
-    residuals.wire.inside = number(rng) >> (trial % 32);
-    const auto decoded = Codec<GncResiduals>::decode(residuals.wire);
-    ++(decoded.value ? accepted : turned_down);
-    if (!decoded.value) continue;
-    CHECK(std::size_t{decoded.value->between} + decoded.value->inside <=
-          decoded.value->residuals.size());
-    for (const float r : decoded.value->residuals) CHECK((std::isfinite(r) && r >= 0.0F));
+      CHECK(decoded.value->pairs == some_hello().pairs);  // there is no other with two poses
+    }
+    auto share = written(some_share());
+    spoil(share.reduced, rng);
+    spoil(share.diagonal, rng);
+    spoil(share.residuals, rng);
+    const auto told = Codec<GncShare>::decode(share.wire);
+    ++(told.value ? accepted : turned_down);
+    if (!told.value) continue;
+    CHECK(told.value->reduced.allFinite());
+    CHECK(told.value->schur.diagonal.allFinite());
+    for (const float r : told.value->residuals) CHECK((std::isfinite(r) && r >= 0.0F));
   }
   CHECK(accepted > 0);
   CHECK(turned_down > 0);

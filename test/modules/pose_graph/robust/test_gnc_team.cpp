@@ -4,6 +4,8 @@
 #include "modules/core/lie.hpp"
 #include "modules/pose_graph/robust/central_gnc.hpp"
 #include "modules/pose_graph/robust/gnc_team.hpp"
+#include "modules/pose_graph/robust/isolated_closures.hpp"
+#include "modules/pose_graph/robust/staged_gnc_team.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {
@@ -148,6 +150,48 @@ TEST_CASE("GNC finds a jump in odometry if it may", "[gnc]") {
   options.reject_odometry = true;
   CHECK(gnc_centrally(grid.graph, options).kept == without_jump);
   CHECK(solved(grid.graph, options).kept() == without_jump);
+}
+
+TEST_CASE("false closures stand alone, true ones beside each other", "[gnc]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const SpoiledGrid grid = spoiled_grid(rng, 10, 4, 60);
+  const std::vector<bool> isolated =
+      isolated_closures(grid.graph, odometry_edges(grid.graph), kBarc);
+  const auto last_true = isolated.begin() + static_cast<std::ptrdiff_t>(grid.true_edges);
+  CHECK(std::count(isolated.begin(), last_true, true) == 0);
+  // With three others beside each, a few of 60 agree by chance.
+  CHECK(std::count(last_true, isolated.end(), true) >= 55);
+}
+
+TEST_CASE("GNC in stages rejects as many false closures as there are true ones", "[gnc]") {
+  const unsigned seed = GENERATE(1U, 2U);
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  SpoiledGrid grid = spoiled_grid(rng, 10, 4, 90);
+  // A true one far from all others comes back in.
+  std::vector<bool> kept = expected(grid);
+  const auto lone = std::find_if(grid.graph.edges.begin(), grid.graph.edges.end(),
+                                 [](const BlockEdge& e) { return e.i == 45 && e.j == 55; });
+  REQUIRE(lone != grid.graph.edges.end());
+  for (const BlockEdge& e : std::vector<BlockEdge>(grid.graph.edges))
+    if (e.j == e.i + 10 && e.i != 45 && std::abs(e.i - 45) <= 5) {
+      const auto beside =
+          std::find_if(grid.graph.edges.begin(), grid.graph.edges.end(),
+                       [&](const BlockEdge& other) { return other.i == e.i && other.j == e.j; });
+      kept.erase(kept.begin() + (beside - grid.graph.edges.begin()));
+      grid.graph.edges.erase(beside);
+    }
+  GncAgentOptions options;
+  options.gnc.barc = kBarc;
+  StagedGncTeam team(grid.graph, 3, options);
+  CHECK(team.isolated() >= 80);
+  RoundMeter meter(grid.graph.robots(), {});
+  int rounds = 0;
+  while (team.step(meter)) REQUIRE(++rounds < 300);
+  CHECK(team.done());
+  CHECK(team.kept() == kept);
 }
 
 TEST_CASE("two edges between the same keyframes are a step of odometry and a closure", "[gnc]") {
