@@ -44,6 +44,8 @@ std::string text_of(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
+constexpr double kKeypointBytes = 40.0;  // idl/loop_closure.idl
+
 // Sums of traffic.csv grow with time: the last row of each peer counts.
 std::optional<double> mean_keyframe_bytes(const fs::path& traffic) {
   const std::string text = text_of(traffic);
@@ -92,9 +94,12 @@ RobotNumbers read_robot(const YAML::Node& team, const RobotPlan& plan, const fs:
   if (const YAML::Node traffic = node_at(own, "traffic"); traffic && traffic.IsMap())
     for (const auto& entry : traffic)
       robot.sent_bytes[entry.first.Scalar()] = entry.second.as<double>(0.0);
-  robot.keyframe_bytes = mean_keyframe_bytes(run / plan.name / "traffic.csv");
   robot.module_s = module_seconds(run / plan.name / "timing.csv");
   const YAML::Node summary = read_json(run / plan.name / "summary.json");
+  const auto keypoints = number_at(summary, "keypoints");
+  robot.keyframe_bytes = keypoints && robot.keyframes > 0
+                             ? *keypoints * kKeypointBytes / static_cast<double>(robot.keyframes)
+                             : mean_keyframe_bytes(run / plan.name / "traffic.csv");
   robot.processor_s = number_at(summary, "process.cpu_s");
   robot.peak_memory_mb = scaled(number_at(summary, "process.peak_memory_bytes"), 1e-6);
   robot.mesh = mesh_of(team, plan.name);

@@ -30,7 +30,7 @@ struct RobotNumbers {
   std::size_t keyframes = 0;
   std::optional<double> odometry_error_m, optimized_error_m;  ///< Absolute, rmse.
   std::map<std::string, double> sent_bytes;                   ///< By category.
-  std::optional<double> keyframe_bytes;  ///< Mean size of a keyframe's message.
+  std::optional<double> keyframe_bytes;  ///< Mean size with all its keypoints.
   std::optional<double> processor_s;     ///< CPU time of the whole robot.
   std::optional<double> peak_memory_mb;
   std::map<std::string, double> module_s;  ///< Time in the steps of each module, waiting excluded.
