@@ -16,7 +16,7 @@ constexpr std::size_t kFewIsolated = 32;
 constexpr double kClosuresPerPose = 0.25;
 // Of all closures, from here on: where most have others beside them, the few that do not have no
 // cause to be false, and the team does better to hear all at once.
-constexpr double kManyIsolated = 0.125;
+constexpr double kManyIsolated = 0.2;
 // Of barc: what comes back in may lie so far off poses that were found without it.
 constexpr double kSecondChance = 3.0;
 
