@@ -42,6 +42,16 @@ std::optional<BlockEdge> block_edge(const RelativePose& measured) {
 
 }  // namespace
 
+ClosureId closure_id(RobotId self, const BlockEdge& edge) {
+  return {{self, static_cast<KeyframeIndex>(edge.i)}, {self, static_cast<KeyframeIndex>(edge.j)}};
+}
+
+ClosureId closure_id(RobotId self, RobotId peer, const InterEdge& edge) {
+  const KeyframeId own{self, edge.own};
+  const KeyframeId other{peer, edge.other};
+  return edge.from_own ? ClosureId{own, other} : ClosureId{other, own};
+}
+
 bool LocalGraph::add(const KeyframeOdometry& keyframe) {
   if (keyframe.id.robot != self_ || keyframe.id.index != keyframes_) return false;
   if (keyframes_ > 0) {

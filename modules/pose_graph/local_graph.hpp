@@ -22,6 +22,10 @@ struct InterEdge {
   double tau = 1.0;
 };
 
+/// Which closure of robot `self` an edge is: inside it, or to `peer`.
+[[nodiscard]] ClosureId closure_id(RobotId self, const BlockEdge& edge);
+[[nodiscard]] ClosureId closure_id(RobotId self, RobotId peer, const InterEdge& edge);
+
 /// What one robot knows of the pose graph: its odometry, the closures that touch it, and which of
 /// them are inliers. Closures and inlier sets may come in any order and repeatedly. An inlier set
 /// counts once all its closures, and the keyframes of this robot they end on, have arrived; of the

@@ -60,6 +60,9 @@ void PgoAgent::peer_alive(PgoPeer peer) {
   Peer& entry = peers_.try_emplace(peer.robot, Peer{.boot = peer.boot}).first->second;
   if (entry.boot != peer.boot) {
     graph_.forget(peer.robot);
+    std::erase_if(rejected_, [&](const ClosureId& id) {
+      return id.from.robot == peer.robot || id.to.robot == peer.robot;
+    });
     entry = Peer{.boot = peer.boot};
   }
   entry.alive = true;

@@ -17,6 +17,12 @@
 
 namespace km {
 
+/// Closures of one robot.
+struct ClosureCount {
+  std::size_t all = 0;
+  std::size_t rejected = 0;
+};
+
 /// What a step of the agent gives to the others and to its own robot.
 struct [[nodiscard]] PgoOutput {
   std::optional<PgoStatus> status;
@@ -25,6 +31,8 @@ struct [[nodiscard]] PgoOutput {
   std::vector<SolverMessagePtr> exchange = {};
   std::optional<Trajectory> trajectory;
   std::optional<OptimizerProgress> progress;
+  std::optional<ClosureCount>
+      weighed;                        ///< When a solver that rejects closures has come to the end.
   std::optional<std::string> notice;  ///< Something that a person should know.
   bool more = false;                  ///< The next step has work already, without further input.
 };
@@ -49,10 +57,14 @@ struct [[nodiscard]] PgoOutput {
 ///   still never above the cost before); robots without common edges move at the same time. Public
 ///   poses are rounded to single precision by their sender, who goes on from the rounded ones: all
 ///   compute with the same numbers.
-/// - kNewton, by exchanges of a SessionSolver. Its poses are adopted when the whole team has come
+/// - kNewton and kGnc, by exchanges of a SessionSolver. Its poses are adopted when the whole team
+/// has come
 ///   to the end; a session that is left before changes nothing, so its cost cannot have risen. It
 ///   is not left for new measurements, and the next one waits until its bytes are paid for. If the
 ///   solver of any member gives up, all of them go on by kRbcd from where the session began.
+///
+/// Closures that kGnc has rejected hold nothing to speak of in kRbcd until the next session of kGnc
+/// weighs them anew: they keep a weight of kJointWeight, and so their ends stay public.
 ///
 /// A robot that has gone leaves its last public poses behind as fixed neighbours, so that the
 /// others keep their frame and what it told them; such sessions are kRbcd. One that returns with
@@ -147,6 +159,7 @@ class PgoAgent {
   [[nodiscard]] EdgesTo edges_to_absent(const SessionPlan& plan) const;
   [[nodiscard]] LiftedPoses extended_poses() const;
   void start_block(const SessionPlan& plan, EdgesTo edges, const EdgesTo& absent);
+  void loosen_rejected(std::vector<BlockEdge>& own, EdgesTo& edges) const;
   void advance(PgoOutput& output);
   void align(PgoOutput& output);
   void enter_frame(PgoOutput& output);
@@ -168,6 +181,7 @@ class PgoAgent {
   void advance_solver(PgoOutput& output);
   void send(SolverContent content, PgoOutput& output);
   void adopt_solution(PgoOutput& output);
+  void take_verdicts(PgoOutput& output);
   void give_up(PgoOutput& output, const std::string& why);
   [[nodiscard]] std::optional<RobotId> one_that_gave_up() const;
 
@@ -186,6 +200,7 @@ class PgoAgent {
   std::uint32_t sessions_opened_ = 0;
   std::uint32_t total_rounds_ = 0;
   std::size_t intra_closures_tried_ = 0;
+  std::set<ClosureId> rejected_;  // by kGnc
   std::optional<PublicPoses> sent_poses_;
   std::optional<PgoStatus> sent_status_;
   bool announce_session_ = false;

@@ -3,6 +3,7 @@
 
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/pgo_agent.hpp"
+#include "modules/pose_graph/robust/gnc_schedule.hpp"
 
 namespace km {
 namespace {
@@ -53,7 +54,8 @@ LiftedPoses PgoAgent::extended_poses() const {
 
 void PgoAgent::start_block(const SessionPlan& plan, EdgesTo edges, const EdgesTo& absent) {
   edges.insert(absent.begin(), absent.end());
-  const std::vector<BlockEdge> own_edges = graph_.own_edges();
+  std::vector<BlockEdge> own_edges = graph_.own_edges();
+  loosen_rejected(own_edges, edges);
   block_.emplace(extended_poses(), own_edges, edges);
   for (const auto& [robot, to_absent] : absent) {
     const PublicPoses& poses = *peers_.at(robot).poses;
@@ -61,11 +63,27 @@ void PgoAgent::start_block(const SessionPlan& plan, EdgesTo edges, const EdgesTo
   }
   // Alone, nothing ties the block to its present place: closures may call for a better start.
   const std::size_t intra_closures = own_edges.size() + 1 - graph_.keyframes();
-  if (plan.members.size() == 1 && edges.empty() && intra_closures != intra_closures_tried_) {
+  // Not if they may be false.
+  const bool trusted = config_.method != PgoMethod::kGnc;
+  if (trusted && plan.members.size() == 1 && edges.empty() &&
+      intra_closures != intra_closures_tried_) {
     const auto poses = chordal_initialisation(Eigen::Index{graph_.keyframes()}, own_edges);
     block_->offer(lift(poses, config_.rank));
     intra_closures_tried_ = intra_closures;
   }
+}
+
+void PgoAgent::loosen_rejected(std::vector<BlockEdge>& own, EdgesTo& edges) const {
+  if (rejected_.empty()) return;
+  const auto loosen = [&](const ClosureId& id, double& kappa, double& tau) {
+    if (!rejected_.contains(id)) return;
+    kappa *= kJointWeight;
+    tau *= kJointWeight;
+  };
+  for (std::size_t k = graph_.keyframes() - 1; k < own.size(); ++k)  // after odometry
+    loosen(closure_id(self_.robot, own[k]), own[k].kappa, own[k].tau);
+  for (auto& [peer, list] : edges)
+    for (InterEdge& e : list) loosen(closure_id(self_.robot, peer, e), e.kappa, e.tau);
 }
 
 bool PgoAgent::join(const PgoSession& session) {
@@ -133,7 +151,9 @@ void PgoAgent::align(PgoOutput& output) {
   const PgoFrame& frame = running_->session.plan.frame;
   if (frame_ != frame && running_->position_of.at(self_.robot) != 0) {
     if (!hear_neighbours()) return repeat_if_silent(output);
-    const TruncatedNewtonOptions options{.max_iterations = kAlignmentSteps,
+    // False closures would bend the odometry that gnc weighs them by.
+    const bool trusted = config_.method != PgoMethod::kGnc;
+    const TruncatedNewtonOptions options{.max_iterations = trusted ? kAlignmentSteps : 0,
                                          .max_cg_iterations = config_.max_cg_iterations};
     block_->align({config_.alignment_rotation_rad, config_.alignment_translation_m}, options);
   }

@@ -34,8 +34,8 @@ bool PgoAgent::start_solver(PgoOutput& output) {
   std::set<RobotId> members;
   for (const auto& [robot, position] : running_->position_of) members.insert(robot);
   exchange.solver =
-      make_session_solver(running_->session.method, std::move(exchange.edges), std::move(members),
-                          round_to_poses(block_->X(), exchange.anchor));
+      make_session_solver(running_->session.method, config_.gnc_barc, std::move(exchange.edges),
+                          std::move(members), round_to_poses(block_->X(), exchange.anchor));
   send(exchange.solver->hello(), output);
   for (const auto& [robot, peer] : peers_)
     for (const SolverMessagePtr& message : peer.exchange)
@@ -88,8 +88,24 @@ void PgoAgent::adopt_solution(PgoOutput& output) {
   for (std::size_t k = 0; k < poses.size(); ++k)
     X.middleCols<4>(4 * static_cast<Eigen::Index>(k)) = lift(exchange.anchor, poses[k]);
   block_->move_to(std::move(X));
+  take_verdicts(output);
   running_->round = 1;
   send_poses(rounded_public_poses(), 0.0, 0.0, output);
+}
+
+void PgoAgent::take_verdicts(PgoOutput& output) {
+  const std::vector<WeighedClosure> weighed = running_->exchange->solver->weighed_closures();
+  if (weighed.empty()) return;
+  ClosureCount& count = output.weighed.emplace();
+  for (const WeighedClosure& closure : weighed) {
+    ++count.all;
+    if (closure.kept) {
+      rejected_.erase(closure.id);
+    } else {
+      rejected_.insert(closure.id);
+      ++count.rejected;
+    }
+  }
 }
 
 void PgoAgent::give_up(PgoOutput& output, const std::string& why) {

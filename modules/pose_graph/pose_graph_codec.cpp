@@ -24,7 +24,8 @@ PgoPeer writer_of(const km_wire_Header& header) {
 
 std::optional<PgoMethod> method_of(std::uint8_t wire) {
   const auto method = static_cast<PgoMethod>(wire);
-  const bool known = method == PgoMethod::kRbcd || method == PgoMethod::kNewton;
+  const bool known =
+      method == PgoMethod::kRbcd || method == PgoMethod::kNewton || method == PgoMethod::kGnc;
   return known ? std::optional(method) : std::nullopt;
 }
 

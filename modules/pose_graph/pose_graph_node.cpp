@@ -122,6 +122,10 @@ void PoseGraphNode::publish(PgoOutput output) const {
   if (output.session) topics_.sessions.publish(std::move(*output.session));
   if (output.poses) topics_.poses.publish(std::move(*output.poses));
   for (const SolverMessagePtr& message : output.exchange) topics_.exchanges.publish(message);
+  if (output.weighed && output.weighed->rejected > 0)
+    log::limited(log::Level::kInfo, name(), "weighed")
+        << output.weighed->rejected << " of this robot's " << output.weighed->all
+        << " closures rejected by graduated non-convexity";
   if (output.notice) log::limited(log::Level::kWarn, name(), "notice") << *output.notice;
   if (output.status) topics_.status.publish(std::move(*output.status));
   if (output.trajectory) topics_.trajectory.publish(std::move(*output.trajectory));

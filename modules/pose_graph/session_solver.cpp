@@ -4,16 +4,20 @@
 #include <utility>
 
 #include "modules/pose_graph/newton/newton_session_solver.hpp"
+#include "modules/pose_graph/robust/gnc_session_solver.hpp"
 
 namespace km {
 
-std::unique_ptr<SessionSolver> make_session_solver(PgoMethod method, RobotEdges edges,
-                                                   std::set<RobotId> members,
+std::unique_ptr<SessionSolver> make_session_solver(PgoMethod method, double gnc_barc,
+                                                   RobotEdges edges, std::set<RobotId> members,
                                                    std::vector<SE3> start) {
   switch (method) {
     case PgoMethod::kNewton:
       return std::make_unique<NewtonSessionSolver>(std::move(edges), std::move(members),
                                                    std::move(start));
+    case PgoMethod::kGnc:
+      return std::make_unique<GncSessionSolver>(std::move(edges), std::move(members),
+                                                std::move(start), gnc_barc);
     case PgoMethod::kRbcd:
       break;
   }

@@ -5,6 +5,7 @@
 #include <set>
 #include <vector>
 
+#include "modules/core/pose_graph.hpp"
 #include "modules/pose_graph/newton/robot_graph.hpp"
 #include "modules/pose_graph/pgo_method.hpp"
 #include "modules/pose_graph/solver_message.hpp"
@@ -15,6 +16,12 @@ namespace km {
 struct SolverProgress {
   double cost = 0.0;       ///< Of the team, at poses().
   double decrement = 0.0;  ///< sqrt(g^T H^-1 g) there: the gradient in the metric of the Hessian.
+};
+
+/// What a solver that rejects closures makes of one.
+struct WeighedClosure {
+  ClosureId id;
+  bool kept = true;
 };
 
 /// One robot's part in solving a session's graph by exchanges (see SolverMessage), in which all
@@ -38,11 +45,15 @@ class SessionSolver {
   /// Poses of this robot with the lowest cost that the team has agreed on.
   [[nodiscard]] virtual const std::vector<SE3>& poses() const = 0;
   [[nodiscard]] virtual SolverProgress progress() const = 0;
+  /// The closures of this robot, as things stand; empty if the method uses all it is given.
+  [[nodiscard]] virtual std::vector<WeighedClosure> weighed_closures() const { return {}; }
 };
 
 /// The solver of `method`, which must be one that goes by exchanges. `start`: this robot's poses,
-/// in the frame of the session.
-[[nodiscard]] std::unique_ptr<SessionSolver> make_session_solver(PgoMethod method, RobotEdges edges,
+/// in the frame of the session. `gnc_barc`: see PoseGraphConfig. The first edges of its own are its
+/// odometry, one per pose but the first.
+[[nodiscard]] std::unique_ptr<SessionSolver> make_session_solver(PgoMethod method, double gnc_barc,
+                                                                 RobotEdges edges,
                                                                  std::set<RobotId> members,
                                                                  std::vector<SE3> start);
 

@@ -7,8 +7,8 @@ km_module(pose_graph
 
 add_library(km_pose_graph_agent STATIC
   newton/newton_session_solver.cpp pgo_agent.cpp pgo_block.cpp pgo_exchange.cpp pgo_session.cpp
-  pgo_sweep.cpp session_solver.cpp solver_message.cpp)
-target_link_libraries(km_pose_graph_agent PUBLIC km_pose_graph_newton)
+  pgo_sweep.cpp robust/gnc_session_solver.cpp session_solver.cpp solver_message.cpp)
+target_link_libraries(km_pose_graph_agent PUBLIC km_pose_graph_newton km_pose_graph_robust)
 
 km_node(pose_graph SOURCES pose_graph_codec.cpp pose_graph_node.cpp solver_message_codec.cpp
-        LINK km_pose_graph_agent km_pose_graph_newton_node)
+        LINK km_pose_graph_agent km_pose_graph_newton_node km_pose_graph_robust_node)

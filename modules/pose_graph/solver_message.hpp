@@ -7,13 +7,14 @@
 
 #include "modules/pose_graph/newton/newton_messages.hpp"
 #include "modules/pose_graph/pgo_messages.hpp"
+#include "modules/pose_graph/robust/gnc_messages.hpp"
 
 namespace km {
 
 /// The sender cannot go on: the session's graph is refused, or its numbers are.
 struct SolverGivesUp {};
 
-using SolverContent = std::variant<SolverGivesUp, NewtonHello, NewtonShare>;
+using SolverContent = std::variant<SolverGivesUp, NewtonHello, NewtonShare, GncHello, GncShare>;
 
 /// What a robot contributes to one exchange of a session that is solved by exchanges: every member
 /// sends its n-th message when it has the others' n-1 before. So nobody is ever more than one

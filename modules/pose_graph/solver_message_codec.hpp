@@ -3,9 +3,11 @@
 #include <solver.h>
 
 #include <cstdint>
+#include <variant>
 #include <vector>
 
 #include "modules/pose_graph/newton/newton_codec.hpp"
+#include "modules/pose_graph/robust/gnc_codec.hpp"
 #include "modules/pose_graph/solver_message.hpp"
 #include "runtime/dds/codec.hpp"
 
@@ -17,15 +19,18 @@ template <>
 struct Codec<SolverMessage> {
   using Wire = km_wire_SolverMessage;
   static constexpr const char* kTopic = "pgo_exchanges";
-  static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::uint16_t kVersion = 3;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_SolverMessage_desc; }
 
   struct Encoded {
     Wire wire{};
-    Codec<NewtonHello>::Encoded hello;
-    Codec<NewtonShare>::Encoded share;
+    std::variant<std::monostate, Codec<NewtonHello>::Encoded, Codec<NewtonShare>::Encoded,
+                 Codec<GncHello>::Encoded, Codec<GncShare>::Encoded>
+        content;  // what the one element below borrows from
     std::vector<km_wire_NewtonHello> newton_hello;
     std::vector<km_wire_NewtonShare> newton_share;
+    std::vector<km_wire_GncHello> gnc_hello;
+    std::vector<km_wire_GncShare> gnc_share;
   };
   static Encoded encode(const SolverMessage& message);
   static Decoded<SolverMessage> decode(const Wire& wire);

@@ -94,6 +94,7 @@ std::optional<GncShare> GncAgent::step_on() {
   if (!at_base_ && !(cost <= base_cost * (1.0 + kRounding) + kNegligible)) return go_back();
   if (!at_base_) retried_ = false;
   base_ = candidate_;
+  cost_ = cost;
   backtracks_ = 0;
   const bool final_weights = decided_told_;
   if (all_in_ > 0)
@@ -102,6 +103,7 @@ std::optional<GncShare> GncAgent::step_on() {
     update_weights(inside);
   at_base_ = false;
   const PublicSystem::Solution solution = solve();
+  decrement_ = solution.decrement;
   if (final_weights) {
     if (0.5 * solution.decrement <= options_.tolerance * cost + kNegligible) {
       phase_ = Phase::kDone;

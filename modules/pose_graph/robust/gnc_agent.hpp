@@ -63,6 +63,11 @@ class GncAgent {
 
   /// Where the team has agreed on; before it has met, where this robot starts, in its own frame.
   [[nodiscard]] const std::vector<SE3>& poses() const { return base_.own; }
+  /// Of the team's edges at poses(), with the weights that led there; 0 before the first step.
+  [[nodiscard]] double cost() const { return cost_; }
+  /// g^T H^-1 g of the last step.
+  [[nodiscard]] double decrement() const { return decrement_; }
+  [[nodiscard]] const GncEdges& edges() const { return edges_; }
   /// nullopt before the team has met.
   [[nodiscard]] const std::optional<GncSchedule>& schedule() const { return schedule_; }
   /// Whether an edge of this robot, or to a peer, is an inlier; trusted ones are.
@@ -109,7 +114,9 @@ class GncAgent {
   std::size_t first_inside_ = 0;        // of this robot's candidates inside
   std::vector<double> link_weights_;
 
-  Poses base_;       // what the team has agreed on
+  Poses base_;  // what the team has agreed on
+  double cost_ = 0.0;
+  double decrement_ = 0.0;
   Poses candidate_;  // after the step at hand
   TeamStep step_;
   int backtracks_ = 0;                    // in a row

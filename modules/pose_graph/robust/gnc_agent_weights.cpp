@@ -46,6 +46,7 @@ GncAgent::GncAgent(GncEdges edges, std::set<RobotId> team, int dimension,
 GncHello GncAgent::hello() const {
   const RobotId self = edges_.edges.self;
   GncHello hello{.robot = self,
+                 .barc = options_.gnc.barc,
                  .poses = block_.public_poses(),
                  .common_frame = common_frame_,
                  .pairs = block_.pairs(),
@@ -67,6 +68,12 @@ GncHello GncAgent::hello() const {
 }
 
 void GncAgent::meet() {
+  for (const auto& [robot, hello] : hellos_)
+    if (hello.barc != options_.gnc.barc)
+      throw std::invalid_argument("GncAgent: robot " + std::to_string(robot) + " has barc " +
+                                  std::to_string(hello.barc) + ", robot " +
+                                  std::to_string(edges_.edges.self) + " has " +
+                                  std::to_string(options_.gnc.barc));
   graph_ = std::make_shared<const PublicGraph>(hellos_);
   for (const auto& [peer, list] : edges_.edges.to)
     if (graph_->link_count(edges_.edges.self, peer) != list.size())

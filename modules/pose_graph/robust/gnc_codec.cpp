@@ -56,6 +56,7 @@ Codec<GncHello>::Encoded Codec<GncHello>::encode(const GncHello& hello) {
   encoded.residuals = hello.residuals;
   Wire& wire = encoded.wire;
   wire.robot = hello.robot;
+  wire.barc = hello.barc;
   wire.common_frame = hello.common_frame;
   wire.closures = hello.closures;
   borrow(wire.links, encoded.links);
@@ -82,7 +83,9 @@ Decoded<GncHello> Codec<GncHello>::decode(const Wire& wire) {
     return Result::refuse("poses out of order");
   if (wire.closures > residuals->size()) return Result::refuse("fewer residuals than closures");
   if (!are_residuals(*residuals)) return Result::refuse("a residual is negative or not a number");
+  if (!std::isfinite(wire.barc) || wire.barc < 0.0) return Result::refuse("barc is no threshold");
   GncHello hello{.robot = wire.robot,
+                 .barc = wire.barc,
                  .poses = {poses->begin(), poses->end()},
                  .common_frame = wire.common_frame,
                  .closures = wire.closures,

@@ -20,7 +20,7 @@ template <>
 struct Codec<GncHello> {
   using Wire = km_wire_GncHello;
   static constexpr const char* kTopic = "gnc_hello";
-  static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::uint16_t kVersion = 2;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_GncHello_desc; }
 
   struct Encoded {

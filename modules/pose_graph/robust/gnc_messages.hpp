@@ -23,6 +23,7 @@ struct GncLink {
 /// First message of a robot that takes part in graduated non-convexity: what is public of it.
 struct GncHello {
   RobotId robot = 0;
+  double barc = 0.0;  ///< As in its GncOptions: everyone decides for himself, so all need one.
   std::vector<GncLink> links = {};  ///< To robots with higher ids; to each in one order for both.
   std::vector<KeyframeIndex> poses = {};  ///< Public poses, ascending.
   std::vector<SE3> T_start_pose = {};     ///< Where they start.

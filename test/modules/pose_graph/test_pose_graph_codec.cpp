@@ -61,7 +61,8 @@ PublicPoses some_poses(Eigen::Index rank) {
 }  // namespace
 
 TEST_CASE("a status comes back as it was sent", "[pose_graph][codec]") {
-  const PgoStatus status = some_status();
+  PgoStatus status = some_status();
+  status.method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton, PgoMethod::kGnc);
   const auto decoded = Codec<PgoStatus>::decode(written(status, status.sender).wire);
   REQUIRE(decoded.value);
   CHECK(*decoded.value == status);

@@ -27,6 +27,7 @@ bool refused(const T& message) {
 GncHello some_hello() {
   std::mt19937 rng(1);
   GncHello hello{.robot = 3,
+                 .barc = 7.5,
                  .poses = {2, 5},
                  .T_start_pose = {random_pose(rng), random_pose(rng)},
                  .common_frame = true,
@@ -84,6 +85,7 @@ TEST_CASE("GNC's messages come back from the wire", "[gnc]") {
   const auto decoded = Codec<GncHello>::decode(encoded.wire);
   REQUIRE(decoded.value);
   CHECK(decoded.value->robot == hello.robot);
+  CHECK(decoded.value->barc == hello.barc);
   CHECK(decoded.value->poses == hello.poses);
   CHECK(decoded.value->common_frame == hello.common_frame);
   CHECK(decoded.value->pairs == hello.pairs);
@@ -134,6 +136,8 @@ TEST_CASE("GNC's hellos that make no sense are refused", "[gnc]") {
   CHECK(refused(spoiled([](GncHello& h) { h.pairs[0] = {1, 1}; })));
   CHECK(refused(spoiled([](GncHello& h) { h.pairs[0] = {0, 2}; })));
   CHECK(refused(spoiled([](GncHello& h) { h.closures = 3; })));
+  CHECK(refused(spoiled([](GncHello& h) { h.barc = -1.0; })));
+  CHECK(refused(spoiled([](GncHello& h) { h.barc = kNaN; })));
   CHECK(refused(spoiled([](GncHello& h) { h.residuals[0] = -1.0F; })));
   CHECK(refused(spoiled([](GncHello& h) { h.links[0].other.robot = 2; })));
   CHECK(refused(spoiled([](GncHello& h) { h.links[0].kappa = 0.0; })));
