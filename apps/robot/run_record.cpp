@@ -50,6 +50,15 @@ void RunRecord::add(const OptimizerProgress& progress) {
   progress_ = progress;
 }
 
+void RunRecord::add(const ClosureVerdicts& verdicts) {
+  for (const WeighedClosure& closure : verdicts.closures) {
+    if (closure.kept)
+      rejected_.erase(closure.id);
+    else
+      rejected_.insert(closure.id);
+  }
+}
+
 void RunRecord::add(const Trajectory& trajectory) {
   if (trajectory.robot == robot_) trajectory_ = trajectory;
 }
@@ -68,7 +77,7 @@ double RunRecord::median_depth_m(std::uint32_t keyframe) const {
 
 bool RunRecord::is_inlier(const ClosureId& id) const {
   const auto set = inlier_sets_.find(std::minmax(id.from.robot, id.to.robot));
-  return set != inlier_sets_.end() &&
+  return set != inlier_sets_.end() && !rejected_.contains(id) &&
          std::binary_search(set->second.closures.begin(), set->second.closures.end(), id);
 }
 
@@ -85,6 +94,8 @@ std::vector<ClosureOutcome> RunRecord::outcomes() const {
     if (outcome.stage == ClosureStage::kVerified) {
       if (is_inlier(id))
         outcome.stage = ClosureStage::kInlier;
+      else if (rejected_.contains(id))
+        outcome.reason = "rejected by graduated non-convexity";
       else if (outcome.reason.empty())
         outcome.reason = "inconsistent with the other closures of the robot pair";
     } else if (outcome.reason.empty()) {

@@ -13,6 +13,7 @@
 #include "modules/dense_sensing/dense_sensing_progress.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/optimized_mesh.hpp"
+#include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/semantic_mapping/mapping_progress.hpp"
 
 namespace km {
@@ -31,6 +32,7 @@ class RunRecord {
   void add(const ClosureOutcome& outcome);
   void add(const Trajectory& trajectory);  ///< Of this robot.
   void add(const OptimizerProgress& progress);
+  void add(const ClosureVerdicts& verdicts);
   void add(const DenseSensingProgress& progress) { dense_sensing_ = progress; }
   void add(const MappingProgress& progress) { mapping_ = progress; }
   void add(const MapMesh& /*map*/) { ++activity_; }  // its correction follows
@@ -87,7 +89,7 @@ class RunRecord {
   [[nodiscard]] std::vector<Closure> inlier_closures() const;
 
   /// Every candidate of this robot in the order of ids, the stage raised to kInlier, or the reason
-  /// filled in, by the newest inlier sets.
+  /// filled in, by the newest inlier sets and by what the optimiser has rejected of them.
   [[nodiscard]] std::vector<ClosureOutcome> outcomes() const;
 
   /// Poses in the team's frame: of every image, or of every keyframe where there are no images.
@@ -111,6 +113,7 @@ class RunRecord {
   std::size_t keypoints_ = 0;
   std::map<ClosureId, Closure> closures_;
   std::map<std::pair<RobotId, RobotId>, InlierSet> inlier_sets_;
+  std::set<ClosureId> rejected_;  // by the optimiser, of the inlier sets
   std::map<ClosureId, ClosureOutcome> outcomes_;
   std::optional<Trajectory> trajectory_;
   std::optional<DenseSensingProgress> dense_sensing_;

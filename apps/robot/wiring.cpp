@@ -140,7 +140,8 @@ void Robot::add_back_end(const RobotConfig& config) {
                       topics_.peer_inlier_sets, bridge_->peers().events(), topics_.peer_pgo_status,
                       topics_.peer_pgo_sessions, topics_.peer_poses, topics_.peer_exchanges,
                       topics_.own_pgo_status, topics_.own_pgo_sessions, topics_.own_poses,
-                      topics_.own_exchanges, topics_.trajectory, topics_.progress});
+                      topics_.own_exchanges, topics_.trajectory, topics_.progress,
+                      topics_.closure_verdicts});
 }
 
 // What crosses between robots, and how: the kinds of topic are those of runtime/dds/topic_kind.hpp.
@@ -186,6 +187,7 @@ void Robot::add_records() {
   recorder_->record(topics_.peer_inlier_sets);
   recorder_->record(topics_.trajectory);
   recorder_->record(topics_.progress);
+  recorder_->record(topics_.closure_verdicts);
   recorder_->record(topics_.dense_sensing_progress);
   recorder_->record(topics_.mapping_progress);
   recorder_->record(topics_.maps);

@@ -18,6 +18,7 @@
 #include "modules/mesh_deformation/mesh_deformation_node.hpp"
 #include "modules/place_recognition/keyframe_bow.hpp"
 #include "modules/place_recognition/place_query.hpp"
+#include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/pose_graph/graph_playback_node.hpp"
 #include "modules/pose_graph/pgo_messages.hpp"
 #include "modules/pose_graph/recorded_graph.hpp"
@@ -64,6 +65,7 @@ struct Topics {
   Topic<SolverMessage> own_exchanges, peer_exchanges;
   Topic<Trajectory> trajectory;
   Topic<OptimizerProgress> progress;
+  Topic<ClosureVerdicts> closure_verdicts;
   Topic<RobotStatus> own_status, peer_status;
 };
 

@@ -17,12 +17,6 @@
 
 namespace km {
 
-/// Closures of one robot.
-struct ClosureCount {
-  std::size_t all = 0;
-  std::size_t rejected = 0;
-};
-
 /// What a step of the agent gives to the others and to its own robot.
 struct [[nodiscard]] PgoOutput {
   std::optional<PgoStatus> status;
@@ -31,10 +25,9 @@ struct [[nodiscard]] PgoOutput {
   std::vector<SolverMessagePtr> exchange = {};
   std::optional<Trajectory> trajectory;
   std::optional<OptimizerProgress> progress;
-  std::optional<ClosureCount>
-      weighed;                        ///< When a solver that rejects closures has come to the end.
-  std::optional<std::string> notice;  ///< Something that a person should know.
-  bool more = false;                  ///< The next step has work already, without further input.
+  std::optional<ClosureVerdicts> verdicts;  ///< Of a solver that rejects, at its end.
+  std::optional<std::string> notice;        ///< Something that a person should know.
+  bool more = false;  ///< The next step has work already, without further input.
 };
 
 /// One robot's part of distributed pose graph optimisation, as a state machine without threads and

@@ -94,18 +94,14 @@ void PgoAgent::adopt_solution(PgoOutput& output) {
 }
 
 void PgoAgent::take_verdicts(PgoOutput& output) {
-  const std::vector<WeighedClosure> weighed = running_->exchange->solver->weighed_closures();
-  if (weighed.empty()) return;
-  ClosureCount& count = output.weighed.emplace();
-  for (const WeighedClosure& closure : weighed) {
-    ++count.all;
-    if (closure.kept) {
+  ClosureVerdicts verdicts = running_->exchange->solver->verdicts();
+  for (const WeighedClosure& closure : verdicts.closures) {
+    if (closure.kept)
       rejected_.erase(closure.id);
-    } else {
+    else
       rejected_.insert(closure.id);
-      ++count.rejected;
-    }
   }
+  if (!verdicts.closures.empty()) output.verdicts = std::move(verdicts);
 }
 
 void PgoAgent::give_up(PgoOutput& output, const std::string& why) {

@@ -122,14 +122,19 @@ void PoseGraphNode::publish(PgoOutput output) const {
   if (output.session) topics_.sessions.publish(std::move(*output.session));
   if (output.poses) topics_.poses.publish(std::move(*output.poses));
   for (const SolverMessagePtr& message : output.exchange) topics_.exchanges.publish(message);
-  if (output.weighed && output.weighed->rejected > 0)
-    log::limited(log::Level::kInfo, name(), "weighed")
-        << output.weighed->rejected << " of this robot's " << output.weighed->all
-        << " closures rejected by graduated non-convexity";
   if (output.notice) log::limited(log::Level::kWarn, name(), "notice") << *output.notice;
   if (output.status) topics_.status.publish(std::move(*output.status));
   if (output.trajectory) topics_.trajectory.publish(std::move(*output.trajectory));
   if (output.progress) topics_.progress.publish(std::move(*output.progress));
+  if (output.verdicts) publish(std::move(*output.verdicts));
+}
+
+void PoseGraphNode::publish(ClosureVerdicts verdicts) const {
+  if (const std::size_t rejected = verdicts.rejected(); rejected > 0)
+    log::limited(log::Level::kInfo, name(), "verdicts")
+        << rejected << " of this robot's " << verdicts.closures.size()
+        << " closures rejected by graduated non-convexity";
+  topics_.verdicts.publish(std::move(verdicts));
 }
 
 }  // namespace km

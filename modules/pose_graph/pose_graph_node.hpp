@@ -31,6 +31,7 @@ struct PoseGraphTopics {
   const Topic<SolverMessage>& exchanges;     ///< Out, to all robots: state, keys robot and slot.
   const Topic<Trajectory>& trajectory;       ///< Out.
   const Topic<OptimizerProgress>& progress;  ///< Out.
+  const Topic<ClosureVerdicts>& verdicts;    ///< Out, where closures are rejected.
 };
 
 /// One robot's part of distributed pose graph optimisation: an PgoAgent on its thread.
@@ -66,6 +67,7 @@ class PoseGraphNode final : public Node {
   void take_status(const PgoStatus& status);
   void refuse(const char* kind, RobotId from) const;
   void publish(PgoOutput output) const;
+  void publish(ClosureVerdicts verdicts) const;
 
   const PoseGraphTopics topics_;
   const PgoMethod method_;

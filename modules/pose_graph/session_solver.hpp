@@ -5,7 +5,7 @@
 #include <set>
 #include <vector>
 
-#include "modules/core/pose_graph.hpp"
+#include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/pose_graph/newton/robot_graph.hpp"
 #include "modules/pose_graph/pgo_method.hpp"
 #include "modules/pose_graph/solver_message.hpp"
@@ -16,12 +16,6 @@ namespace km {
 struct SolverProgress {
   double cost = 0.0;       ///< Of the team, at poses().
   double decrement = 0.0;  ///< sqrt(g^T H^-1 g) there: the gradient in the metric of the Hessian.
-};
-
-/// What a solver that rejects closures makes of one.
-struct WeighedClosure {
-  ClosureId id;
-  bool kept = true;
 };
 
 /// One robot's part in solving a session's graph by exchanges (see SolverMessage), in which all
@@ -46,7 +40,7 @@ class SessionSolver {
   [[nodiscard]] virtual const std::vector<SE3>& poses() const = 0;
   [[nodiscard]] virtual SolverProgress progress() const = 0;
   /// The closures of this robot, as things stand; empty if the method uses all it is given.
-  [[nodiscard]] virtual std::vector<WeighedClosure> weighed_closures() const { return {}; }
+  [[nodiscard]] virtual ClosureVerdicts verdicts() const { return {}; }
 };
 
 /// The solver of `method`, which must be one that goes by exchanges. `start`: this robot's poses,

@@ -75,8 +75,8 @@ class PgoTeam {
   }
   const OptimizerProgress& progress(RobotId robot) const { return robots_.at(robot).progress; }
   /// When a solver that rejects closures last came to the end.
-  const std::optional<ClosureCount>& weighed(RobotId robot) const {
-    return robots_.at(robot).weighed;
+  const std::optional<ClosureVerdicts>& verdicts(RobotId robot) const {
+    return robots_.at(robot).verdicts;
   }
   std::size_t bytes_sent() const { return bytes_; }
   double now_s() const { return now_s_; }
@@ -112,7 +112,7 @@ class PgoTeam {
     std::unique_ptr<PgoAgent> agent;
     std::optional<Trajectory> trajectory;
     OptimizerProgress progress;
-    std::optional<ClosureCount> weighed;
+    std::optional<ClosureVerdicts> verdicts;
   };
   struct Delivery {
     RobotId from, to;
@@ -125,7 +125,7 @@ class PgoTeam {
       more = output.more;
       if (output.trajectory) robot.trajectory = std::move(output.trajectory);
       if (output.progress) robot.progress = std::move(*output.progress);
-      if (output.weighed) robot.weighed = output.weighed;
+      if (output.verdicts) robot.verdicts = output.verdicts;
       if (output.notice) notices.push_back(*output.notice);
       if ((output.poses || !output.exchange.empty()) && on_update) on_update(robot.peer.robot);
       if (output.session) broadcast(robot, std::move(*output.session));

@@ -45,15 +45,15 @@ SolverProgress GncSessionSolver::progress() const {
   return {agent_.cost(), std::sqrt(std::max(0.0, agent_.decrement()))};
 }
 
-std::vector<WeighedClosure> GncSessionSolver::weighed_closures() const {
+ClosureVerdicts GncSessionSolver::verdicts() const {
   const RobotEdges& edges = agent_.edges().edges;
-  std::vector<WeighedClosure> closures;
+  ClosureVerdicts verdicts;
   for (std::size_t k = odometry_of(edges); k < edges.own.size(); ++k)
-    closures.push_back({closure_id(edges.self, edges.own[k]), agent_.kept_own(k)});
+    verdicts.closures.push_back({closure_id(edges.self, edges.own[k]), agent_.kept_own(k)});
   for (const auto& [peer, list] : edges.to)
     for (std::size_t k = 0; k < list.size(); ++k)
-      closures.push_back({closure_id(edges.self, peer, list[k]), agent_.kept(peer, k)});
-  return closures;
+      verdicts.closures.push_back({closure_id(edges.self, peer, list[k]), agent_.kept(peer, k)});
+  return verdicts;
 }
 
 }  // namespace km

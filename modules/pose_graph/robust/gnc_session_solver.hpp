@@ -23,7 +23,7 @@ class GncSessionSolver final : public SessionSolver {
   [[nodiscard]] bool done() const override { return agent_.done(); }
   [[nodiscard]] const std::vector<SE3>& poses() const override { return agent_.poses(); }
   [[nodiscard]] SolverProgress progress() const override;
-  [[nodiscard]] std::vector<WeighedClosure> weighed_closures() const override;
+  [[nodiscard]] ClosureVerdicts verdicts() const override;
 
  private:
   GncAgent agent_;

@@ -84,9 +84,9 @@ TEST_CASE("a team that weighs its closures ends at the optimum of the true ones"
   CHECK(team.progress(7).cost == Approx(optimum).epsilon(1e-6).margin(1e-6));
   for (const RobotId robot : ids) {
     CAPTURE(robot);
-    REQUIRE(team.weighed(robot));
-    CHECK(team.weighed(robot)->all == closures_of(all, robot));
-    CHECK(team.weighed(robot)->rejected == closures_of(all, robot) - closures_of(graph, robot));
+    REQUIRE(team.verdicts(robot));
+    CHECK(team.verdicts(robot)->closures.size() == closures_of(all, robot));
+    CHECK(team.verdicts(robot)->rejected() == closures_of(all, robot) - closures_of(graph, robot));
   }
 }
 

@@ -24,9 +24,9 @@ struct Robot {
   }
 
   PoseGraphTopics topics() {
-    return {odometry,    closures,      inlier_sets, peer_inlier_sets, peer_events,
-            peer_status, peer_sessions, peer_poses,  peer_exchanges,   status,
-            sessions,    poses,         exchanges,   trajectory,       progress};
+    return {odometry,      closures,   inlier_sets,    peer_inlier_sets, peer_events, peer_status,
+            peer_sessions, peer_poses, peer_exchanges, status,           sessions,    poses,
+            exchanges,     trajectory, progress,       verdicts};
   }
 
   void hears(Robot& other) {
@@ -75,6 +75,7 @@ struct Robot {
   Topic<SolverMessage> peer_exchanges, exchanges;
   Topic<Trajectory> trajectory;
   Topic<OptimizerProgress> progress;
+  Topic<ClosureVerdicts> verdicts;
   std::mutex mutex;
   std::condition_variable changed;
   std::optional<Trajectory> latest;
@@ -100,7 +101,7 @@ constexpr double kSinglePrecision_m = 1e-5;
 }  // namespace
 
 TEST_CASE("two nodes on their threads end in one frame", "[pose_graph][node]") {
-  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
+  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton, PgoMethod::kGnc);
   CAPTURE(to_string(method));
   const SplitGraph graph = parallel_lines();
   Robot two({2, 11}, method);

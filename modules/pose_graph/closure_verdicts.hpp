@@ -1,0 +1,27 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "modules/core/pose_graph.hpp"
+
+namespace km {
+
+struct WeighedClosure {
+  ClosureId id;
+  bool kept = true;
+};
+
+/// What graduated non-convexity makes of a robot's closures, those of one session; for each of them
+/// the latest counts.
+struct ClosureVerdicts {
+  std::vector<WeighedClosure> closures;
+
+  [[nodiscard]] std::size_t rejected() const {
+    return static_cast<std::size_t>(
+        std::count_if(closures.begin(), closures.end(), [](const auto& c) { return !c.kept; }));
+  }
+};
+
+}  // namespace km
