@@ -7,6 +7,9 @@ namespace {
 
 using Pairs = std::set<std::pair<KeyframeIndex, KeyframeIndex>>;
 
+// Robots that have hardly met must not be kept apart by a few wrong candidates.
+constexpr int kForgivenFailures = 4;
+
 KeyframeIndex gap(KeyframeIndex a, KeyframeIndex b) {
   return a > b ? a - b : b - a;
 }
@@ -29,14 +32,16 @@ RequestEconomy::Verdict RequestEconomy::judge(const LoopCandidate& candidate) {
   const int reach = std::min(config_.max_link_separation, peer.successes);
   if (reach > 0 && any_near(peer.links, query, own, static_cast<KeyframeIndex>(reach)))
     return Verdict::kLinked;
-  const auto beside = static_cast<KeyframeIndex>(config_.attempt_separation);
-  if (beside > 0 && any_near(peer.tried, query, own, beside)) return Verdict::kTried;
+  const int beside = std::min(config_.attempt_separation, peer.successes);
+  if (beside > 0 && any_near(peer.tried, query, own, static_cast<KeyframeIndex>(beside)))
+    return Verdict::kTried;
 
   const auto kind_number =
       std::min<std::size_t>(static_cast<std::size_t>(candidate.support), peer.kinds.size() - 1);
   Kind& kind = peer.kinds[kind_number];
   if (peer.in_vain != query) ++kind.passed_over;  // of a query's candidates one counts
-  if (kind.passed_over <= config_.failure_patience * kind.failures) {
+  const int failures = std::max(0, kind.failures - kForgivenFailures);
+  if (kind.passed_over <= config_.failure_patience * failures) {
     peer.in_vain = query;
     return Verdict::kVain;
   }

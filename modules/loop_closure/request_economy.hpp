@@ -19,12 +19,12 @@ namespace km {
 /// verified closure of the same two robots, near meaning that both its keyframes are no more
 /// keyframes away than max_link_separation, or, while there are few, than the number of this peer's
 /// keyframes that have led to a closure: the first ones may be dense. It is also passed over next
-/// to one that has been asked for already.
+/// to one that has been asked for already; before the first closure all are asked for.
 ///
 /// In a world that repeats itself most candidates are wrong. Right ones come in company: the views
 /// around the match resemble the query, too. Candidates are told apart by peer and by how many of
-/// their query support each other, and of a kind that has failed n times, only every n-th is asked
-/// for (n times failure_patience): what never leads to anything costs ever less.
+/// their query support each other, and of a kind that has failed n + 4 times, only every n-th is
+/// asked for (n times failure_patience): what never leads to anything costs ever less.
 ///
 /// Deterministic, no randomness. Not thread-safe.
 class RequestEconomy {

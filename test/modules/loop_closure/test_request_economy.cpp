@@ -53,8 +53,14 @@ TEST_CASE("What was asked for is not asked for again beside it", "[request_econo
   config.attempt_separation = 2;
   RequestEconomy economy(config);
   REQUIRE(economy.judge(candidate(10, 20)) == Verdict::kAsk);
-  CHECK(economy.judge(candidate(12, 18)) == Verdict::kTried);
-  CHECK(economy.judge(candidate(13, 20)) == Verdict::kAsk);
+  CHECK(economy.judge(candidate(12, 18)) == Verdict::kAsk);  // nothing is linked yet
+  for (const KeyframeIndex query : {100U, 200U}) {
+    economy.link({{kSelf, query}, {kPeer, query}});
+    REQUIRE(economy.judge(candidate(query, 300)) == Verdict::kAsk);
+    economy.conclude({kPeer, query}, true);
+  }
+  CHECK(economy.judge(candidate(12, 19)) == Verdict::kTried);
+  CHECK(economy.judge(candidate(15, 20)) == Verdict::kAsk);
   CHECK(economy.judge(candidate(10, 30)) == Verdict::kAsk);  // another place
   CHECK(economy.judge(candidate(0, 0)) == Verdict::kAsk);
 }
@@ -71,8 +77,9 @@ TEST_CASE("A kind that fails is asked for ever less, and no other with it", "[re
     ++asked;
     economy.conclude({kPeer, query}, false);
   }
-  // After n failures n are passed over: n (n + 1) / 2 queries for n requests.
-  CHECK(asked == 31);
+  // Four are forgiven; then n are passed over after n failures: n (n + 1) / 2 queries for n
+  // requests.
+  CHECK(asked == 4 + 31);
   CHECK(economy.judge(candidate(500, 7, 5)) == Verdict::kAsk);
   CHECK(economy.judge(candidate(501, 7, 9)) == Verdict::kAsk);  // as with a support of 5
 }
@@ -81,7 +88,7 @@ TEST_CASE("The candidates of one query count once", "[request_economy]") {
   LoopClosureConfig config;
   config.attempt_separation = 0;
   RequestEconomy economy(config);
-  for (KeyframeIndex query = 0; query < 2; ++query) {
+  for (KeyframeIndex query = 0; query < 6; ++query) {
     while (economy.judge(candidate(query, 7)) != Verdict::kAsk) ++query;
     economy.conclude({kPeer, query}, false);
   }
