@@ -9,8 +9,8 @@ namespace km {
 struct KeyframeFeaturesConfig {
   static constexpr const char* kSection = "keyframe_features";
 
-  /// Keypoints kept per keyframe, spread evenly over the left image. Each costs 40 bytes when
-  /// another robot asks for the keyframe.
+  /// Keypoints kept per keyframe, spread evenly over the left image. Another robot that asks for the
+  /// keyframe gets loop_closure.reply_keypoints of them at most.
   int max_keypoints = 1000;
 
   /// Smallest contrast of a corner [grey levels]. Lower finds more points in dim scenes.

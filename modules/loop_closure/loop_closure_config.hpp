@@ -50,19 +50,21 @@ struct LoopClosureConfig {
 
   /// A peer's keyframe is not asked for near a verified closure: with both keyframes of the
   /// candidate at most so many keyframes from those of the closure. Grows up to this with the
-  /// number of closures, see RequestEconomy; 0: ask for all.
+  /// number of the peer's keyframes that led to closures, see RequestEconomy; 0: ask for all.
   int max_link_separation = 16;
 
-  /// Nor is one asked for so near to another that was; 0: ask for all.
+  /// Nor is one asked for so near to another that was, likewise growing; 0: ask for all.
   int attempt_separation = 2;
 
-  /// Of candidates whose like have failed n times, one in this times n is asked for; 0: all.
+  /// Of candidates whose like have failed n times beyond the first few, this times n are passed
+  /// over before one is asked for; 0: all are.
   double failure_patience = 1.0;
 
   /// Keypoints of a keyframe that a peer is sent at most, 40 bytes each.
   int reply_keypoints = 400;
 
-  /// Keyframes of peers kept for further candidates; each takes about 50 kB.
+  /// Keyframes of peers kept for further candidates; each takes about 20 kB with the default
+  /// reply_keypoints.
   int cached_keyframes = 500;
 
   /// Seed of the sampling.
@@ -94,7 +96,7 @@ struct LoopClosureConfig {
     visitor.field("failure_patience", failure_patience, {0.0, 100.0},
                   "candidates passed over per failure of their like; 0: none");
     visitor.field("reply_keypoints", reply_keypoints, {50, 100000}, "sent to a peer, 40 B each");
-    visitor.field("cached_keyframes", cached_keyframes, {1, 1000000}, "of peers, 50 kB each");
+    visitor.field("cached_keyframes", cached_keyframes, {1, 1000000}, "of peers, about 20 kB each");
     visitor.field("seed", seed, {0U, ~0U}, "of the sampling");
   }
 };
