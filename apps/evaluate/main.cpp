@@ -173,7 +173,7 @@ constexpr const char* kRender =
     "down\n"
     "  x,y,z,qx,qy,qz,qw       likewise, a camera's pose (its z forward, y down)\n"
     "Write --view=-1,... for one that begins with a minus sign.\n\n"
-    "A team's frame is that of the first robot's first pose: it need not be upright. --reference\n"
+    "A team's frame is the odometry frame of the robot with the lowest id, so upright. --reference\n"
     "turns the map to lie in another frame.\n\n"
     "Examples:\n"
     "  kimera_multi_evaluate render --mesh mesh.ply --trajectory optimized.tum \\\n"

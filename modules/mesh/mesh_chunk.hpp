@@ -29,7 +29,7 @@ struct MeshChunk {
 
   MeshChunkKey key;
   std::uint64_t boot = 0;  ///< Process of the robot that sent it; of received chunks only.
-  RobotId anchor = 0;      ///< Robot whose first keyframe defines `world`.
+  RobotId anchor = 0;      ///< Robot whose odometry frame is `world`.
   float step_m = 0.001F;
   std::array<std::int32_t, 3> origin = {0, 0, 0};  ///< [step_m] in `world`.
   std::vector<Triple> offsets = {};                ///< Of each vertex [step_m].

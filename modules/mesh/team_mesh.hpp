@@ -24,7 +24,7 @@ enum class ChunkVerdict {
 /// The mesh of one robot, as far as it has arrived.
 struct RobotMesh {
   RobotId robot = 0;
-  RobotId anchor = 0;  ///< Robot whose first keyframe defines `world`.
+  RobotId anchor = 0;  ///< Robot whose odometry frame is `world`.
   LabelledMesh mesh;   ///< In `world`.
   std::size_t chunks = 0;
   std::size_t outdated_chunks = 0;  ///< Left out: another anchor's or step's.

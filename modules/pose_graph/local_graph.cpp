@@ -61,6 +61,10 @@ bool LocalGraph::add(const KeyframeOdometry& keyframe) {
       throw std::invalid_argument("LocalGraph: odometry to keyframe " + to_string(keyframe.id) +
                                   " is not finite with a usable covariance");
     odometry_.push_back(*step);
+  } else {
+    if (!keyframe.T_odom_kf.matrix().allFinite())
+      throw std::invalid_argument("LocalGraph: the first keyframe's pose is not finite");
+    T_odom_first_ = keyframe.T_odom_kf;
   }
   ++keyframes_;
   ++revision_;

@@ -58,6 +58,8 @@ class LocalGraph {
 
   /// Odometry and inlier closures inside this robot.
   [[nodiscard]] std::vector<BlockEdge> own_edges() const;
+  /// Pose of keyframe 0 in the frame of odometry; the identity before there is one.
+  [[nodiscard]] const SE3& T_odom_first() const { return T_odom_first_; }
   /// Odometry step from keyframe i - 1 to i. Precondition: 0 < i < keyframes().
   [[nodiscard]] const SE3& step_to(std::uint32_t i) const { return odometry_[i - 1].T_i_j; }
 
@@ -71,6 +73,7 @@ class LocalGraph {
   bool complete(const InlierSet& set);
 
   RobotId self_;
+  SE3 T_odom_first_ = SE3::Identity();
   std::uint32_t keyframes_ = 0;
   std::uint32_t revision_ = 0;
   std::vector<BlockEdge> odometry_;

@@ -142,8 +142,9 @@ PgoOutput PgoAgent::step(double now_s) {
 }
 
 PgoStatus PgoAgent::make_status() const {
-  return {self_,           frame_,        frame_version_, graph_.keyframes(), graph_.revision(),
-          graph_.offers(), config_.method};
+  return {
+      self_,           frame_,         frame_version_,       graph_.keyframes(), graph_.revision(),
+      graph_.offers(), config_.method, graph_.T_odom_first()};
 }
 
 void PgoAgent::send_status(PgoOutput& output) {
@@ -157,16 +158,21 @@ void PgoAgent::send_status(PgoOutput& output) {
   output.status = std::move(status);
 }
 
-std::optional<Eigen::MatrixXd> PgoAgent::pose_of_anchor(RobotId anchor) const {
+std::optional<Eigen::MatrixXd> PgoAgent::world_of(RobotId anchor) const {
   if (running_ && running_->exchange && running_->session.finished &&
       anchor == running_->session.anchor && running_->session.anchor_pose.cols() == 4)
     return running_->session.anchor_pose;
+  const auto before = [](const LiftedPoses& X, const SE3& T_odom_first) {
+    return lift(Eigen::MatrixXd(X.leftCols<4>()), T_odom_first.inverse());
+  };
   // What the others know it as: then all are in one frame to the last digit.
   if (anchor == self_.robot)
-    return sent_poses_ ? restore_stiefel(sent_poses_->X.leftCols<4>()) : block_->X().leftCols<4>();
+    return before(sent_poses_ ? restore_stiefel(sent_poses_->X.leftCols<4>()) : block_->X(),
+                  graph_.T_odom_first());
   const auto peer = peers_.find(anchor);
-  if (peer != peers_.end() && peer->second.poses && peer->second.poses->frame == frame_)
-    return peer->second.poses->X.leftCols<4>();
+  if (peer != peers_.end() && peer->second.poses && peer->second.status &&
+      peer->second.poses->frame == frame_)
+    return before(peer->second.poses->X, peer->second.status->T_odom_first);
   const PgoSession& session = running_->session;
   if (anchor == session.anchor && session.anchor_pose.cols() == 4) return session.anchor_pose;
   return std::nullopt;
@@ -187,7 +193,7 @@ void PgoAgent::publish(PgoOutput& output) {
     return;
   const bool in_frame = running_ && running_->round;
   const RobotId anchor = in_frame ? running_->session.anchor : self_.robot;
-  const auto pose = pose_of_anchor(anchor);
+  const auto pose = world_of(anchor);
   if (!pose || (in_frame && awaits_anchor())) return;
   publish_due_ = false;
   published_s_ = now_s_;

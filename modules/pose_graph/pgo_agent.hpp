@@ -133,7 +133,7 @@ class PgoAgent {
   void publish(PgoOutput& output);
   [[nodiscard]] OptimizerProgress make_progress() const;
   [[nodiscard]] bool holds_all(const SessionPlan& plan) const;
-  [[nodiscard]] std::optional<Eigen::MatrixXd> pose_of_anchor(RobotId anchor) const;
+  [[nodiscard]] std::optional<Eigen::MatrixXd> world_of(RobotId anchor) const;
 
   // pgo_session.cpp: who optimises what, and who says so.
   void coordinate(PgoOutput& output);

@@ -27,7 +27,7 @@ void PgoAgent::exchange(PgoOutput& output) {
 bool PgoAgent::start_solver(PgoOutput& output) {
   const RobotId anchor = running_->session.anchor;
   const bool member = anchor != self_.robot && running_->position_of.contains(anchor);
-  const auto pose = pose_of_anchor(anchor);
+  const auto pose = world_of(anchor);
   if (!pose || (member && poses_in_session(anchor, 0) == nullptr)) return false;
   Exchange& exchange = *running_->exchange;
   exchange.anchor = *pose;

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <compare>
 #include <cstdint>
+#include <tuple>
 #include <vector>
 
+#include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/pose_graph/pgo_method.hpp"
 #include "modules/pose_graph/stiefel.hpp"
@@ -46,7 +48,15 @@ struct PgoStatus {
   std::uint32_t revision = 0;  ///< Grows with its own keyframes and intra-robot closures.
   std::vector<EdgeSetOffer> offers = {};
   PgoMethod method = PgoMethod::kRbcd;  ///< Its configuration's; only equal ones go together.
-  bool operator==(const PgoStatus&) const = default;
+  /// Of its keyframe 0. Odometry's frame is upright, keyframe 0 need not be.
+  SE3 T_odom_first = SE3::Identity();
+  friend bool operator==(const PgoStatus& a, const PgoStatus& b) {
+    const auto rest = [](const PgoStatus& s) {
+      return std::tie(s.sender, s.frame, s.frame_version, s.keyframes, s.revision, s.offers,
+                      s.method);
+    };
+    return rest(a) == rest(b) && a.T_odom_first.matrix() == b.T_odom_first.matrix();
+  }
 };
 
 /// A session optimises one frozen graph. Its coordinator numbers them.
@@ -88,8 +98,9 @@ struct PgoSession {
   PgoMethod method = PgoMethod::kRbcd;
   std::uint32_t rank = 0;
   std::uint32_t max_rounds = 0;  ///< 0: no limit.
-  RobotId anchor = 0;            ///< Its keyframe 0 is the origin of `world`.
-  /// r x 4 if the anchor is no longer a member, and at the end of exchanges; else empty.
+  RobotId anchor = 0;            ///< The frame of its odometry is `world`.
+  /// Of `world`, r x 4, if the anchor is no longer a member, and at the end of exchanges; else
+  /// empty.
   LiftedPoses anchor_pose = {};
   std::uint32_t round = 0;     ///< Last round that all members have finished.
   double cost = 0.0;           ///< Team cost after it.

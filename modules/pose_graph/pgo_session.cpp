@@ -115,7 +115,7 @@ void PgoAgent::open_session() {
   session.anchor = coordinator_of(plan_);
   // `world` stays where it is when its robot has gone.
   if (running_ && running_->session.anchor < session.anchor && frame_ == plan_.frame)
-    if (const auto pose = pose_of_anchor(running_->session.anchor)) {
+    if (const auto pose = world_of(running_->session.anchor)) {
       session.anchor = running_->session.anchor;
       session.anchor_pose = *pose;
     }

@@ -31,7 +31,7 @@ void PgoAgent::count_share(const PublicPoses& poses) {
   PgoSession& session = running_->session;
   if (running_->exchange) {  // all have adopted the solution
     session.finished = announce_session_ = true;
-    const auto pose = pose_of_anchor(session.anchor);
+    const auto pose = world_of(session.anchor);
     if (pose && session.anchor_pose.size() == 0) session.anchor_pose = *pose;
     return;
   }

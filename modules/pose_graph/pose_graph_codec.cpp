@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "runtime/dds/wire_pose.hpp"
 #include "runtime/dds/wire_sequence.hpp"
 
 namespace km {
@@ -48,6 +49,7 @@ Codec<PgoStatus>::Encoded Codec<PgoStatus>::encode(const PgoStatus& status) {
   encoded.wire.keyframes = status.keyframes;
   encoded.wire.revision = status.revision;
   encoded.wire.method = static_cast<std::uint8_t>(status.method);
+  encoded.wire.origin = to_wire(status.T_odom_first);
   borrow(encoded.wire.offers, encoded.offers);
   return encoded;
 }
@@ -59,13 +61,18 @@ Decoded<PgoStatus> Codec<PgoStatus>::decode(const Wire& wire) {
   if (!offers) return Result::refuse("offers are missing or too many");
   const auto method = method_of(wire.method);
   if (!method) return Result::refuse("unknown method");
+  constexpr std::uint16_t kWithOrigin = 3;
+  const auto T_odom_first =
+      wire.header.version < kWithOrigin ? std::optional(SE3::Identity()) : from_wire(wire.origin);
+  if (!T_odom_first) return Result::refuse("the origin is not a pose");
   PgoStatus status{.sender = writer_of(wire.header),
                    .frame = from_wire(wire.frame),
                    .frame_version = wire.frame_version,
                    .keyframes = wire.keyframes,
                    .revision = wire.revision,
                    .offers = {},
-                   .method = *method};
+                   .method = *method,
+                   .T_odom_first = *T_odom_first};
   for (const km_wire_EdgeSetOffer& offer : *offers) {
     if (offer.edges == 0 || offer.peer == wire.robot)
       return Result::refuse("an offer without edges or to its own robot");

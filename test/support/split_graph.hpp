@@ -13,8 +13,9 @@ namespace km {
 /// A pose graph dealt out to robots. Every edge is given once.
 struct SplitGraph {
   std::map<RobotId, std::uint32_t> keyframes;
-  std::vector<RelativePose> odometry;  ///< Keyframe i to i + 1 of one robot, ascending.
-  std::vector<RelativePose> closures;  ///< All others.
+  std::vector<RelativePose> odometry;        ///< Keyframe i to i + 1 of one robot, ascending.
+  std::vector<RelativePose> closures;        ///< All others.
+  std::map<RobotId, SE3> T_odom_first = {};  ///< Of keyframe 0; the identity if not given.
 
   /// Poses of all robots one after the other, ascending by id, as one block.
   [[nodiscard]] WholeGraph whole() const {
@@ -88,6 +89,8 @@ inline Closure make_closure(const RelativePose& measured) {
 inline void feed_odometry(PgoAgent& agent, RobotId robot, const SplitGraph& graph) {
   KeyframeOdometry first;
   first.id = {robot, 0};
+  if (const auto origin = graph.T_odom_first.find(robot); origin != graph.T_odom_first.end())
+    first.T_odom_kf = first.T_previous_kf = origin->second;
   (void)agent.add(first);
   for (const RelativePose& e : graph.odometry)
     if (e.from.robot == robot) (void)agent.add(keyframe_odometry(e));

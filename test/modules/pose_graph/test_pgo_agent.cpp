@@ -56,15 +56,20 @@ TEST_CASE("three robots with frames of their own end in the anchor's", "[pose_gr
                     exact_edge({c, 0}, {c, 1}, step)};
   graph.closures = {exact_edge({a, 0}, {b, 0}, still), exact_edge({a, 1}, {b, 1}, step),
                     exact_edge({a, 0}, {c, 0}, still), exact_edge({a, 1}, {c, 1}, step)};
+  // Where each first keyframe is in its odometry's frame: only the anchor's matters.
+  std::mt19937 rng(3);
+  for (const RobotId robot : {a, b, c}) graph.T_odom_first[robot] = random_pose(rng);
+  const SE3 T_world_first = graph.T_odom_first.at(a);
   PgoTeam team;
   add_all(team, graph, config_of(method));
   REQUIRE(team.run(10.0, [&] { return team.all_settled(); }));
-  for (const RobotId robot : {b, c}) {
+  for (const RobotId robot : {a, b, c}) {
     CAPTURE(robot);
     REQUIRE(team.trajectory(robot) != nullptr);
     CHECK(team.trajectory(robot)->anchor == a);
-    CHECK(team.trajectory(robot)->T_world_kf[0].isApprox(SE3::Identity(), 1e-6));
-    CHECK(team.trajectory(robot)->T_world_kf[1].isApprox(step, 1e-6));
+    const auto& poses = team.trajectory(robot)->T_world_kf;
+    CHECK(poses[0].isApprox(T_world_first, 1e-6));
+    CHECK(poses[1].isApprox(robot == a ? T_world_first : T_world_first * step, 1e-6));
   }
 }
 

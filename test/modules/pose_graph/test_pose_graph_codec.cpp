@@ -16,6 +16,7 @@ typename Codec<T>::Encoded written(const T& message, const PgoPeer& writer) {
   auto encoded = Codec<T>::encode(message);
   encoded.wire.header.robot = writer.robot;
   encoded.wire.header.boot = writer.boot;
+  encoded.wire.header.version = Codec<T>::kVersion;
   return encoded;
 }
 
@@ -26,7 +27,9 @@ PgoStatus some_status() {
           .keyframes = 12,
           .revision = 34,
           .offers = {{3, 5, {2, 99}}, {65535, 1, {1, 1}}},
-          .method = PgoMethod::kNewton};
+          .method = PgoMethod::kNewton,
+          .T_odom_first = make_pose(Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5).toRotationMatrix(),
+                                    {1.0, -2.0, 3.0})};
 }
 
 PgoSession some_session(bool with_anchor) {
@@ -101,6 +104,15 @@ TEST_CASE("public poses of single precision come back exactly", "[pose_graph][co
   CHECK(decoded.value->X == poses.X);
 }
 
+TEST_CASE("a status from before robots told their origin has none", "[pose_graph][codec]") {
+  auto encoded = written(some_status(), some_status().sender);
+  encoded.wire.header.version = 2;
+  encoded.wire.origin = {};
+  const auto decoded = Codec<PgoStatus>::decode(encoded.wire);
+  REQUIRE(decoded.value);
+  CHECK(decoded.value->T_odom_first.matrix() == SE3::Identity().matrix());
+}
+
 TEST_CASE("messages that cannot be meant are refused", "[pose_graph][codec]") {
   SECTION("status") {
     auto encoded = written(some_status(), some_status().sender);
@@ -118,6 +130,9 @@ TEST_CASE("messages that cannot be meant are refused", "[pose_graph][codec]") {
     }
     SECTION("method") {
       wire.method = 250;
+    }
+    SECTION("origin") {
+      wire.origin.q[3] = std::numeric_limits<double>::quiet_NaN();
     }
     SECTION("no buffer") {
       wire.offers._buffer = nullptr;
