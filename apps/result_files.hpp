@@ -5,11 +5,14 @@
 
 namespace km {
 
+/// Names and colours of the labels, beside a mesh that has some.
+inline constexpr const char* kLabelPalette = "label_palette.csv";
+
 /// What a robot leaves in its output folder.
 inline constexpr std::array kResultFiles = {
-    "odometry.tum",  "optimized.tum",      "pose_graph.g2o",   "keyframes.csv", "loop_closures.csv",
-    "optimizer.csv", "traffic.csv",        "timing.csv",       "config.yaml",   "summary.json",
-    "mesh.ply",      "mesh_optimized.ply", "label_palette.csv"};
+    "odometry.tum",  "optimized.tum", "pose_graph.g2o",     "keyframes.csv", "loop_closures.csv",
+    "optimizer.csv", "traffic.csv",   "process.csv",        "timing.csv",    "config.yaml",
+    "summary.json",  "mesh.ply",      "mesh_optimized.ply", kLabelPalette};
 
 /// Folder of the meshes that other robots sent, robot<id>.ply each.
 inline constexpr const char* kPeerMeshes = "peer_meshes";

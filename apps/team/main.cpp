@@ -6,6 +6,7 @@
 #include <random>
 
 #include "apps/program_folder.hpp"
+#include "apps/result_files.hpp"
 #include "apps/team/finished_run.hpp"
 #include "apps/team/run_team.hpp"
 #include "apps/team/team_report.hpp"
@@ -37,6 +38,8 @@ constexpr const char* kAbout =
     "Examples:\n"
     "  kimera_multi_team --config config/teams/euroc_two_robots.yaml --dataset MH_01_easy\n"
     "  kimera_multi_team --config config/teams/tunnels.yaml --dataset tunnels_8robots --rate max\n"
+    "  kimera_multi_team --config team.yaml -- --set mapping.mode=off   # after --: of every "
+    "robot\n"
     "  kimera_multi_team --config team.yaml --output results --report   # robots ran elsewhere";
 
 struct TeamOptions {
@@ -108,11 +111,10 @@ std::vector<km::RobotRun> run_robots(const TeamOptions& options, const km::TeamP
 
 // Names and colours of the labels beside the team's mesh: those of the first robot that has some.
 void copy_palette(const km::TeamPlan& plan) {
-  constexpr const char* kFile = "label_palette.csv";
   for (const km::RobotPlan& robot : plan.robots) {
-    const fs::path own = plan.output / robot.name / kFile;
+    const fs::path own = plan.output / robot.name / km::kLabelPalette;
     if (!fs::exists(own)) continue;
-    fs::copy_file(own, plan.output / kFile, fs::copy_options::overwrite_existing);
+    fs::copy_file(own, plan.output / km::kLabelPalette, fs::copy_options::overwrite_existing);
     return;
   }
 }
@@ -155,6 +157,11 @@ int main(int argc, char** argv) try {
   define(app, options);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::ExtrasError& error) {
+    app.exit(error);
+    std::cerr << "Options of the robots come after --, as in\n"
+                 "  kimera_multi_team --config team.yaml -- --set mapping.mode=off\n";
+    return 1;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 1;
   }

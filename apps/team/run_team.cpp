@@ -24,7 +24,8 @@ void remove_earlier_run(const TeamPlan& plan) {
     remove_results(folder);
     std::filesystem::remove(folder / "exit_code");
   }
-  std::filesystem::remove(plan.output / "trajectories.svg");
+  for (const char* file : {"trajectories.svg", "team_mesh.ply", kLabelPalette})
+    std::filesystem::remove(plan.output / file);
 }
 
 std::string number(double value) {

@@ -80,6 +80,9 @@ std::string drift_remark(const TeamResult& team) {
   std::size_t left = lengths_m.size();
   for (const double length_m : lengths_m)
     text << length_m << (--left == 0 ? " m.\n" : left == 1 ? " and " : ", ");
+  text
+      << "Odometry is aligned with the truth robot by robot, the optimised trajectories all by one "
+         "transform: that\nof a robot can be off as a whole.\n";
   return text.str();
 }
 
@@ -154,18 +157,46 @@ std::string skipped_remark(const RobotResult& robot) {
          " % of its frames: use a lower --rate, or max\n";
 }
 
-std::string failures(const TeamResult& team) {
+// A robot that left nothing has one reason for all that is missing: how it failed.
+std::string notes(const TeamResult& team) {
   std::string text;
   for (const std::string& note : team.notes) text.append("note: ").append(note).append("\n");
   for (const RobotResult& robot : team.robots) {
+    if (robot.left_nothing()) continue;
     for (const std::string& note : robot.notes)
       text.append("note: ").append(robot.plan.name).append(": ").append(note).append("\n");
     text += skipped_remark(robot);
-    if (robot.run.exit.ok()) continue;
-    text += robot.plan.name + " failed, " + to_string(robot.run.exit) + "; its last words:\n";
-    for (const std::string& line : robot.run.last_words)
-      text.append("  ").append(line).append("\n");
   }
+  return text;
+}
+
+// Robots that failed alike, by a mistyped option of all say, are told of once.
+std::string failures(const TeamResult& team) {
+  struct Failure {
+    std::string exit, last_words, names;
+    bool of_several = false;
+  };
+  std::vector<Failure> failures;
+  for (const RobotResult& robot : team.robots) {
+    if (robot.run.exit.ok()) continue;
+    Failure failure{to_string(robot.run.exit), {}, robot.plan.name};
+    for (const std::string& line : robot.run.last_words)
+      if (!line.empty()) failure.last_words.append("  ").append(line).append("\n");
+    const auto same = std::find_if(failures.begin(), failures.end(), [&](const Failure& other) {
+      return other.exit == failure.exit && other.last_words == failure.last_words;
+    });
+    if (same == failures.end()) {
+      failures.push_back(std::move(failure));
+    } else {
+      same->names.append(", ").append(failure.names);
+      same->of_several = true;
+    }
+  }
+  std::string text;
+  for (const Failure& failure : failures)
+    text += failure.names + " failed, " + failure.exit +
+            (failure.of_several ? "; their last words:\n" : "; its last words:\n") +
+            failure.last_words;
   return text;
 }
 
@@ -212,12 +243,15 @@ void write_robot(JsonWriter& json, const RobotResult& robot) {
 }  // namespace
 
 std::string to_table(const TeamResult& team) {
+  const std::string remarks = notes(team) + failures(team);
+  if (std::all_of(team.robots.begin(), team.robots.end(),
+                  [](const RobotResult& robot) { return robot.left_nothing(); }))
+    return remarks;
   std::string text =
       run_table(team) + '\n' + trajectory_table(team) + '\n' + closure_table(team) + '\n';
   if (team.closures) text += to_table(*team.closures) + '\n';
   if (const std::string meshes = to_table(team.meshes); !meshes.empty()) text += meshes + '\n';
   text += traffic_table(team);
-  const std::string remarks = failures(team);
   return remarks.empty() ? text : text + '\n' + remarks;
 }
 

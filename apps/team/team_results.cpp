@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "apps/team/team_frame.hpp"
 #include "modules/evaluation/closure_files.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/evaluation/trajectory_plot.hpp"
@@ -72,14 +73,17 @@ class Trajectories {
 
 // The closures of all robots whose truth is known against it; nullopt where there is nothing to
 // judge. What keeps a robot out is noted with the team.
-std::optional<ClosureScores> judge_closures(const TeamPlan& plan, Trajectories& trajectories,
+std::optional<ClosureScores> judge_closures(const TeamPlan& plan,
+                                            const std::vector<RobotResult>& robots,
+                                            Trajectories& trajectories,
                                             std::vector<std::string>& notes) try {
   const auto camera = camera_of(plan);
   if (!camera) return std::nullopt;
   std::vector<TrueKeyframe> keyframes;
   std::vector<ClosureRecord> closures;
-  for (const RobotPlan& robot : plan.robots) {
-    if (robot.truth.empty()) continue;
+  for (const RobotResult& result : robots) {
+    const RobotPlan& robot = result.plan;
+    if (robot.truth.empty() || result.left_nothing()) continue;
     try {
       const auto folder = plan.output / robot.name;
       const auto own =
@@ -132,7 +136,6 @@ TeamResult collect_results(const TeamPlan& plan, std::vector<RobotRun> runs) {
   TeamResult result;
   result.notes = plan.notes;
   Trajectories trajectories(plan);
-  std::vector<TrajectoryInput> optimized;
   for (std::size_t i = 0; i < plan.robots.size(); ++i) {
     RobotResult robot;
     robot.plan = plan.robots[i];
@@ -144,9 +147,17 @@ TeamResult collect_results(const TeamPlan& plan, std::vector<RobotRun> runs) {
     }
     if (const auto input = trajectories.input(robot.plan, "odometry.tum", robot.notes))
       robot.odometry = trajectory_error({&*input, 1}).joint;
+    result.robots.push_back(std::move(robot));
+  }
+  find_team_frame(result.robots);
+  TeamPlan joined = plan;
+  joined.robots.clear();
+  std::vector<TrajectoryInput> optimized;
+  for (RobotResult& robot : result.robots) {
+    if (!robot.in_team_frame) continue;
+    joined.robots.push_back(robot.plan);
     if (const auto input = trajectories.input(robot.plan, "optimized.tum", robot.notes))
       optimized.push_back(*input);
-    result.robots.push_back(std::move(robot));
   }
   if (!optimized.empty()) {
     result.optimized = trajectory_error(optimized);
@@ -154,9 +165,9 @@ TeamResult collect_results(const TeamPlan& plan, std::vector<RobotRun> runs) {
   }
   if (plan.truth_mesh.empty() || result.optimized)
     result.meshes = collect_meshes(
-        plan, result.optimized ? result.optimized->alignment.T_truth_estimate : SE3::Identity(),
+        joined, result.optimized ? result.optimized->alignment.T_truth_estimate : SE3::Identity(),
         result.notes);
-  result.closures = judge_closures(plan, trajectories, result.notes);
+  result.closures = judge_closures(plan, result.robots, trajectories, result.notes);
   return result;
 }
 

@@ -41,14 +41,18 @@ struct RobotResult {
   RobotRun run;
   std::optional<RobotSummary> summary;
   std::optional<TrajectoryError> odometry;  ///< Aligned alone.
+  bool in_team_frame = true;                ///< Its optimised poses are, see find_team_frame().
   std::vector<std::string> notes;
+
+  /// True if it failed before it wrote results: why is in its last words.
+  [[nodiscard]] bool left_nothing() const { return !summary && !run.exit.ok(); }
 };
 
 /// A team after the run.
 struct TeamResult {
   std::vector<RobotResult> robots;
-  std::optional<TeamError> optimized;     ///< Of the robots that have poses, under one alignment.
-  std::string plot;                       ///< SVG of `optimized` from above; empty without it.
+  std::optional<TeamError> optimized;  ///< Of the robots in the team's frame, under one alignment.
+  std::string plot;                    ///< SVG of `optimized` from above; empty without it.
   std::optional<ClosureScores> closures;  ///< Of robots with cameras, where the truth is known.
   TeamMeshes meshes;                      ///< Of robots that made a map.
   std::vector<std::string> notes;         ///< Why something of the team is absent.

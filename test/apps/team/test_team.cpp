@@ -76,11 +76,22 @@ TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
                                 Catch::Contains("  out of luck"));
 }
 
+TEST_CASE("Robots that all fail at once leave no empty tables", "[team]") {
+  const Team team("rm \"$out/summary.json\"; echo 'no such key' >&2; exit 1");
+  const auto result = run_command(team.command);
+  CAPTURE(result.output);
+  CHECK(result.exit_code == 3);
+  CHECK_THAT(result.output, Catch::EndsWith("alice, bob failed, exit code 1; their last words:\n"
+                                            "  no such key\n") &&
+                                !Catch::Contains("team, one frame"));
+}
+
 TEST_CASE("Results of an earlier run are not shown for a robot that fails", "[team]") {
   const Team team("[ $name = bob ] && { rm \"$out/summary.json\"; exit 1; }; exit 0");
   for (const char* file : {"summary.json", "optimized.tum", "exit_code"})
     team.folder.write(std::string("out/bob/") + file, "{\"frames\": 4711}");
-  team.folder.write("out/trajectories.svg", "old");
+  for (const char* file : {"out/trajectories.svg", "out/team_mesh.ply", "out/label_palette.csv"})
+    team.folder.write(file, "old");
   team.folder.write("out/bob/notes.txt", "of the user");
   const auto result = run_command(team.command);
   CAPTURE(result.output);
@@ -88,7 +99,8 @@ TEST_CASE("Results of an earlier run are not shown for a robot that fails", "[te
   CHECK_THAT(result.output, !Catch::Contains("4711"));
   CHECK_FALSE(fs::exists(team.folder.path() / "out/bob/optimized.tum"));
   CHECK_FALSE(fs::exists(team.folder.path() / "out/bob/exit_code"));
-  CHECK_FALSE(fs::exists(team.folder.path() / "out/trajectories.svg"));
+  for (const char* file : {"out/trajectories.svg", "out/team_mesh.ply", "out/label_palette.csv"})
+    CHECK_FALSE(fs::exists(team.folder.path() / file));
   CHECK(fs::exists(team.folder.path() / "out/bob/notes.txt"));
 }
 
@@ -154,6 +166,10 @@ TEST_CASE("What cannot be run is refused with code 1", "[team]") {
   CHECK(fast.exit_code == 1);
   CHECK_THAT(fast.output, Catch::Contains("fast is neither a positive number nor max") &&
                               !Catch::Contains("status of alice"));
+  const auto misplaced = run_command(team.command + " --set a.b=1");
+  CHECK(misplaced.exit_code == 1);
+  CHECK_THAT(misplaced.output, Catch::Contains("not expected: --set") &&
+                                   Catch::Contains("Options of the robots come after --"));
   const auto report = run_command(team.command + " --report");
   CHECK(report.exit_code == 1);
   CHECK_THAT(report.output, Catch::EndsWith("out: no such folder\n"));

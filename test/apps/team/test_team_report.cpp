@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <sstream>
 
+#include "apps/team/team_frame.hpp"
 #include "apps/team/text_table.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -90,12 +91,79 @@ TEST_CASE("A robot without results leaves a note, the others are judged", "[team
 TEST_CASE("The tables show results, failures and last words", "[team]") {
   const TemporaryFolder folder;
   const std::string text = to_table(example(folder));
-  for (const char* expected : {"team, one frame", "100.0%", "FAILED, exit code 3",
-                               "b failed, exit code 3; its last words:\n  error: no luck", "2.0 kB",
-                               "3.0 MB", "400 B", "2 robots", "note: b: "}) {
+  for (const char* expected :
+       {"team, one frame", "100.0%", "FAILED, exit code 3",
+        "b failed, exit code 3; its last words:\n  error: no luck", "2.0 kB", "3.0 MB", "400 B",
+        "2 robots", "aligned with the truth robot by robot"}) {
     CAPTURE(text, expected);
     CHECK_THAT(text, Catch::Contains(expected));
   }
+}
+
+TEST_CASE("A robot that left nothing is told of by its last words only", "[team]") {
+  const TemporaryFolder folder;
+  TeamResult team = example(folder);
+  CHECK_THAT(to_table(team), !Catch::Contains("no such file"));
+  team.robots[0].summary.reset();
+  for (RobotResult& robot : team.robots) robot.run = {{1, 0}, {"no such key", ""}};
+  CHECK(to_table(team) == "a, b failed, exit code 1; their last words:\n  no such key\n");
+}
+
+// Robots that end with these anchors and members.
+std::vector<RobotResult> ended(const std::vector<std::pair<RobotId, std::vector<RobotId>>>& ends) {
+  std::vector<RobotResult> robots(ends.size());
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    robots[i].plan.id = static_cast<RobotId>(i);
+    robots[i].summary.emplace();
+    robots[i].summary->pgo_anchor = ends[i].first;
+    robots[i].summary->pgo_members = ends[i].second;
+  }
+  return robots;
+}
+
+TEST_CASE("Robots outside the team's frame are found and noted", "[team]") {
+  auto robots = ended({{0, {0}}, {1, {1, 2}}, {1, {1, 2}}, {0, {}}});
+  robots.emplace_back();  // without a summary nobody knows
+  find_team_frame(robots);
+  CHECK_FALSE(robots[0].in_team_frame);
+  CHECK(robots[1].in_team_frame);
+  CHECK(robots[2].in_team_frame);
+  CHECK_FALSE(robots[3].in_team_frame);
+  CHECK(robots[4].in_team_frame);
+  REQUIRE(robots[3].notes.size() == 1);
+  CHECK_THAT(robots[3].notes[0], Catch::StartsWith("never joined the others"));
+  CHECK(robots[1].notes.empty());
+
+  auto halves = ended({{0, {0, 1}}, {0, {0, 1}}, {2, {2, 3}}, {2, {2, 3}}});
+  find_team_frame(halves);
+  CHECK(halves[0].in_team_frame);
+  CHECK_FALSE(halves[2].in_team_frame);
+  CHECK_THAT(halves[3].notes.at(0), Catch::StartsWith("ended in the frame of robot 2"));
+}
+
+TEST_CASE("A robot that never joined is not judged in the team's frame", "[team]") {
+  const TemporaryFolder folder;
+  TeamPlan plan;
+  plan.output = folder.path();
+  for (const RobotId id : {RobotId{1}, RobotId{2}, RobotId{3}}) {
+    RobotPlan robot;
+    robot.id = id;
+    robot.name = "r" + std::to_string(id);
+    robot.graph = "g.csv";
+    robot.truth = folder.write(robot.name + ".tum", straight_line(0.0));
+    plan.robots.push_back(robot);
+    for (const char* file : {"odometry", "optimized"})
+      folder.write(robot.name + '/' + file + ".tum", straight_line(id == 3 ? 50.0 : 0.0));
+    folder.write(robot.name + "/summary.json",
+                 id == 3 ? R"({"pgo": {"anchor": 0, "members": []}})"
+                         : R"({"pgo": {"anchor": 1, "members": [1, 2]}})");
+  }
+  const TeamResult team = collect_results(plan, {{{0, 0}, {}}, {{0, 0}, {}}, {{0, 0}, {}}});
+  REQUIRE(team.optimized);
+  CHECK(team.optimized->robots.size() == 2);
+  CHECK(team.optimized->joint.position_m.rmse < 1e-9);  // with r3 it would be tens of metres
+  CHECK(team.robots[2].odometry);
+  CHECK_THAT(to_table(team), Catch::Contains("note: r3: never joined the others"));
 }
 
 TEST_CASE("A robot that skipped many frames is told of", "[team]") {
