@@ -103,7 +103,8 @@ const char* to_string(VerificationStatus status) {
     case VerificationStatus::kTooFewInliers:
       return "too few inliers";
     case VerificationStatus::kPoorlyHeld:
-      return "pose hangs on a few inliers";
+      return "pose hangs on a few inliers: without them its sigma exceeds max_position_sigma_m or "
+             "max_rotation_sigma_rad";
   }
   return "";
 }
