@@ -6,6 +6,7 @@
 
 #include "apps/result_files.hpp"
 #include "apps/robot/departure.hpp"
+#include "apps/robot/process_usage.hpp"
 #include "apps/robot/results.hpp"
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/status_text.hpp"
@@ -60,7 +61,7 @@ std::ofstream open_result(const fs::path& file) {
   return stream;
 }
 
-// What happens beside the modules while they run: phase, status line, traffic over time.
+// What happens beside the modules while they run: phase, status line, traffic and memory over time.
 class Watch {
  public:
   Watch(const RobotOptions& options, const RobotConfig& config, Robot& robot)
@@ -68,7 +69,9 @@ class Watch {
         departure_(config.run.settle_s, options.serve_limit_s),
         start_s_(steady_now_s()),
         traffic_file_(open_result(options.output / "traffic.csv")),
-        traffic_csv_(traffic_file_) {}
+        traffic_csv_(traffic_file_),
+        process_file_(open_result(options.output / "process.csv")),
+        process_csv_(process_file_) {}
 
   /// True when the robot may leave. Called ten times a second.
   bool poll() {
@@ -76,8 +79,9 @@ class Watch {
     const TrafficSnapshot traffic = robot_.bridge().traffic();
     const bool ended = robot_.input_ended();
     robot_.recorder().with_record([&](const RunRecord& record) {
-      status_line_.update(
-          status_text(robot_.dataset_time_s(), record, robot_.bridge().peers().list(), traffic));
+      status_line_.update(status_text(robot_.dataset_time_s(), record,
+                                      robot_.bridge().peers().list(), traffic,
+                                      process_usage().resident_bytes));
       if (leaving_since_s_) return;
       const std::vector<RobotPhase> peers = present_peers();
       robot_.set_phase(departure_.update(now_s, {.input_ended = ended,
@@ -85,17 +89,18 @@ class Watch {
                                                  .activity = record.activity(),
                                                  .present_peers = peers}));
     });
-    if (now_s - traffic_written_s_ >= kTrafficInterval_s) write_traffic(now_s, traffic);
+    if (now_s - written_s_ >= kInterval_s) write(now_s, traffic);
     return departure_.reason() != nullptr && said_goodbye(now_s);
   }
 
-  void finish() { write_traffic(seconds(), robot_.bridge().traffic()); }
+  void finish() { write(seconds(), robot_.bridge().traffic()); }
+  [[nodiscard]] MemoryTrend memory() const { return process_csv_.memory(); }
   [[nodiscard]] double seconds() const { return steady_now_s() - start_s_; }
   [[nodiscard]] const char* reason() const { return departure_.reason(); }
 
  private:
-  static constexpr double kTrafficInterval_s = 1.0;
-  static constexpr double kGoodbye_s = 1.5;  // three times the period of the status
+  static constexpr double kInterval_s = 1.0;  // between rows of a CSV
+  static constexpr double kGoodbye_s = 1.5;   // three times the period of the status
 
   // Tells the others before going, so that they go with the same solution.
   bool said_goodbye(double now_s) {
@@ -118,10 +123,12 @@ class Watch {
     return phases;
   }
 
-  void write_traffic(double now_s, const TrafficSnapshot& traffic) {
+  void write(double now_s, const TrafficSnapshot& traffic) {
     traffic_csv_.append(now_s, traffic);
     traffic_file_.flush();  // what is recorded survives a crash
-    traffic_written_s_ = now_s;
+    process_csv_.append(now_s, process_usage());
+    process_file_.flush();
+    written_s_ = now_s;
   }
 
   Robot& robot_;
@@ -129,7 +136,9 @@ class Watch {
   double start_s_;
   std::ofstream traffic_file_;
   TrafficCsv traffic_csv_;
-  double traffic_written_s_ = 0.0;
+  std::ofstream process_file_;
+  ProcessCsv process_csv_;
+  double written_s_ = 0.0;
   std::optional<double> leaving_since_s_;
   StatusLine status_line_;
 };
@@ -167,10 +176,13 @@ void say(const RobotOptions& options, const RunEnd& end, const Verdict& verdict)
                        << options.output.string();
 }
 
-RunSummary summarize(const RobotOptions& options, Robot& robot, double seconds, const RunEnd& end) {
+RunSummary summarize(const RobotOptions& options, Robot& robot, double seconds,
+                     const MemoryTrend& memory, const RunEnd& end) {
   RunSummary summary;
   summary.name = options.name;
   summary.seconds = seconds;
+  summary.process = process_usage();
+  summary.memory = memory;
   summary.exit_reason = verdict_of(end).reason;
   summary.frames = end.images.value_or(ImageCounts{}).read;
   summary.frames_skipped = end.images.value_or(ImageCounts{}).skipped;
@@ -202,6 +214,10 @@ int run_robot(const RobotOptions& options, SignalWatch& signals) {
   RobotInput input = open_input(options, config, mapping);
   Robot robot(options, config, std::move(input), mapping, signals);
   log_network(config, robot.interface());
+  if (mapping && mapping->sensor.labels == LabelsFrom::kImages &&
+      !config.segmentation.palette.empty())
+    log::warn("robot") << "segmentation.palette is not used: labels are recorded, and with them "
+                          "their label_palette.csv";
   make_output_folder(options.output);
   remove_results(options.output);
   open_result(options.output / "config.yaml") << config.effective;
@@ -214,10 +230,11 @@ int run_robot(const RobotOptions& options, SignalWatch& signals) {
   watch->finish();
   const RunEnd end = end_of(options, robot, result, watch->reason());
   const double seconds = watch->seconds();
+  const MemoryTrend memory = watch->memory();
   watch.reset();  // the status line ends before the last log lines
 
   robot.recorder().with_record([&](const RunRecord& record) {
-    write_results(options.output, record, summarize(options, robot, seconds, end));
+    write_results(options.output, record, summarize(options, robot, seconds, memory, end));
     if (robot.mesh_files() != nullptr) robot.mesh_files()->finish(record.trajectory());
   });
   if (robot.peer_meshes() != nullptr)
