@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "apps/simulate/options_file.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/simulation/dataset/number_text.hpp"
 
@@ -108,7 +109,12 @@ void define_images(CLI::App& app, SimulationOptions& options) {
 }  // namespace
 
 void define(CLI::App& app, SimulationOptions& options) {
-  app.set_config("--config", "", "File of options, see config/simulation/");
+  app.set_config("--config", "", "File of options, see config/simulation/")
+      ->check(CLI::Validator(
+          [&app](const std::string& file) {
+            return file.empty() ? std::string() : problems_of_options_file(app, file);
+          },
+          "FILE"));
   app.allow_config_extras(CLI::config_extras_mode::error);
   choice(app, "--world", options.world, kWorlds, "What there is to see")->required();
   app.add_option("--robots", options.robots, "How many robots move through it")

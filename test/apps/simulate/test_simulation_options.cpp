@@ -104,6 +104,28 @@ TEST_CASE("Options may come from a file, and the command line has the last word"
              Catch::Contains("colour"));
 }
 
+TEST_CASE("All that is wrong with a file of options is said by line", "[simulate]") {
+  const TemporaryFolder folder;
+  const std::string file = folder
+                               .write("bad.toml",
+                                      "# a city\nworld = \"citty\"\nsped = 3\n\nseed: 5\n"
+                                      "rate = \"fast\"  # Hz\ndepth = maybe\nrobots = [2\n"
+                                      "[images]\nimage-format = \"png\nlabels = true\n")
+                               .string();
+  const std::string text = refusal({"--config", file});
+  CAPTURE(text);
+  CHECK_THAT(text, Catch::Contains(file + " line 2: world: citty not in"));
+  CHECK_THAT(text, Catch::Contains(file + " line 3: no option is named 'sped'; --help lists them"));
+  CHECK_THAT(text, Catch::Contains(" line 5: expected `option = value`, there is 'seed: 5'"));
+  CHECK_THAT(text, Catch::Contains(" line 6: rate: 'fast' is not a number from 0.1 to 200"));
+  CHECK_THAT(text, Catch::Contains(" line 7: depth: 'maybe' is neither true nor false"));
+  CHECK_THAT(text, Catch::Contains(" line 8: robots: no closing ]"));
+  CHECK_THAT(text, Catch::Contains(" line 9: there are no sections"));
+  CHECK_THAT(text, Catch::Contains(" line 10: image-format: no closing \""));
+  CHECK_THAT(text, !Catch::Contains(" line 11"));
+  CHECK_THAT(refusal({"--config", "nowhere.toml"}), Catch::Contains("nowhere.toml: no such file"));
+}
+
 TEST_CASE("The files of options that come with the program can be used", "[simulate]") {
   const std::string name = GENERATE("city", "camp", "demo");
   const auto options = parse({"--config", "config/simulation/" + name + ".toml", "--output", "x"});
