@@ -49,6 +49,23 @@ std::string json_of(const MeshReport& report, const LabelPalette& palette) {
   return text.str();
 }
 
+constexpr double kLargeMove_m = 0.5;  // beyond, ICP may have found another surface
+constexpr const char* kPlacing =
+    "the meshes were taken to lie in the frame of the truth; --trajectory and --trajectory-truth "
+    "of their robots place them first";
+
+MeshReport compared(const LabelledMesh& truth, std::span<const MeshInput> inputs,
+                    const MeshErrorOptions& options, StageProgress& progress,
+                    const MeshCommand& command) try {
+  return mesh_error(truth, inputs, options,
+                    [&](std::string_view stage, double share) { progress(stage, share); });
+} catch (const std::invalid_argument& error) {
+  const std::string problem = error.what();
+  const bool elsewhere = problem.find("in one frame") != problem.npos;
+  if (!elsewhere || !command.trajectories.empty()) throw;
+  throw std::invalid_argument(problem + "\nnote: " + kPlacing);
+}
+
 }  // namespace
 
 void evaluate_meshes(const MeshCommand& command) {
@@ -63,10 +80,10 @@ void evaluate_meshes(const MeshCommand& command) {
     inputs.push_back({short_name(file), meshes.emplace_back(read_ply(file))});
   const LabelPalette palette = palette_of(command, truth, inputs);
 
-  const MeshReport report =
-      mesh_error(truth, inputs, options,
-                 [&](std::string_view stage, double share) { progress(stage, share); });
+  const MeshReport report = compared(truth, inputs, options, progress, command);
   std::cout << to_table(report, palette);
+  if (command.trajectories.empty() && report.moved_m > kLargeMove_m)
+    std::cout << "note: " << kPlacing << '\n';
   if (!command.json.empty()) write_file(command.json, json_of(report, palette));
 }
 

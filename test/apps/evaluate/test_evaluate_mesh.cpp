@@ -70,7 +70,8 @@ TEST_CASE("mesh starts registration where the trajectories say", "[evaluate]") {
       kTool + "mesh --truth " + meshes.truth.string() + " --estimate " + meshes.a.string();
   const auto lost = run_command(command);
   CHECK(lost.exit_code == 1);
-  CHECK_THAT(lost.output, Catch::Contains("are both in one frame?"));
+  CHECK_THAT(lost.output, Catch::Contains("are both in one frame?") &&
+                              Catch::Contains("--trajectory and --trajectory-truth"));
   const auto placed = run_command(command + " --trajectory " + moved.string() +
                                   " --trajectory-truth " + truth.string() + " --no-icp");
   CAPTURE(placed.output);
