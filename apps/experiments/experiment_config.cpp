@@ -27,11 +27,9 @@ Texts texts(YamlKeys& keys, const std::string& key) {
   return keys.get<Texts>(key, kTexts).value_or(Texts{});
 }
 
-WorldConfig read_world(YamlSource& source, const std::string& name, const YAML::Node& node,
-                       bool quick) {
-  YamlKeys keys(source, node, quick);
+WorldConfig read_world(YamlSource& source, YamlKeys& keys, const std::string& name) {
   WorldConfig world;
-  world.name = name;
+  world.name = world.recordings = name;
   world.title = keys.get<std::string>("title", "a text").value_or(name);
   const auto file = [&](const char* key) -> fs::path {
     const auto text = keys.get<std::string>(key, "a path");
@@ -56,17 +54,57 @@ WorldConfig read_world(YamlSource& source, const std::string& name, const YAML::
     *value = keys.get<double>(key, "a number of seconds").value_or(*value);
     if (!(*value > 0.0)) source.problem(keys.child(key), std::string(key) + " is not positive");
   }
-  keys.finish();
   return world;
+}
+
+// Trajectories do not depend on the map: runs that only tell their spread do without.
+WorldConfig repetition(const WorldConfig& world, const std::string& kind, unsigned number) {
+  WorldConfig other = world;
+  other.name += '-' + kind + std::to_string(number);
+  other.title += ", " + kind + ' ' + std::to_string(number);
+  other.repeats = world.name;
+  other.robot.insert(other.robot.end(), {"--set", "mapping.mode=off"});
+  return other;
+}
+
+void set_seed(Texts& arguments, unsigned seed) {
+  const auto given = std::find(arguments.begin(), arguments.end(), "--seed");
+  if (given != arguments.end() && given + 1 != arguments.end())
+    *(given + 1) = std::to_string(seed);
+  else
+    arguments.insert(arguments.end(), {"--seed", std::to_string(seed)});
+}
+
+std::vector<WorldConfig> repetitions_of(const WorldConfig& world, YamlSource& source,
+                                        YamlKeys& keys) {
+  std::vector<WorldConfig> others;
+  const auto runs = keys.get<unsigned>("runs", "a number").value_or(1);
+  if (runs < 1 || runs > 99) source.problem(keys.child("runs"), "runs is not from 1 to 99");
+  for (unsigned run = 2; run <= std::min(runs, 99U); ++run)
+    others.push_back(repetition(world, "run", run));
+  for (const unsigned seed : keys.get<std::vector<unsigned>>("seeds", "a list of numbers")
+                                 .value_or(std::vector<unsigned>{})) {
+    others.push_back(repetition(world, "seed", seed));
+    others.back().recordings = others.back().name;
+    set_seed(others.back().simulate, seed);
+  }
+  return others;
 }
 
 std::vector<WorldConfig> read_worlds(YamlSource source, bool quick) {
   std::vector<WorldConfig> worlds;
   const YAML::Node root = load(source);
-  if (!root.IsMap()) source.problem(root, "expected a world and its keys here");
-  if (root.IsMap())
-    for (const auto& entry : root)
-      worlds.push_back(read_world(source, entry.first.Scalar(), entry.second, quick));
+  if (!root.IsMap()) {
+    source.problem(root, "expected a world and its keys here");
+    return worlds;
+  }
+  for (const auto& entry : root) {
+    YamlKeys keys(source, entry.second, quick);
+    worlds.push_back(read_world(source, keys, entry.first.Scalar()));
+    const auto others = repetitions_of(worlds.back(), source, keys);
+    worlds.insert(worlds.end(), others.begin(), others.end());
+    keys.finish();
+  }
   return worlds;
 }
 
@@ -116,6 +154,32 @@ Texts read_world_names(YamlSource source, const std::vector<WorldConfig>& worlds
   return names;
 }
 
+AloneExperiment read_alone(YamlSource& source, const YAML::Node& node, bool quick,
+                           const std::vector<WorldConfig>& worlds) {
+  AloneExperiment alone;
+  if (!node) return alone;
+  YamlKeys keys(source, node, quick);
+  alone.world = keys.require<std::string>("world", "a text");
+  alone.robot = keys.require<std::string>("robot", "a text");
+  alone.arguments = texts(keys, "arguments");
+  const auto world = std::find_if(worlds.begin(), worlds.end(),
+                                  [&](const auto& w) { return w.name == alone.world; });
+  if (world == worlds.end())
+    source.problem(keys.child("world"), "no world " + alone.world + " in worlds.yaml");
+  else if (std::count(world->robots.begin(), world->robots.end(), alone.robot) == 0)
+    source.problem(keys.child("robot"), alone.world + " has no robot " + alone.robot);
+  keys.finish();
+  return alone;
+}
+
+void read_resources(YamlSource source, bool quick, ExperimentConfig& config) {
+  const YAML::Node root = load(source);
+  YamlKeys keys(source, root, quick);
+  config.resources_worlds = read_names(source, keys, config.worlds);
+  config.alone = read_alone(source, keys.child("alone"), quick, config.worlds);
+  keys.finish();
+}
+
 void read_trajectory(YamlSource source, bool quick, ExperimentConfig& config) {
   const YAML::Node root = load(source);
   YamlKeys keys(source, root, quick);
@@ -136,6 +200,13 @@ const WorldConfig& ExperimentConfig::world(const std::string& name) const {
                        [&](const WorldConfig& world) { return world.name == name; });
 }
 
+std::vector<std::string> ExperimentConfig::repetitions(const std::string& world) const {
+  std::vector<std::string> names;
+  for (const WorldConfig& other : worlds)
+    if (other.repeats == world) names.push_back(other.name);
+  return names;
+}
+
 ExperimentConfig read_experiments(const fs::path& folder, bool quick) {
   std::string problems;
   const auto source = [&](const char* name) { return YamlSource{folder / name, problems}; };
@@ -144,7 +215,7 @@ ExperimentConfig read_experiments(const fs::path& folder, bool quick) {
   config.worlds = read_worlds(source("worlds.yaml"), quick);
   config.pcm = read_pcm(source("pcm.yaml"), quick);
   read_trajectory(source("trajectory.yaml"), quick, config);
-  config.resources_worlds = read_world_names(source("resources.yaml"), config.worlds, quick);
+  read_resources(source("resources.yaml"), quick, config);
   config.mesh_worlds = read_world_names(source("mesh.yaml"), config.worlds, quick);
   config.semantics_worlds = read_world_names(source("semantics.yaml"), config.worlds, quick);
   if (!problems.empty()) throw ExperimentConfigError(problems);

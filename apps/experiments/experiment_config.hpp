@@ -17,6 +17,8 @@ struct ExperimentConfigError : std::runtime_error {
 /// A world, the recordings that robots make in it, and how a team is run on them.
 struct WorldConfig {
   std::string name;                       ///< Of its files; known ones are compared with the paper.
+  std::string repeats = {};               ///< Name of the world this is another run of; or empty.
+  std::string recordings = {};            ///< Name of the world whose recordings it is run on.
   std::string title;                      ///< "City".
   std::filesystem::path simulation;       ///< Options file of kimera_multi_simulate; may be empty.
   std::vector<std::string> simulate;      ///< More options of kimera_multi_simulate.
@@ -39,6 +41,13 @@ struct PcmExperiment {
   std::vector<std::string> searches;  ///< As kimera_multi_pcm names them.
 };
 
+/// One robot without others and without a map.
+struct AloneExperiment {
+  std::string world;  ///< Whose recording it is run on; empty: there is no such experiment.
+  std::string robot;
+  std::vector<std::string> arguments;  ///< Of kimera_multi_robot.
+};
+
 /// A column of the trajectory table.
 struct PgoMethodConfig {
   std::string name;  ///< local, rbcd, rbcd50, dgs and centralized are compared with the paper.
@@ -49,8 +58,11 @@ struct PgoMethodConfig {
 /// What the files in config/experiments/ say.
 struct ExperimentConfig {
   bool quick = false;  ///< Small versions of the experiments.
+  /// Those of worlds.yaml, each followed by its repetitions: WORLD-run2 on the same recordings,
+  /// WORLD-seed2 on those of another seed.
   std::vector<WorldConfig> worlds;
   PcmExperiment pcm;
+  AloneExperiment alone;
   std::vector<std::string> trajectory_worlds;  ///< Names in `worlds`, as those below.
   std::vector<PgoMethodConfig> methods;
   std::vector<std::string> resources_worlds;
@@ -59,6 +71,9 @@ struct ExperimentConfig {
 
   /// Precondition: there is one of that name.
   [[nodiscard]] const WorldConfig& world(const std::string& name) const;
+
+  /// Names of the repetitions of a world.
+  [[nodiscard]] std::vector<std::string> repetitions(const std::string& world) const;
 };
 
 /// Reads worlds.yaml, pcm.yaml, trajectory.yaml, resources.yaml, mesh.yaml and semantics.yaml.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "apps/experiments/recorded_flight_files.hpp"
 #include "apps/experiments/world_steps.hpp"
 
 namespace km {
@@ -55,6 +56,33 @@ std::vector<Step> pgo_steps(const WorldConfig& world, const std::vector<PgoMetho
   return steps;
 }
 
+// The recording of its world, and the robot on it.
+std::vector<Step> alone_steps(const ExperimentConfig& config, const ExperimentPaths& paths) {
+  const WorldConfig& world = config.world(config.alone.world);
+  const AloneFiles files = alone_files(config, paths);
+  Step step{
+      .name = "alone-" + world.name,
+      .title = "one robot alone, without a map, " + world.title + ", " + config.alone.robot,
+      .command = {(paths.programs / "kimera_multi_robot").string(), "--robot", "0", "--name",
+                  config.alone.robot, "--dataset", files.recording.string(), "--output",
+                  files.run.string()},
+      .outputs = {files.run / "summary.json", files.run / "timing.csv", files.run / "odometry.tum"},
+      .expected_s = 0.25 * world.team_s};
+  append(step.command, config.alone.arguments);
+  std::vector<Step> steps = world_steps(world, paths);
+  steps.pop_back();  // the team
+  if (world_files(world, paths).original) {
+    if (!world.original_config.empty())
+      append(step.command, {"--config", world.original_config.string()});
+    step.inputs = {files.recording / "mav0/cam0/data.csv"};
+  } else {
+    step.inputs = {world_files(world, paths).recordings / "simulation.json"};
+    step.needs = {simulate_step_name(world)};
+  }
+  steps.push_back(std::move(step));
+  return steps;
+}
+
 void append_steps(std::vector<Step>& steps, std::vector<Step> more) {
   for (Step& step : more) {
     const auto same = [&](const Step& other) { return other.name == step.name; };
@@ -67,7 +95,7 @@ void append_steps(std::vector<Step>& steps, std::vector<Step> more) {
 WorldFiles world_files(const WorldConfig& world, const ExperimentPaths& paths) {
   WorldFiles files;
   files.original = has_original_images(world, paths);
-  files.recordings = paths.data / world.name;
+  files.recordings = paths.data / world.recordings;
   files.team_file = files.original ? paths.results / "teams" / (world.name + ".yaml")
                                    : files.recordings / "team.yaml";
   files.run = paths.data / (world.name + (files.original ? "_euroc_res" : "_res"));
@@ -83,6 +111,14 @@ PgoFiles pgo_files(const WorldConfig& world, const PgoMethodConfig& method,
                    const ExperimentPaths& paths) {
   const std::string name = "pgo-" + world.name + '-' + method.name;
   return {paths.results / (name + ".json"), paths.results / "poses" / (name + ".tum")};
+}
+
+AloneFiles alone_files(const ExperimentConfig& config, const ExperimentPaths& paths) {
+  const WorldConfig& world = config.world(config.alone.world);
+  const WorldFiles files = world_files(world, paths);
+  return {files.original ? find_recorded_flight(paths.euroc, config.alone.robot).folder
+                         : files.recordings / config.alone.robot,
+          paths.data / (world.name + (files.original ? "_euroc_alone" : "_alone"))};
 }
 
 PcmFiles pcm_files(unsigned seed, const ExperimentPaths& paths) {
@@ -106,10 +142,16 @@ std::vector<Step> plan_experiment(const std::string& experiment, const Experimen
   for (const std::string& name : worlds) {
     const WorldConfig& world = config.world(name);
     append_steps(steps, world_steps(world, paths));
-    if (experiment == "trajectory" || experiment == "resources")
-      append_steps(steps, pgo_steps(world, config.methods, paths));
     if (experiment == "mesh") append_steps(steps, picture_steps(world, paths));
+    if (experiment != "trajectory" && experiment != "resources") continue;
+    append_steps(steps, pgo_steps(world, config.methods, paths));
+    for (const std::string& repetition : config.repetitions(name)) {
+      append_steps(steps, world_steps(config.world(repetition), paths));
+      append_steps(steps, pgo_steps(config.world(repetition), config.methods, paths));
+    }
   }
+  if (experiment == "resources" && !config.alone.world.empty())
+    append_steps(steps, alone_steps(config, paths));
   return steps;
 }
 

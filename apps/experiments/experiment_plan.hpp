@@ -53,6 +53,13 @@ struct PgoFiles {
 [[nodiscard]] PgoFiles pgo_files(const WorldConfig& world, const PgoMethodConfig& method,
                                  const ExperimentPaths& paths);
 
+/// What a robot leaves that is run alone.
+struct AloneFiles {
+  std::filesystem::path recording;
+  std::filesystem::path run;
+};
+[[nodiscard]] AloneFiles alone_files(const ExperimentConfig& config, const ExperimentPaths& paths);
+
 struct PcmFiles {
   std::filesystem::path json, plot;
 };

@@ -147,7 +147,11 @@ class HtmlWriter {
   }
 
   void operator()(const ReportProvenance& provenance) {
-    out_ << "<details><summary>How these numbers were obtained</summary>\n<table>\n<thead><tr>"
+    for (const std::string& line : provenance.open) out_ << "<p>" << xml_escaped(line) << "</p>\n";
+    if (!provenance.common.empty()) out_ << "<p>" << xml_escaped(provenance.common) << "</p>\n";
+    if (provenance.rows.empty()) return;
+    out_ << "<details><summary>" << provenance.rows.size()
+         << " steps</summary>\n<table>\n<thead><tr>"
             "<th>step</th><th>command</th><th>when</th><th>machine, commit</th></tr></thead>\n"
             "<tbody>\n";
     for (const auto& row : provenance.rows)

@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "apps/experiments/report.hpp"
+#include "apps/experiments/run_inputs.hpp"
 #include "apps/experiments/run_steps.hpp"
 #include "apps/experiments/step_record.hpp"
 #include "apps/program_folder.hpp"
@@ -22,7 +23,10 @@ constexpr const char* kAbout =
     "and the commit, and made anew only if its command or its inputs change. Ctrl-C keeps what is\n"
     "done; the same command goes on. Recordings and results of teams that are in --data already\n"
     "are used as they are.\n\n"
-    "Configuration: config/experiments/*.yaml (worlds, seeds, methods).\n"
+    "Configuration: config/experiments/*.yaml (worlds, seeds, methods). --data, --graphs, "
+    "--euroc,\n"
+    "--config and --quick are kept with the results: `list`, `report` and later runs need only\n"
+    "--results, and take what they are given instead.\n"
     "Exit code: 0 if all is done, 1 for input that cannot be used, 3 if a step failed or lacks\n"
     "something, 130 if it was stopped.\n\n"
     "Examples:\n"
@@ -35,8 +39,11 @@ constexpr const char* kAbout =
     "images are then used, or only their true poses and inertial data (CSV, perhaps gzipped), on\n"
     "which rooms are rendered.";
 
+constexpr const char* kData = "experiments_data";
+constexpr const char* kResults = "experiments_results";
+
 struct Options {
-  fs::path data = "experiments_data", results, graphs, euroc, config;
+  fs::path data, results, graphs, euroc, config;
   fs::path programs = km::program_folder();
   std::vector<std::string> names;
   bool quick = false, again = false;
@@ -49,9 +56,10 @@ std::vector<std::string> all_names() {
 }
 
 void define(CLI::App& app, Options& options) {
-  app.add_option("--data", options.data, "Recordings, and the results of teams on them")
-      ->capture_default_str();
-  app.add_option("--results", options.results, "Numbers, logs and the report (default: results)");
+  app.add_option("--data", options.data,
+                 "Recordings, and the results of teams on them (default: experiments_data)");
+  app.add_option("--results", options.results,
+                 "Numbers, logs and the report (default: experiments_results)");
   app.add_option("--graphs", options.graphs, "Recorded pose graphs (default: the folder of --data)")
       ->check(CLI::ExistingDirectory);
   app.add_option("--euroc", options.euroc, "EuRoC's recordings, see above")
@@ -74,14 +82,44 @@ fs::path shipped_config() {
   throw std::runtime_error("no config/experiments here or near the program; give --config");
 }
 
-km::ExperimentPaths paths_of(const Options& options) {
-  const fs::path below = options.quick ? "quick" : "";
-  const fs::path results = options.results.empty() ? "results" / below : options.results;
-  return {.programs = options.programs,
-          .data = (options.data / below).lexically_normal(),
-          .results = results,
-          .graphs = options.graphs.empty() ? options.data : options.graphs,
-          .euroc = options.euroc};
+// What to do, and with what: the command line, else what was kept with the results.
+struct Setup {
+  km::ExperimentPaths paths;
+  fs::path config;
+  bool quick = false;
+};
+
+Setup setup_of(const Options& options, bool is_run) {
+  Setup setup{.paths = {}, .config = {}, .quick = options.quick};
+  km::ExperimentPaths& paths = setup.paths;
+  const auto below = [&] { return setup.quick ? "quick" : ""; };
+  paths.results =
+      options.results.empty() ? (kResults / fs::path(below())).lexically_normal() : options.results;
+  const km::RunInputs kept = km::read_run_inputs(paths.results).value_or(km::RunInputs{});
+  if (!is_run) setup.quick = setup.quick || kept.quick;
+  const auto first = [](const fs::path& given, const fs::path& then) {
+    return given.empty() ? then : given;
+  };
+  const fs::path data = first(options.data, kData);
+  paths.data = options.data.empty() && kept.quick == setup.quick && !kept.data.empty()
+                   ? kept.data
+                   : (data / below()).lexically_normal();
+  paths.graphs = first(options.graphs, first(kept.graphs, data));
+  paths.euroc = first(options.euroc, kept.euroc);
+  paths.programs = options.programs;
+  setup.config = first(options.config, kept.config);
+  if (setup.config.empty()) setup.config = shipped_config();
+  return setup;
+}
+
+void keep(const Options& options, const Setup& setup) {
+  const km::RunInputs before = km::read_run_inputs(setup.paths.results).value_or(km::RunInputs{});
+  km::write_run_inputs(setup.paths.results,
+                       {.data = setup.paths.data,
+                        .graphs = setup.paths.graphs,
+                        .euroc = setup.paths.euroc,
+                        .config = options.config.empty() ? before.config : options.config,
+                        .quick = setup.quick});
 }
 
 std::vector<std::string> chosen(const Options& options) {
@@ -105,7 +143,9 @@ void list(const km::ExperimentConfig& config, const km::ExperimentPaths& paths) 
     }
     std::cout << km::align_columns(rows) << missing << '\n';
   }
-  std::cout << "data: " << paths.data.string() << ", results: " << paths.results.string() << '\n';
+  std::cout << "data: " << paths.data.string() << ", graphs: " << paths.graphs.string();
+  if (!paths.euroc.empty()) std::cout << ", euroc: " << paths.euroc.string();
+  std::cout << ", results: " << paths.results.string() << '\n';
 }
 
 void print(const km::ReportSummary& summary) {
@@ -113,18 +153,32 @@ void print(const km::ReportSummary& summary) {
             << summary.met << " of " << summary.targets << " numbers to reach are met\n";
 }
 
-int run(const Options& options, const km::ExperimentConfig& config,
-        const km::ExperimentPaths& paths) {
+int run(const Options& options, const Setup& setup, const km::ExperimentConfig& config) {
+  keep(options, setup);
   km::SignalWatch signals;
-  const std::vector<km::Step> steps = km::plan_experiments(chosen(options), config, paths);
+  const std::vector<km::Step> steps = km::plan_experiments(chosen(options), config, setup.paths);
   km::StepDisplay display = km::StepDisplay::standard_output();
   const km::StepsOutcome outcome =
-      km::run_steps(steps, paths.results, options.again, signals, display);
+      km::run_steps(steps, setup.paths.results, options.again, signals, display);
   std::cout << outcome.made << " steps made, " << outcome.kept << " were done before\n";
   for (const std::string& problem : outcome.problems) std::cerr << problem << '\n';
-  print(km::write_report(config, paths));
+  print(km::write_report(config, setup.paths));
   if (outcome.stopped) return 130;
   return outcome.problems.empty() ? 0 : 3;
+}
+
+// A report that is there stays if there is nothing to write a new one of.
+void report(const km::ExperimentConfig& config, const km::ExperimentPaths& paths) {
+  const std::vector<km::Step> steps = km::plan_experiments(all_names(), config, paths);
+  const bool any = std::any_of(steps.begin(), steps.end(), [&](const km::Step& step) {
+    return km::state_of(step, paths.results) == km::StepState::kDone;
+  });
+  if (!any)
+    throw std::runtime_error(
+        "nothing to report: " + paths.results.string() +
+        " has no result of these experiments; `run` makes them, `list` shows what there is, "
+        "--results and --quick say where to look");
+  print(km::write_report(config, paths));
 }
 
 }  // namespace
@@ -151,15 +205,14 @@ int main(int argc, char** argv) try {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 1;
   }
-  const km::ExperimentPaths paths = paths_of(options);
-  const km::ExperimentConfig config = km::read_experiments(
-      options.config.empty() ? shipped_config() : options.config, options.quick);
+  const Setup setup = setup_of(options, run_command->parsed());
+  const km::ExperimentConfig config = km::read_experiments(setup.config, setup.quick);
   if (list_command->parsed())
-    list(config, paths);
+    list(config, setup.paths);
   else if (run_command->parsed())
-    return run(options, config, paths);
+    return run(options, setup, config);
   else
-    print(km::write_report(config, paths));
+    report(config, setup.paths);
   return 0;
 } catch (const std::exception& error) {
   std::cerr << "kimera_multi_experiments: " << error.what() << '\n';

@@ -55,7 +55,10 @@ class MarkdownWriter {
   }
 
   void operator()(const ReportProvenance& provenance) {
-    out_ << "<details><summary>How these numbers were obtained</summary>\n\n";
+    if (!provenance.common.empty()) out_ << provenance.common << "\n\n";
+    for (const std::string& line : provenance.open) out_ << line << "\n\n";
+    if (provenance.rows.empty()) return;
+    out_ << "<details><summary>" << provenance.rows.size() << " steps</summary>\n\n";
     for (const auto& row : provenance.rows)
       out_ << "- " << row.what << ": `" << row.command << "`; " << row.when
            << (row.machine.empty() ? "" : "; ") << row.machine << '\n';

@@ -102,10 +102,9 @@ void add_target(ReportInput& input, const ReportInput::World& world, const char*
                 const char* unit, bool less_is_better) {
   if (!before || !after) return;
   const bool met = less_is_better ? *after < *before : *after > *before;
-  input.targets.push_back(
-      {what, world.config->title,
-       less_is_better ? "less after the correction" : "more after the correction",
-       fixed(*before, 2) + " to " + fixed(*after, 2) + unit, met});
+  input.add_target({what, world.config->title,
+                    less_is_better ? "less after the correction" : "more after the correction",
+                    fixed(*before, 2) + " to " + fixed(*after, 2) + unit, met, true});
 }
 
 ReportTable labels_table(const std::vector<ReportInput::World>& worlds) {
@@ -138,6 +137,10 @@ bool has_meshes(const ReportInput::World& world) {
   return world.results->mesh.before.error_m || world.results->mesh.after.error_m;
 }
 
+bool has_labels(const ReportInput::World& world) {
+  return world.results->mesh.before.labels_percent || world.results->mesh.after.labels_percent;
+}
+
 std::vector<ReportInput::World> with_meshes(std::vector<ReportInput::World> worlds) {
   std::erase_if(worlds, [](const auto& world) { return !has_meshes(world); });
   return worlds;
@@ -145,18 +148,18 @@ std::vector<ReportInput::World> with_meshes(std::vector<ReportInput::World> worl
 
 }  // namespace
 
-ReportSection mesh_section(ReportInput& input) {
+std::optional<ReportSection> mesh_section(ReportInput& input) {
+  const auto worlds = with_meshes(input.worlds(input.config().mesh_worlds));
+  if (worlds.empty()) return std::nullopt;
   ReportSection section{.id = "mesh", .title = "Meshes", .blocks = {}};
   section.blocks.emplace_back(ReportParagraph{
       "Each robot's mesh as its odometry built it, moved as a whole into the team's frame, and the "
       "same mesh after local mesh optimisation bent it to the team's solution; and all robots' "
       "meshes together. The paper shows its errors as bars without numbers."});
-  const auto worlds = with_meshes(input.worlds(input.config().mesh_worlds));
-  if (!worlds.empty()) {
-    section.blocks.emplace_back(charts(worlds));
-    section.blocks.emplace_back(error_table(worlds));
-    section.blocks.emplace_back(pictures(input, worlds));
-  }
+  section.blocks.emplace_back(charts(worlds));
+  section.blocks.emplace_back(error_table(worlds));
+  if (ReportFigures row = pictures(input, worlds); !row.figures.empty())
+    section.blocks.emplace_back(std::move(row));
   for (const auto& world : worlds) {
     const auto& [before, after] = world.results->mesh;
     add_target(input, world, "error of the merged mesh", centimetres(before.error_m),
@@ -164,31 +167,30 @@ ReportSection mesh_section(ReportInput& input) {
     add_target(input, world, "error of the merged mesh, without what no robot saw",
                centimetres(before.seen_error_m), centimetres(after.seen_error_m), " cm", true);
   }
-  section.blocks.emplace_back(input.provenance("mesh"));
   return section;
 }
 
-ReportSection semantics_section(ReportInput& input) {
+std::optional<ReportSection> semantics_section(ReportInput& input) {
+  auto worlds = with_meshes(input.worlds(input.config().semantics_worlds));
+  std::erase_if(worlds, [](const auto& world) { return !has_labels(world); });
+  if (worlds.empty()) return std::nullopt;
   ReportSection section{.id = "semantics", .title = "Labels", .blocks = {}};
   section.blocks.emplace_back(ReportParagraph{
       "Labels come from the simulator's images of classes, as in the paper; each vertex of the "
       "mesh has the most likely one of what all its views said. The paper has no truth for the "
       "Vicon rooms; ours are rendered, so there is one."});
-  const auto worlds = with_meshes(input.worlds(input.config().semantics_worlds));
-  if (!worlds.empty()) section.blocks.emplace_back(labels_table(worlds));
+  section.blocks.emplace_back(labels_table(worlds));
   for (const auto& world : worlds) {
     const auto& [before, after] = world.results->mesh;
     add_target(input, world, "right labels of the merged mesh", before.labels_percent,
                after.labels_percent, " %", false);
     if (const PaperLabels* const paper = paper_labels(world.config->name);
         paper != nullptr && after.labels_percent)
-      input.targets.push_back(
-          {"right labels of the merged mesh, corrected", world.config->title,
-           "at least " + fixed(paper->after_percent.back(), 2) + " %, the paper's",
-           fixed(*after.labels_percent, 2) + " %",
-           *after.labels_percent >= paper->after_percent.back()});
+      input.add_target({"right labels of the merged mesh, corrected", world.config->title,
+                        "at least " + fixed(paper->after_percent.back(), 2) + " %, the paper's",
+                        fixed(*after.labels_percent, 2) + " %",
+                        *after.labels_percent >= paper->after_percent.back(), true});
   }
-  section.blocks.emplace_back(input.provenance("semantics"));
   return section;
 }
 

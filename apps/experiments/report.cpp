@@ -1,6 +1,6 @@
 #include "apps/experiments/report.hpp"
 
-#include <algorithm>
+#include <array>
 
 #include "apps/experiments/report_sections.hpp"
 #include "apps/output_file.hpp"
@@ -26,12 +26,21 @@ ReportDocument make_document(ReportInput& input) {
   ReportDocument document{
       .title = "Kimera-Multi: the paper's experiments", .lead = kLead, .sections = {}};
   if (input.config().quick) document.lead += kQuick;
+  std::string missing;
   std::vector<ReportSection> sections;
-  for (const auto& section :
-       {pcm_section, trajectory_section, resources_section, mesh_section, semantics_section})
-    sections.push_back(section(input));
+  constexpr std::array kSections = {pcm_section, trajectory_section, resources_section,
+                                    mesh_section, semantics_section};
+  static_assert(kSections.size() == kExperiments.size());
+  for (std::size_t k = 0; k < kSections.size(); ++k)
+    if (auto section = kSections[k](input))
+      sections.push_back(std::move(*section));
+    else
+      missing += (missing.empty() ? " Not run so far: " : ", ") + std::string(kExperiments[k].name);
+  if (!missing.empty()) document.lead += missing + '.';
   document.sections.push_back(targets_section(input));
   for (ReportSection& section : sections) document.sections.push_back(std::move(section));
+  document.sections.push_back(
+      {.id = "origin", .title = "How the numbers were obtained", .blocks = {input.provenance()}});
   return document;
 }
 
@@ -88,10 +97,11 @@ ReportSummary write_report(const ExperimentConfig& config, const ExperimentPaths
   ReportInput input(config, paths);
   const ReportDocument document = make_document(input);
   ReportSummary summary{.html = paths.results / "report.html",
-                        .markdown = paths.results / "report.md",
-                        .targets = input.targets.size()};
-  summary.met = static_cast<std::size_t>(std::count_if(input.targets.begin(), input.targets.end(),
-                                                       [](const Target& t) { return t.met; }));
+                        .markdown = paths.results / "report.md"};
+  for (const Target& target : input.targets()) {
+    summary.targets += target.judged ? 1 : 0;
+    summary.met += target.judged && target.met ? 1 : 0;
+  }
   write_figures(document, paths.results / "figures");
   write_output(summary.html, [&](std::ostream& out) { out << to_html(document); });
   write_output(summary.markdown, [&](std::ostream& out) { out << to_markdown(document); });

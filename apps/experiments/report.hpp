@@ -9,7 +9,7 @@ namespace km {
 /// What the report says, in short.
 struct ReportSummary {
   std::filesystem::path html, markdown;
-  std::size_t targets = 0, met = 0;
+  std::size_t targets = 0, met = 0;  ///< Numbers to reach that were judged.
 };
 
 /// Writes report.html, report.md with its figures/, and numbers.json, which has every table, to

@@ -46,12 +46,14 @@ struct ReportFigures {
   std::vector<ReportFigure> figures;
 };
 
-/// How the numbers were got; folded away where that can be.
+/// How the numbers were got; the steps are folded away where that can be.
 struct ReportProvenance {
   struct Row {
     std::string what, command, when, machine;
   };
-  std::vector<Row> rows;
+  std::string common;             ///< What all rows have in common: their machine, say.
+  std::vector<Row> rows;          ///< What was done.
+  std::vector<std::string> open;  ///< What was not, and why.
 };
 
 using ReportBlock = std::variant<ReportParagraph, ReportTable, ReportFigures, ReportProvenance>;

@@ -8,29 +8,69 @@
 namespace km {
 namespace {
 
+namespace fs = std::filesystem;
+
 std::string machine_text(const StepRecord& record) {
   return record.machine.processor + ", " + std::to_string(record.machine.cores) + " cores, " +
-         fixed(record.machine.memory_gb, 0) + " GB, load " + fixed(record.machine.load, 1) +
-         "; commit " + record.commit;
+         fixed(record.machine.memory_gb, 0) + " GB; commit " + record.commit;
 }
 
-ReportProvenance::Row row_of(const Step& step, const StepRecord* record) {
-  if (record == nullptr)
-    return {step.title, command_text(step.command),
-            step.missing.empty() ? "not up to date, or not run" : "not run: " + step.missing, ""};
-  if (record->command.empty())
-    return {step.title, "found in " + step.outputs.front().string(), "made before, elsewhere", ""};
-  return {step.title, command_text(record->command),
-          record->started + ", " + fixed(record->seconds, 1) + " s", machine_text(*record)};
+// Folders that most commands name, and how they are called in the report.
+using Folders = std::vector<std::pair<std::string, std::string>>;
+
+Folders folders_of(const ExperimentPaths& paths) {
+  Folders folders;
+  for (const auto& [name, path] : {std::pair{"RESULTS", &paths.results},
+                                   {"DATA", &paths.data},
+                                   {"EUROC", &paths.euroc},
+                                   {"GRAPHS", &paths.graphs}})
+    if (!path->empty() && *path != fs::path("."))
+      folders.emplace_back(name, path->lexically_normal().string());
+  return folders;
+}
+
+std::string with_names(std::string text, const Folders& folders) {
+  for (const auto& [name, folder] : folders)
+    if (text.starts_with(folder + '/')) return name + text.substr(folder.size());
+  return text;
+}
+
+ReportProvenance::Row row_of(const Step& step, const StepRecord& record, const Folders& folders) {
+  if (record.command.empty())
+    return {step.title, "found in " + with_names(step.outputs.front().string(), folders),
+            "made before, elsewhere", ""};
+  std::vector<std::string> command = record.command;
+  for (std::string& word : command) word = with_names(word, folders);
+  return {step.title, command_text(command),
+          record.started + ", " + fixed(record.seconds, 1) + " s, load " +
+              fixed(record.machine.load, 1),
+          machine_text(record)};
+}
+
+// What all steps that were run have in common is said once.
+void join_machines(ReportProvenance& provenance) {
+  std::string machine;
+  for (const ReportProvenance::Row& row : provenance.rows) {
+    if (row.machine.empty()) continue;
+    if (!machine.empty() && row.machine != machine) return;
+    machine = row.machine;
+  }
+  if (machine.empty()) return;
+  provenance.common = "All on " + machine + ".";
+  for (ReportProvenance::Row& row : provenance.rows) row.machine.clear();
+}
+
+std::vector<std::string> all_experiments() {
+  std::vector<std::string> names;
+  for (const ExperimentName& experiment : kExperiments) names.emplace_back(experiment.name);
+  return names;
 }
 
 }  // namespace
 
 ReportInput::ReportInput(const ExperimentConfig& config, const ExperimentPaths& paths)
     : config_(config), paths_(paths) {
-  std::vector<std::string> names;
-  for (const ExperimentName& experiment : kExperiments) names.emplace_back(experiment.name);
-  for (const Step& step : plan_experiments(names, config, paths))
+  for (const Step& step : plan_experiments(all_experiments(), config, paths))
     if (state_of(step, paths.results) == StepState::kDone)
       records_[step.name] = *read_record(paths.results, step.name);
 }
@@ -53,13 +93,50 @@ const PgoNumbers* ReportInput::pgo(const WorldConfig& world, const PgoMethodConf
   return &pgo_.at(step);
 }
 
-ReportProvenance ReportInput::provenance(const std::string& experiment) const {
+std::vector<ReportInput::World> ReportInput::runs_of(const WorldConfig& world) {
+  std::vector<std::string> names{world.name};
+  const std::vector<std::string> others = config_.repetitions(world.name);
+  names.insert(names.end(), others.begin(), others.end());
+  return worlds(names);
+}
+
+const PgoNumbers* ReportInput::pgo(const WorldConfig& world, const std::string& method) {
+  for (const PgoMethodConfig& candidate : config_.methods)
+    if (candidate.name == method) return pgo(world, candidate);
+  return nullptr;
+}
+
+std::optional<RobotNumbers> ReportInput::alone() const {
+  if (config_.alone.world.empty() || !has("alone-" + config_.alone.world)) return std::nullopt;
+  RobotNumbers robot = read_lone_robot(alone_files(config_, paths_).run);
+  robot.name = config_.alone.robot;
+  return robot;
+}
+
+ReportProvenance ReportInput::provenance() const {
   ReportProvenance provenance;
-  for (const Step& step : plan_experiment(experiment, config_, paths_)) {
+  const Folders folders = folders_of(paths_);
+  std::map<std::string, std::string> open;  // why: steps
+  for (const Step& step : plan_experiments(all_experiments(), config_, paths_)) {
     const auto record = records_.find(step.name);
-    provenance.rows.push_back(row_of(step, record == records_.end() ? nullptr : &record->second));
+    if (record != records_.end()) {
+      provenance.rows.push_back(row_of(step, record->second, folders));
+      continue;
+    }
+    std::string& names = open[step.missing.empty() ? "not run, or not up to date" : step.missing];
+    names += (names.empty() ? "" : ", ") + step.name;
   }
+  for (const auto& [why, names] : open)
+    provenance.open.push_back("Not done: " + names + " (" + why + ").");
+  join_machines(provenance);
+  for (const auto& [name, folder] : folders)
+    provenance.common += (provenance.common.empty() ? "" : " ") + name + ": " + folder + ".";
   return provenance;
+}
+
+void ReportInput::add_target(Target target) {
+  target.judged = !(config_.quick && target.full_size);
+  targets_.push_back(std::move(target));
 }
 
 std::string number_text(const std::optional<double>& value, int decimals) {

@@ -19,6 +19,8 @@ struct Target {
   std::string wanted;    ///< "at most 0.08 m".
   std::string measured;  ///< "0.029 m".
   bool met = false;
+  bool full_size = false;  ///< Small versions of the experiments cannot answer it.
+  bool judged = true;      ///< Set by ReportInput.
 };
 
 /// What the report is made of: results that belong to the configuration as it is now. Worlds and
@@ -41,15 +43,26 @@ class ReportInput {
   };
   [[nodiscard]] std::vector<World> worlds(const std::vector<std::string>& names);
 
+  /// The world and its repetitions, as far as there are results.
+  [[nodiscard]] std::vector<World> runs_of(const WorldConfig& world);
+
   /// nullptr if the method's result is not there.
   [[nodiscard]] const PgoNumbers* pgo(const WorldConfig& world, const PgoMethodConfig& method);
+  /// The same of the method of that name; nullptr also if it is not configured.
+  [[nodiscard]] const PgoNumbers* pgo(const WorldConfig& world, const std::string& method);
 
-  /// How the results of an experiment were made; of what is not there the reason.
-  [[nodiscard]] ReportProvenance provenance(const std::string& experiment) const;
+  /// The robot that was run alone, if it was.
+  [[nodiscard]] std::optional<RobotNumbers> alone() const;
 
-  std::vector<Target> targets;  ///< Collected by the sections.
+  /// How all results were made; of what is not there the reason.
+  [[nodiscard]] ReportProvenance provenance() const;
+
+  void add_target(Target target);
+  /// Those that the sections added.
+  [[nodiscard]] const std::vector<Target>& targets() const { return targets_; }
 
  private:
+  std::vector<Target> targets_;
   const ExperimentConfig& config_;
   const ExperimentPaths& paths_;
   std::map<std::string, StepRecord> records_;

@@ -1,8 +1,9 @@
 #include <algorithm>
-#include <set>
 
 #include "apps/experiments/paper_results.hpp"
+#include "apps/experiments/processor_tables.hpp"
 #include "apps/experiments/report_sections.hpp"
+#include "apps/experiments/spread.hpp"
 #include "apps/team/text_table.hpp"
 
 namespace km {
@@ -17,13 +18,11 @@ struct Communication {
   double images = 0.0, keypoints = 0.0;
 
   double total() const { return place_recognition + verification + pgo; }
+  double whole_run() const { return place_recognition + verification + live_pgo; }
+  double of_keypoints_percent(double sent) const {
+    return 100.0 * sent / std::max(1e-9, keypoints);
+  }
 };
-
-const PgoNumbers* pgo_named(ReportInput& input, const WorldConfig& world, const char* name) {
-  for (const PgoMethodConfig& method : input.config().methods)
-    if (method.name == name) return input.pgo(world, method);
-  return nullptr;
-}
 
 double megabytes(const PgoNumbers* numbers) {
   return numbers == nullptr ? 0.0 : 1e-6 * numbers->bytes;
@@ -35,8 +34,8 @@ Communication communication(ReportInput& input, const ReportInput::World& world)
   mb.place_recognition = results.sent_mb("place_recognition");
   mb.verification = results.sent_mb("geometric_verification");
   mb.live_pgo = results.sent_mb("pgo");
-  mb.pgo = megabytes(pgo_named(input, *world.config, "rbcd"));
-  mb.best_pgo = megabytes(pgo_named(input, *world.config, "newton"));
+  mb.pgo = megabytes(input.pgo(*world.config, "rbcd"));
+  mb.best_pgo = megabytes(input.pgo(*world.config, "newton"));
   mb.images =
       1e-6 * kBytesPerPixel * static_cast<double>(results.image_pixels * results.keyframes());
   for (const RobotNumbers& robot : results.robots)
@@ -53,12 +52,11 @@ ReportTable communication_table(ReportInput& input, const std::vector<ReportInpu
   for (const auto& world : worlds) {
     const PaperWorld* const paper = paper_world(world.config->name);
     const Communication mb = communication(input, world);
-    const PgoNumbers* const rbcd = pgo_named(input, *world.config, "rbcd");
+    const PgoNumbers* const rbcd = input.pgo(*world.config, "rbcd");
     const auto cell = [&](double ours, int decimals, auto theirs) {
       return ReportCell{fixed(ours, decimals),
                         paper == nullptr ? std::string() : fixed(theirs(*paper), decimals)};
     };
-    const double share = 100.0 * mb.total() / std::max(1e-9, mb.keypoints);
     table.rows.push_back(
         {{world.config->title},
          cell(static_cast<double>(world.results->keyframes()), 0, [](auto& p) { return p.poses; }),
@@ -70,7 +68,8 @@ ReportTable communication_table(ReportInput& input, const std::vector<ReportInpu
          cell(mb.total(), 2, [](auto& p) { return p.total_mb; }),
          cell(mb.images, 1, [](auto& p) { return p.images_mb; }),
          cell(mb.keypoints, 2, [](auto& p) { return p.keypoints_mb; }),
-         cell(share, 0, [](auto& p) { return 100.0 * p.total_mb / p.keypoints_mb; })});
+         cell(mb.of_keypoints_percent(mb.total()), 0,
+              [](auto& p) { return 100.0 * p.total_mb / p.keypoints_mb; })});
   }
   table.note =
       "Bytes as serialized, of all robots. PGO: one solve of the final graph by RBCD, as in the "
@@ -87,12 +86,11 @@ ReportTable live_table(ReportInput& input, const std::vector<ReportInput::World>
                   "all of the run / keypoints [%]"}};
   for (const auto& world : worlds) {
     const Communication mb = communication(input, world);
-    const double all = mb.place_recognition + mb.verification + mb.live_pgo;
     table.rows.push_back({{world.config->title},
                           {fixed(mb.pgo, 2)},
                           {fixed(mb.best_pgo, 2)},
                           {fixed(mb.live_pgo, 2)},
-                          {fixed(100.0 * all / std::max(1e-9, mb.keypoints), 0)}});
+                          {fixed(mb.of_keypoints_percent(mb.whole_run()), 0)}});
   }
   table.note = "The running team solves anew whenever a closure is added; the paper's solves once.";
   return table;
@@ -110,12 +108,12 @@ ReportTable computation_table(ReportInput& input, const std::vector<ReportInput:
     const PaperWorld* const paper = paper_world(world.config->name);
     std::vector<ReportCell> row{{world.config->title}};
     const auto seconds = [&](const char* name, double theirs) {
-      const PgoNumbers* const pgo = pgo_named(input, *world.config, name);
+      const PgoNumbers* const pgo = input.pgo(*world.config, name);
       row.push_back({pgo == nullptr ? "-" : fixed(pgo->seconds, 3),
                      paper == nullptr || theirs == 0.0 ? std::string() : fixed(theirs, 2)});
     };
     const auto rounds = [&](const char* name, int theirs) {
-      const PgoNumbers* const pgo = pgo_named(input, *world.config, name);
+      const PgoNumbers* const pgo = input.pgo(*world.config, name);
       row.push_back({pgo == nullptr ? "-" : std::to_string(pgo->rounds),
                      theirs == 0 ? std::string() : std::to_string(theirs)});
     };
@@ -134,83 +132,55 @@ ReportTable computation_table(ReportInput& input, const std::vector<ReportInput:
   return table;
 }
 
-// Modules whose steps take most of a robot's time; those that only wait for others are left out.
-ReportTable profile_table(const std::vector<ReportInput::World>& worlds) {
-  constexpr double kLeastShare_percent = 0.5;
-  std::map<std::string, double> most;  // percent in the world where it is largest
-  const auto share = [](const RobotNumbers& robot, const std::string& module) {
-    const auto found = robot.module_s.find(module);
-    if (found == robot.module_s.end() || !(robot.recorded_s > 0.0)) return 0.0;
-    return 100.0 * found->second / robot.recorded_s;
-  };
-  const auto mean_share = [&](const WorldResults& results, const std::string& module) {
-    double sum = 0.0;
-    for (const RobotNumbers& robot : results.robots) sum += share(robot, module);
-    return sum / static_cast<double>(std::max<std::size_t>(results.robots.size(), 1));
-  };
-  for (const auto& world : worlds)
-    for (const RobotNumbers& robot : world.results->robots)
-      for (const auto& [module, seconds] : robot.module_s)
-        most[module] = std::max(most[module], mean_share(*world.results, module));
-  std::vector<std::pair<double, std::string>> modules;
-  for (const auto& [module, percent] : most)
-    if (percent >= kLeastShare_percent) modules.emplace_back(-percent, module);
-  std::sort(modules.begin(), modules.end());
+// Of worlds whose team was run more than once.
+ReportTable spread_table(ReportInput& input, const std::vector<ReportInput::World>& worlds) {
   ReportTable table{
-      .caption =
-          "Where the time goes: steps of each module over the recording [%], mean of the robots",
-      .columns = {"module"}};
-  for (const auto& world : worlds) table.columns.push_back(world.config->title);
-  for (const auto& [percent, module] : modules) {
-    std::vector<ReportCell> row{{module}};
-    for (const auto& world : worlds) row.push_back({fixed(mean_share(*world.results, module), 1)});
-    table.rows.push_back(std::move(row));
+      .caption = "How much runs differ: median, and lowest to highest [MB]",
+      .columns = {"world", "runs", "place recognition", "verification", "all solves of the run",
+                  "one solve by RBCD", "total, one solve / keypoints [%]"}};
+  for (const auto& world : worlds) {
+    std::vector<Communication> runs;
+    for (const auto& run : input.runs_of(*world.config)) runs.push_back(communication(input, run));
+    if (runs.size() < 2) continue;
+    const auto cell = [&](const auto& value, int decimals) {
+      std::vector<double> values;
+      for (const Communication& mb : runs) values.push_back(value(mb));
+      return spread_cell(spread_of(std::move(values)), decimals);
+    };
+    table.rows.push_back({{world.config->title},
+                          {std::to_string(runs.size())},
+                          cell([](auto& mb) { return mb.place_recognition; }, 2),
+                          cell([](auto& mb) { return mb.verification; }, 2),
+                          cell([](auto& mb) { return mb.live_pgo; }, 2),
+                          cell([](auto& mb) { return mb.pgo; }, 2),
+                          cell([](auto& mb) { return mb.of_keypoints_percent(mb.total()); }, 1)});
   }
-  table.note =
-      "By the clock on the wall: with three robots on few cores a step also waits for a "
-      "core, so these are upper bounds of processor time.";
   return table;
 }
 
-ReportTable processor_table(const std::vector<ReportInput::World>& worlds) {
-  ReportTable table{
-      .caption = "Processor and memory of a whole robot",
-      .columns = {"robot", "recording [s]", "CPU time [s]", "cores", "peak memory [MB]"}};
-  for (const auto& [config, results] : worlds)
-    for (const RobotNumbers& robot : results->robots) {
-      if (!robot.processor_s && !robot.peak_memory_mb) continue;
-      const bool known = robot.processor_s && robot.recorded_s > 0.0;
-      table.rows.push_back({{config->title + ", " + robot.name},
-                            {fixed(robot.recorded_s, 0)},
-                            {number_text(robot.processor_s, 1)},
-                            {known ? fixed(*robot.processor_s / robot.recorded_s, 2) : "-"},
-                            {number_text(robot.peak_memory_mb, 0)}});
-    }
-  return table;
-}
-
+// The paper counts one solve; what the team sent in fact is judged by the same number.
 void add_targets(ReportInput& input, const ReportInput::World& world) {
   const Communication mb = communication(input, world);
   if (!(mb.keypoints > 0.0)) return;
-  const double percent = 100.0 * mb.total() / mb.keypoints;
-  input.targets.push_back({"communication over that of centralised keypoints", world.config->title,
-                           "at most " + fixed(kMostShare_percent, 0) + " %, aim " +
-                               fixed(kAimedShare_percent, 0) + " %",
-                           fixed(percent, 0) + " %", percent <= kMostShare_percent});
-  for (const RobotNumbers& robot : world.results->robots)
-    if (robot.processor_s && robot.recorded_s > 0.0) {
-      const double cores = *robot.processor_s / robot.recorded_s;
-      input.targets.push_back({"processor of a whole robot",
-                               world.config->title + ", " + robot.name, "at most 1 core",
-                               fixed(cores, 2) + " cores", cores <= 1.0});
-    }
+  const auto add = [&](const char* what, double sent, const std::string& wanted) {
+    const double percent = mb.of_keypoints_percent(sent);
+    input.add_target({std::string("communication over that of centralised keypoints, ") + what,
+                      world.config->title, wanted, fixed(percent, 0) + " %",
+                      percent <= kMostShare_percent, true});
+  };
+  const std::string most = "at most " + fixed(kMostShare_percent, 0) + " %";
+  add("one solve, as the paper counts", mb.total(),
+      most + ", aim " + fixed(kAimedShare_percent, 0) + " %");
+  add("all solves of the run", mb.whole_run(), most);
 }
 
 }  // namespace
 
-ReportSection resources_section(ReportInput& input) {
-  ReportSection section{.id = "resources", .title = "Communication and computation", .blocks = {}};
+std::optional<ReportSection> resources_section(ReportInput& input) {
   const auto worlds = input.worlds(input.config().resources_worlds);
+  const std::optional<RobotNumbers> alone = input.alone();
+  if (worlds.empty() && !alone) return std::nullopt;
+  ReportSection section{.id = "resources", .title = "Communication and computation", .blocks = {}};
   section.blocks.emplace_back(ReportParagraph{
       "What the robots send to each other, against a centralised system that sends every keyframe "
       "to a base station, as images or as keypoints with descriptors; and what optimisation and "
@@ -218,13 +188,12 @@ ReportSection resources_section(ReportInput& input) {
   if (!worlds.empty()) {
     section.blocks.emplace_back(communication_table(input, worlds));
     section.blocks.emplace_back(live_table(input, worlds));
-    section.blocks.emplace_back(computation_table(input, worlds));
-    if (ReportTable table = processor_table(worlds); !table.rows.empty())
+    if (ReportTable table = spread_table(input, worlds); !table.rows.empty())
       section.blocks.emplace_back(std::move(table));
-    section.blocks.emplace_back(profile_table(worlds));
+    section.blocks.emplace_back(computation_table(input, worlds));
   }
   for (const auto& world : worlds) add_targets(input, world);
-  section.blocks.emplace_back(input.provenance("resources"));
+  add_processor_tables(input, worlds, alone, section);
   return section;
 }
 

@@ -74,6 +74,11 @@ std::string line_value(const char* file, const std::string& key) {
   return {};
 }
 
+// "city" of "data/city/".
+std::string last_name(const fs::path& path) {
+  return (path.has_filename() ? path : path.parent_path()).filename().string();
+}
+
 bool all_exist(const std::vector<fs::path>& files) {
   return std::all_of(files.begin(), files.end(), [](const fs::path& f) { return fs::exists(f); });
 }
@@ -92,8 +97,8 @@ Machine this_machine() {
 
 std::string fingerprint_of(const Step& step) {
   Fingerprint fingerprint;
-  for (std::size_t i = 0; i < step.command.size(); ++i)
-    fingerprint.add(i == 0 ? fs::path(step.command[0]).filename().string() : step.command[i]);
+  for (const std::string& word : step.command)
+    fingerprint.add(word.find('/') == word.npos ? word : last_name(word));
   for (const auto& [file, text] : step.writes) fingerprint.add(text);
   for (const fs::path& input : step.inputs) fingerprint.add_file(input);
   return fingerprint.text();

@@ -3,6 +3,7 @@
 
 #include "apps/experiments/paper_results.hpp"
 #include "apps/experiments/report_sections.hpp"
+#include "apps/experiments/spread.hpp"
 #include "apps/team/text_table.hpp"
 
 namespace km {
@@ -15,12 +16,6 @@ constexpr double kMostDrift_percent = 0.5;
 // Rounding leaves the cost of the optimum itself a hair below or above.
 double gap_percent(const PgoNumbers& numbers) {
   return std::max(0.0, 100.0 * (numbers.cost / numbers.optimum - 1.0));
-}
-
-const PgoMethodConfig* method_named(const ReportInput& input, const std::string& name) {
-  for (const PgoMethodConfig& method : input.config().methods)
-    if (method.name == name) return &method;
-  return nullptr;
 }
 
 ReportTable inputs_table(const std::vector<ReportInput::World>& worlds) {
@@ -109,12 +104,12 @@ ReportTable gap_table(ReportInput& input, const std::vector<ReportInput::World>&
 ReportFigures plots(ReportInput& input, const std::vector<ReportInput::World>& worlds) {
   ReportFigures row;
   for (const auto& world : worlds)
-    for (const char* name : {"local", "newton"}) {
-      const PgoMethodConfig* const method = method_named(input, name);
-      const PgoNumbers* const pgo = method == nullptr ? nullptr : input.pgo(*world.config, *method);
+    for (const PgoMethodConfig& method : input.config().methods) {
+      if (method.name != "local" && method.name != "newton") continue;
+      const PgoNumbers* const pgo = input.pgo(*world.config, method);
       if (pgo == nullptr || pgo->plot.empty()) continue;
-      row.figures.push_back({.name = "trajectory-" + world.config->name + '-' + name,
-                             .caption = world.config->title + ", " + method->title +
+      row.figures.push_back({.name = "trajectory-" + world.config->name + '-' + method.name,
+                             .caption = world.config->title + ", " + method.title +
                                         ": keyframes from above, truth in grey.",
                              .svg = pgo->plot});
     }
@@ -143,30 +138,75 @@ ReportTable odometry_table(const std::vector<ReportInput::World>& worlds) {
   return table;
 }
 
+// Of worlds whose team was run more than once.
+ReportTable spread_table(ReportInput& input, const std::vector<ReportInput::World>& worlds) {
+  ReportTable table{
+      .caption = "How much runs differ: median, and lowest to highest",
+      .groups = {{"", 2}, {"ATE of the keyframes [m]", 3}, {"", 3}},
+      .columns = {"world", "runs", "local PGO", "RBCD", "Newton (ours)",
+                  "RBCD above the optimum [%]", "ATE of odometry, mean [m]", "closures kept"}};
+  for (const auto& world : worlds) {
+    const std::vector<ReportInput::World> runs = input.runs_of(*world.config);
+    if (runs.size() < 2) continue;
+    const auto over_runs = [&](const auto& value) {
+      std::vector<double> values;
+      for (const auto& run : runs) values.push_back(value(run));
+      return spread_of(std::move(values));
+    };
+    const auto error = [&](const char* method) {
+      return spread_cell(over_runs([&](const auto& run) {
+                           const PgoNumbers* const pgo = input.pgo(*run.config, method);
+                           return pgo == nullptr ? NAN : pgo->error_m.value_or(NAN);
+                         }),
+                         4);
+    };
+    const auto gap = [&](const auto& run) {
+      const PgoNumbers* const pgo = input.pgo(*run.config, "rbcd");
+      return pgo == nullptr ? NAN : gap_percent(*pgo);
+    };
+    const auto odometry_m = [](const auto& run) {
+      double sum_m = 0.0;
+      for (const RobotNumbers& robot : run.results->robots)
+        sum_m += robot.odometry_error_m.value_or(NAN);
+      return sum_m / static_cast<double>(run.results->robots.size());
+    };
+    const auto closures = [](const auto& run) { return run.results->closures.value_or(NAN); };
+    table.rows.push_back({{world.config->title},
+                          {std::to_string(runs.size())},
+                          error("local"),
+                          error("rbcd"),
+                          error("newton"),
+                          spread_cell(over_runs(gap), 4),
+                          spread_cell(over_runs(odometry_m), 4),
+                          spread_cell(over_runs(closures), 0)});
+  }
+  table.note =
+      "The tables above are of the first run. Further runs are on the same recordings, or on those "
+      "of another seed of the world (worlds.yaml: runs, seeds), without a map. Robots are "
+      "processes that meet when they do, so no two runs are the same.";
+  return table;
+}
+
 void add_optimisation_targets(ReportInput& input, const ReportInput::World& world) {
-  const auto pgo = [&](const char* name) {
-    const PgoMethodConfig* const method = method_named(input, name);
-    return method == nullptr ? nullptr : input.pgo(*world.config, *method);
-  };
-  const PgoNumbers* const local = pgo("local");
-  const PgoNumbers* const rbcd = pgo("rbcd");
+  const PgoNumbers* const local = input.pgo(*world.config, "local");
+  const PgoNumbers* const rbcd = input.pgo(*world.config, "rbcd");
   const PaperWorld* const paper = paper_world(world.config->name);
   if (local != nullptr && rbcd != nullptr && paper != nullptr && local->error_m && rbcd->error_m) {
     const double ratio = *rbcd->error_m / *local->error_m;
     const double wanted = paper->ate_m[1] / paper->ate_m[0];
-    input.targets.push_back({"ATE of RBCD over that of local PGO", world.config->title,
-                             "at most " + fixed(wanted, 2) + ", the paper's", fixed(ratio, 2),
-                             ratio <= wanted});
+    input.add_target({"ATE of RBCD over that of local PGO", world.config->title,
+                      "at most " + fixed(wanted, 2) + ", the paper's", fixed(ratio, 2),
+                      ratio <= wanted, true});
   }
   const auto gap = [&](const PgoNumbers* numbers, const char* what, double most_percent) {
     if (numbers == nullptr) return;
     const double percent = gap_percent(*numbers);
-    input.targets.push_back({std::string("cost of ") + what + " above the optimum",
-                             world.config->title, "at most " + paper_text(most_percent) + " %",
-                             significant(percent, 2) + " %", percent <= most_percent});
+    input.add_target({std::string("cost of ") + what + " above the optimum", world.config->title,
+                      "at most " + paper_text(most_percent) + " %", significant(percent, 2) + " %",
+                      percent <= most_percent});
   };
   gap(rbcd, "RBCD", kMostRbcdGap_percent);
-  gap(pgo("newton"), "our best", kMostBestGap_percent);
+  gap(input.pgo(*world.config, "newton"), "our best", kMostBestGap_percent);
 }
 
 void add_odometry_targets(ReportInput& input, const ReportInput::World& world) {
@@ -174,22 +214,23 @@ void add_odometry_targets(ReportInput& input, const ReportInput::World& world) {
     if (!robot.odometry_error_m) continue;
     const std::string where = world.config->title + ", " + robot.name;
     if (const auto most_m = published_odometry_error_m(robot.name)) {
-      input.targets.push_back({"ATE of odometry", where, "at most " + fixed(*most_m, 2) + " m",
-                               fixed(*robot.odometry_error_m, 3) + " m",
-                               *robot.odometry_error_m <= *most_m});
+      input.add_target({"ATE of odometry", where, "at most " + fixed(*most_m, 2) + " m",
+                        fixed(*robot.odometry_error_m, 3) + " m",
+                        *robot.odometry_error_m <= *most_m, true});
     } else if (robot.distance_m > 0.0) {
       const double percent = 100.0 * *robot.odometry_error_m / robot.distance_m;
-      input.targets.push_back({"ATE of odometry over the distance", where, "at most 0.5 %",
-                               fixed(percent, 3) + " %", percent <= kMostDrift_percent});
+      input.add_target({"ATE of odometry over the distance", where, "at most 0.5 %",
+                        fixed(percent, 3) + " %", percent <= kMostDrift_percent, true});
     }
   }
 }
 
 }  // namespace
 
-ReportSection trajectory_section(ReportInput& input) {
-  ReportSection section{.id = "trajectory", .title = "Trajectories", .blocks = {}};
+std::optional<ReportSection> trajectory_section(ReportInput& input) {
   const auto worlds = input.worlds(input.config().trajectory_worlds);
+  if (worlds.empty()) return std::nullopt;
+  ReportSection section{.id = "trajectory", .title = "Trajectories", .blocks = {}};
   section.blocks.emplace_back(ReportParagraph{
       "A team runs in each world. The pose graph it ends with, its odometry and the closures it "
       "kept, is then solved from the same start by every method: local PGO joins the robots' own "
@@ -197,17 +238,16 @@ ReportSection trajectory_section(ReportInput& input) {
       "Newton method see only their robot's part and the messages of the others; the centralised "
       "one certifies its optimum. RBCD and DGS start from the chordal initialisation of the whole "
       "graph, which is not counted; the Newton method's team finds its start itself."});
-  if (!worlds.empty()) {
-    section.blocks.emplace_back(inputs_table(worlds));
-    section.blocks.emplace_back(half_table(input, worlds, true));
-    section.blocks.emplace_back(half_table(input, worlds, false));
-    section.blocks.emplace_back(gap_table(input, worlds));
-    section.blocks.emplace_back(plots(input, worlds));
-    section.blocks.emplace_back(odometry_table(worlds));
-  }
+  section.blocks.emplace_back(inputs_table(worlds));
+  section.blocks.emplace_back(half_table(input, worlds, true));
+  section.blocks.emplace_back(half_table(input, worlds, false));
+  section.blocks.emplace_back(gap_table(input, worlds));
+  section.blocks.emplace_back(plots(input, worlds));
+  section.blocks.emplace_back(odometry_table(worlds));
+  if (ReportTable table = spread_table(input, worlds); !table.rows.empty())
+    section.blocks.emplace_back(std::move(table));
   for (const auto& world : worlds) add_optimisation_targets(input, world);
   for (const auto& world : worlds) add_odometry_targets(input, world);
-  section.blocks.emplace_back(input.provenance("trajectory"));
   return section;
 }
 

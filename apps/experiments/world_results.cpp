@@ -82,6 +82,13 @@ void add_truth(const fs::path& truth, RobotNumbers& robot) {
   robot.recorded_s = 1e-9 * static_cast<double>(poses.back().stamp - poses.front().stamp);
 }
 
+// What the robot took of its host.
+void add_process(const fs::path& run, const YAML::Node& summary, RobotNumbers& robot) {
+  robot.module_s = module_seconds(run / "timing.csv");
+  robot.processor_s = number_at(summary, "process.cpu_s");
+  robot.peak_memory_mb = scaled(number_at(summary, "process.peak_memory_bytes"), 1e-6);
+}
+
 RobotNumbers read_robot(const YAML::Node& team, const RobotPlan& plan, const fs::path& run) {
   RobotNumbers robot;
   robot.name = plan.name;
@@ -94,14 +101,12 @@ RobotNumbers read_robot(const YAML::Node& team, const RobotPlan& plan, const fs:
   if (const YAML::Node traffic = node_at(own, "traffic"); traffic && traffic.IsMap())
     for (const auto& entry : traffic)
       robot.sent_bytes[entry.first.Scalar()] = entry.second.as<double>(0.0);
-  robot.module_s = module_seconds(run / plan.name / "timing.csv");
   const YAML::Node summary = read_json(run / plan.name / "summary.json");
+  add_process(run / plan.name, summary, robot);
   const auto keypoints = number_at(summary, "keypoints");
   robot.keyframe_bytes = keypoints && robot.keyframes > 0
                              ? *keypoints * kKeypointBytes / static_cast<double>(robot.keyframes)
                              : mean_keyframe_bytes(run / plan.name / "traffic.csv");
-  robot.processor_s = number_at(summary, "process.cpu_s");
-  robot.peak_memory_mb = scaled(number_at(summary, "process.peak_memory_bytes"), 1e-6);
   robot.mesh = mesh_of(team, plan.name);
   return robot;
 }
@@ -137,6 +142,15 @@ double WorldResults::sent_mb(const std::string& category) const {
     if (const auto found = robot.sent_bytes.find(category); found != robot.sent_bytes.end())
       bytes += found->second;
   return 1e-6 * bytes;
+}
+
+RobotNumbers read_lone_robot(const fs::path& run) {
+  RobotNumbers robot;
+  add_process(run, read_json(run / "summary.json"), robot);
+  const std::vector<StampedPose> poses = read_trajectory(run / "odometry.tum");
+  if (poses.empty()) throw std::runtime_error((run / "odometry.tum").string() + ": no poses");
+  robot.recorded_s = 1e-9 * static_cast<double>(poses.back().stamp - poses.front().stamp);
+  return robot;
 }
 
 WorldResults read_world_results(const WorldConfig& world, const ExperimentPaths& paths) {

@@ -30,8 +30,8 @@ struct RobotNumbers {
   std::size_t keyframes = 0;
   std::optional<double> odometry_error_m, optimized_error_m;  ///< Absolute, rmse.
   std::map<std::string, double> sent_bytes;                   ///< By category.
-  std::optional<double> keyframe_bytes;  ///< Mean size with all its keypoints.
-  std::optional<double> processor_s;     ///< CPU time of the whole robot.
+  std::optional<double> keyframe_bytes;                       ///< Mean size with all its keypoints.
+  std::optional<double> processor_s;                          ///< CPU time of the whole robot.
   std::optional<double> peak_memory_mb;
   std::map<std::string, double> module_s;  ///< Time in the steps of each module, waiting excluded.
   MeshPair mesh;
@@ -50,6 +50,10 @@ struct WorldResults {
   /// Sum over the robots [MB]; nothing for a category that none sent.
   [[nodiscard]] double sent_mb(const std::string& category) const;
 };
+
+/// Length of the recording, processor, memory and modules of a robot that was run alone, from its
+/// folder of results. Throws std::runtime_error, as below.
+[[nodiscard]] RobotNumbers read_lone_robot(const std::filesystem::path& run);
 
 /// Reads the team's tables and what the robots left. Throws std::runtime_error naming the file that
 /// is missing or not what it should be.

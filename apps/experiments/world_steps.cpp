@@ -33,6 +33,7 @@ void add_flights(const WorldConfig& world, const ExperimentPaths& paths, Step& s
     }
     truths.push_back(flight.truth.string());
     imus.push_back(flight.imu.string());
+    step.inputs.insert(step.inputs.end(), {flight.truth, flight.imu});
   }
   const auto add = [&](const char* option, const std::vector<std::string>& values) {
     step.command.emplace_back(option);
@@ -46,7 +47,7 @@ void add_flights(const WorldConfig& world, const ExperimentPaths& paths, Step& s
 Step simulate_step(const WorldConfig& world, const ExperimentPaths& paths) {
   const WorldFiles files = world_files(world, paths);
   const fs::path made = files.recordings / "simulation.json";
-  Step step{.name = "simulate-" + world.name,
+  Step step{.name = simulate_step_name(world),
             .title = "recordings, " + world.title,
             .command = {(paths.programs / "kimera_multi_simulate").string()},
             .outputs = {made, files.team_file},
@@ -114,7 +115,7 @@ Step team_step(const WorldConfig& world, const ExperimentPaths& paths) {
   if (files.original)
     step.writes = {{files.team_file, original_team_file(world, paths)}};
   else
-    step.needs = {"simulate-" + world.name};
+    step.needs = {simulate_step_name(world)};
   if (made_elsewhere(step, summaries, paths)) {
     step.title = "tables of the team's run, " + world.title;
     step.command.emplace_back("--report");
@@ -144,13 +145,18 @@ bool has_original_images(const WorldConfig& world, const ExperimentPaths& paths)
          });
 }
 
+std::string simulate_step_name(const WorldConfig& world) {
+  return "simulate-" + world.recordings;
+}
+
 std::string team_step_name(const WorldConfig& world) {
   return "team-" + world.name;
 }
 
 std::vector<Step> world_steps(const WorldConfig& world, const ExperimentPaths& paths) {
   std::vector<Step> steps;
-  if (!has_original_images(world, paths)) steps.push_back(simulate_step(world, paths));
+  const bool has_own = world.recordings == world.name;  // else the world that it repeats makes them
+  if (has_own && !has_original_images(world, paths)) steps.push_back(simulate_step(world, paths));
   steps.push_back(team_step(world, paths));
   return steps;
 }

@@ -11,6 +11,7 @@ namespace km {
 namespace {
 
 using Catch::Contains;
+namespace fs = std::filesystem;
 
 struct Plan {
   TemporaryFolder folder;
@@ -38,7 +39,8 @@ TEST_CASE("A world is simulated, its team is run, its graph is solved by every m
           "[experiments]") {
   const Plan plan;
   const auto steps = plan_experiment("trajectory", plan.config, plan.paths());
-  CHECK(steps.size() == 4 * (2 + plan.config.methods.size()));
+  constexpr std::size_t kWorlds = 4, kRuns = 3;  // on the same recordings
+  CHECK(steps.size() == kWorlds * (1 + kRuns * (1 + plan.config.methods.size())));
   CHECK(steps[0].name == "simulate-city");
   CHECK(steps[1].name == "team-city");
   CHECK(steps[1].needs == std::vector<std::string>{"simulate-city"});
@@ -48,6 +50,49 @@ TEST_CASE("A world is simulated, its team is run, its graph is solved by every m
   CHECK_THAT(command_text(plan.step("trajectory", "pgo-city-rbcd50").command),
              Contains("kimera_multi_pgo") && Contains("--rounds 50 --json"));
   CHECK(plan.step("trajectory", "pgo-city-dgs").copies.size() == 3);
+}
+
+TEST_CASE("A world is run again on its recordings, and on those of other seeds", "[experiments]") {
+  Plan plan;
+  const Step again = plan.step("trajectory", "team-city-run3");
+  CHECK(again.needs == std::vector<std::string>{"simulate-city"});
+  CHECK_THAT(command_text(again.command), Contains("data/city/team.yaml") && Contains("--output") &&
+                                              Contains("data/city-run3_res") &&
+                                              Contains("--set mapping.mode=off"));
+  const auto mesh = plan_experiment("mesh", plan.config, plan.paths());
+  CHECK(std::none_of(mesh.begin(), mesh.end(),
+                     [](const Step& step) { return step.name.find("run") != step.name.npos; }));
+  fs::copy("config", plan.folder.path() / "config", fs::copy_options::recursive);
+  plan.folder.write("config/experiments/worlds.yaml",
+                    "city: {robots: [a], seeds: [5], simulate: [--seed, \"1\", --labels]}\n"
+                    "camp: {robots: [a], seeds: [6]}\nv1: {robots: [a]}\nv2: {robots: [a]}\n");
+  plan.folder.write("config/experiments/resources.yaml", "worlds: [city]\n");
+  plan.config = read_experiments(plan.folder.path() / "config/experiments", false);
+  CHECK_THAT(command_text(plan.step("trajectory", "simulate-city-seed5").command),
+             Contains("--seed 5 --labels") && Contains("data/city-seed5"));
+  CHECK_THAT(command_text(plan.step("trajectory", "simulate-camp-seed6").command),
+             Contains("--seed 6"));
+  CHECK(plan.step("trajectory", "team-city-seed5").needs ==
+        std::vector<std::string>{"simulate-city-seed5"});
+}
+
+TEST_CASE("One robot is run alone on the recording of a world", "[experiments]") {
+  const Plan plan;
+  const Step alone = plan.step("resources", "alone-v1");
+  CHECK(alone.needs == std::vector<std::string>{"simulate-v1"});
+  CHECK_THAT(command_text(alone.command), Contains("kimera_multi_robot") &&
+                                              Contains("data/v1/V1_01") &&
+                                              Contains("--rate max --set mapping.mode=off"));
+}
+
+TEST_CASE("A step is the same wherever its files lie", "[experiments]") {
+  Step step{.name = "s", .title = "", .command = {"/a/tool", "data/city/", "--rate", "max"}};
+  const std::string fingerprint = fingerprint_of(step);
+  step.command[0] = "/b/tool";
+  step.command[1] = "/home/me/data/city";
+  CHECK(fingerprint_of(step) == fingerprint);
+  step.command[1] = "/home/me/data/camp";
+  CHECK(fingerprint_of(step) != fingerprint);
 }
 
 TEST_CASE("Steps of several experiments are planned once, each after what it needs",

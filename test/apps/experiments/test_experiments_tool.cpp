@@ -39,9 +39,11 @@ struct Laboratory {
   }
   CommandResult run(const std::string& arguments) const {
     const std::string root = folder.path().string();
-    return run_command(kTool + arguments + " --quick --config " + root +
-                       "/config/experiments --graphs " + root + "/graphs --data " + root +
-                       "/data --results " + root + "/results");
+    return bare(arguments + " --quick --config " + root + "/config/experiments --graphs " + root +
+                "/graphs --data " + root + "/data");
+  }
+  CommandResult bare(const std::string& arguments) const {
+    return run_command(kTool + arguments + " --results " + (folder.path() / "results").string());
   }
 };
 
@@ -53,11 +55,11 @@ TEST_CASE("The quick pcm experiment runs, reports, and is not run twice", "[expe
   CHECK_THAT(first.output, Contains("[1/2] consistent closures, seed 1: done in") &&
                                Contains("2 steps made, 0 were done before"));
   const std::string page = laboratory.folder.read("results/report.html");
-  CHECK_THAT(page, Contains("search time and clique against vertices, seed 2") &&
+  CHECK_THAT(page, Contains("search time and clique against vertices") && Contains("--seed 2") &&
                        Contains("--outliers 30") && Contains("small versions") &&
                        Contains("exact search: clique against batch"));
-  CHECK_THAT(laboratory.folder.read("results/report.md"), Contains("figures/pcm-1.svg"));
-  CHECK_THAT(laboratory.folder.read("results/figures/pcm-1.svg"), Catch::StartsWith("<svg"));
+  CHECK_THAT(laboratory.folder.read("results/report.md"), Contains("figures/pcm.svg"));
+  CHECK_THAT(laboratory.folder.read("results/figures/pcm.svg"), Catch::StartsWith("<svg"));
   const CommandResult second = laboratory.run("run pcm");
   CHECK_THAT(second.output, Contains("0 steps made, 2 were done before"));
   CHECK_THAT(laboratory.run("list").output, Contains("pcm-1") && Contains("done"));
@@ -66,6 +68,28 @@ TEST_CASE("The quick pcm experiment runs, reports, and is not run twice", "[expe
   laboratory.folder.write("config/experiments/pcm.yaml", pcm + "closures: 10\n");
   CHECK_THAT(laboratory.run("list").output, Contains("outdated"));
   CHECK_THAT(laboratory.run("run pcm").output, Contains("2 steps made"));
+}
+
+TEST_CASE("What a run was given is kept with its results", "[experiments]") {
+  const Laboratory laboratory;
+  const CommandResult empty = laboratory.bare("report");
+  CHECK(empty.exit_code == 1);
+  CHECK_THAT(empty.output, Contains("nothing to report") && Contains("--results"));
+  CHECK_FALSE(fs::exists(laboratory.folder.path() / "results/report.md"));
+  REQUIRE(laboratory.run("run pcm").exit_code == 0);
+  const std::string before = laboratory.folder.read("results/numbers.json");
+  const CommandResult report = laboratory.bare("report");
+  CAPTURE(report.output);
+  CHECK_THAT(report.output, Contains("2 of 2 numbers to reach are met"));
+  CHECK(laboratory.folder.read("results/numbers.json") == before);
+  CHECK_THAT(laboratory.bare("list").output,
+             Contains((laboratory.folder.path() / "graphs").string()));
+  // The command line has the last word.
+  fs::create_directory(laboratory.folder.path() / "none");
+  const CommandResult other =
+      laboratory.bare("report --graphs " + (laboratory.folder.path() / "none").string());
+  CHECK(other.exit_code == 1);
+  CHECK(laboratory.folder.read("results/numbers.json") == before);
 }
 
 TEST_CASE("The tool says what is wrong or missing", "[experiments]") {
