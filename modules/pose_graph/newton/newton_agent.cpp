@@ -122,10 +122,18 @@ void NewtonAgent::learn_separators() {
   for (const KeyframeId& id : graph_->kept())
     place_of_kept_.push_back(static_cast<int>(
         std::lower_bound(separators.begin(), separators.end(), id) - separators.begin()));
-  separator_poses_.assign(separators.size(), SE3::Identity());
-  if (accepted_.empty()) return;
   for (std::size_t s = 0; s < separators.size(); ++s)
-    separator_poses_[s] = told_pose(separators[s]);
+    if (is_public(separators[s])) public_separators_.push_back(static_cast<Index>(s));
+  separator_poses_.assign(public_separators_.size(), SE3::Identity());
+  if (accepted_.empty()) return;
+  for (std::size_t k = 0; k < public_separators_.size(); ++k)
+    separator_poses_[k] = told_pose(separators[static_cast<std::size_t>(public_separators_[k])]);
+}
+
+bool NewtonAgent::is_public(const KeyframeId& id) const {
+  const auto hello = hellos_.find(id.robot);
+  return hello != hellos_.end() &&
+         std::binary_search(hello->second.poses.begin(), hello->second.poses.end(), id.index);
 }
 
 void NewtonAgent::factorise_own(const RobotSystem& system) {
@@ -235,7 +243,8 @@ std::optional<NewtonShare> NewtonAgent::go_back() {
 TeamStep NewtonAgent::make_step(const MatrixXd& separators) const {
   const Index block = tangent_size(dimension_);
   TeamStep step;
-  step.separators = separators.reshaped(block, separators.rows() / block);
+  step.separators =
+      separators.reshaped(block, separators.rows() / block)(Eigen::all, public_separators_);
   step.nodes = substitute_back(separators).reshaped(block, graph_->nodes());
   remove_drift(step, nodes_, separator_poses_);
   return step;

@@ -25,8 +25,8 @@ struct NewtonOptions {
 
 /// One robot's part in a distributed Newton method for pose graphs.
 ///
-/// Separators, public poses of which every edge between robots has one (see RobotGraph), cut the
-/// team's graph into parts that touch one robot's private poses each. In every round a robot
+/// Separators, poses of which every edge between robots has one (see RobotGraph), cut the team's
+/// graph into parts that touch one robot's other poses each. In every round a robot
 /// linearises its edges at the present poses, eliminates its poses but the separators from Newton's
 /// equations, and broadcasts what remains: right-hand side and Schur complement on the separators,
 /// and its share of the cost. From all robots' shares everyone solves the same small system and
@@ -81,6 +81,7 @@ class NewtonAgent {
   void meet();
   void learn_separators();
   [[nodiscard]] SE3 told_pose(const KeyframeId& id) const;
+  [[nodiscard]] bool is_public(const KeyframeId& id) const;
   NewtonShare share_of(const RobotSystem& system, bool with_schur);
   NewtonShare newton_share(Elimination elimination);
   NewtonShare rotation_share();
@@ -108,11 +109,12 @@ class NewtonAgent {
   std::optional<FrontalCholesky> factor_;
   SeparatorSystem separator_system_;
   std::vector<int> place_of_kept_;  // among the separators
-  Eigen::MatrixXd forwarded_;       // of the last share: the eliminated right-hand side
+  std::vector<Eigen::Index> public_separators_;
+  Eigen::MatrixXd forwarded_;  // of the last share: the eliminated right-hand side
   bool pattern_sent_ = false;
 
   std::vector<SE3> nodes_;            // candidate: own poses, then other robots' separators
-  std::vector<SE3> separator_poses_;  // candidate
+  std::vector<SE3> separator_poses_;  // candidate, of the public ones
   std::vector<SE3> base_nodes_;       // where the last step began
   std::vector<SE3> base_separators_;
   TeamStep step_;

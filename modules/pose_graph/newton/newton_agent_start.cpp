@@ -20,9 +20,9 @@ NewtonShare NewtonAgent::set_rotations() {
   const MatrixXd X = substitute_back(separators);
   for (std::size_t k = 0; k < nodes_.size(); ++k)
     nodes_[k].linear() = rotation_of(X.middleRows(dimension_ * static_cast<Index>(k), dimension_));
-  for (std::size_t s = 0; s < separator_poses_.size(); ++s)
-    separator_poses_[s].linear() =
-        rotation_of(separators.middleRows(dimension_ * static_cast<Index>(s), dimension_));
+  for (std::size_t k = 0; k < separator_poses_.size(); ++k)
+    separator_poses_[k].linear() =
+        rotation_of(separators.middleRows(dimension_ * public_separators_[k], dimension_));
   const RobotSystem system = translation_system(*graph_, nodes_, dimension_);
   factorise_own(system);
   return share_of(system, true);
@@ -35,9 +35,9 @@ NewtonShare NewtonAgent::set_translations() {
   const MatrixXd X = substitute_back(separators);
   for (std::size_t k = 0; k < nodes_.size(); ++k)
     nodes_[k].translation().head(dimension_) = X.row(static_cast<Index>(k)).transpose();
-  for (std::size_t s = 0; s < separator_poses_.size(); ++s)
-    separator_poses_[s].translation().head(dimension_) =
-        separators.row(static_cast<Index>(s)).transpose();
+  for (std::size_t k = 0; k < separator_poses_.size(); ++k)
+    separator_poses_[k].translation().head(dimension_) =
+        separators.row(public_separators_[k]).transpose();
   return newton_share(Elimination::kGaussNewton);
 }
 

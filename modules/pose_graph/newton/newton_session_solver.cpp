@@ -13,12 +13,16 @@ constexpr int kDimension = 3;
 // contradict each other the cost is 0, and a relative tolerance would never be met.
 constexpr double kNegligible = 1e-9;
 
+// Second derivatives are worth some fifty right-hand sides in bytes.
+constexpr double kPatience = 30.0;
+
 }  // namespace
 
 NewtonSessionSolver::NewtonSessionSolver(RobotEdges edges, std::set<RobotId> members,
                                          std::vector<SE3> start)
     : agent_(std::move(edges), std::move(members), kDimension,
-             NewtonOptions{.absolute_tolerance = kNegligible}, std::move(start)) {}
+             NewtonOptions{.absolute_tolerance = kNegligible, .patience_rounds = kPatience},
+             std::move(start)) {}
 
 void NewtonSessionSolver::receive(const SolverMessagePtr& message) {
   if (const auto* hello = std::get_if<NewtonHello>(&message->content)) agent_.receive(*hello);

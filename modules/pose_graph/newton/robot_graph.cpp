@@ -89,10 +89,6 @@ RobotGraph::RobotGraph(const RobotEdges& robot, std::span<const KeyframeId> cove
   for (Eigen::Index v = 0; v < robot.poses; ++v)
     ids_.push_back({robot.self, static_cast<KeyframeIndex>(v)});
   std::vector<bool> keep(ids_.size(), false);
-  std::vector<bool> free_to_keep(ids_.size(), false);
-  for (const auto& [peer, list] : robot.to)
-    for (const InterEdge& e : list)
-      if (e.own < ids_.size()) free_to_keep[e.own] = true;
   for (std::size_t v = 0; v < keep.size(); ++v)
     keep[v] = std::binary_search(cover.begin(), cover.end(), ids_[v]);
   if (cover.empty() && !keep.empty()) keep[keep.size() / 2] = true;
@@ -102,9 +98,8 @@ RobotGraph::RobotGraph(const RobotEdges& robot, std::span<const KeyframeId> cove
   }
   add_edges_between(robot, cover, keep);
   for (const Edge& e : edges_) check_measurement(robot.self, e);
-  free_to_keep.resize(keep.size(), false);
   const std::vector<NodePair> pairs = couple(edges_);
-  keep = keep_sparse(std::move(keep), free_to_keep, pairs);
+  if (!cover.empty()) keep = keep_sparse(std::move(keep), pairs);
   plan_ = std::make_shared<const EliminationPlan>(std::move(keep), pairs);
 }
 

@@ -29,9 +29,9 @@ struct RobotEdges {
 /// The part of the pose graph that one robot eliminates: its own poses as nodes 0 to n - 1, then
 /// the cover's poses of other robots that its edges end on. Every edge between robots belongs to
 /// exactly one of its two: to the one whose end is not in the cover, else to the one with the lower
-/// id. Kept are the poses of the cover, and of the robot's other public poses those whose
-/// elimination would couple more poses than it uncouples: where a team meets everywhere, that is
-/// most of them, and the Schur complement stays sparse.
+/// id. Kept are the poses of the cover, and of the robot's other poses those whose elimination
+/// would couple more poses than it uncouples: where a robot meets itself or the team everywhere,
+/// that is most of them, and the Schur complement stays sparse.
 class RobotGraph {
  public:
   /// An edge between nodes and the coupling it belongs to; transposed: its i is the coupling's j.
@@ -47,8 +47,8 @@ class RobotGraph {
   /// the cover.
   RobotGraph(const RobotEdges& edges, std::span<const KeyframeId> cover);
 
-  /// Takes the precisions of the robot's own edges from `own`, which lists the same edges. Here they
-  /// may be zero: the pattern of the plan stays.
+  /// Takes the precisions of the robot's own edges from `own`, which lists the same edges. Here
+  /// they may be zero: the pattern of the plan stays.
   void set_precisions(std::span<const BlockEdge> own);
 
   [[nodiscard]] const std::vector<Edge>& edges() const { return edges_; }

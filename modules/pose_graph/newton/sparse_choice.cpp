@@ -4,8 +4,6 @@
 #include <cstdint>
 #include <queue>
 
-#include "modules/pose_graph/newton/elimination_plan.hpp"
-
 namespace km {
 namespace {
 
@@ -72,25 +70,20 @@ enum class State { kKept, kOffered, kOutdated, kEliminated };
 
 }  // namespace
 
-std::vector<bool> keep_sparse(std::vector<bool> keep, const std::vector<bool>& free_to_keep,
-                              const std::vector<NodePair>& pairs) {
-  std::vector<bool> all = keep;
-  for (std::size_t v = 0; v < all.size(); ++v) all[v] = all[v] || free_to_keep[v];
-  const EliminationPlan plan(all, pairs);
-  const std::vector<int>& nodes = plan.kept();
-  BitGraph graph(static_cast<int>(nodes.size()), plan.kept_pairs());
+std::vector<bool> keep_sparse(std::vector<bool> keep, const std::vector<NodePair>& pairs) {
+  BitGraph graph(static_cast<int>(keep.size()), pairs);
 
   // A node whose surroundings have changed is looked at again when its turn comes by its old
   // growth, or when no other is left whose turn it is: after each elimination would be too often
   // where everyone is everyone's neighbour.
-  std::vector<State> state(nodes.size(), State::kKept);
+  std::vector<State> state(keep.size(), State::kKept);
   std::priority_queue<std::pair<int, int>> queue;  // least growth first, then lowest node
   const auto offer = [&](std::size_t v) {
     state[v] = State::kOffered;
     queue.emplace(-graph.growth(static_cast<int>(v)), -static_cast<int>(v));
   };
-  for (std::size_t v = 0; v < nodes.size(); ++v)
-    if (!keep[static_cast<std::size_t>(nodes[v])]) offer(v);
+  for (std::size_t v = 0; v < keep.size(); ++v)
+    if (!keep[v]) offer(v);
   const auto eliminate = [&](int v) {
     state[static_cast<std::size_t>(v)] = State::kEliminated;
     for (const int u : graph.eliminate(v))
@@ -114,11 +107,10 @@ std::vector<bool> keep_sparse(std::vector<bool> keep, const std::vector<bool>& f
       progress = true;
     }
     queue = {};
-    for (std::size_t v = 0; v < nodes.size(); ++v)
+    for (std::size_t v = 0; v < keep.size(); ++v)
       if (state[v] == State::kOffered || state[v] == State::kOutdated) offer(v);
   }
-  for (std::size_t v = 0; v < nodes.size(); ++v)
-    if (state[v] != State::kEliminated) keep[static_cast<std::size_t>(nodes[v])] = true;
+  for (std::size_t v = 0; v < keep.size(); ++v) keep[v] = state[v] != State::kEliminated;
   return keep;
 }
 

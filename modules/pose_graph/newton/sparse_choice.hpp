@@ -7,11 +7,9 @@
 namespace km {
 
 /// Which nodes of a graph to keep so that the Schur complement has few couplings: those in `keep`,
-/// and of those in `free_to_keep` all whose elimination, after that of the others, would add more
-/// couplings than it removes. Greedy: the node that adds fewest, net, is eliminated first.
-/// O(nodes free to keep x couplings of the result / 64).
+/// and of the others all whose elimination would add more couplings than it removes. Greedy: the
+/// node that adds fewest, net, is eliminated first. O(nodes x couplings of the result / 64).
 [[nodiscard]] std::vector<bool> keep_sparse(std::vector<bool> keep,
-                                            const std::vector<bool>& free_to_keep,
                                             const std::vector<NodePair>& pairs);
 
 }  // namespace km
