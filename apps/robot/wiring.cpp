@@ -156,10 +156,18 @@ void Robot::add_network() {
   dds.receive_addressed(t.peer_requests, kRequest, kGeometricVerification);
   dds.send(t.own_replies, kRequest, kGeometricVerification);
   dds.receive_addressed(t.peer_replies, kRequest, kGeometricVerification);
-  dds.send(t.own_closures, kEvent, kGeometricVerification);
-  dds.receive(t.closures, kEvent, kGeometricVerification);
-  dds.send(t.own_inlier_sets, kState, kPoseGraphOptimization);
-  dds.receive(t.peer_inlier_sets, kState, kPoseGraphOptimization);
+  // A closure, and whether it is an inlier, is of use to the robots it joins and to no others.
+  t.own_closures.subscribe([&t](const auto& closure) {
+    if (closure->to.id.robot != closure->from.id.robot)
+      t.closures_to_peers.publish(Addressed<Closure>{closure->to.id.robot, closure});
+  });
+  dds.send(t.closures_to_peers, kEvent, kGeometricVerification);
+  dds.receive_addressed(t.closures, kEvent, kGeometricVerification);
+  t.own_inlier_sets.subscribe([&t](const auto& set) {
+    if (set->a != set->b) t.inlier_sets_to_peers.publish(Addressed<InlierSet>{set->b, set});
+  });
+  dds.send(t.inlier_sets_to_peers, kState, kPoseGraphOptimization);
+  dds.receive_addressed(t.peer_inlier_sets, kState, kPoseGraphOptimization);
   dds.send(t.own_pgo_status, kState, kPoseGraphOptimization);
   dds.receive(t.peer_pgo_status, kState, kPoseGraphOptimization);
   dds.send(t.own_pgo_sessions, kState, kPoseGraphOptimization);

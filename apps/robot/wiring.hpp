@@ -58,7 +58,9 @@ struct Topics {
   Topic<KeyframeReply> peer_replies;
   Topic<ClosureOutcome> outcomes;
   Topic<Closure> own_closures, closures;  // the latter: own and received
+  Topic<Addressed<Closure>> closures_to_peers;
   Topic<InlierSet> own_inlier_sets, peer_inlier_sets;
+  Topic<Addressed<InlierSet>> inlier_sets_to_peers;
   Topic<PgoStatus> own_pgo_status, peer_pgo_status;
   Topic<PgoSession> own_pgo_sessions, peer_pgo_sessions;
   Topic<PublicPoses> own_poses, peer_poses;
