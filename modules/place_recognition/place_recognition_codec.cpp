@@ -1,83 +1,77 @@
 #include "modules/place_recognition/place_recognition_codec.hpp"
 
+#include <bit>
 #include <limits>
 #include <utility>
 
+#include "modules/place_recognition/packed_bits.hpp"
 #include "runtime/dds/wire_sequence.hpp"
 
 namespace km {
 namespace {
 
 constexpr std::uint64_t kMax32 = std::numeric_limits<std::uint32_t>::max();
-constexpr std::size_t kMaxPackedBytes = 10 * kMaxBagWords;  // two numbers of 5 bytes for a word
+constexpr std::size_t kMaxPackedBytes = 16 * kMaxBagWords;  // two numbers of at most 64 bits a word
+constexpr unsigned kParameterBits = 5;
 
-void append_number(std::vector<std::uint8_t>& bytes, std::uint64_t number) {
-  for (; number >= 0x80; number >>= 7U)
-    bytes.push_back(static_cast<std::uint8_t>(0x80U | (number & 0x7FU)));
-  bytes.push_back(static_cast<std::uint8_t>(number));
-}
-
-// Takes a number from the front of `bytes`. 35 bits suffice for all that pack() writes.
-std::optional<std::uint64_t> take_number(std::span<const std::uint8_t>& bytes) {
-  std::uint64_t number = 0;
-  for (unsigned shift = 0; shift < 35 && !bytes.empty(); shift += 7) {
-    const std::uint8_t byte = bytes.front();
-    bytes = bytes.subspan(1);
-    number |= std::uint64_t{byte & 0x7FU} << shift;
-    if (byte < 0x80) return number;
-  }
-  return std::nullopt;
+// The parameter of the Golomb-Rice code that is shortest for gaps of this mean: about ln 2 of it.
+unsigned rice_parameter(std::uint64_t range, std::size_t words) {
+  const std::uint64_t typical = range / words * 45 / 64;
+  return typical > 1 ? static_cast<unsigned>(std::bit_width(typical)) - 1 : 0;
 }
 
 }  // namespace
 
 std::vector<std::uint8_t> pack(const BagOfWords& bag) {
-  std::vector<std::uint8_t> bytes;
-  bytes.reserve(bag.size() * 5 / 4);
+  BitWriter bits;
+  bits.gamma(bag.size() + 1);
+  if (bag.empty()) return bits.take();
+  const unsigned parameter = rice_parameter(std::uint64_t{bag.back().word} + 1, bag.size());
+  bits.bits(parameter, kParameterBits);
   std::uint64_t next = 0;  // smallest word that can follow
   for (const auto& [word, count] : bag) {
-    append_number(bytes, 2 * (word - next) + (count > 1 ? 1U : 0U));
-    if (count > 1) append_number(bytes, count - 2);
+    bits.rice(word - next, parameter);
+    bits.gamma(count);
     next = std::uint64_t{word} + 1;
   }
-  return bytes;
+  return bits.take();
 }
 
 std::optional<BagOfWords> unpack(std::span<const std::uint8_t> bytes) {
+  BitReader bits(bytes);
+  const auto size_and_one = bits.gamma();
+  if (!size_and_one || *size_and_one > kMaxBagWords + 1) return std::nullopt;
+  const auto parameter = *size_and_one > 1 ? bits.bits(kParameterBits) : 0;
+  if (!parameter) return std::nullopt;
   BagOfWords bag;
   std::uint64_t next = 0;
-  while (!bytes.empty()) {
-    const std::optional<std::uint64_t> number = take_number(bytes);
-    if (!number || bag.size() == kMaxBagWords) return std::nullopt;
-    const std::uint64_t word = next + *number / 2;
-    std::uint64_t count = 1;
-    if (*number % 2 == 1) {
-      const std::optional<std::uint64_t> beyond_two = take_number(bytes);
-      if (!beyond_two) return std::nullopt;
-      count = *beyond_two + 2;
-    }
-    if (word > kMax32 || count > kMax32) return std::nullopt;
-    bag.push_back({static_cast<std::uint32_t>(word), static_cast<std::uint32_t>(count)});
+  while (bag.size() + 1 < *size_and_one) {
+    const auto gap = bits.rice(static_cast<unsigned>(*parameter));
+    const auto count = bits.gamma();
+    if (!gap || !count || *gap > kMax32 || next + *gap > kMax32 || *count > kMax32)
+      return std::nullopt;
+    const std::uint64_t word = next + *gap;
+    bag.push_back({static_cast<std::uint32_t>(word), static_cast<std::uint32_t>(*count)});
     next = word + 1;
   }
-  return bag;
+  return bits.ended() ? std::optional(std::move(bag)) : std::nullopt;
 }
 
 Codec<KeyframeBow>::Encoded Codec<KeyframeBow>::encode(const KeyframeBow& message) {
   Encoded encoded;
-  encoded.words = pack(message.words);
+  encoded.bag = pack(message.words);
   Wire& wire = encoded.wire;
   wire.keyframe = {.robot = message.id.robot, .index = message.id.index};
   wire.stamp = message.stamp;
   wire.vocabulary = message.vocabulary;
-  borrow(wire.words, encoded.words);
+  borrow(wire.bag, encoded.bag);
   return encoded;
 }
 
 Decoded<KeyframeBow> Codec<KeyframeBow>::decode(const Wire& wire) {
   if (wire.keyframe.robot != wire.header.robot)
     return Decoded<KeyframeBow>::refuse("a keyframe of another robot than the writer");
-  const auto packed = elements_of(wire.words, kMaxPackedBytes);
+  const auto packed = elements_of(wire.bag, kMaxPackedBytes);
   if (!packed) return Decoded<KeyframeBow>::refuse("words are missing or too many");
   std::optional<BagOfWords> words = unpack(*packed);
   if (!words) return Decoded<KeyframeBow>::refuse("the words cannot be decoded");

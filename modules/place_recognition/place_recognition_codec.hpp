@@ -15,26 +15,25 @@ namespace km {
 /// No image has more words; a message that claims more is refused.
 inline constexpr std::size_t kMaxBagWords = 1U << 16U;
 
-/// Bytes of a bag of words. Per word an unsigned LEB128 number 2 * gap + more, where gap is the
-/// distance to the smallest word that could follow the one before; if `more` is 1, a second number,
-/// count - 2, follows. Most words of an image occur once and lie close together: 1000 words take
-/// about 1.2 kB instead of the 6 kB of plain words and weights.
+/// Bytes of a bag of words: how many there are, and of each the distance to the smallest word that
+/// could follow the one before, in a Golomb-Rice code for the mean distance, and how often it
+/// occurs, in an Elias gamma code. 1000 words out of 10000 take about 0.6 kB.
 [[nodiscard]] std::vector<std::uint8_t> pack(const BagOfWords& bag);
 
-/// Inverse of pack(). nullopt if the bytes end inside a number, a word or count exceeds 32 bits, or
-/// there are more than kMaxBagWords words.
+/// Inverse of pack(). nullopt if the bytes end inside a number or go on after the last, if a word
+/// or count exceeds 32 bits, or if there are more than kMaxBagWords words.
 [[nodiscard]] std::optional<BagOfWords> unpack(std::span<const std::uint8_t> bytes);
 
 template <>
 struct Codec<KeyframeBow> {
-  using Wire = km_wire_BowVector;
-  static constexpr const char* kTopic = "bow_vectors";
+  using Wire = km_wire_WordBag;
+  static constexpr const char* kTopic = "word_bags";
   static constexpr std::uint16_t kVersion = 1;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_BowVector_desc; }
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_WordBag_desc; }
 
   struct Encoded {
     Wire wire{};
-    std::vector<std::uint8_t> words;
+    std::vector<std::uint8_t> bag;
   };
   static Encoded encode(const KeyframeBow& message);
   static Decoded<KeyframeBow> decode(const Wire& wire);
