@@ -64,9 +64,10 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
   if (mapping) add_mapping(config, rate, rig.stereo, *mapping);
   add<KeyframeFeaturesNode>(true, config.keyframe_features, rig.stereo, topics_.keyframe_odometry,
                             topics_.keyframes);
+  vocabulary_ =
+      std::make_shared<const Vocabulary>(load_vocabulary(find_shipped_file(config.run.vocabulary)));
   add<PlaceRecognitionNode>(
-      false, config.place_recognition, identity_.robot,
-      std::make_shared<const Vocabulary>(load_vocabulary(find_shipped_file(config.run.vocabulary))),
+      false, config.place_recognition, identity_.robot, vocabulary_,
       PlaceRecognitionTopics{topics_.keyframes, topics_.peer_bows, topics_.own_bows,
                              topics_.candidates, topics_.place_queries});
   topics_.sensors_end.subscribe([this](const auto&) { source_ended_ = true; });
@@ -126,11 +127,11 @@ void Robot::add_playback(const RobotConfig& config, double rate, RecordedGraph g
 
 void Robot::add_back_end(const RobotConfig& config) {
   add<LoopClosureNode>(
-      false, config.loop_closure, identity_.robot,
+      false, config.loop_closure, identity_.robot, vocabulary_,
       LoopClosureTopics{topics_.keyframes, topics_.candidates, topics_.measured_closures,
                         topics_.peer_requests, topics_.peer_replies, bridge_->peers().events(),
-                        topics_.own_requests, topics_.own_replies, topics_.own_closures,
-                        topics_.outcomes});
+                        topics_.peer_bows, topics_.own_requests, topics_.own_replies,
+                        topics_.own_closures, topics_.outcomes});
   topics_.own_closures.subscribe(
       [this](const auto& closure) { topics_.closures.publish(closure); });
   add<PcmNode>(false, config.pcm, identity_.robot, topics_.closures, topics_.own_inlier_sets);

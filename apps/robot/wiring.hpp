@@ -18,6 +18,7 @@
 #include "modules/mesh_deformation/mesh_deformation_node.hpp"
 #include "modules/place_recognition/keyframe_bow.hpp"
 #include "modules/place_recognition/place_query.hpp"
+#include "modules/place_recognition/vocabulary.hpp"
 #include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/pose_graph/graph_playback_node.hpp"
 #include "modules/pose_graph/pgo_messages.hpp"
@@ -128,6 +129,7 @@ class Robot {
   const RobotIdentity identity_;
   DdsParticipant participant_;
   Topics topics_;
+  std::shared_ptr<const Vocabulary> vocabulary_;  // null where nothing is perceived
   std::atomic<bool> source_ended_ = false;
   std::atomic<bool> id_taken_ = false;
   std::atomic<double> dataset_time_s_ = 0.0;

@@ -107,13 +107,15 @@ Codec<KeyframeRequest>::Encoded Codec<KeyframeRequest>::encode(const KeyframeReq
   encoded.wire.robot = request.requester;
   encoded.wire.request = request.number;
   encoded.wire.keyframe = to_wire(request.keyframe);
+  encoded.wire.own = request.own;
   return encoded;
 }
 
 Decoded<KeyframeRequest> Codec<KeyframeRequest>::decode(const Wire& wire) {
   if (wire.robot != wire.header.robot)
     return Decoded<KeyframeRequest>::refuse("asked in the name of another robot");
-  return Decoded<KeyframeRequest>::accept({wire.robot, wire.request, from_wire(wire.keyframe)});
+  return Decoded<KeyframeRequest>::accept(
+      {wire.robot, wire.request, from_wire(wire.keyframe), wire.own});
 }
 
 Codec<KeyframeReply>::Encoded Codec<KeyframeReply>::encode(const KeyframeReply& reply) {

@@ -60,10 +60,11 @@ struct LoopClosureConfig {
   /// over before one is asked for; 0: all are.
   double failure_patience = 1.0;
 
-  /// Keypoints of a keyframe that a peer is sent at most, 40 bytes each.
-  int reply_keypoints = 400;
+  /// Keypoints of a keyframe that a peer is sent at most, 40 bytes each: those most likely to
+  /// correspond, see chosen_by_words().
+  int reply_keypoints = 200;
 
-  /// Keyframes of peers kept for further candidates; each takes about 20 kB with the default
+  /// Keyframes of peers kept for further candidates; each takes about 10 kB with the default
   /// reply_keypoints.
   int cached_keyframes = 500;
 
@@ -96,7 +97,7 @@ struct LoopClosureConfig {
     visitor.field("failure_patience", failure_patience, {0.0, 100.0},
                   "candidates passed over per failure of their like; 0: none");
     visitor.field("reply_keypoints", reply_keypoints, {50, 100000}, "sent to a peer, 40 B each");
-    visitor.field("cached_keyframes", cached_keyframes, {1, 1000000}, "of peers, about 20 kB each");
+    visitor.field("cached_keyframes", cached_keyframes, {1, 1000000}, "of peers, about 10 kB each");
     visitor.field("seed", seed, {0U, ~0U}, "of the sampling");
   }
 };

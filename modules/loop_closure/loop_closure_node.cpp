@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "modules/loop_closure/keyframe_features.hpp"
+#include "modules/loop_closure/keypoint_choice.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 
@@ -18,8 +19,10 @@ constexpr std::chrono::milliseconds kTickPeriod(100);
 }  // namespace
 
 LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
+                                 std::shared_ptr<const Vocabulary> vocabulary,
                                  const LoopClosureTopics& topics)
     : self_(self),
+      vocabulary_(std::move(vocabulary)),
       topics_(topics),
       verifier_(config),
       peers_(static_cast<std::size_t>(config.cached_keyframes)),
@@ -40,6 +43,7 @@ LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
   topics_.peer_requests.subscribe(queue);
   topics_.peer_replies.subscribe(queue);
   topics_.peer_events.subscribe(queue);
+  if (vocabulary_) topics_.peer_bows.subscribe(queue);
 }
 
 void LoopClosureNode::start() {
@@ -83,7 +87,8 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeRequest>& request
     reply.found = true;
     reply.keyframe.odometry = own->second->odometry;
     reply.keyframe.stamp = own->second->stamp;
-    reply.keyframe.features = reduced(own->second->features, reply_keypoints_);
+    reply.keyframe.features =
+        worth_sending(own->second->features, {request->requester, request->own});
   }
   topics_.own_replies.publish(Addressed<KeyframeReply>{
       request->requester, std::make_shared<const KeyframeReply>(std::move(reply))});
@@ -106,6 +111,14 @@ void LoopClosureNode::step(const std::shared_ptr<const PeerEvent>& event) {
     return;
   requests_.returned(event->identity.robot);
   send_due_requests();
+}
+
+void LoopClosureNode::step(const std::shared_ptr<const KeyframeBow>& bow) {
+  if (bow->vocabulary != vocabulary_->id()) return;
+  std::vector<std::uint32_t>& words = words_[bow->id];
+  words.clear();
+  words.reserve(bow->words.size());
+  for (const WordCount& entry : bow->words) words.push_back(entry.word);
 }
 
 void LoopClosureNode::step(const LoopClosureTick& tick) {
@@ -133,6 +146,14 @@ LoopClosureNode::KeyframePtr LoopClosureNode::find(const KeyframeId& id) {
   if (id.robot != self_) return peers_.get(id);
   const auto own = own_.find(id);
   return own == own_.end() ? nullptr : own->second;
+}
+
+KeyframeFeatures LoopClosureNode::worth_sending(const KeyframeFeatures& features,
+                                                const KeyframeId& to) const {
+  const auto words = words_.find(to);
+  return words == words_.end()
+             ? reduced(features, reply_keypoints_)
+             : chosen_by_words(features, reply_keypoints_, *vocabulary_, words->second);
 }
 
 // Goes on with what is there; waits for what is not, a peer's keyframe by asking for it.
@@ -211,10 +232,14 @@ void LoopClosureNode::report(const Work& work, ClosureStage stage, std::string r
 
 void LoopClosureNode::send_due_requests() {
   for (const KeyframeId& keyframe : requests_.due(now_s_)) {
+    std::vector<Work>& works = waiting_.at(keyframe);
     auto request = std::make_shared<const KeyframeRequest>(
-        KeyframeRequest{.requester = self_, .number = next_request_++, .keyframe = keyframe});
+        KeyframeRequest{.requester = self_,
+                        .number = next_request_++,
+                        .keyframe = keyframe,
+                        .own = works.front().id.from.index});
     topics_.own_requests.publish(Addressed<KeyframeRequest>{keyframe.robot, std::move(request)});
-    for (Work& work : waiting_.at(keyframe))
+    for (Work& work : works)
       if (!std::exchange(work.requested, true)) report(work, ClosureStage::kRequested);
   }
 }

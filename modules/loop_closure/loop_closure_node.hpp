@@ -18,6 +18,8 @@
 #include "modules/loop_closure/keyframe_requests.hpp"
 #include "modules/loop_closure/request_economy.hpp"
 #include "modules/loop_closure/verifier.hpp"
+#include "modules/place_recognition/keyframe_bow.hpp"
+#include "modules/place_recognition/vocabulary.hpp"
 #include "runtime/dds/bridge.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
@@ -34,6 +36,7 @@ struct LoopClosureTopics {
   Topic<KeyframeRequest>& peer_requests;   ///< In: for own keyframes.
   Topic<KeyframeReply>& peer_replies;      ///< In: to this robot's requests.
   Topic<PeerEvent>& peer_events;           ///< In: who comes and goes.
+  Topic<KeyframeBow>& peer_bows;           ///< In: words of the peers' keyframes.
   const Topic<Addressed<KeyframeRequest>>& own_requests;
   const Topic<Addressed<KeyframeReply>>& own_replies;
   const Topic<Closure>& own_closures;     ///< Out: verified.
@@ -55,8 +58,10 @@ struct LoopClosureTick {
 /// is verified once here; its other robot may find and verify it as well, with the ends exchanged.
 class LoopClosureNode final : public Node {
  public:
-  /// Throws ConfigError if `config` is out of bounds.
-  LoopClosureNode(const LoopClosureConfig& config, RobotId self, const LoopClosureTopics& topics);
+  /// `vocabulary` may be null: then keypoints are sent without regard to their words. Throws
+  /// ConfigError if `config` is out of bounds.
+  LoopClosureNode(const LoopClosureConfig& config, RobotId self,
+                  std::shared_ptr<const Vocabulary> vocabulary, const LoopClosureTopics& topics);
 
   std::string_view name() const override { return "loop_closure"; }
   void start() override;
@@ -71,6 +76,7 @@ class LoopClosureNode final : public Node {
   void step(const std::shared_ptr<const KeyframeRequest>& request);
   void step(const std::shared_ptr<const KeyframeReply>& reply);
   void step(const std::shared_ptr<const PeerEvent>& event);
+  void step(const std::shared_ptr<const KeyframeBow>& bow);
   void step(const LoopClosureTick& tick);
 
  private:
@@ -78,7 +84,7 @@ class LoopClosureNode final : public Node {
       std::variant<std::shared_ptr<const Keyframe>, std::shared_ptr<const LoopCandidate>,
                    std::shared_ptr<const RelativePose>, std::shared_ptr<const KeyframeRequest>,
                    std::shared_ptr<const KeyframeReply>, std::shared_ptr<const PeerEvent>,
-                   LoopClosureTick>;
+                   std::shared_ptr<const KeyframeBow>, LoopClosureTick>;
   using KeyframePtr = std::shared_ptr<const Keyframe>;
 
   /// A candidate, or a measured closure, on its way.
@@ -99,11 +105,15 @@ class LoopClosureNode final : public Node {
   void report(const Work& work, ClosureStage stage, std::string reason = {},
               const Verification& numbers = {}) const;
   void send_due_requests();
+  [[nodiscard]] KeyframeFeatures worth_sending(const KeyframeFeatures& features,
+                                               const KeyframeId& to) const;
 
   const RobotId self_;
+  const std::shared_ptr<const Vocabulary> vocabulary_;
   const LoopClosureTopics topics_;
   const Verifier verifier_;
   std::map<KeyframeId, KeyframePtr> own_;
+  std::map<KeyframeId, std::vector<std::uint32_t>> words_;  // of the peers' keyframes, ascending
   KeyframeCache peers_;
   KeyframeRequests requests_;
   RequestEconomy economy_;

@@ -4,6 +4,7 @@
 
 #include "modules/loop_closure/loop_closure_node.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
+#include "test/modules/place_recognition/toy_vocabulary.hpp"
 
 namespace km {
 namespace {
@@ -14,8 +15,8 @@ constexpr RobotId kPeer = 9;
 // A robot's node with its channels; what it sends is kept.
 struct Robot {
   explicit Robot(RobotId self, const LoopClosureConfig& config = {})
-      : node(config, self,
-             {keyframes, candidates, measured, peer_requests, peer_replies, peer_events,
+      : node(config, self, std::make_shared<const Vocabulary>(toy_vocabulary(200)),
+             {keyframes, candidates, measured, peer_requests, peer_replies, peer_events, peer_bows,
               own_requests, own_replies, own_closures, outcomes}) {
     own_requests.subscribe([this](const auto& m) { requests.push_back(*m); });
     own_replies.subscribe([this](const auto& m) { replies.push_back(*m); });
@@ -35,6 +36,7 @@ struct Robot {
   Topic<KeyframeRequest> peer_requests;
   Topic<KeyframeReply> peer_replies;
   Topic<PeerEvent> peer_events;
+  Topic<KeyframeBow> peer_bows;
   Topic<Addressed<KeyframeRequest>> own_requests;
   Topic<Addressed<KeyframeReply>> own_replies;
   Topic<Closure> own_closures;
@@ -159,6 +161,42 @@ TEST_CASE("both answers of a repeated request give one closure", "[loop_closure_
   CHECK(robot.requests[0].message->number != robot.requests[1].message->number);
   deliver(robot, peer);
   CHECK(robot.closures.size() == 1);
+}
+
+TEST_CASE("of a keyframe those points are sent that the requester's own one has words of",
+          "[loop_closure_node]") {
+  const bool told = GENERATE(true, false);
+  CAPTURE(told);
+  const Scene scene(13);
+  constexpr std::uint32_t kSent = 50;
+  Robot robot(kSelf), peer(kPeer, {.reply_keypoints = kSent});
+  Keyframe full = scene.peer;
+  const auto words = static_cast<std::uint32_t>(full.features.descriptors.size());
+  for (std::uint32_t i = 0; i < words; ++i) full.features.descriptors[i] = toy_descriptor(i);
+  full.features.keypoints[100].inverse_depth = 0.0F;
+  peer.give(full);
+  BagOfWords theirs;  // of the last points, but not of the very last
+  for (std::uint32_t word = words - kSent; word + 1 < words; ++word) theirs.push_back({word, 1});
+  const Vocabulary vocabulary = toy_vocabulary(200);
+  if (told)
+    peer.give(KeyframeBow{.id = {kSelf, 0}, .vocabulary = vocabulary.id(), .words = theirs});
+  peer.give(KeyframeBow{.id = {kSelf, 1}, .vocabulary = vocabulary.id(), .words = {{3, 1}}});
+  peer.give(KeyframeBow{.id = {kSelf, 0}, .vocabulary = 1, .words = {{4, 1}}});
+  robot.give(scene.own);
+  robot.give(scene.candidate());
+  REQUIRE(robot.requests.size() == 1);
+  CHECK(robot.requests[0].message->own == 0);
+  peer.node.step(robot.requests[0].message);
+  REQUIRE(peer.replies.size() == 1);
+
+  std::vector<OrbDescriptor> expected;  // the strongest come first, and those without depth last
+  for (std::uint32_t word = words - kSent; told && word + 1 < words; ++word)
+    if (word != 100) expected.push_back(toy_descriptor(word));
+  for (std::uint32_t word = 0; expected.size() < kSent; ++word)
+    expected.push_back(toy_descriptor(word));
+  const KeyframeFeatures& sent = peer.replies[0].message->keyframe.features;
+  CHECK(sent.descriptors == expected);
+  CHECK(sent.keypoints.size() == kSent);
 }
 
 TEST_CASE("a peer that returns is asked at once for what it owes", "[loop_closure_node]") {
