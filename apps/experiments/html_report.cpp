@@ -23,9 +23,9 @@ p { max-width: 78ch; margin: 12px 0; }
 nav { margin: 26px 0 0; padding: 14px 18px; background: var(--band); border-radius: 8px; }
 nav a { color: var(--accent); text-decoration: none; margin-right: 22px; white-space: nowrap; }
 nav a:hover { text-decoration: underline; }
-.scroll { overflow-x: auto; margin: 26px 0; }
+.scroll { overflow-x: auto; margin: 0 0 26px; }
 table { border-collapse: collapse; font-size: 14.5px; font-variant-numeric: tabular-nums; }
-caption { text-align: left; font-weight: 600; padding: 0 0 8px; max-width: 78ch; }
+.caption { font-weight: 600; font-size: 14.5px; margin: 26px 0 8px; }
 th, td { padding: 6px 12px; text-align: right; white-space: nowrap; vertical-align: top; }
 th { font-weight: 600; color: var(--soft); vertical-align: bottom; }
 th:first-child, td:first-child { text-align: left; padding-left: 2px; }
@@ -38,7 +38,9 @@ tbody tr:hover { background: var(--band); }
 .best { font-weight: 700; }
 .met { color: #14713d; font-weight: 600; }
 .missed { color: #b3261e; font-weight: 600; }
-.words td, .words th { text-align: left; }
+table.words { width: 100%; }
+.words td, .words th { text-align: left; white-space: normal; }
+.words td:first-child, .words th:first-child { width: 40%; }
 .note { color: var(--soft); font-size: 13.5px; margin: -14px 0 26px; }
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(400px, 1fr)); gap: 26px;
   margin: 26px 0; }
@@ -110,8 +112,9 @@ class HtmlWriter {
   }
 
   void operator()(const ReportTable& table) {
-    out_ << "<div class=\"scroll\"><table" << (table.words ? " class=\"words\"" : "")
-         << ">\n<caption>" << xml_escaped(table.caption) << "</caption>\n<thead>\n";
+    out_ << "<p class=\"caption\">" << xml_escaped(table.caption)
+         << "</p>\n<div class=\"scroll\"><table" << (table.words ? " class=\"words\"" : "")
+         << ">\n<thead>\n";
     if (!table.groups.empty()) {
       out_ << "<tr>";
       for (const ColumnGroup& group : table.groups)

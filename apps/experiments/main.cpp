@@ -92,9 +92,10 @@ struct Setup {
 Setup setup_of(const Options& options, bool is_run) {
   Setup setup{.paths = {}, .config = {}, .quick = options.quick};
   km::ExperimentPaths& paths = setup.paths;
-  const auto below = [&] { return setup.quick ? "quick" : ""; };
-  paths.results =
-      options.results.empty() ? (kResults / fs::path(below())).lexically_normal() : options.results;
+  const auto below = [&](const fs::path& folder) {
+    return setup.quick ? folder / "quick" : folder;
+  };
+  paths.results = options.results.empty() ? below(kResults) : options.results;
   const km::RunInputs kept = km::read_run_inputs(paths.results).value_or(km::RunInputs{});
   if (!is_run) setup.quick = setup.quick || kept.quick;
   const auto first = [](const fs::path& given, const fs::path& then) {
@@ -103,7 +104,7 @@ Setup setup_of(const Options& options, bool is_run) {
   const fs::path data = first(options.data, kData);
   paths.data = options.data.empty() && kept.quick == setup.quick && !kept.data.empty()
                    ? kept.data
-                   : (data / below()).lexically_normal();
+                   : below(data);
   paths.graphs = first(options.graphs, first(kept.graphs, data));
   paths.euroc = first(options.euroc, kept.euroc);
   paths.programs = options.programs;

@@ -34,8 +34,9 @@ ReportTable processor_table(const std::vector<ReportInput::World>& worlds,
   for (const auto& [config, results] : worlds)
     for (const RobotNumbers& robot : results->robots)
       if (robot.processor_s || robot.peak_memory_mb)
-        table.rows.push_back(processor_row(config->title + ", " + robot.name,
-                                           robot.mesh.before.error_m ? "yes" : "-", robot));
+        table.rows.push_back(
+            processor_row(config->title + ", " + robot.name,
+                          robot.module_s.contains("semantic_mapping") ? "yes" : "no", robot));
   table.note =
       "CPU time of the robot's process, user and system, all threads, from start to end; cores: "
       "that "
@@ -46,10 +47,12 @@ ReportTable processor_table(const std::vector<ReportInput::World>& worlds,
   return table;
 }
 
+// Share of the module in the time of all modules' steps.
 double share_percent(const RobotNumbers& robot, const std::string& module) {
+  double all_s = 0.0;
+  for (const auto& [other, seconds] : robot.module_s) all_s += seconds;
   const auto found = robot.module_s.find(module);
-  if (found == robot.module_s.end() || !(robot.recorded_s > 0.0)) return 0.0;
-  return 100.0 * found->second / robot.recorded_s;
+  return found == robot.module_s.end() || !(all_s > 0.0) ? 0.0 : 100.0 * found->second / all_s;
 }
 
 // Robots whose mean is a column.
@@ -68,7 +71,7 @@ struct Profiled {
 ReportTable profile_table(const std::vector<Profiled>& columns) {
   constexpr double kLeastShare_percent = 0.5;
   ReportTable table{.caption =
-                        "Where the time goes: steps of each module over the recording [%], "
+                        "Where the time goes: share of each module in that of all steps [%], "
                         "mean of the robots",
                     .columns = {"module"}};
   std::map<std::string, double> most;  // percent in the column where it is largest
@@ -88,8 +91,8 @@ ReportTable profile_table(const std::vector<Profiled>& columns) {
     table.rows.push_back(std::move(row));
   }
   table.note =
-      "By the clock on the wall: with three robots on few cores a step also waits for a "
-      "core, so these are upper bounds of processor time.";
+      "By the clock on the wall: a step also waits for a core, those of the map the longest, which "
+      "give way to odometry.";
   return table;
 }
 

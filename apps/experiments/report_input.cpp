@@ -24,8 +24,7 @@ Folders folders_of(const ExperimentPaths& paths) {
                                    {"DATA", &paths.data},
                                    {"EUROC", &paths.euroc},
                                    {"GRAPHS", &paths.graphs}})
-    if (!path->empty() && *path != fs::path("."))
-      folders.emplace_back(name, path->lexically_normal().string());
+    if (!path->empty() && *path != fs::path(".")) folders.emplace_back(name, path->string());
   return folders;
 }
 

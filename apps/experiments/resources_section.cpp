@@ -164,7 +164,7 @@ void add_targets(ReportInput& input, const ReportInput::World& world) {
   if (!(mb.keypoints > 0.0)) return;
   const auto add = [&](const char* what, double sent, const std::string& wanted) {
     const double percent = mb.of_keypoints_percent(sent);
-    input.add_target({std::string("communication over that of centralised keypoints, ") + what,
+    input.add_target({std::string("communication over all keypoints sent, ") + what,
                       world.config->title, wanted, fixed(percent, 0) + " %",
                       percent <= kMostShare_percent, true});
   };
