@@ -1,0 +1,40 @@
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <utility>
+
+namespace km {
+
+/// The newest message of a kind, until it is taken: for large ones of which only the newest counts.
+/// In the queue of a slow node they would pile up, each held in memory until its turn. Thread-safe.
+template <typename T>
+class Latest {
+ public:
+  using Message = std::shared_ptr<const T>;
+
+  /// Replaces what was not taken. Nothing after close().
+  void put(Message message) {
+    const std::lock_guard lock(mutex_);
+    if (!closed_) message_.swap(message);
+  }
+
+  /// Null if nothing came since the last time.
+  [[nodiscard]] Message take() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(message_, nullptr);
+  }
+
+  /// What was put can still be taken.
+  void close() {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+  }
+
+ private:
+  std::mutex mutex_;
+  Message message_;
+  bool closed_ = false;
+};
+
+}  // namespace km
