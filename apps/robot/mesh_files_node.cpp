@@ -8,30 +8,36 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kQueueCapacity = 1024;  // more than a robot publishes during one write
+// Of each kind the newest is kept beside the queue: one piece of news tells of all.
+constexpr std::size_t kQueueCapacity = 1;
 
 }  // namespace
 
 MeshFilesNode::MeshFilesNode(std::filesystem::path folder, const MeshFilesTopics& topics)
     : folder_(std::move(folder)),
       worker_(
-          kQueueCapacity, Overflow::kBlock,
-          [this](const Input& input) {
+          kQueueCapacity, Overflow::kDropOldest,
+          [this](const News&) {
             work_in_background();
-            std::visit(
-                [this](const auto& message) {
-                  step(*message);
-                  if constexpr (std::is_same_v<decltype(message),
-                                               const std::shared_ptr<const MapMesh>&>)
-                    map_ = message;
-                },
-                input);
+            take_latest();
           },
           "mesh_files") {
-  take(topics.keyframes);
-  take(topics.trajectory);
-  take(topics.maps);
-  take(topics.optimized);
+  topics.keyframes.subscribe([this](const auto& keyframe) {
+    if (keyframe->id.index == 0) first_keyframe_.put(keyframe);
+  });
+  topics.trajectory.subscribe([this](const auto& trajectory) { trajectory_.put(trajectory); });
+  follow(topics.maps, latest_map_);
+  follow(topics.optimized, optimized_);
+}
+
+void MeshFilesNode::take_latest() {
+  if (const auto keyframe = first_keyframe_.take()) step(*keyframe);
+  if (const auto trajectory = trajectory_.take()) step(*trajectory);
+  if (const auto map = latest_map_.take()) {
+    step(*map);
+    map_ = map;
+  }
+  if (const auto optimized = optimized_.take()) step(*optimized);
 }
 
 void MeshFilesNode::step(const KeyframeOdometry& keyframe) {

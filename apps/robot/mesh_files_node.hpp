@@ -5,12 +5,12 @@
 #include <memory>
 #include <optional>
 #include <string_view>
-#include <variant>
 
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/optimized_mesh.hpp"
+#include "runtime/latest.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
 #include "runtime/worker.hpp"
@@ -50,21 +50,27 @@ class MeshFilesNode final : public Node {
   void finish(const std::optional<Trajectory>& trajectory);
 
  private:
-  template <typename... T>
-  using AnyOf = std::variant<std::shared_ptr<const T>...>;
-  using Input = AnyOf<KeyframeOdometry, Trajectory, MapMesh, OptimizedMesh>;
+  struct News {};  // something is to be taken
 
   template <typename T>
-  void take(Topic<T>& topic) {
-    topic.subscribe([this](const std::shared_ptr<const T>& message) { worker_.post(message); });
+  void follow(Topic<T>& topic, Latest<T>& newest) {
+    topic.subscribe([this, &newest](const std::shared_ptr<const T>& message) {
+      newest.put(message);
+      worker_.post(News());
+    });
   }
+  void take_latest();
   void write_map(const LabelledMesh& map) const;
 
   const std::filesystem::path folder_;
   std::optional<SE3> T_odom_first_;   // the first keyframe
   std::optional<SE3> T_world_first_;  // likewise, optimised
   std::shared_ptr<const MapMesh> map_;
-  Worker<Input> worker_;  // last member: stops first
+  Latest<KeyframeOdometry> first_keyframe_;
+  Latest<Trajectory> trajectory_;
+  Latest<MapMesh> latest_map_;
+  Latest<OptimizedMesh> optimized_;
+  Worker<News> worker_;  // last member: stops first
 };
 
 }  // namespace km

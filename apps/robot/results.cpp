@@ -1,7 +1,5 @@
 #include "apps/robot/results.hpp"
 
-#include <sys/resource.h>
-
 #include <cinttypes>
 #include <cstdio>
 #include <fstream>
@@ -120,6 +118,7 @@ void write_map_counts(JsonWriter& json, const RunRecord& record) {
   json.field("blocks", map.size.blocks);
   json.field("vertices", map.size.vertices);
   json.field("faces", map.size.faces);
+  json.field("superseded_faces_dropped", map.size.dropped_faces);
   const RunRecord::MeshCorrections& corrections = record.mesh_corrections();
   json.field("corrections", corrections.deformed);
   json.field("moves_as_a_whole", corrections.moved);
@@ -128,17 +127,15 @@ void write_map_counts(JsonWriter& json, const RunRecord& record) {
   json.end_object();
 }
 
-// What all threads of the robot took so far.
-void write_process(JsonWriter& json) {
-  rusage usage{};
-  if (getrusage(RUSAGE_SELF, &usage) != 0) return;
-  const auto seconds = [](const timeval& time) {
-    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
-  };
+void write_process(JsonWriter& json, const ProcessUsage& usage, const MemoryTrend& memory) {
   json.key("process");
   json.begin_object();
-  json.field("cpu_s", seconds(usage.ru_utime) + seconds(usage.ru_stime));
-  json.field("peak_memory_bytes", 1024 * usage.ru_maxrss);
+  json.field("cpu_s", usage.cpu_s);
+  json.field("peak_memory_bytes", usage.peak_bytes);
+  json.field("memory_at_start_bytes", memory.first_bytes);
+  json.field("memory_at_end_bytes", memory.last_bytes);
+  if (memory.growth_bytes_per_minute)
+    json.field("memory_growth_bytes_per_minute", *memory.growth_bytes_per_minute);
   json.end_object();
 }
 
@@ -180,7 +177,7 @@ void write_summary(const fs::path& file, const RunRecord& record, const RunSumma
   json.begin_object();
   for (const auto& [category, bytes] : summary.traffic_bytes) json.field(category, bytes);
   json.end_object();
-  write_process(json);
+  write_process(json, summary.process, summary.memory);
   json.field("seconds", summary.seconds);
   json.field("exit_reason", summary.exit_reason);
   json.end_object();

@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include "apps/robot/process_usage.hpp"
 #include "apps/robot/run_record.hpp"
 
 namespace km {
@@ -17,6 +18,8 @@ struct RunSummary {
   std::uint64_t frames_skipped = 0;                    ///< Pairs that odometry was too slow for.
   std::map<std::string, std::uint64_t> traffic_bytes;  ///< Sent, by category.
   double seconds = 0.0;                                ///< Wall time of the run.
+  ProcessUsage process;
+  MemoryTrend memory;
   std::string exit_reason;
 };
 

@@ -75,7 +75,8 @@ std::string map_text(const std::optional<MappingProgress>& mapping) {
 }  // namespace
 
 std::string status_text(double dataset_time_s, const RunRecord& record,
-                        const std::vector<Peer>& peers, const TrafficSnapshot& traffic) {
+                        const std::vector<Peer>& peers, const TrafficSnapshot& traffic,
+                        std::uint64_t resident_bytes) {
   const auto sent = [&traffic](TrafficCategory category) {
     return bytes_text(traffic.bytes(Direction::kOut, category));
   };
@@ -85,7 +86,9 @@ std::string status_text(double dataset_time_s, const RunRecord& record,
          optimizer_text(record.progress()) + map_text(record.mapping()) + " | out: place " +
          sent(TrafficCategory::kPlaceRecognition) + ", verify " +
          sent(TrafficCategory::kGeometricVerification) + ", pgo " +
-         sent(TrafficCategory::kPoseGraphOptimization) + ", other " + sent(TrafficCategory::kOther);
+         sent(TrafficCategory::kPoseGraphOptimization) + ", other " +
+         sent(TrafficCategory::kOther) +
+         format(" | %.0f MB", 1e-6 * static_cast<double>(resident_bytes));
 }
 
 }  // namespace km

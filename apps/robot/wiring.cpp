@@ -37,6 +37,11 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     : identity_{.robot = options.robot, .name = options.name, .boot = random_boot_id()},
       participant_(config.dds, identity_),
       supervisor_(signals) {
+  topics_.keyframe_odometry.subscribe([this](const auto& keyframe) {
+    KeyframeOdometry pose = *keyframe;
+    pose.frame = nullptr;
+    topics_.keyframe_poses.publish(std::move(pose));
+  });
   auto bridge = std::make_unique<DdsBridge>(participant_);
   bridge_ = bridge.get();
   if (auto* reader = std::get_if<std::unique_ptr<DatasetReader>>(&input))
@@ -87,18 +92,19 @@ void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig&
                         overflow,
                         DenseSensingTopics{topics_.located_frames, topics_.dense_frames,
                                            topics_.dense_sensing_progress});
-  add<SemanticMappingNode>(
-      true, map, camera, plan.palette, config.mapping.mesh_interval_s, overflow,
-      SemanticMappingTopics{topics_.dense_frames, topics_.maps, topics_.mapping_progress});
+  add<SemanticMappingNode>(true, map, camera, plan.palette, config.mapping.mesh_interval_s,
+                           overflow,
+                           SemanticMappingTopics{topics_.dense_frames, topics_.superseded_surface,
+                                                 topics_.maps, topics_.mapping_progress});
 }
 
 void Robot::add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder) {
   mesh_deformation_ = &add<MeshDeformationNode>(
       false, config.mesh_deformation, identity_.robot,
-      MeshDeformationTopics{topics_.maps, topics_.keyframe_odometry, topics_.trajectory,
-                            topics_.optimized_meshes});
+      MeshDeformationTopics{topics_.maps, topics_.keyframe_poses, topics_.trajectory,
+                            topics_.optimized_meshes, topics_.superseded_surface});
   mesh_files_ = &add<MeshFilesNode>(false, folder,
-                                    MeshFilesTopics{topics_.keyframe_odometry, topics_.trajectory,
+                                    MeshFilesTopics{topics_.keyframe_poses, topics_.trajectory,
                                                     topics_.maps, topics_.optimized_meshes});
 }
 
@@ -137,7 +143,7 @@ void Robot::add_back_end(const RobotConfig& config) {
   add<PcmNode>(false, config.pcm, identity_.robot, topics_.closures, topics_.own_inlier_sets);
   add<PoseGraphNode>(
       false, config.pose_graph, PgoPeer{identity_.robot, identity_.boot},
-      PoseGraphTopics{topics_.keyframe_odometry, topics_.closures, topics_.own_inlier_sets,
+      PoseGraphTopics{topics_.keyframe_poses, topics_.closures, topics_.own_inlier_sets,
                       topics_.peer_inlier_sets, bridge_->peers().events(), topics_.peer_pgo_status,
                       topics_.peer_pgo_sessions, topics_.peer_poses, topics_.peer_exchanges,
                       topics_.own_pgo_status, topics_.own_pgo_sessions, topics_.own_poses,
@@ -188,7 +194,7 @@ void Robot::add_network() {
 void Robot::add_records() {
   recorder_ = &add<RecorderNode>(false, identity_.robot);
   recorder_->record(topics_.odometry);
-  recorder_->record(topics_.keyframe_odometry);
+  recorder_->record(topics_.keyframe_poses);
   recorder_->record(topics_.keyframes);
   recorder_->record(topics_.closures);
   recorder_->record(topics_.outcomes);

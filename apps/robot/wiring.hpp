@@ -14,6 +14,7 @@
 #include "modules/core/frame.hpp"
 #include "modules/dense_sensing/dense_sensing_progress.hpp"
 #include "modules/loop_closure/keyframe_exchange.hpp"
+#include "modules/mesh/superseded_surface.hpp"
 #include "modules/mesh/team_mesh_node.hpp"
 #include "modules/mesh_deformation/mesh_deformation_node.hpp"
 #include "modules/place_recognition/keyframe_bow.hpp"
@@ -41,12 +42,14 @@ struct Topics {
   Topic<GraphPlaybackEnd> playback_end;
   Topic<OdometryState> odometry;
   Topic<KeyframeOdometry> keyframe_odometry;
+  Topic<KeyframeOdometry> keyframe_poses;  // the same without images, for those who hold them long
   Topic<Keyframe> keyframes;
   Topic<LocatedFrame> located_frames;
   Topic<DenseFrame> dense_frames;
   Topic<DenseSensingProgress> dense_sensing_progress;
   Topic<MapMesh> maps;
   Topic<OptimizedMesh> optimized_meshes;
+  Topic<SupersededSurface> superseded_surface;
   Topic<MeshChunk> own_chunks, peer_chunks;
   Topic<MappingProgress> mapping_progress;
   Topic<RelativePose> measured_closures;

@@ -20,6 +20,9 @@ struct MapMesh {
   /// Names the vertices from one update to the next; never given twice. Ascending, so that vertices
   /// that are in two updates are in the same order in both, and new ones come last.
   std::vector<std::uint64_t> ids = {};
+
+  /// Side of the voxels the mesh was made from [m]; 0: unknown.
+  double voxel_m = 0.0;
 };
 
 }  // namespace km

@@ -76,6 +76,9 @@ struct LocalMeshOptimizer::State {
   // Nodes whose vertex was seen again; indices of their vertices in the new mesh.
   std::vector<std::uint32_t> follow_vertices(const VertexMatch& matched, const MapMesh& map);
 
+  // More than a third of the nodes stands for no surface any more.
+  [[nodiscard]] bool outgrown() const;
+
   // Brings nodes, regions and bindings up to date with `map`. Returns the number of new nodes.
   std::size_t take_over(const MapMesh& map);
 
@@ -145,6 +148,14 @@ DeformationGraph LocalMeshOptimizer::State::make_graph(const MapMesh& map,
   return graph;
 }
 
+bool LocalMeshOptimizer::State::outgrown() const {
+  std::vector<char> stands(simplified.nodes.size(), 0);
+  for (const std::uint32_t node : simplified.node_of_vertex)
+    if (node != kNoIndex) stands[node] = 1;
+  const auto empty = std::count(stands.begin(), stands.end(), 0);
+  return 3 * static_cast<std::size_t>(empty) > stands.size();
+}
+
 LocalMeshOptimizer::LocalMeshOptimizer(const MeshDeformationConfig& config)
     : state_(std::make_unique<State>(config)) {}
 LocalMeshOptimizer::~LocalMeshOptimizer() = default;
@@ -155,15 +166,19 @@ DeformedMesh LocalMeshOptimizer::optimize(const MapMesh& map, std::span<const SE
                                           std::span<const SE3> T_world_kf) {
   check_trajectories(T_odom_kf, T_world_kf);
   check_map_mesh(map, T_odom_kf.size());
-  State& state = *state_;
-  if (T_odom_kf.size() < state.T_world_kf_last.size())
+  if (T_odom_kf.size() < state_->T_world_kf_last.size())
     throw std::invalid_argument("mesh deformation: " + std::to_string(T_odom_kf.size()) +
                                 " keyframes, fewer than the " +
-                                std::to_string(state.T_world_kf_last.size()) + " before");
+                                std::to_string(state_->T_world_kf_last.size()) + " before");
   DeformedMesh result;
   MeshDeformationReport& report = result.report;
 
-  report.new_nodes = state.take_over(map);
+  report.new_nodes = state_->take_over(map);
+  if (state_->outgrown()) {
+    reset();
+    report.new_nodes = state_->take_over(map);
+  }
+  State& state = *state_;
   const DeformationGraph graph = state.make_graph(map, T_odom_kf);
   const std::vector<SE3> anchors = complete(T_odom_kf, T_world_kf);
   report.warm = state.solved;

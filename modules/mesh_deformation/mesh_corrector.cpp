@@ -3,11 +3,15 @@
 #include <utility>
 
 #include "modules/mesh_deformation/map_mesh_check.hpp"
+#include "modules/mesh_deformation/surface_heirs.hpp"
 
 namespace km {
 
 MeshCorrector::MeshCorrector(const MeshDeformationConfig& config)
-    : scale_{config.min_move_m, config.min_rotation_rad}, optimizer_(config) {}
+    : duplicate_voxels_(config.duplicate_voxels),
+      window_keyframes_(static_cast<KeyframeIndex>(config.time_window_keyframes)),
+      scale_{config.min_move_m, config.min_rotation_rad},
+      optimizer_(config) {}
 
 std::optional<MeshCorrection> MeshCorrector::correct(const CorrectionInput& input) {
   check_trajectories(input.T_odom_kf, input.T_world_kf);
@@ -18,8 +22,7 @@ std::optional<MeshCorrection> MeshCorrector::correct(const CorrectionInput& inpu
   if (largest_difference(anchors_, motion.T_after_before, T_published_optimized_, scale_) <= 1.0)
     return std::nullopt;
   T_published_optimized_ = motion.T_after_before;
-  MeshCorrection result{input.map.mesh, report_, false};
-  result.mesh.vertices = optimized_vertices_;
+  MeshCorrection result{optimized_, report_, false, {}, 0};
   result.mesh.transform(T_published_optimized_);
   return result;
 }
@@ -30,14 +33,27 @@ MeshCorrection MeshCorrector::correct_afresh(const CorrectionInput& input) {
   return deform(input, complete(input.T_odom_kf, input.T_world_kf));
 }
 
+// Without names or size of voxels the mapper could not be told, or nothing be judged.
+std::vector<std::uint32_t> MeshCorrector::heirs_in(const LabelledMesh& mesh,
+                                                   const MapMesh& map) const {
+  constexpr double kLongestEdge_voxels = 2.0;  // sqrt(3), and what bending adds
+  if (duplicate_voxels_ <= 0.0 || map.voxel_m <= 0.0 || map.ids.empty())
+    return std::vector(mesh.vertices.size(), kNoIndex);
+  return find_heirs(
+      mesh, map.seen_by,
+      {duplicate_voxels_ * map.voxel_m, kLongestEdge_voxels * map.voxel_m, window_keyframes_});
+}
+
 MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<SE3> anchors) {
-  DeformedMesh deformed = optimizer_.optimize(input.map, input.T_odom_kf, input.T_world_kf);
+  const DeformedMesh deformed = optimizer_.optimize(input.map, input.T_odom_kf, input.T_world_kf);
+  const std::vector<std::uint32_t> heirs = heirs_in(deformed.mesh, input.map);
   map_version_ = input.map_version;
   anchors_ = std::move(anchors);
-  optimized_vertices_ = deformed.mesh.vertices;
+  optimized_ = without_superseded(deformed.mesh, heirs);
   report_ = deformed.report;
   T_published_optimized_ = SE3::Identity();
-  return {std::move(deformed.mesh), report_, true};
+  return {optimized_, report_, true, named(heirs, input.map.ids),
+          deformed.mesh.faces.size() - optimized_.faces.size()};
 }
 
 }  // namespace km

@@ -7,6 +7,7 @@
 
 #include "modules/core/geometry.hpp"
 #include "modules/mesh/map_mesh.hpp"
+#include "modules/mesh/superseded_surface.hpp"
 #include "modules/mesh_deformation/keyframe_motion.hpp"
 #include "modules/mesh_deformation/local_mesh_optimizer.hpp"
 #include "modules/mesh_deformation/mesh_deformation_config.hpp"
@@ -22,14 +23,18 @@ struct CorrectionInput {
 };
 
 struct [[nodiscard]] MeshCorrection {
-  LabelledMesh mesh;             ///< In the frame of the optimised poses.
-  MeshDeformationReport report;  ///< Of the last optimisation.
-  bool deformed = true;          ///< False: that result, moved as a whole.
+  LabelledMesh mesh;  ///< In the frame of the optimised poses, without superseded surface.
+  MeshDeformationReport report;      ///< Of the last optimisation.
+  bool deformed = true;              ///< False: that result, moved as a whole.
+  SupersededSurface superseded;      ///< Of the map; empty where nothing was deformed.
+  std::size_t superseded_faces = 0;  ///< Left out of `mesh`.
 };
 
 /// Keeps a mesh up to date with map and trajectory, at the least cost: nothing while no keyframe
 /// moved by the configured threshold, one rigid motion where all of them moved alike, as they do
-/// when the origin of `world` changes, and Local Mesh Optimization otherwise.
+/// when the origin of `world` changes, and Local Mesh Optimization otherwise. After that, drift is
+/// out of the mesh and copies of surface that was seen on several visits coincide: of these the
+/// newest stays (see find_heirs()).
 ///
 /// Not thread-safe.
 class MeshCorrector {
@@ -47,13 +52,17 @@ class MeshCorrector {
 
  private:
   [[nodiscard]] MeshCorrection deform(const CorrectionInput& input, std::vector<SE3> anchors);
+  [[nodiscard]] std::vector<std::uint32_t> heirs_in(const LabelledMesh& mesh,
+                                                    const MapMesh& map) const;
 
+  const double duplicate_voxels_;
+  const KeyframeIndex window_keyframes_;
   MotionScale scale_;
   LocalMeshOptimizer optimizer_;
   // Of the last optimisation.
   std::optional<std::uint64_t> map_version_;
   std::vector<SE3> anchors_;  // the trajectory, completed
-  std::vector<Eigen::Vector3f> optimized_vertices_;
+  LabelledMesh optimized_;
   MeshDeformationReport report_;
   SE3 T_published_optimized_ = SE3::Identity();  // how its result has been moved since
 };

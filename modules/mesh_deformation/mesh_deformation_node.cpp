@@ -34,21 +34,23 @@ MeshDeformationNode::MeshDeformationNode(const MeshDeformationConfig& config, Ro
     : config_(checked(config)),
       self_(self),
       optimized_(topics.optimized),
+      superseded_(topics.superseded),
       corrector_(config),
       worker_(
           kQueue, Overflow::kBlock,
           [this](const Input& input) {
             work_in_background();
-            step(input, steady_now_s());
+            const double now_s = steady_now_s();
+            take_latest(now_s);
+            step(input, now_s);
           },
           MeshDeformationConfig::kSection),
       ticks_(
           steady_duration(kTickShare * config.period_s), [this] { worker_.post(Tick()); },
           "mesh tick") {
-  const auto forward = [this](const auto& message) { worker_.post(message); };
-  topics.keyframes.subscribe(forward);
-  topics.maps.subscribe(forward);
-  topics.trajectory.subscribe(forward);
+  topics.keyframes.subscribe([this](const auto& keyframe) { worker_.post(keyframe); });
+  topics.maps.subscribe([this](const auto& map) { latest_map_.put(map); });
+  topics.trajectory.subscribe([this](const auto& newest) { latest_trajectory_.put(newest); });
 }
 
 void MeshDeformationNode::start() {
@@ -57,17 +59,24 @@ void MeshDeformationNode::start() {
 }
 
 void MeshDeformationNode::finish() {
-  worker_.post(End());
+  latest_map_.close();
+  latest_trajectory_.close();
+  worker_.post(End());  // refused once stopped
 }
 
 void MeshDeformationNode::stop() noexcept {
-  worker_.post(End());  // refused if stopped before
+  finish();
   worker_.stop();
   ticks_.stop();
 }
 
 std::exception_ptr MeshDeformationNode::error() const {
   return worker_.error() != nullptr ? worker_.error() : ticks_.error();
+}
+
+void MeshDeformationNode::take_latest(double now_s) {
+  if (auto map = latest_map_.take()) step(std::move(map), now_s);
+  if (auto trajectory = latest_trajectory_.take()) step(std::move(trajectory), now_s);
 }
 
 void MeshDeformationNode::step(const Input& input, double now_s) {
@@ -129,7 +138,10 @@ void MeshDeformationNode::correct() {
                        std::move(correction->mesh),
                        correction->report,
                        correction->deformed,
-                       end_s - start_s};
+                       end_s - start_s,
+                       correction->superseded_faces};
+  if (!correction->superseded.vertices.empty())
+    superseded_.publish(std::move(correction->superseded));
   report(result);
   optimized_.publish(std::move(result));
 }
@@ -143,7 +155,8 @@ void MeshDeformationNode::report(const OptimizedMesh& result) const {
   log::debug(name()) << report.vertices << " vertices, " << report.nodes << " nodes ("
                      << report.new_nodes << " new), " << report.keyframes
                      << " keyframes: " << to_string(report.status) << " after " << report.iterations
-                     << " iterations, " << result.seconds << " s";
+                     << " iterations, " << result.superseded_faces << " faces seen anew, "
+                     << result.seconds << " s";
   if (report.status == DeformationStatus::kFailed)
     log::limited(log::Level::kWarn, name(), "failed")
         << "the deformation graph of " << report.nodes

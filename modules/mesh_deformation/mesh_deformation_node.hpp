@@ -11,6 +11,7 @@
 #include "modules/core/pose_graph.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/mesh_deformation/optimized_mesh.hpp"
+#include "runtime/latest.hpp"
 #include "runtime/metrics.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
@@ -21,10 +22,11 @@ namespace km {
 
 /// Channels of the mesh deformation node; they must outlive it.
 struct MeshDeformationTopics {
-  Topic<MapMesh>& maps;                   ///< In: the newest counts.
-  Topic<KeyframeOdometry>& keyframes;     ///< In: own ones, ascending.
-  Topic<Trajectory>& trajectory;          ///< In: own, the newest counts.
-  const Topic<OptimizedMesh>& optimized;  ///< Out.
+  Topic<MapMesh>& maps;                        ///< In: the newest counts.
+  Topic<KeyframeOdometry>& keyframes;          ///< In: own ones, ascending.
+  Topic<Trajectory>& trajectory;               ///< In: own, the newest counts.
+  const Topic<OptimizedMesh>& optimized;       ///< Out.
+  const Topic<SupersededSurface>& superseded;  ///< Out: of the maps, for the mapper.
 };
 
 /// Corrects the robot's mesh when its map or its trajectory changed: a MeshCorrector on its thread.
@@ -63,6 +65,7 @@ class MeshDeformationNode final : public Node {
   void step(const Input& input, double now_s);
 
  private:
+  void take_latest(double now_s);
   void take(const KeyframeOdometry& keyframe);
   void take(Topic<MapMesh>::Message map);
   void correct();
@@ -73,6 +76,7 @@ class MeshDeformationNode final : public Node {
   const MeshDeformationConfig config_;
   const RobotId self_;
   const Topic<OptimizedMesh>& optimized_;
+  const Topic<SupersededSurface>& superseded_;
   MeshCorrector corrector_;
   Topic<MapMesh>::Message map_;
   std::uint64_t map_version_ = 0;
@@ -82,6 +86,8 @@ class MeshDeformationNode final : public Node {
   double next_s_ = 0.0;
   bool ended_ = false;
   Timing timing_;
+  Latest<MapMesh> latest_map_;  // not yet handled
+  Latest<Trajectory> latest_trajectory_;
   Worker<Input> worker_;
   Periodic ticks_;  // last member: stops before the worker it posts to
 };

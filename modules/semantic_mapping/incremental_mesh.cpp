@@ -1,7 +1,6 @@
 #include "modules/semantic_mapping/incremental_mesh.hpp"
 
 #include <algorithm>
-#include <numeric>
 
 namespace km {
 namespace {
@@ -24,6 +23,10 @@ bool reaches(std::uint16_t cell, int offset) {
   const int last =
       ((cell & 7) == 7 ? 1 : 0) | ((cell >> 3 & 7) == 7 ? 2 : 0) | ((cell >> 6 & 7) == 7 ? 4 : 0);
   return (last & offset) == offset;
+}
+
+VoxelLabels labels_of(const VoxelBlock& block, std::size_t voxel) {
+  return block.labels == nullptr ? VoxelLabels() : (*block.labels)[voxel];
 }
 
 void mark_changed(VoxelBlock& block, KeyframeIndex since) {
@@ -172,10 +175,10 @@ void IncrementalMesh::compute(Vertex& vertex, const BlockCells& cells, const Eig
 
   // First the voxel behind the surface: the ray to it went through the surface right here, while
   // that to the one in front goes on to where it meets some surface, maybe another.
-  const LabelId near_label = label_of(near_block, near_voxel);
-  const LabelId far_label = label_of(far_block, far_voxel);
-  vertex.label = a < 0.0F ? near_label : far_label;
-  if (vertex.label == 0) vertex.label = a < 0.0F ? far_label : near_label;
+  const VoxelLabels near_labels = labels_of(near_block, near_voxel);
+  const VoxelLabels far_labels = labels_of(far_block, far_voxel);
+  vertex.labels = a < 0.0F ? near_labels : far_labels;
+  if (label_of(vertex.labels) == 0) vertex.labels = a < 0.0F ? far_labels : near_labels;
 
   const auto seen = [](const VoxelBlock& block, std::size_t v) {
     return (block.near_rows[v / kBlockSide] >> v % kBlockSide & 1U) != 0;
@@ -184,9 +187,7 @@ void IncrementalMesh::compute(Vertex& vertex, const BlockCells& cells, const Eig
   if (seen(far_block, far_voxel)) vertex.last = std::max(vertex.last, far_block.last_seen);
 }
 
-LabelId IncrementalMesh::label_of(const VoxelBlock& block, std::size_t voxel) const {
-  if (block.labels == nullptr) return 0;
-  const VoxelLabels& labels = (*block.labels)[voxel];
+LabelId IncrementalMesh::label_of(const VoxelLabels& labels) const {
   const LabelId best = labels.best();
   if (best == 0 || min_label_probability_ <= 0.0) return best;
   return labels.probability(best, label_model_) >= min_label_probability_ ? best : LabelId{0};
@@ -268,36 +269,6 @@ void IncrementalMesh::finalise(VoxelBlock& block, BlockMap& map) {
     cells.resize(kept);
   });
   disown(block);
-}
-
-MapMesh IncrementalMesh::snapshot(const BlockMap& map, bool labelled) const {
-  std::vector<std::uint32_t> order;
-  order.reserve(vertex_count());
-  for (std::size_t i = 0; i < vertices_.size(); ++i)
-    if (vertices_[i].uses > 0) order.push_back(static_cast<std::uint32_t>(i));
-  std::sort(order.begin(), order.end(),
-            [&](auto a, auto b) { return vertices_[a].id < vertices_[b].id; });
-
-  MapMesh map_mesh;
-  LabelledMesh& mesh = map_mesh.mesh;
-  std::vector<std::uint32_t> index(vertices_.size());
-  for (const std::uint32_t place : order) {
-    const Vertex& vertex = vertices_[place];
-    index[place] = static_cast<std::uint32_t>(mesh.vertices.size());
-    mesh.vertices.push_back(vertex.position);
-    if (labelled) mesh.labels.push_back(vertex.label);
-    map_mesh.seen_by.push_back({vertex.first, vertex.last});
-    map_mesh.ids.push_back(vertex.id);
-  }
-  mesh.faces.reserve(faces_);
-  const auto add = [&](const std::vector<Face>& faces) {
-    for (const Face& face : faces)
-      mesh.faces.push_back({index[face[0]], index[face[1]], index[face[2]]});
-  };
-  add(final_faces_);
-  for (const auto& block : map.blocks())
-    if (block->mesh != nullptr) add(block->mesh->faces);
-  return map_mesh;
 }
 
 }  // namespace km

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "modules/mesh/map_mesh.hpp"
+#include "modules/mesh/superseded_surface.hpp"
 #include "modules/semantic_mapping/block_cells.hpp"
 #include "modules/semantic_mapping/block_map.hpp"
 #include "modules/semantic_mapping/marching_cubes.hpp"
@@ -17,6 +18,12 @@ struct MeshUpdateReport {
   std::size_t blocks = 0;  ///< Meshed anew.
   std::size_t vertices_added = 0;
   std::size_t vertices_removed = 0;
+};
+
+/// What IncrementalMesh::drop() did.
+struct SurfaceDrop {
+  std::size_t faces = 0;
+  std::size_t vertices = 0;
 };
 
 /// The zero level of a map as triangles, kept up to date block by block.
@@ -41,6 +48,11 @@ class IncrementalMesh {
   /// changed, and makes the faces of their cells, and of others' that reach into them, final.
   MeshUpdateReport finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map);
 
+  /// Drops the final faces all of whose vertices are listed, and of these the vertices without
+  /// other faces, whose votes of labels go to their heirs. A vertex counts only if it and its heir
+  /// are final; ids that are not (or no longer) known are passed over. n log n in the mesh.
+  SurfaceDrop drop(const SupersededSurface& superseded);
+
   /// All faces and the vertices they use. Without labels if `labelled` is false.
   [[nodiscard]] MapMesh snapshot(const BlockMap& map, bool labelled) const;
 
@@ -57,11 +69,11 @@ class IncrementalMesh {
     Eigen::Vector3f position = Eigen::Vector3f::Zero();
     std::uint32_t uses = 0;       // by corners of faces
     std::uint64_t id = kRemoved;  // see MapMesh::ids; kRemoved: the place is free
-    std::uint64_t computed = 0;   // update in which position and label were computed
+    BlockMesh* owner = nullptr;   // null: its block is gone
+    VoxelLabels labels;
     KeyframeIndex first = 0, last = 0;
-    BlockMesh* owner = nullptr;  // null: its block is gone
+    std::uint32_t computed = 0;  // update in which position and labels were computed
     std::uint16_t edge = 0;      // of the owner
-    LabelId label = 0;
   };
 
   MeshUpdateReport mesh_blocks(const std::vector<VoxelBlock*>& blocks, BlockMap& map);
@@ -74,7 +86,8 @@ class IncrementalMesh {
   std::uint32_t new_vertex(KeyframeIndex keyframe);
   void compute(Vertex& vertex, const BlockCells& cells, const Eigen::Vector3i& voxel,
                int axis) const;
-  [[nodiscard]] LabelId label_of(const VoxelBlock& block, std::size_t voxel) const;
+  [[nodiscard]] LabelId label_of(const VoxelLabels& labels) const;
+  [[nodiscard]] std::vector<std::uint32_t> final_heirs(const SupersededSurface& superseded) const;
   std::size_t remove_unused();
   void disown(VoxelBlock& block);
 
@@ -90,7 +103,8 @@ class IncrementalMesh {
   std::vector<Face> final_faces_;
   std::vector<Face> forgotten_faces_;
   std::size_t faces_ = 0;
-  std::uint64_t next_id_ = 0, update_ = 0;
+  std::uint64_t next_id_ = 0;
+  std::uint32_t update_ = 0;
 };
 
 }  // namespace km

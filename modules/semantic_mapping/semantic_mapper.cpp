@@ -90,6 +90,7 @@ struct SemanticMapper::State {
   std::optional<Eigen::Vector3d> camera_at;  // last one
   double way_m = 0.0;                        // of the camera
   bool labelled = false;
+  std::size_t dropped_faces = 0;
 };
 
 std::vector<SemanticMapper::State::Update> SemanticMapper::State::select(
@@ -232,13 +233,19 @@ MeshUpdateReport SemanticMapper::update_mesh() {
   return state_->update_mesh();
 }
 
+SurfaceDrop SemanticMapper::drop(const SupersededSurface& superseded) {
+  const SurfaceDrop dropped = state_->mesh.drop(superseded);
+  state_->dropped_faces += dropped.faces;
+  return dropped;
+}
+
 MapMesh SemanticMapper::mesh() const {
   return state_->mesh.snapshot(state_->map, state_->labelled);
 }
 
 MapSize SemanticMapper::size() const {
   return {state_->map.size(), state_->mesh.vertex_count(), state_->mesh.face_count(),
-          state_->mesh.final_face_count()};
+          state_->mesh.final_face_count(), state_->dropped_faces};
 }
 
 }  // namespace km

@@ -41,10 +41,11 @@ struct [[nodiscard]] IntegrationReport {
 
 /// Sizes of the map.
 struct MapSize {
-  std::size_t blocks = 0;       ///< In memory.
-  std::size_t vertices = 0;     ///< Final ones included.
-  std::size_t faces = 0;        ///< Likewise.
-  std::size_t final_faces = 0;  ///< Of blocks that left the window.
+  std::size_t blocks = 0;         ///< In memory.
+  std::size_t vertices = 0;       ///< Final ones included.
+  std::size_t faces = 0;          ///< Likewise.
+  std::size_t final_faces = 0;    ///< Of blocks that left the window.
+  std::size_t dropped_faces = 0;  ///< Since the start: superseded, see drop().
 };
 
 /// Fuses depth and label images with known poses into a truncated signed distance function and
@@ -63,7 +64,8 @@ struct MapSize {
 /// crosses that edge. Blocks that leave the window (see SemanticMappingConfig) become final mesh
 /// that never changes again, but where it still hangs together with blocks in the window.
 ///
-/// Memory: max_blocks bounds the voxels; the mesh grows with the surface seen.
+/// Memory: max_blocks bounds the voxels; the mesh grows with the surface seen, and as often as it
+/// was seen anew but for what drop() is told.
 ///
 /// Deterministic: the same calls give the same mesh, bit by bit, however many threads OpenCV's pool
 /// has (cv::setNumThreads(); images and blocks are worked on in parallel). Not thread-safe.
@@ -88,6 +90,10 @@ class SemanticMapper {
   /// Meshes again what changed since the last call. After every frame, or less often: a vertex that
   /// came up in between has the first of these frames' keyframe as its first.
   MeshUpdateReport update_mesh();
+
+  /// Drops final surface that a later visit has mapped again (see IncrementalMesh::drop()): its
+  /// labels vote on, its faces are gone for good. Surface in the window stays.
+  SurfaceDrop drop(const SupersededSurface& superseded);
 
   /// The mesh as of the last update_mesh(), final and active parts together, in the odometry frame,
   /// with labels if any frame had some; without colours (see LabelledMesh::colour_by()). Every

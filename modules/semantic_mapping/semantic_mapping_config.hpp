@@ -34,8 +34,8 @@ struct SemanticMappingConfig {
   double max_weight = 100.0;
 
   /// Surface is meshed where the weights sum up to more than this: what a few wrong depths put into
-  /// the air stays out. With the depth errors below one look suffices up to 3.8 m, at 6 m it takes six.
-  /// 0: all that was ever seen.
+  /// the air stays out. With the depth errors below one look suffices up to 3.8 m, at 6 m it takes
+  /// six. 0: all that was ever seen.
   double min_weight = 0.05;
 
   /// Probability that a pixel's label is right; the rest is spread evenly over the other classes.

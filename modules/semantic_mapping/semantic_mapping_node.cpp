@@ -28,6 +28,7 @@ SemanticMappingNode::SemanticMappingNode(const SemanticMappingConfig& config,
           },
           SemanticMappingConfig::kSection) {
   topics_.frames.subscribe([this](const auto& frame) { worker_.post(frame); });
+  topics_.superseded.subscribe([this](const auto& superseded) { superseded_.put(superseded); });
 }
 
 void SemanticMappingNode::stop() noexcept {
@@ -38,7 +39,8 @@ void SemanticMappingNode::stop() noexcept {
   topics_.progress.publish(progress_);
   const MappingProgress& p = progress_;
   log::info(name()) << p.integrated << " frames, " << p.size.vertices << " vertices, "
-                    << p.size.faces << " faces; too late " << p.too_late;
+                    << p.size.faces << " faces, " << p.size.dropped_faces
+                    << " more seen anew and dropped; too late " << p.too_late;
   if (p.wrong_size + p.bad_pose + p.labels_outside + p.blocks_refused > 0)
     log::warn(name()) << "skipped " << p.wrong_size << " frames of the wrong size and "
                       << p.bad_pose << " without a usable pose; " << p.labels_outside
@@ -46,7 +48,15 @@ void SemanticMappingNode::stop() noexcept {
                       << " blocks beyond max_blocks";
 }
 
+void SemanticMappingNode::drop_superseded() {
+  const Topic<SupersededSurface>::Message superseded = superseded_.take();
+  if (superseded == nullptr) return;
+  const SurfaceDrop dropped = mapper_.drop(*superseded);
+  log::debug(name()) << "dropped " << dropped.faces << " faces seen anew";
+}
+
 void SemanticMappingNode::step(const DenseFrame& frame) {
+  drop_superseded();
   count(frame,
         mapper_.integrate(*frame.depth, frame.labels.get(), frame.T_odom_cam, frame.keyframe));
   // Once for each keyframe: a vertex then knows the first that saw it.

@@ -7,6 +7,7 @@
 #include "modules/core/dense_frame.hpp"
 #include "modules/semantic_mapping/mapping_progress.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
+#include "runtime/latest.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
 #include "runtime/worker.hpp"
@@ -16,6 +17,7 @@ namespace km {
 /// Channels of the mapping node; they must outlive it.
 struct SemanticMappingTopics {
   Topic<DenseFrame>& frames;               ///< In, in order of time.
+  Topic<SupersededSurface>& superseded;    ///< In: of the maps; the newest counts.
   const Topic<MapMesh>& maps;              ///< Out: the whole map.
   const Topic<MappingProgress>& progress;  ///< Out: with every frame.
 };
@@ -38,11 +40,13 @@ class SemanticMappingNode final : public Node {
   std::exception_ptr error() const override { return worker_.error(); }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Handles one frame synchronously. The thread calls only this; so can tests and replay.
+  /// Handles one frame synchronously, after dropping what has become superseded. The thread calls
+  /// only this; so can tests and replay.
   void step(const DenseFrame& frame);
 
  private:
   void count(const DenseFrame& frame, const IntegrationReport& report);
+  void drop_superseded();
   void publish_mesh();
 
   SemanticMapper mapper_;
@@ -53,6 +57,8 @@ class SemanticMappingNode final : public Node {
   std::optional<KeyframeIndex> meshed_;  // keyframe of the last update of the mesh
   std::optional<Stamp> published_;       // frame of the last mesh published
   bool stopped_ = false;
+  // What comes of the node's own maps may not wait for room in its queue: that could be for ever.
+  Latest<SupersededSurface> superseded_;
   Worker<Topic<DenseFrame>::Message> worker_;  // last member: stops first
 };
 

@@ -49,6 +49,10 @@ class VoxelLabels {
     }
   }
 
+  /// Adds the votes of another place on the same surface, by the same rules; beyond 255, both fade
+  /// alike.
+  void add(VoxelLabels other);
+
   /// The label with most votes, the earlier of equals; 0 without any.
   [[nodiscard]] LabelId best() const { return ids_[0]; }
 
@@ -62,6 +66,7 @@ class VoxelLabels {
   static constexpr std::size_t kPlaces = 4;
 
   void observe_other(LabelId label, unsigned votes);
+  void halve();
 
   std::array<LabelId, kPlaces> ids_ = {};         // by falling votes; 0: free
   std::array<std::uint8_t, kPlaces> votes_ = {};  // 0 exactly where ids_ is

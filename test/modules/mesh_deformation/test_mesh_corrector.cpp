@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "modules/mesh_deformation/mesh_corrector.hpp"
+#include "modules/mesh_deformation/mesh_node.hpp"
 #include "test/modules/mesh_deformation/corridor.hpp"
 #include "test/support/random_pose.hpp"
 
@@ -139,6 +140,112 @@ TEST_CASE("A mesh corrected afresh does not show what was corrected before", "[m
   CHECK(on_the_way->mesh.vertices != expected.mesh.vertices);  // else there is nothing to test
   CHECK(corrector.correct_afresh(corridor.input()).mesh.vertices == expected.mesh.vertices);
   CHECK_FALSE(corrector.correct(corridor.input()));
+}
+
+// A corridor gone along twice; odometry puts the second visit 0.6 m higher.
+struct TwoVisits {
+  static constexpr float kDrift_m = 0.6F;
+
+  TwoVisits() {
+    const MapMesh once = sheet(kSheet);
+    const auto count = static_cast<KeyframeIndex>(keyframe_count(kSheet));
+    map = once;
+    map.voxel_m = kSheet.step_m;
+    LabelledMesh again = once.mesh;
+    for (Eigen::Vector3f& p : again.vertices) p.z() += kDrift_m;
+    map.mesh.append(again);
+    for (const auto& [first, last] : once.seen_by) {
+      map.seen_by.push_back({first + count + kAway, last + count + kAway});
+      map.ids.push_back(map.ids.size());
+    }
+    for (const SE3& pose : keyframes_above(kSheet)) T_world_kf.push_back(pose);
+    T_world_kf.resize(T_world_kf.size() + kAway, T_world_kf.back());
+    for (const SE3& pose : keyframes_above(kSheet)) T_world_kf.push_back(pose);
+    T_odom_kf = T_world_kf;
+    for (std::size_t i = count; i < T_odom_kf.size(); ++i)
+      T_odom_kf[i].translation().z() += static_cast<double>(kDrift_m);
+  }
+  [[nodiscard]] CorrectionInput input() const { return {map, version, T_odom_kf, T_world_kf}; }
+  [[nodiscard]] std::size_t one() const { return map.mesh.faces.size() / 2; }
+
+  static constexpr KeyframeIndex kAway = 30;  // keyframes between the visits
+  MapMesh map;
+  std::vector<SE3> T_odom_kf, T_world_kf;
+  std::uint64_t version = 1;
+};
+
+TEST_CASE("Of two visits that coincide once they are corrected, the newer stays",
+          "[mesh_deformation]") {
+  TwoVisits visits;
+  MeshDeformationConfig config;
+  SECTION("corrected") {
+    MeshCorrector corrector(config);
+    const auto first = corrector.correct(visits.input());
+    REQUIRE(first);
+    CHECK(first->mesh.faces.size() == visits.one());
+    CHECK(first->mesh.labels.size() == first->mesh.vertices.size());
+    CHECK(first->superseded_faces == visits.one());
+    CHECK(first->report.vertices == visits.map.mesh.vertices.size());
+    const auto count = static_cast<std::uint64_t>(visits.map.ids.size() / 2);
+    REQUIRE(first->superseded.vertices.size() == count);
+    for (std::uint64_t v = 0; v < count; ++v) {
+      CHECK(first->superseded.vertices[v].id == v);
+      CHECK(first->superseded.vertices[v].heir == v + count);
+    }
+    for (SE3& pose : visits.T_world_kf) pose.translation().y() += 1.0;
+    const auto moved = corrector.correct(visits.input());
+    REQUIRE(moved);
+    CHECK_FALSE(moved->deformed);
+    CHECK(moved->mesh.faces == first->mesh.faces);
+    CHECK(moved->superseded.vertices.empty());
+  }
+  SECTION("as odometry has them, both stay") {
+    visits.T_world_kf = visits.T_odom_kf;
+    const auto result = MeshCorrector(config).correct(visits.input());
+    REQUIRE(result);
+    CHECK(result->mesh.faces.size() == 2 * visits.one());
+    CHECK(result->superseded.vertices.empty());
+  }
+  SECTION("switched off, both stay") {
+    config.duplicate_voxels = 0.0;
+    CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == 0);
+  }
+  SECTION("of voxels of unknown size, both stay") {
+    visits.map.voxel_m = 0.0;
+    CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == 0);
+  }
+}
+
+// Coming again and again: the mapper drops what is superseded, and the graph follows.
+TEST_CASE("The deformation graph does not grow in a place seen again and again",
+          "[mesh_deformation]") {
+  TwoVisits visits;
+  const std::uint64_t count = visits.map.ids.size() / 2;
+  MeshCorrector corrector(MeshDeformationConfig{});
+  std::size_t nodes_at_first = 0, most_nodes = 0;
+  for (std::uint64_t visit = 0; visit < 8; ++visit) {
+    const auto result = corrector.correct(visits.input());
+    REQUIRE(result);
+    CHECK(result->mesh.faces.size() == visits.one());
+    if (visit == 0) nodes_at_first = result->report.nodes;
+    most_nodes = std::max(most_nodes, result->report.nodes);
+    // The older copy is gone, the newer one is the older now, and a third comes.
+    const auto keyframes = static_cast<KeyframeIndex>(keyframe_count(kSheet)) + TwoVisits::kAway;
+    for (std::uint64_t& id : visits.map.ids) id += count;
+    for (SeenBy& seen : visits.map.seen_by) seen = {seen[0] + keyframes, seen[1] + keyframes};
+    visits.T_odom_kf.resize(visits.T_odom_kf.size() + TwoVisits::kAway, visits.T_odom_kf.back());
+    for (SE3 pose : keyframes_above(kSheet)) {
+      visits.T_world_kf.push_back(pose);
+      pose.translation().z() +=
+          static_cast<double>(TwoVisits::kDrift_m) * static_cast<double>(visit + 2);
+      visits.T_odom_kf.push_back(pose);
+    }
+    visits.T_world_kf.insert(visits.T_world_kf.end() - std::ssize(keyframes_above(kSheet)),
+                             TwoVisits::kAway, visits.T_world_kf.back());
+    for (Eigen::Vector3f& p : visits.map.mesh.vertices) p.z() += TwoVisits::kDrift_m;
+    ++visits.version;
+  }
+  CHECK(most_nodes <= 2 * nodes_at_first);
 }
 
 }  // namespace

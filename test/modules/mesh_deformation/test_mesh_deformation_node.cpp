@@ -27,7 +27,7 @@ struct Robot {
       changed.notify_all();
     });
   }
-  MeshDeformationTopics topics() { return {maps, keyframes, trajectory, optimized}; }
+  MeshDeformationTopics topics() { return {maps, keyframes, trajectory, optimized, superseded}; }
 
   [[nodiscard]] std::shared_ptr<const KeyframeOdometry> keyframe(std::size_t i) const {
     return std::make_shared<const KeyframeOdometry>(KeyframeOdometry{
@@ -48,6 +48,7 @@ struct Robot {
   Topic<KeyframeOdometry> keyframes;
   Topic<Trajectory> trajectory;
   Topic<OptimizedMesh> optimized;
+  Topic<SupersededSurface> superseded;
   std::mutex mutex;
   std::condition_variable changed;
   std::vector<OptimizedMesh> results;

@@ -13,6 +13,7 @@ constexpr Stamp kPeriod = 200'000'000;  // 5 Hz
 
 struct Bench {
   Topic<DenseFrame> frames;
+  Topic<SupersededSurface> superseded;
   Topic<MapMesh> maps;
   Topic<MappingProgress> progress;
   std::vector<std::shared_ptr<const MapMesh>> meshes;
@@ -22,9 +23,9 @@ struct Bench {
   explicit Bench(Overflow overflow = Overflow::kBlock) {
     maps.subscribe([this](const auto& message) { meshes.push_back(message); });
     progress.subscribe([this](const auto& message) { last = *message; });
-    node = std::make_unique<SemanticMappingNode>(settings(), small_camera(), two_classes(), 3.0,
-                                                 overflow,
-                                                 SemanticMappingTopics{frames, maps, progress});
+    node = std::make_unique<SemanticMappingNode>(
+        settings(), small_camera(), two_classes(), 3.0, overflow,
+        SemanticMappingTopics{frames, superseded, maps, progress});
   }
 };
 
@@ -90,6 +91,40 @@ TEST_CASE("A mapper that is too slow gives up the oldest frames and counts them"
   CHECK(bench.last.too_late == 8);
   CHECK(bench.meshes.size() == 1);
   CHECK(bench.meshes.back()->seen_by.front()[0] == 4);  // frames 8 and 9
+}
+
+TEST_CASE("What is told to be superseded is dropped with the next frame",
+          "[semantic_mapping_node]") {
+  Bench bench;
+  const auto step = [&](int i, double x) {
+    DenseFrame next = frame(i);
+    next.T_odom_cam = at(x);
+    bench.node->step(next);
+  };
+  for (int i = 0; i < 16; ++i) step(i, 0.0);
+  REQUIRE(bench.meshes.size() == 1);
+  const MapMesh first = *bench.meshes.front();
+  for (int i = 16; i < 20; ++i) step(i, 20.0);  // out of the window
+  for (int i = 20; i < 24; ++i) step(i, 0.0);
+  for (int i = 24; i < 40; ++i) step(i, 20.0);
+  const MapMesh& twice = *bench.meshes.back();
+  const std::size_t faces = bench.last.size.faces;
+  REQUIRE(bench.last.size.final_faces >= 2 * first.mesh.faces.size());
+  // Seen from the same place alike: in the same order.
+  SupersededSurface superseded;
+  std::vector<std::uint64_t> again;
+  for (std::size_t v = 0; v < twice.ids.size(); ++v)
+    if (twice.seen_by[v][0] >= 10 && twice.mesh.vertices[v].x() < 5.0F)
+      again.push_back(twice.ids[v]);
+  REQUIRE(again.size() == first.ids.size());
+  for (std::size_t v = 0; v < again.size(); ++v)
+    superseded.vertices.push_back({first.ids[v], again[v]});
+  bench.superseded.publish(SupersededSurface{});  // the newest counts
+  bench.superseded.publish(superseded);
+  CHECK(bench.last.size.dropped_faces == 0);
+  step(40, 20.0);
+  CHECK(bench.last.size.dropped_faces == first.mesh.faces.size());
+  CHECK(bench.last.size.faces == faces - first.mesh.faces.size());
 }
 
 TEST_CASE("Nothing seen, no mesh", "[semantic_mapping_node]") {

@@ -95,5 +95,30 @@ TEST_CASE("A single class is certain", "[semantic_mapping]") {
   CHECK(labels.probability(1, {1, 0.8}) == 1.0);
 }
 
+TEST_CASE("Votes of two places add up", "[semantic_mapping]") {
+  VoxelLabels a, b;
+  a.observe(1, 8);
+  a.observe(2, 3);
+  b.observe(2, 7);
+  b.observe(3, 1);
+  a.add(b);
+  CHECK(a.best() == 2);
+  CHECK(a.weight_of(1) == 8.0 / kOne);
+  CHECK(a.weight_of(2) == 10.0 / kOne);
+  CHECK(a.weight_of(3) == 1.0 / kOne);
+  a.add(VoxelLabels());
+  CHECK(a.weight_of(2) == 10.0 / kOne);
+
+  SECTION("beyond what is counted both sides fade alike") {
+    VoxelLabels full, other;
+    for (int i = 0; i < 25; ++i) full.observe(5, 8);   // 200
+    for (int i = 0; i < 20; ++i) other.observe(5, 8);  // 160
+    for (int i = 0; i < 10; ++i) other.observe(6, 8);  // 80
+    full.add(other);
+    CHECK(full.weight_of(5) == 180.0 / kOne);
+    CHECK(full.weight_of(6) == 40.0 / kOne);
+  }
+}
+
 }  // namespace
 }  // namespace km

@@ -1,0 +1,187 @@
+#include "modules/mesh_deformation/surface_heirs.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <unordered_map>
+#include <utility>
+
+#include "modules/mesh_deformation/node_grid.hpp"
+
+namespace km {
+namespace {
+
+// Normals that differ by more are another surface's: cosine of 60 degrees.
+constexpr float kMinCosine = 0.5F;
+
+// How far beside a triangle a point still counts as on it, of the distance along the normal: where
+// faces meet at an angle, the normals of none hit the wedge between them.
+constexpr float kBeside = 0.25F;
+
+float squared_distance_to_segment(const Eigen::Vector3f& p, const Eigen::Vector3f& a,
+                                  const Eigen::Vector3f& b) {
+  const Eigen::Vector3f ab = b - a;
+  const float length2 = ab.squaredNorm();
+  const float t = length2 > 0.0F ? std::clamp((p - a).dot(ab) / length2, 0.0F, 1.0F) : 0.0F;
+  return (p - a - t * ab).squaredNorm();
+}
+
+// Squared distance of a point of the triangle's plane from the triangle.
+float squared_distance_in_plane(const Eigen::Vector3f& p, const std::array<Eigen::Vector3f, 3>& t,
+                                const Eigen::Vector3f& normal) {
+  bool inside = true;
+  float nearest2 = std::numeric_limits<float>::infinity();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Eigen::Vector3f &a = t[i], &b = t[(i + 1) % 3];
+    if ((b - a).cross(p - a).dot(normal) >= 0.0F) continue;
+    inside = false;
+    nearest2 = std::min(nearest2, squared_distance_to_segment(p, a, b));
+  }
+  return inside ? 0.0F : nearest2;
+}
+
+class HeirSearch {
+ public:
+  HeirSearch(const LabelledMesh& mesh, std::span<const SeenBy> seen_by, const SameSurface& same)
+      : mesh_(mesh),
+        seen_by_(seen_by),
+        window_(same.window_keyframes),
+        distance_(static_cast<float>(same.distance_m)),
+        // Of the first corner of a face from where it counts.
+        reach_((1.0F + kBeside) * distance_ + static_cast<float>(same.longest_edge_m)),
+        heirs_(mesh.vertices.size(), kNoIndex),
+        asked_(mesh.vertices.size(), 0) {
+    compute_normals();
+  }
+
+  std::vector<std::uint32_t> run() {
+    std::vector<std::uint32_t> order(mesh_.faces.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::stable_sort(order.begin(), order.end(),
+                     [this](auto a, auto b) { return first_[a] > first_[b]; });
+    // All faces that can supersede a corner are newer than this one: they have been judged.
+    for (const std::uint32_t f : order) {
+      const LabelledMesh::Face& face = mesh_.faces[f];
+      for (const std::uint32_t v : face)
+        if (std::exchange(asked_[v], 1) == 0) heirs_[v] = heir_of(v);
+      if (!is_superseded(face, heirs_)) insert(f);
+    }
+    return std::move(heirs_);
+  }
+
+ private:
+  void compute_normals() {
+    normals_.assign(mesh_.vertices.size(), Eigen::Vector3f::Zero());
+    for (const auto& [a, b, c] : mesh_.faces) {
+      const Eigen::Vector3f& p = mesh_.vertices[a];
+      const Eigen::Vector3f area = (mesh_.vertices[b] - p).cross(mesh_.vertices[c] - p);
+      face_normals_.push_back(area.normalized());  // zero stays zero
+      for (const std::uint32_t v : {a, b, c}) normals_[v] += area;
+      first_.push_back(std::min({seen_by_[a][0], seen_by_[b][0], seen_by_[c][0]}));
+    }
+    for (Eigen::Vector3f& normal : normals_) normal.normalize();
+  }
+
+  [[nodiscard]] GridCell cell_of(const Eigen::Vector3f& point) const {
+    return grid_cell(point.cast<double>(), static_cast<double>(2.0F * reach_));
+  }
+
+  void insert(std::uint32_t face) {
+    cells_[cell_of(mesh_.vertices[mesh_.faces[face][0]])].push_back(face);
+  }
+
+  [[nodiscard]] std::uint32_t heir_of(std::uint32_t v) const {
+    const Eigen::Vector3f reach = Eigen::Vector3f::Constant(reach_);
+    const GridCell low = cell_of(mesh_.vertices[v] - reach);
+    const GridCell high = cell_of(mesh_.vertices[v] + reach);
+    float nearest = std::numeric_limits<float>::infinity();
+    std::uint32_t nearest_face = kNoIndex;
+    for (std::int64_t x = low[0]; x <= high[0]; ++x)
+      for (std::int64_t y = low[1]; y <= high[1]; ++y)
+        for (std::int64_t z = low[2]; z <= high[2]; ++z)
+          if (const auto cell = cells_.find({x, y, z}); cell != cells_.end())
+            for (const std::uint32_t face : cell->second)
+              if (const float d = distance_to(face, v); d < nearest) {
+                nearest = d;
+                nearest_face = face;
+              }
+    return nearest_face == kNoIndex ? kNoIndex : nearest_corner(nearest_face, v);
+  }
+
+  // Along the normal of the face; infinite if it does not supersede the vertex.
+  [[nodiscard]] float distance_to(std::uint32_t face, std::uint32_t v) const {
+    constexpr float kNot = std::numeric_limits<float>::infinity();
+    if (first_[face] <= seen_by_[v][1] + window_) return kNot;
+    const Eigen::Vector3f& normal = face_normals_[face];
+    const auto& [a, b, c] = mesh_.faces[face];
+    const Eigen::Vector3f& p = mesh_.vertices[v];
+    const float along = (p - mesh_.vertices[a]).dot(normal);
+    if (std::abs(along) > distance_ || normals_[v].dot(normal) < kMinCosine) return kNot;
+    const float beside2 = squared_distance_in_plane(
+        p - along * normal, {mesh_.vertices[a], mesh_.vertices[b], mesh_.vertices[c]}, normal);
+    const float most = kBeside * distance_;
+    return beside2 <= most * most ? std::abs(along) : kNot;
+  }
+
+  [[nodiscard]] std::uint32_t nearest_corner(std::uint32_t face, std::uint32_t v) const {
+    const Eigen::Vector3f& p = mesh_.vertices[v];
+    return *std::min_element(
+        mesh_.faces[face].begin(), mesh_.faces[face].end(), [&](auto a, auto b) {
+          return (mesh_.vertices[a] - p).squaredNorm() < (mesh_.vertices[b] - p).squaredNorm();
+        });
+  }
+
+  const LabelledMesh& mesh_;
+  std::span<const SeenBy> seen_by_;
+  KeyframeIndex window_;
+  float distance_;
+  float reach_;
+  std::vector<Eigen::Vector3f> normals_, face_normals_;
+  std::vector<KeyframeIndex> first_;  // of each face
+  std::vector<std::uint32_t> heirs_;
+  std::vector<char> asked_;
+  std::unordered_map<GridCell, std::vector<std::uint32_t>, GridCellHash> cells_;  // faces that stay
+};
+
+template <typename T>
+void keep(std::vector<T>& values, const std::vector<std::uint32_t>& kept) {
+  if (values.empty()) return;
+  for (std::size_t i = 0; i < kept.size(); ++i) values[i] = values[kept[i]];
+  values.resize(kept.size());
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> find_heirs(const LabelledMesh& mesh, std::span<const SeenBy> seen_by,
+                                      const SameSurface& same) {
+  return HeirSearch(mesh, seen_by, same).run();
+}
+
+LabelledMesh without_superseded(const LabelledMesh& mesh, std::span<const std::uint32_t> heirs) {
+  LabelledMesh result = mesh;
+  std::erase_if(result.faces, [&](const auto& face) { return is_superseded(face, heirs); });
+  std::vector<std::uint32_t> index(mesh.vertices.size(), kNoIndex), kept;
+  for (const auto& face : result.faces)
+    for (const std::uint32_t v : face) index[v] = 0;
+  for (std::uint32_t v = 0; v < index.size(); ++v) {
+    if (index[v] == kNoIndex && heirs[v] != kNoIndex) continue;
+    index[v] = static_cast<std::uint32_t>(kept.size());
+    kept.push_back(v);
+  }
+  for (auto& face : result.faces)
+    for (std::uint32_t& v : face) v = index[v];
+  keep(result.vertices, kept);
+  keep(result.labels, kept);
+  keep(result.colors, kept);
+  return result;
+}
+
+SupersededSurface named(std::span<const std::uint32_t> heirs, std::span<const std::uint64_t> ids) {
+  SupersededSurface surface;
+  for (std::size_t v = 0; v < heirs.size(); ++v)
+    if (heirs[v] != kNoIndex) surface.vertices.push_back({ids[v], ids[heirs[v]]});
+  return surface;
+}
+
+}  // namespace km

@@ -1,0 +1,50 @@
+#include <catch2/catch.hpp>
+#include <sstream>
+#include <vector>
+
+#include "apps/robot/process_usage.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::uint64_t kMega = 1'000'000;
+
+TEST_CASE("Memory that is taken shows, and processor time does", "[robot]") {
+  const ProcessUsage before = process_usage();
+  CHECK(before.resident_bytes > kMega);
+  CHECK(before.peak_bytes >= before.resident_bytes / 2);  // counted lazily by the kernel
+  constexpr std::size_t kTaken = 64 * kMega;
+  const std::vector<char> taken(kTaken, 1);
+  const ProcessUsage after = process_usage();
+  CHECK(after.resident_bytes > before.resident_bytes + kTaken * 9 / 10);
+  CHECK(after.cpu_s >= before.cpu_s);
+  CHECK(taken.back() == 1);
+}
+
+TEST_CASE("The growth of memory is that of the second half of the time", "[robot]") {
+  std::ostringstream text;
+  ProcessCsv csv(text);
+  CHECK_FALSE(csv.memory().growth_bytes_per_minute);
+  const std::uint64_t per_s = GENERATE(0U, 50'000U);
+  for (std::uint64_t s = 0; s <= 120; ++s)  // 2 MB a second for a minute, then less
+    csv.append(static_cast<double>(s),
+               {.resident_bytes =
+                    100 * kMega + (s < 60 ? 2 * kMega * s : 120 * kMega + per_s * (s - 60))});
+  const MemoryTrend trend = csv.memory();
+  CHECK(trend.first_bytes == 100 * kMega);
+  CHECK(trend.last_bytes == 220 * kMega + 60 * per_s);
+  REQUIRE(trend.growth_bytes_per_minute);
+  CHECK(*trend.growth_bytes_per_minute == Approx(60.0 * static_cast<double>(per_s)).margin(1.0));
+}
+
+TEST_CASE("process.csv has a row for each sample", "[robot]") {
+  std::ostringstream text;
+  ProcessCsv csv(text);
+  csv.append(0.5, {.cpu_s = 0.25, .resident_bytes = 12345});
+  csv.append(1.5, {.cpu_s = 1.0, .resident_bytes = 23456});
+  CHECK(text.str() == "time_s,cpu_s,resident_bytes\n0.500,0.250,12345\n1.500,1.000,23456\n");
+  CHECK_FALSE(csv.memory().growth_bytes_per_minute);  // too few
+}
+
+}  // namespace
+}  // namespace km
