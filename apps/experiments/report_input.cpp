@@ -1,6 +1,7 @@
 #include "apps/experiments/report_input.hpp"
 
 #include <cmath>
+#include <set>
 #include <sstream>
 
 #include "apps/team/text_table.hpp"
@@ -10,9 +11,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string machine_text(const StepRecord& record) {
-  return record.machine.processor + ", " + std::to_string(record.machine.cores) + " cores, " +
-         fixed(record.machine.memory_gb, 0) + " GB; commit " + record.commit;
+std::string machine_text(const Machine& machine) {
+  return machine.processor + ", " + std::to_string(machine.cores) + " cores, " +
+         fixed(machine.memory_gb, 0) + " GB";
 }
 
 // Folders that most commands name, and how they are called in the report.
@@ -43,20 +44,30 @@ ReportProvenance::Row row_of(const Step& step, const StepRecord& record, const F
   return {step.title, command_text(command),
           record.started + ", " + fixed(record.seconds, 1) + " s, load " +
               fixed(record.machine.load, 1),
-          machine_text(record)};
+          ""};
 }
 
-// What all steps that were run have in common is said once.
-void join_machines(ReportProvenance& provenance) {
-  std::string machine;
-  for (const ReportProvenance::Row& row : provenance.rows) {
-    if (row.machine.empty()) continue;
-    if (!machine.empty() && row.machine != machine) return;
-    machine = row.machine;
+// Machine and commit of the rows' steps: what all have in common is said once, the rest with each.
+void add_machines(const std::vector<const StepRecord*>& records, ReportProvenance& provenance) {
+  std::set<std::string> machines, commits;
+  for (const StepRecord* record : records) {
+    if (record->command.empty()) continue;  // made elsewhere
+    machines.insert(machine_text(record->machine));
+    commits.insert("commit " + record->commit);
   }
-  if (machine.empty()) return;
-  provenance.common = "All on " + machine + ".";
-  for (ReportProvenance::Row& row : provenance.rows) row.machine.clear();
+  const auto joined = [](const std::string& a, const std::string& b) {
+    return a + (a.empty() || b.empty() ? "" : "; ") + b;
+  };
+  const auto common = [](const std::set<std::string>& texts) {
+    return texts.size() == 1 ? *texts.begin() : std::string();
+  };
+  if (const std::string all = joined(common(machines), common(commits)); !all.empty())
+    provenance.common = "All on " + all + '.';
+  for (std::size_t k = 0; k < records.size(); ++k)
+    if (!records[k]->command.empty())
+      provenance.rows[k].machine =
+          joined(machines.size() > 1 ? machine_text(records[k]->machine) : std::string(),
+                 commits.size() > 1 ? "commit " + records[k]->commit : std::string());
 }
 
 std::vector<std::string> all_experiments() {
@@ -115,11 +126,13 @@ std::optional<RobotNumbers> ReportInput::alone() const {
 ReportProvenance ReportInput::provenance() const {
   ReportProvenance provenance;
   const Folders folders = folders_of(paths_);
+  std::vector<const StepRecord*> records;
   std::map<std::string, std::string> open;  // why: steps
   for (const Step& step : plan_experiments(all_experiments(), config_, paths_)) {
     const auto record = records_.find(step.name);
     if (record != records_.end()) {
       provenance.rows.push_back(row_of(step, record->second, folders));
+      records.push_back(&record->second);
       continue;
     }
     std::string& names = open[step.missing.empty() ? "not run, or not up to date" : step.missing];
@@ -127,7 +140,7 @@ ReportProvenance ReportInput::provenance() const {
   }
   for (const auto& [why, names] : open)
     provenance.open.push_back("Not done: " + names + " (" + why + ").");
-  join_machines(provenance);
+  add_machines(records, provenance);
   for (const auto& [name, folder] : folders)
     provenance.common += (provenance.common.empty() ? "" : " ") + name + ": " + folder + ".";
   return provenance;
