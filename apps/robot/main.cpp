@@ -1,7 +1,3 @@
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
-
 #include <exception>
 #include <fstream>
 #include <iostream>
@@ -9,6 +5,10 @@
 
 #include "apps/robot/run.hpp"
 #include "runtime/log.hpp"
+
+#ifdef __GLIBC__  // known to the headers above
+#include <malloc.h>
+#endif
 
 namespace {
 
