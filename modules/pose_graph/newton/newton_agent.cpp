@@ -170,12 +170,20 @@ NewtonShare NewtonAgent::newton_share(Elimination elimination) {
   last_decrement_.reset();
   all_gauss_newton_ = elimination == Elimination::kGaussNewton;
   if (elimination == Elimination::kFull) {
-    const RobotSystem system = newton_system(*graph_, nodes_, dimension_, Curvature::kFull);
-    if (factor_->factorise(system.A)) return share_of(system, true);
+    const RobotSystem system = eliminated_system(*graph_, nodes_, dimension_, Curvature::kFull);
+    if (factor_->factorise(system.A)) return with_kept_edges(system, Curvature::kFull);
   }
-  const RobotSystem system = newton_system(*graph_, nodes_, dimension_, Curvature::kGaussNewton);
+  const RobotSystem system =
+      eliminated_system(*graph_, nodes_, dimension_, Curvature::kGaussNewton);
   factorise_own(system);
-  return share_of(system, true);
+  return with_kept_edges(system, Curvature::kGaussNewton);
+}
+
+NewtonShare NewtonAgent::with_kept_edges(const RobotSystem& system, Curvature curvature) {
+  NewtonShare share = share_of(system, true);
+  share.curvature = curvature;
+  share.edges = kept_edges(*graph_, nodes_);
+  return share;
 }
 
 MatrixXd NewtonAgent::substitute_back(const MatrixXd& separators) const {

@@ -84,6 +84,7 @@ class NewtonAgent {
   [[nodiscard]] bool is_public(const KeyframeId& id) const;
   NewtonShare share_of(const RobotSystem& system, bool with_schur);
   NewtonShare newton_share(Elimination elimination);
+  NewtonShare with_kept_edges(const RobotSystem& system, Curvature curvature);
   NewtonShare rotation_share();
   NewtonShare set_rotations();
   NewtonShare set_translations();

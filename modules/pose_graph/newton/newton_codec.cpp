@@ -26,6 +26,41 @@ Eigen::MatrixXd matrix_of(std::span<const double> values, Index rows) {
                                            static_cast<Index>(values.size()) / rows);
 }
 
+km_wire_SinglePose to_wire(const SinglePose& T) {
+  return {.q = {T.q.x(), T.q.y(), T.q.z(), T.q.w()}, .t = {T.t.x(), T.t.y(), T.t.z()}};
+}
+
+std::optional<SinglePose> from_wire(const km_wire_SinglePose& wire) {
+  constexpr float kUnit = 1e-3F;
+  const SinglePose T{Eigen::Quaternionf(wire.q[3], wire.q[0], wire.q[1], wire.q[2]),
+                     Eigen::Vector3f(wire.t[0], wire.t[1], wire.t[2])};
+  // Written so that NaN fails.
+  const bool usable = std::abs(T.q.norm() - 1.0F) <= kUnit && T.t.allFinite();
+  return usable ? std::optional(T) : std::nullopt;
+}
+
+bool is_precision(float value) {
+  return value >= 0.0F && std::isfinite(value);
+}
+
+// The edges of a share with so many couplings; nullopt if one makes no sense.
+std::optional<std::vector<KeptEdge>> edges_of(std::span<const km_wire_KeptEdge> edges,
+                                              std::span<const km_wire_SinglePose> measured,
+                                              std::size_t couplings) {
+  std::vector<KeptEdge> result;
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    const km_wire_KeptEdge& wire = edges[k];
+    const auto present = from_wire(wire.T_i_j);
+    const auto was = measured.empty() ? present : from_wire(measured[k]);
+    if (!present || !was || wire.pair / 2 >= couplings || !is_precision(wire.kappa) ||
+        !is_precision(wire.tau))
+      return std::nullopt;
+    result.push_back({static_cast<int>(wire.pair / 2), wire.pair % 2 == 1, wire.kappa, wire.tau,
+                      *present, *was});
+  }
+  return result;
+}
+
 }  // namespace
 
 Codec<NewtonHello>::Encoded Codec<NewtonHello>::encode(const NewtonHello& hello) {
@@ -68,8 +103,20 @@ Decoded<NewtonHello> Codec<NewtonHello>::decode(const Wire& wire) {
 Codec<NewtonShare>::Encoded Codec<NewtonShare>::encode(const NewtonShare& share) {
   Encoded encoded;
   encoded.reduced = all_of(share.reduced);
-  encoded.diagonal = lower_triangles(share.schur.diagonal);
-  encoded.coupling = all_of(share.schur.coupling);
+  const std::vector<bool> present = blocks_to_send(share);
+  const auto block = std::max<Index>(1, share.schur.block());
+  const auto poses = static_cast<std::size_t>(share.schur.diagonal.cols() / block);
+  encoded.diagonal = lower_triangles(gathered(share.schur.diagonal, present, 0));
+  encoded.coupling = all_of(gathered(share.schur.coupling, present, poses));
+  encoded.present = packed(present);
+  for (const KeptEdge& e : share.edges) {
+    encoded.edges.push_back(
+        {.pair = 2 * static_cast<std::uint32_t>(e.pair) + (e.transposed ? 1 : 0),
+         .kappa = e.kappa,
+         .tau = e.tau,
+         .T_i_j = to_wire(e.present)});
+    if (share.curvature == Curvature::kFull) encoded.measured.push_back(to_wire(e.measured));
+  }
   for (const KeyframeId& id : share.kept) encoded.kept.push_back(to_wire(id));
   for (const auto& [i, j] : share.pairs)
     encoded.pairs.push_back({static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j)});
@@ -83,8 +130,12 @@ Codec<NewtonShare>::Encoded Codec<NewtonShare>::encode(const NewtonShare& share)
   borrow(wire.reduced, encoded.reduced);
   borrow(wire.diagonal, encoded.diagonal);
   borrow(wire.coupling, encoded.coupling);
+  wire.couplings = static_cast<std::uint32_t>(present.size() - poses);
   borrow(wire.kept, encoded.kept);
   borrow(wire.pairs, encoded.pairs);
+  borrow(wire.present, encoded.present);
+  borrow(wire.edges, encoded.edges);
+  borrow(wire.measured, encoded.measured);
   return encoded;
 }
 
@@ -103,15 +154,35 @@ Decoded<NewtonShare> Codec<NewtonShare>::decode(const Wire& wire) {
   const auto coupling = elements_of(wire.coupling, kMaxCouplings * block);
   const auto kept = elements_of(wire.kept, kMaxKeptPoses);
   const auto pairs = elements_of(wire.pairs, kMaxCouplings);
-  if (!reduced || !diagonal || !coupling || !kept || !pairs)
+  const auto present = elements_of(wire.present, (kMaxKeptPoses + kMaxCouplings) / 8);
+  const auto edges = elements_of(wire.edges, kMaxCouplings);
+  const auto measured = elements_of(wire.measured, kMaxCouplings);
+  if (!reduced || !diagonal || !coupling || !kept || !pairs || !present || !edges || !measured)
     return Result::refuse("a list is missing or too long");
-  if (reduced->size() % rows != 0 || coupling->size() % block != 0)
+  if (reduced->size() % rows != 0 || coupling->size() % block != 0 ||
+      diagonal->size() % triangle != 0)
     return Result::refuse("a matrix is not made of blocks");
   const std::size_t poses = reduced->size() / rows;
-  if (!diagonal->empty() && diagonal->size() != poses * triangle)
+  const std::size_t couplings = wire.couplings;
+  const bool with_schur = !present->empty();
+  // Every coupling has a block or an edge: nobody makes room for more than he has sent.
+  if (couplings > coupling->size() / block + edges->size() || (couplings > 0 && !with_schur))
+    return Result::refuse("couplings of which nothing is said");
+  if (with_schur && present->size() != (poses + couplings + 7) / 8)
     return Result::refuse("right-hand side and Schur complement differ in size");
-  if (!kept->empty() && (kept->size() != poses || pairs->size() * block != coupling->size()))
+  const std::vector<bool> there = unpacked(*present, with_schur ? poses + couplings : 0);
+  const auto first_coupling = there.begin() + static_cast<std::ptrdiff_t>(with_schur ? poses : 0);
+  if (std::count(there.begin(), first_coupling, true) * static_cast<std::ptrdiff_t>(triangle) !=
+          static_cast<std::ptrdiff_t>(diagonal->size()) ||
+      std::count(first_coupling, there.end(), true) * static_cast<std::ptrdiff_t>(block) !=
+          static_cast<std::ptrdiff_t>(coupling->size()))
+    return Result::refuse("other blocks than are said to be there");
+  if (!kept->empty() && (kept->size() != poses || pairs->size() != couplings))
     return Result::refuse("Schur complement and pattern differ in size");
+  if (!measured->empty() && measured->size() != edges->size())
+    return Result::refuse("edges and what was measured differ in number");
+  auto kept_edges = edges_of(*edges, *measured, couplings);
+  if (!kept_edges) return Result::refuse("an edge between kept poses makes no sense");
   if (!all_finite(*reduced) || !all_finite(*diagonal) || !all_finite(*coupling) ||
       !std::isfinite(wire.cost) || !std::isfinite(wire.decrement))
     return Result::refuse("a number is not finite");
@@ -122,8 +193,11 @@ Decoded<NewtonShare> Codec<NewtonShare>::decode(const Wire& wire) {
                     .decrement = wire.decrement,
                     .block = B};
   share.reduced = matrix_of(*reduced, static_cast<Index>(reduced->size()) / columns);
-  if (!diagonal->empty())
-    share.schur = {from_lower_triangles(*diagonal, B), matrix_of(*coupling, B)};
+  if (with_schur)
+    share.schur = {scattered(from_lower_triangles(*diagonal, B), poses, there, 0),
+                   scattered(matrix_of(*coupling, B), couplings, there, poses)};
+  share.curvature = measured->empty() ? Curvature::kGaussNewton : Curvature::kFull;
+  share.edges = *std::move(kept_edges);
   for (const km_wire_KeyframeRef& id : *kept) share.kept.push_back(from_wire(id));
   for (const km_wire_KeptPair& pair : *pairs) {
     if (pair.i >= pair.j || pair.j >= poses)

@@ -35,12 +35,12 @@ struct Codec<NewtonHello> {
 };
 
 /// Written by the robot itself, in double precision: soft modes of a long trajectory are below
-/// single precision of its stiff ones.
+/// single precision of its stiff ones. Blocks of zeros are left out.
 template <>
 struct Codec<NewtonShare> {
   using Wire = km_wire_NewtonShare;
   static constexpr const char* kTopic = "newton_shares";
-  static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::uint16_t kVersion = 2;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_NewtonShare_desc; }
 
   struct Encoded {
@@ -50,6 +50,9 @@ struct Codec<NewtonShare> {
     std::vector<double> coupling;
     std::vector<km_wire_KeyframeRef> kept;
     std::vector<km_wire_KeptPair> pairs;
+    std::vector<std::uint8_t> present;
+    std::vector<km_wire_KeptEdge> edges;
+    std::vector<km_wire_SinglePose> measured;
   };
   static Encoded encode(const NewtonShare& share);
   static Decoded<NewtonShare> decode(const Wire& wire);

@@ -6,6 +6,7 @@
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/pose_graph/newton/block_matrix.hpp"
+#include "modules/pose_graph/newton/kept_edge.hpp"
 #include "modules/pose_graph/newton/link_cover.hpp"
 
 namespace km {
@@ -26,7 +27,10 @@ struct NewtonShare {
   double decrement = 0.0;  ///< Squared norm of the forward-substituted eliminated right-hand side.
   Eigen::Index block = 0;  ///< Unknowns per pose, B.
   Eigen::MatrixXd reduced = {};  ///< (B kept) x k: right-hand side of the kept nodes.
-  BlockMatrix schur = {};        ///< Of the kept nodes; empty: as in the round before.
+  /// Of the kept nodes, without the edges between them; empty: as in the round before.
+  BlockMatrix schur = {};
+  Curvature curvature = Curvature::kGaussNewton;  ///< Of the second derivatives in it.
+  std::vector<KeptEdge> edges = {};  ///< Those between kept nodes, where schur is not empty.
   // Pattern of the Schur complement, with the first one only.
   std::vector<KeyframeId> kept = {};  ///< Separators of the team.
   std::vector<NodePair> pairs = {};   ///< Coupled ones, in places of `kept`.

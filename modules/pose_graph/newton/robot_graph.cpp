@@ -84,7 +84,7 @@ void RobotGraph::add_edges_between(const RobotEdges& robot, std::span<const Keyf
   }
 }
 
-RobotGraph::RobotGraph(const RobotEdges& robot, std::span<const KeyframeId> cover) {
+RobotGraph::RobotGraph(const RobotEdges& robot, std::span<const KeyframeId> cover, Keep policy) {
   if (robot.poses < 1) refuse(robot.self, "it has no poses");
   for (Eigen::Index v = 0; v < robot.poses; ++v)
     ids_.push_back({robot.self, static_cast<KeyframeIndex>(v)});
@@ -99,8 +99,21 @@ RobotGraph::RobotGraph(const RobotEdges& robot, std::span<const KeyframeId> cove
   add_edges_between(robot, cover, keep);
   for (const Edge& e : edges_) check_measurement(robot.self, e);
   const std::vector<NodePair> pairs = couple(edges_);
-  if (!cover.empty()) keep = keep_sparse(std::move(keep), pairs);
+  if (policy == Keep::kSparse && !cover.empty()) keep = keep_sparse(std::move(keep), pairs);
   plan_ = std::make_shared<const EliminationPlan>(std::move(keep), pairs);
+  find_kept_edges();
+}
+
+void RobotGraph::find_kept_edges() {
+  const std::vector<int>& place = plan_->place_of_kept();
+  const std::vector<NodePair>& pairs = plan_->kept_pairs();
+  for (Edge& e : edges_) {
+    const auto [a, b] =
+        std::minmax(place[static_cast<std::size_t>(e.i)], place[static_cast<std::size_t>(e.j)]);
+    if (a < 0) continue;
+    const auto pair = std::lower_bound(pairs.begin(), pairs.end(), NodePair{a, b});
+    e.kept_pair = static_cast<int>(pair - pairs.begin());
+  }
 }
 
 void RobotGraph::set_precisions(std::span<const BlockEdge> own) {

@@ -38,14 +38,18 @@ class RobotGraph {
   struct Edge : BlockEdge {
     int pair = 0;
     bool transposed = false;
+    int kept_pair = -1;  ///< In the plan's kept_pairs(), if both its nodes are kept.
   };
+
+  /// What to keep beside the cover.
+  enum class Keep { kSparse, kCoverOnly };
 
   /// `cover` as from cover_links(), of the whole team. If it is empty the robot is alone, and keeps
   /// its middle pose.
   /// Throws std::invalid_argument if there are no poses, if an edge names one that is not there, if
   /// a measurement is not finite or a precision not positive, or if an edge to a peer has no end in
   /// the cover.
-  RobotGraph(const RobotEdges& edges, std::span<const KeyframeId> cover);
+  RobotGraph(const RobotEdges& edges, std::span<const KeyframeId> cover, Keep keep = Keep::kSparse);
 
   /// Takes the precisions of the robot's own edges from `own`, which lists the same edges. Here
   /// they may be zero: the pattern of the plan stays.
@@ -63,6 +67,7 @@ class RobotGraph {
  private:
   void add_edges_between(const RobotEdges& robot, std::span<const KeyframeId> cover,
                          std::vector<bool>& keep);
+  void find_kept_edges();
 
   std::vector<Edge> edges_;
   std::vector<KeyframeId> ids_;  // of the nodes

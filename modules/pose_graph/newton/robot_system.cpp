@@ -55,19 +55,51 @@ void add_model(RobotSystem& system, const RobotGraph::Edge& e, const EdgeModel& 
   add_coupling(system.A, e, model.H_ij.block<kBlock, kBlock>(kFirst, kFirst));
 }
 
+void add_slope(RobotSystem& system, const RobotGraph::Edge& e, const EdgeModel& model,
+               Index block) {
+  block == 3 ? add_slope<3>(system, e, model) : add_slope<6>(system, e, model);
+}
+
+void add_model(RobotSystem& system, const RobotGraph::Edge& e, const EdgeModel& model,
+               Index block) {
+  block == 3 ? add_model<3>(system, e, model) : add_model<6>(system, e, model);
+}
+
 }  // namespace
 
 RobotSystem newton_system(const RobotGraph& graph, std::span<const SE3> poses, int dimension,
                           Curvature curvature) {
   RobotSystem system = zero_system(graph, tangent_size(dimension), 1);
+  for (const RobotGraph::Edge& e : graph.edges())
+    add_model(system, e, model_edge(e, pose(poses, e.i), pose(poses, e.j), curvature),
+              tangent_size(dimension));
+  return system;
+}
+
+RobotSystem eliminated_system(const RobotGraph& graph, std::span<const SE3> poses, int dimension,
+                              Curvature curvature) {
+  const Index block = tangent_size(dimension);
+  RobotSystem system = zero_system(graph, block, 1);
+  EdgeModel slope;
   for (const RobotGraph::Edge& e : graph.edges()) {
-    const EdgeModel model = model_edge(e, pose(poses, e.i), pose(poses, e.j), curvature);
-    if (dimension == 2)
-      add_model<3>(system, e, model);
-    else
-      add_model<6>(system, e, model);
+    if (e.kept_pair < 0) {
+      add_model(system, e, model_edge(e, pose(poses, e.i), pose(poses, e.j), curvature), block);
+    } else {
+      slope_edge(e, pose(poses, e.i), pose(poses, e.j), slope);
+      add_slope(system, e, slope, block);
+    }
   }
   return system;
+}
+
+std::vector<KeptEdge> kept_edges(const RobotGraph& graph, std::span<const SE3> poses) {
+  std::vector<KeptEdge> edges;
+  for (const RobotGraph::Edge& e : graph.edges())
+    if (e.kept_pair >= 0)
+      edges.push_back(
+          {e.kept_pair, e.transposed, static_cast<float>(e.kappa), static_cast<float>(e.tau),
+           SinglePose::of(pose(poses, e.i).inverse() * pose(poses, e.j)), SinglePose::of(e.T_i_j)});
+  return edges;
 }
 
 RobotSystem newton_slope(const RobotGraph& graph, std::span<const SE3> poses, int dimension) {
@@ -75,10 +107,7 @@ RobotSystem newton_slope(const RobotGraph& graph, std::span<const SE3> poses, in
   EdgeModel model;
   for (const RobotGraph::Edge& e : graph.edges()) {
     slope_edge(e, pose(poses, e.i), pose(poses, e.j), model);
-    if (dimension == 2)
-      add_slope<3>(system, e, model);
-    else
-      add_slope<6>(system, e, model);
+    add_slope(system, e, model, tangent_size(dimension));
   }
   return system;
 }

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "modules/pose_graph/newton/edge_model.hpp"
+#include "modules/pose_graph/newton/kept_edge.hpp"
 #include "modules/pose_graph/newton/robot_graph.hpp"
 
 namespace km {
@@ -24,7 +26,13 @@ inline Eigen::Index tangent_size(int dimension) {
 /// be of another curvature.
 [[nodiscard]] RobotSystem newton_system(const RobotGraph& graph, std::span<const SE3> poses,
                                         int dimension, Curvature curvature);
-/// The same without A.
+/// The same, but A without the edges between kept poses.
+[[nodiscard]] RobotSystem eliminated_system(const RobotGraph& graph, std::span<const SE3> poses,
+                                            int dimension, Curvature curvature);
+/// Those edges.
+[[nodiscard]] std::vector<KeptEdge> kept_edges(const RobotGraph& graph, std::span<const SE3> poses);
+
+/// Newton's equations without A.
 [[nodiscard]] RobotSystem newton_slope(const RobotGraph& graph, std::span<const SE3> poses,
                                        int dimension);
 

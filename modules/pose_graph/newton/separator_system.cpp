@@ -71,9 +71,33 @@ bool SeparatorSystem::factorise(const NewtonShares& shares) {
       else
         sum.between(pair[p]) += schur.between(static_cast<int>(p));
     }
+    add_kept_edges(*share, member->second, sum);
   }
   factor_.emplace(plan_);
   return factor_->factorise(sum);
+}
+
+void SeparatorSystem::add_kept_edges(const NewtonShare& share, const Member& member,
+                                     BlockMatrix& sum) const {
+  const Eigen::Index B = sum.block();
+  const auto part = [B](const Matrix6& H) {  // of what moves: see robot_system.hpp
+    const Eigen::Index first = B == 3 ? 2 : 0;
+    return H.block(first, first, B, B);
+  };
+  for (const KeptEdge& e : share.edges) {
+    if (!is_place(e.pair, member.pair) || (B != 3 && B != 6))
+      refuse(share.robot, "has an edge between poses that it does not couple");
+    const int pair = member.pair[static_cast<std::size_t>(e.pair)];
+    const auto& [low, high] = plan_->pairs()[static_cast<std::size_t>(pair)];
+    const bool downwards = e.transposed != member.transposed[static_cast<std::size_t>(e.pair)];
+    const EdgeModel model = e.model(share.curvature);
+    sum.at(downwards ? high : low) += part(model.H_ii);
+    sum.at(downwards ? low : high) += part(model.H_jj);
+    if (downwards)
+      sum.between(pair) += part(model.H_ij).transpose();
+    else
+      sum.between(pair) += part(model.H_ij);
+  }
 }
 
 SeparatorSystem::Solution SeparatorSystem::solve(const NewtonShares& shares,

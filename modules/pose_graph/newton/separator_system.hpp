@@ -42,6 +42,7 @@ class SeparatorSystem {
     std::vector<bool> transposed;
   };
   void learn_pattern(const NewtonShares& shares);
+  void add_kept_edges(const NewtonShare& share, const Member& member, BlockMatrix& sum) const;
 
   std::vector<KeyframeId> separators_;
   std::map<RobotId, Member> members_;

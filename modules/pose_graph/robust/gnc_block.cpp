@@ -24,7 +24,8 @@ RobotGraph graph_of(const RobotEdges& edges) {
   for (const auto& [peer, list] : edges.to)
     for (const InterEdge& e : list) cover.insert({edges.self, e.own});
   const std::vector<KeyframeId> ascending(cover.begin(), cover.end());
-  return {RobotEdges{edges.self, edges.poses, edges.own, {}}, ascending};
+  return {RobotEdges{edges.self, edges.poses, edges.own, {}}, ascending,
+          RobotGraph::Keep::kCoverOnly};
 }
 
 }  // namespace

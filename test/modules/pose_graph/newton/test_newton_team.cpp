@@ -104,7 +104,8 @@ TEST_CASE("a round of the team is an exact Newton step of the whole graph", "[ne
         R_t * (after[k].translation() - before[k].translation());
   }
   REQUIRE(step.norm() > 1e-3);
-  CHECK((H * step + g).norm() < 1e-10 * g.norm());
+  // Edges between kept poses are told in single precision.
+  CHECK((H * step + g).norm() < 1e-5 * g.norm());
 }
 
 TEST_CASE("the team ends at a minimum, the cost never rising", "[newton]") {
