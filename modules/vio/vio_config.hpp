@@ -34,7 +34,7 @@ struct VioConfig {
 
   /// The sensor's noise densities are multiplied by these: vibration, imperfect time stamps and
   /// calibration add to the noise of the data sheet.
-  double gyro_noise_factor = 1.0;
+  double gyro_noise_factor = 8.0;
   double accel_noise_factor = 12.0;
 
   /// Gravity where the robots are [m/s^2].
