@@ -94,9 +94,9 @@ ReportTable table_of(const std::vector<Search>& searches) {
           spread_cell(search.over_runs([&](auto& run) { return run.clique[size - 1]; }), 0));
     table.rows.push_back(std::move(row));
   }
-  std::vector<ReportCell> row{{"all, in sum [s]"}};
+  std::vector<ReportCell> row{{"all additions, in sum"}};
   for (const Search& search : searches)
-    row.push_back(spread_cell(search.over_runs([](auto& run) { return run.sum_s(); }), 3));
+    row.push_back(spread_cell(search.over_runs([](auto& run) { return 1e3 * run.sum_s(); }), 1));
   row.resize(table.columns.size());
   table.rows.push_back(std::move(row));
   table.note = "Times: processor time of one thread, median of the last " +

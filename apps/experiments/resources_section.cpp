@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "apps/experiments/paper_results.hpp"
 #include "apps/experiments/processor_tables.hpp"
@@ -24,8 +25,9 @@ struct Communication {
   }
 };
 
+// Not a number without a result: shown as "-".
 double megabytes(const PgoNumbers* numbers) {
-  return numbers == nullptr ? 0.0 : 1e-6 * numbers->bytes;
+  return numbers == nullptr ? NAN : 1e-6 * numbers->bytes;
 }
 
 Communication communication(ReportInput& input, const ReportInput::World& world) {
@@ -60,7 +62,7 @@ ReportTable communication_table(ReportInput& input, const std::vector<ReportInpu
     table.rows.push_back(
         {{world.config->title},
          cell(static_cast<double>(world.results->keyframes()), 0, [](auto& p) { return p.poses; }),
-         cell(rbcd == nullptr ? 0.0 : static_cast<double>(rbcd->edges), 0,
+         cell(rbcd == nullptr ? NAN : static_cast<double>(rbcd->edges), 0,
               [](auto& p) { return p.edges; }),
          cell(mb.place_recognition, 2, [](auto& p) { return p.place_recognition_mb; }),
          cell(mb.verification, 2, [](auto& p) { return p.verification_mb; }),
@@ -164,6 +166,7 @@ void add_targets(ReportInput& input, const ReportInput::World& world) {
   if (!(mb.keypoints > 0.0)) return;
   const auto add = [&](const char* what, double sent, const std::string& wanted) {
     const double percent = mb.of_keypoints_percent(sent);
+    if (!std::isfinite(percent)) return;
     input.add_target({std::string("communication over all keypoints sent, ") + what,
                       world.config->title, wanted, fixed(percent, 0) + " %",
                       percent <= kMostShare_percent, true});

@@ -23,6 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr int kPoll_ms = 100;
 constexpr std::size_t kLastLines = 12;
+constexpr const char* kLogHint = "\n    (all it said: ";
 
 std::string now_text() {
   const std::time_t now = std::time(nullptr);
@@ -87,8 +88,16 @@ class StepsRun {
     return std::nullopt;
   }
 
+  // Steps that fail for one reason in a row, all methods on one graph say, share a message.
   void fail(const Step& step, const std::string& why) {
     failure_of_[step.name] = step.name;
+    const std::string reason = why.substr(0, why.find(kLogHint));
+    if (reason == last_reason_) {
+      std::string& problem = outcome_.problems.back();
+      problem.insert(problem.find(": "), ", " + step.name);
+      return;
+    }
+    last_reason_ = reason;
     outcome_.problems.push_back(step.name + ": " + why);
   }
 
@@ -181,7 +190,7 @@ class StepsRun {
     // Not every program says what is wrong on standard error.
     for (const auto& words : process.last_words().empty() ? last_lines : process.last_words())
       problem += "\n    " + words;
-    return problem + "\n    (all it said: " + log.string() + ')';
+    return problem + kLogHint + log.string() + ')';
   }
 
   const std::vector<Step>& steps_;
@@ -193,6 +202,7 @@ class StepsRun {
   std::set<std::string> pending_;                  // steps that will be run, for the time left
   std::map<std::string, std::string> failure_of_;  // step: the one whose failure holds it up
   std::map<std::string, std::string> held_up_;     // that one: the names of those it holds up
+  std::string last_reason_;                        // of the last failure
   StepsOutcome outcome_;
 };
 

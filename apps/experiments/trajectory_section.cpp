@@ -25,6 +25,10 @@ ReportTable inputs_table(const std::vector<ReportInput::World>& worlds) {
   for (const auto& [config, results] : worlds) {
     std::string times, distances;
     for (const RobotNumbers& robot : results->robots) {
+      if (!robot.in_team_frame)
+        table.note += config->title + ": " + robot.name +
+                      " never met the others; it is not judged with them, pictures show it in a "
+                      "frame of its own, and there is no solution for all together. ";
       times += (times.empty() ? "" : ", ") + fixed(robot.recorded_s, 0);
       distances += (distances.empty() ? "" : ", ") + fixed(robot.distance_m, 0);
     }

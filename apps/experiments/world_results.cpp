@@ -95,6 +95,8 @@ RobotNumbers read_robot(const YAML::Node& team, const RobotPlan& plan, const fs:
   add_truth(plan.truth, robot);
   const YAML::Node own = named(team["robots"], plan.name);
   robot.keyframes = static_cast<std::size_t>(number_at(own, "keyframes").value_or(0.0));
+  if (const YAML::Node joined = node_at(own, "in_team_frame"); joined && joined.IsScalar())
+    robot.in_team_frame = joined.as<bool>(true);
   robot.odometry_error_m = number_at(own, "odometry.position_m.rmse");
   robot.optimized_error_m =
       number_at(named(node_at(team, "optimized.robots"), plan.name), "position_m.rmse");

@@ -28,6 +28,7 @@ struct RobotNumbers {
   double recorded_s = 0.0;  ///< Length of its recording.
   double distance_m = 0.0;  ///< That it truly went; 0 without a truth.
   std::size_t keyframes = 0;
+  bool in_team_frame = true;                                  ///< False: it never met the others.
   std::optional<double> odometry_error_m, optimized_error_m;  ///< Absolute, rmse.
   std::map<std::string, double> sent_bytes;                   ///< By category.
   std::optional<double> keyframe_bytes;                       ///< Mean size with all its keypoints.

@@ -236,6 +236,7 @@ void write_robot(JsonWriter& json, const RobotResult& robot) {
     json.key("odometry");
     write_json(json, *robot.odometry);
   }
+  json.field("in_team_frame", robot.in_team_frame);
   json.array("notes", robot.notes);
   json.end_object();
 }

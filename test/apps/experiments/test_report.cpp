@@ -56,6 +56,9 @@ class CannedCity {
 
   ReportSummary report() const { return write_report(config_, paths()); }
   std::string read(const std::string& name) const { return folder_.read("results/" + name); }
+  void write(const std::string& name, const std::string& text) const {
+    folder_.write("results/" + name, text);
+  }
   void forget(const std::string& step) const {
     std::filesystem::remove(folder_.path() / "results/steps" / (step + ".json"));
   }
@@ -270,6 +273,17 @@ TEST_CASE("What all solves of a run sent is judged beside the one of the paper",
       Contains("keypoints sent, one solve, as the paper counts | City | at most 38 %, aim 10 % | "
                "**2775 %** |") &&
           Contains("keypoints sent, all solves of the run | City | at most 38 % | **7500 %** |"));
+}
+
+TEST_CASE("A robot that never met the others is named", "[experiments]") {
+  const CannedCity city;
+  const std::string team = city.read("team-city.json");
+  const std::string name = "\"name\": \"robot2\"";
+  std::string apart = team;
+  apart.insert(apart.find(name), "\"in_team_frame\": false, ");
+  city.write("team-city.json", apart);
+  (void)city.report();
+  CHECK_THAT(city.read("report.md"), Contains("City: robot2 never met the others;"));
 }
 
 TEST_CASE("Small versions are judged only by what they can answer", "[experiments]") {

@@ -92,6 +92,16 @@ TEST_CASE("A failed step says why, and holds up only those that need it", "[expe
   CHECK(workshop.runs("bad") == 2);
 }
 
+TEST_CASE("Steps that fail for the same reason share a message", "[experiments]") {
+  Workshop workshop;
+  const char* const torn = "echo graph is torn >&2; exit 7";
+  const StepsOutcome outcome = workshop.run(
+      {workshop.step("a", torn), workshop.step("b", torn), workshop.step("c", "exit 2")});
+  REQUIRE(outcome.problems.size() == 2);
+  CHECK_THAT(outcome.problems[0], Catch::StartsWith("a, b: exit code 7\n    graph is torn"));
+  CHECK_THAT(outcome.problems[1], Catch::StartsWith("c: exit code 2"));
+}
+
 TEST_CASE("A program that complains on standard output is heard", "[experiments]") {
   Workshop workshop;
   const StepsOutcome outcome = workshop.run({workshop.step("bad", "echo robot1 failed; exit 3")});
