@@ -64,6 +64,11 @@ struct LoopClosureConfig {
   /// correspond, see chosen_by_words().
   int reply_keypoints = 200;
 
+  /// Of own keyframes, so many of the newest are kept with all their keypoints, 48 bytes each; older
+  /// ones with twice reply_keypoints, those that reduced() takes: where a robot works for hours,
+  /// keyframes are what its memory goes on growing by.
+  int full_keyframes = 500;
+
   /// Keyframes of peers kept for further candidates; each takes about 10 kB with the default
   /// reply_keypoints.
   int cached_keyframes = 500;
@@ -97,6 +102,7 @@ struct LoopClosureConfig {
     visitor.field("failure_patience", failure_patience, {0.0, 100.0},
                   "candidates passed over per failure of their like; 0: none");
     visitor.field("reply_keypoints", reply_keypoints, {50, 100000}, "sent to a peer, 40 B each");
+    visitor.field("full_keyframes", full_keyframes, {1, 1000000}, "newest own ones, 48 kB each");
     visitor.field("cached_keyframes", cached_keyframes, {1, 1000000}, "of peers, about 10 kB each");
     visitor.field("seed", seed, {0U, ~0U}, "of the sampling");
   }

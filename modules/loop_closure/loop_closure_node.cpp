@@ -29,6 +29,7 @@ LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
       requests_(config.request_timeout_s, config.max_outstanding_requests),
       economy_(config),
       reply_keypoints_(static_cast<std::size_t>(config.reply_keypoints)),
+      full_keyframes_(static_cast<KeyframeIndex>(config.full_keyframes)),
       worker_(
           kQueueCapacity, Overflow::kBlock,
           [this](const Input& input) {
@@ -63,7 +64,20 @@ std::exception_ptr LoopClosureNode::error() const {
 
 void LoopClosureNode::step(const std::shared_ptr<const Keyframe>& own_keyframe) {
   own_[own_keyframe->odometry.id] = own_keyframe;
+  thin_out_before(own_keyframe->odometry.id.index);
   arrived(own_keyframe);
+}
+
+// Of the keyframe that is no longer among the newest only part of the keypoints stays.
+void LoopClosureNode::thin_out_before(KeyframeIndex newest) {
+  if (newest < full_keyframes_) return;
+  const auto old = own_.find({self_, newest - full_keyframes_});
+  if (old == own_.end()) return;
+  auto thinned = std::make_shared<Keyframe>(*old->second);
+  thinned->features = reduced(thinned->features, 2 * reply_keypoints_);
+  thinned->features.keypoints.shrink_to_fit();
+  thinned->features.descriptors.shrink_to_fit();
+  old->second = std::move(thinned);
 }
 
 void LoopClosureNode::step(const std::shared_ptr<const LoopCandidate>& candidate) {

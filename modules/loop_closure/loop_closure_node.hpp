@@ -96,6 +96,7 @@ class LoopClosureNode final : public Node {
     bool requested = false;                     ///< The other end has been asked for.
   };
 
+  void thin_out_before(KeyframeIndex newest);
   void accept(const Work& work);
   bool advance(const Work& work);
   void ask_for(const KeyframeId& missing, const Work& work);
@@ -118,6 +119,7 @@ class LoopClosureNode final : public Node {
   KeyframeRequests requests_;
   RequestEconomy economy_;
   const std::size_t reply_keypoints_;
+  const KeyframeIndex full_keyframes_;
   std::map<KeyframeId, std::vector<Work>> waiting_;  // for this keyframe
   std::set<ClosureId> known_;                        // candidates and measured closures seen
   double now_s_ = 0.0;

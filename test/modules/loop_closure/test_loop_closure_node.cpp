@@ -264,6 +264,25 @@ TEST_CASE("candidates inside one robot need no request, in whatever order things
   CHECK(robot.closures.size() == 1);  // the same pair from the other side
 }
 
+TEST_CASE("an old keyframe of the robot itself keeps a part of its keypoints",
+          "[loop_closure_node]") {
+  Scene scene(8);
+  scene.peer.odometry.id = {kSelf, 50};
+  LoopClosureConfig config;
+  config.reply_keypoints = 50;
+  config.full_keyframes = GENERATE(50, 51);
+  CAPTURE(config.full_keyframes);
+  Robot robot(kSelf, config);
+  robot.give(scene.own);
+  robot.give(scene.peer);
+  robot.give(scene.candidate());
+  REQUIRE(robot.closures.size() == 1);
+  if (config.full_keyframes == 50)  // keyframe 0 is the 51st
+    CHECK(robot.closures[0].inliers <= 100);
+  else
+    CHECK(robot.closures[0].inliers > 100);
+}
+
 TEST_CASE("a measured closure needs only the odometry of the other end", "[loop_closure_node]") {
   Scene scene(9);
   scene.own.features = scene.peer.features = {};
