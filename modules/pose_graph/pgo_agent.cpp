@@ -9,7 +9,7 @@ namespace km {
 namespace {
 
 // A status that has changed is sent again after this part of the period at the earliest.
-constexpr double kEarlyStatus = 0.1;
+constexpr double kEarlyStatus = 0.5;
 constexpr double kFeasible = 1e-3;  // single precision leaves 1e-6
 
 bool well_formed(const PublicPoses& poses, int rank) {

@@ -53,8 +53,9 @@ struct [[nodiscard]] PgoOutput {
 /// - kNewton and kGnc, by exchanges of a SessionSolver. Its poses are adopted when the whole team
 /// has come
 ///   to the end; a session that is left before changes nothing, so its cost cannot have risen. It
-///   is not left for new measurements, and the next one waits until its bytes are paid for. If the
-///   solver of any member gives up, all of them go on by kRbcd from where the session began.
+///   is not left for new measurements, and the next one waits until its bytes are paid for and it
+///   is worth its own. If the solver of any member gives up, all of them go on by kRbcd from where
+///   the session began.
 ///
 /// Closures that kGnc has rejected hold nothing to speak of in kRbcd until the next session of kGnc
 /// weighs them anew: they keep a weight of kJointWeight, and so their ends stay public.
@@ -137,10 +138,11 @@ class PgoAgent {
 
   // pgo_session.cpp: who optimises what, and who says so.
   void coordinate(PgoOutput& output);
-  [[nodiscard]] SessionPlan make_plan() const;
+  void make_plan();
   [[nodiscard]] PgoMethod method_for(const SessionPlan& plan) const;
   [[nodiscard]] bool should_open() const;
   [[nodiscard]] bool paid_for() const;
+  [[nodiscard]] bool worthwhile() const;
   void open_session();
   [[nodiscard]] bool accepts(const PgoSession& session) const;
   void join_or_wait(const PgoSession& session);
@@ -190,6 +192,9 @@ class PgoAgent {
   std::optional<RoundLedger> ledger_;  // if this robot coordinates the running session
   SessionPlan plan_;                   // of what is known
   bool plan_outdated_ = true;
+  double plan_changed_s_ = -1e9;      // its graph
+  std::uint64_t closures_known_ = 0;  // by the robots of the plan
+  std::uint64_t closures_used_ = 0;   // when the last session was opened
   std::uint32_t sessions_opened_ = 0;
   std::uint32_t total_rounds_ = 0;
   std::size_t intra_closures_tried_ = 0;

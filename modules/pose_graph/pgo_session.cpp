@@ -9,8 +9,8 @@ namespace {
 // A session that has not moved for so many status periods is replaced.
 constexpr double kHopelessPeriods = 10.0;
 
-// However much was sent, new measurements wait no longer than this [s].
-constexpr double kLongestWait_s = 30.0;
+// After so long without anything new [s] the team has come to rest.
+constexpr double kAtRest_s = 2.0;
 
 // The same work, in whatever order and frame.
 bool same_graph(const SessionPlan& x, const SessionPlan& y) {
@@ -44,9 +44,13 @@ bool well_formed(const PgoSession& session, int rank, PgoMethod method) {
          std::all_of(pairs.begin(), pairs.end(), known_pair) && anchor_fits;
 }
 
+bool same_members(const SessionPlan& x, const SessionPlan& y) {
+  return x.members.size() == y.members.size() && !has_lost_member(x, y);
+}
+
 }  // namespace
 
-SessionPlan PgoAgent::make_plan() const {
+void PgoAgent::make_plan() {
   std::map<RobotId, PgoStatus> statuses{{self_.robot, make_status()}};
   for (const auto& [robot, peer] : peers_) {
     if (!peer.alive || !peer.status) continue;
@@ -55,12 +59,15 @@ SessionPlan PgoAgent::make_plan() const {
     if (peer.poses && peer.poses->frame_version > status.frame_version)
       status.frame = peer.poses->frame;
   }
-  return plan_session(statuses, self_.robot);
+  SessionPlan plan = plan_session(statuses, self_.robot);
+  if (!same_graph(plan, plan_)) plan_changed_s_ = now_s_;
+  closures_known_ = closures_known(plan, statuses);
+  plan_ = std::move(plan);
 }
 
 void PgoAgent::coordinate(PgoOutput& output) {
   if (std::exchange(plan_outdated_, false)) {
-    plan_ = make_plan();
+    make_plan();
     if (const auto session = std::exchange(waiting_, std::nullopt)) join_or_wait(*session);
   }
   if (coordinator_of(plan_) != self_.robot) return;
@@ -92,7 +99,19 @@ bool PgoAgent::paid_for() const {
   std::size_t most = 0;
   for (const auto& [robot, bytes] : running_->bytes) most = std::max(most, bytes);
   const double price_s = static_cast<double>(most) / (1e3 * config_.exchange_budget_kb_s);
-  return now_s_ - running_->moved_s >= std::min(price_s, kLongestWait_s);
+  return now_s_ - running_->moved_s >= std::min(price_s, config_.session_wait_s);
+}
+
+bool PgoAgent::worthwhile() const {
+  const bool alone = plan_.members.size() == 1;
+  if (alone || !same_members(running_->session.plan, plan_)) return true;
+  // The first closures join the maps; each further one changes them less. Odometry alone changes
+  // nothing: what it adds can wait until the team is at rest.
+  const auto used = static_cast<double>(closures_used_);
+  const bool grown = closures_known_ != closures_used_ &&
+                     static_cast<double>(closures_known_) >= (1.0 + config_.session_growth) * used;
+  return grown || now_s_ - plan_changed_s_ >= kAtRest_s ||
+         now_s_ - running_->moved_s >= config_.session_wait_s;
 }
 
 bool PgoAgent::should_open() const {
@@ -102,7 +121,7 @@ bool PgoAgent::should_open() const {
   const bool stalled = still_s > kHopelessPeriods * config_.status_period_s;
   if (same_graph(session.plan, plan_)) return stalled && !session.finished;
   if (session.id.coordinator != self_ || has_lost_member(session.plan, plan_)) return true;
-  if (running_->exchange) return session.finished ? paid_for() : stalled;
+  if (running_->exchange) return session.finished ? paid_for() && worthwhile() : stalled;
   return session.finished || stalled ||
          session.round >= static_cast<std::uint32_t>(config_.min_rounds_per_session);
 }
@@ -120,6 +139,7 @@ void PgoAgent::open_session() {
       session.anchor_pose = *pose;
     }
   announce_session_ = join(session);
+  if (announce_session_) closures_used_ = closures_known_;
 }
 
 bool PgoAgent::accepts(const PgoSession& session) const {

@@ -27,9 +27,16 @@ struct PoseGraphConfig {
   int max_rounds = 0;
 
   /// newton, gnc: what a robot may send on average [kB/s]. The next session waits until the last
-  /// one is paid for, half a minute at most; robots that need little optimise as often as they
-  /// like.
+  /// one is paid for.
   double exchange_budget_kb_s = 20.0;
+
+  /// newton, gnc: it also waits until it is worth its bytes: until another robot takes part, the
+  /// closures have grown in number by this part of those of the last session, or nothing new has
+  /// come for two seconds.
+  double session_growth = 0.5;
+
+  /// newton, gnc: but for neither reason longer than this [s].
+  double session_wait_s = 60.0;
 
   /// rbcd: a session has converged when a round lowers the team's cost by less than this part of
   /// it.
@@ -70,6 +77,10 @@ struct PoseGraphConfig {
     visitor.field("max_rounds", max_rounds, {0, 1000000}, "rounds per session, 0: no limit");
     visitor.field("exchange_budget_kb_s", exchange_budget_kb_s, {0.1, 1e6},
                   "[kB/s] newton, gnc: a robot's mean, paid for by waiting between sessions");
+    visitor.field("session_growth", session_growth, {0.0, 100.0},
+                  "newton, gnc: of closures, as part of those before, that opens a session");
+    visitor.field("session_wait_s", session_wait_s, {0.0, 3600.0},
+                  "[s] newton, gnc: longest wait of what is new for a session");
     visitor.field("min_relative_decrease", min_relative_decrease, {0.0, 0.1},
                   "rbcd: of the team's cost in a round: less is convergence");
     visitor.field("min_rounds_per_session", min_rounds_per_session, {0, 1000},

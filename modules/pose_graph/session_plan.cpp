@@ -99,6 +99,19 @@ SessionPlan plan_session(const std::map<RobotId, PgoStatus>& statuses, RobotId s
   return plan;
 }
 
+std::uint64_t closures_known(const SessionPlan& plan,
+                             const std::map<RobotId, PgoStatus>& statuses) {
+  std::uint64_t known = 0;
+  for (const SessionPair& pair : plan.pairs)
+    for (const EdgeSetOffer& offer : statuses.at(pair.a).offers)
+      if (offer.peer == pair.b && offer.id == pair.edges) known += offer.edges;
+  for (const SessionMember& member : plan.members) {
+    const PgoStatus& status = statuses.at(member.peer.robot);
+    known += status.revision - std::min(status.revision, status.keyframes);
+  }
+  return known;
+}
+
 RobotId coordinator_of(const SessionPlan& plan) {
   const auto lower = [](const SessionMember& x, const SessionMember& y) {
     return x.peer.robot < y.peer.robot;

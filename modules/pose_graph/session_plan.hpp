@@ -20,6 +20,11 @@ namespace km {
 /// Throws std::invalid_argument if there is no status of `self`.
 [[nodiscard]] SessionPlan plan_session(const std::map<RobotId, PgoStatus>& statuses, RobotId self);
 
+/// What the session of `plan`, made of `statuses`, knows beside odometry: closures between its
+/// robots and, since these are not told one by one, changes of those inside them.
+[[nodiscard]] std::uint64_t closures_known(const SessionPlan& plan,
+                                           const std::map<RobotId, PgoStatus>& statuses);
+
 /// Lowest robot id of the members.
 [[nodiscard]] RobotId coordinator_of(const SessionPlan& plan);
 

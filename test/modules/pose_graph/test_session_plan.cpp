@@ -39,6 +39,19 @@ TEST_CASE("two robots agree on the newest edges that both hold", "[pose_graph][s
   CHECK_FALSE(agreed_edges(a, b));
 }
 
+TEST_CASE("what a session knows are the closures of its pairs and changes inside its robots",
+          "[pose_graph][session]") {
+  PgoStatus a = status_of(1, {{2, 9, {4, 40}}, {2, 7, {3, 30}}, {3, 5, {1, 10}}});
+  PgoStatus b = status_of(2, {{1, 7, {3, 30}}});
+  const PgoStatus c = status_of(3, {});
+  CHECK(closures_known(plan_session(by_robot({a, b, c}), 1), by_robot({a, b, c})) == 7);
+  b.revision = b.keyframes + 4;
+  CHECK(closures_known(plan_session(by_robot({a, b, c}), 1), by_robot({a, b, c})) == 11);
+  CHECK(closures_known(plan_session(by_robot({a, b, c}), 3), by_robot({a, b, c})) == 0);
+  b.revision = 0;  // no robot says so, but a message can
+  CHECK(closures_known(plan_session(by_robot({a, b, c}), 1), by_robot({a, b, c})) == 7);
+}
+
 TEST_CASE("the plan holds the component, best connected first", "[pose_graph][session]") {
   // 3 -10- 8 -2- 5 -7- 3, and 20 -4- 21 apart; 30 claims edges to 3 that 3 does not know.
   const auto statuses =
