@@ -26,12 +26,13 @@ struct NewtonOptions {
 /// One robot's part in a distributed Newton method for pose graphs.
 ///
 /// Separators, poses of which every edge between robots has one (see RobotGraph), cut the team's
-/// graph into parts that touch one robot's other poses each. In every round a robot
-/// linearises its edges at the present poses, eliminates its poses but the separators from Newton's
-/// equations, and broadcasts what remains: right-hand side and Schur complement on the separators,
-/// and its share of the cost. From all robots' shares everyone solves the same small system and
-/// substitutes back into its own poses. So one exchange makes one exact Newton step of the whole
-/// team, and no pose but public ones is ever told.
+/// graph into parts that touch one robot's other poses each. In every round a robot linearises its
+/// edges at the present poses, eliminates its poses but the separators from Newton's equations, and
+/// broadcasts what remains: right-hand side and Schur complement on the separators, its edges
+/// between separators as such (see KeptEdge), and its share of the cost. From all robots' shares
+/// everyone solves the same system and substitutes back into its own poses. So one exchange makes
+/// one Newton step of the whole team, exact but for single precision in second derivatives, and no
+/// pose but public ones is ever told.
 ///
 /// Second derivatives hardly change (see edge_model.hpp): they are eliminated, and sent, only when
 /// the old ones slow down convergence (Shamanskii's variant of Newton's method). The first ones are
