@@ -149,17 +149,20 @@ std::vector<ReportInput::World> with_meshes(std::vector<ReportInput::World> worl
 }  // namespace
 
 std::optional<ReportSection> mesh_section(ReportInput& input) {
-  const auto worlds = with_meshes(input.worlds(input.config().mesh_worlds));
-  if (worlds.empty()) return std::nullopt;
+  const auto all = input.worlds(input.config().mesh_worlds);
+  const auto worlds = with_meshes(all);  // EuRoC's own images have no true mesh
+  ReportFigures drawn = pictures(input, all);
+  if (worlds.empty() && drawn.figures.empty()) return std::nullopt;
   ReportSection section{.id = "mesh", .title = "Meshes", .blocks = {}};
   section.blocks.emplace_back(ReportParagraph{
       "Each robot's mesh as its odometry built it, moved as a whole into the team's frame, and the "
       "same mesh after local mesh optimisation bent it to the team's solution; and all robots' "
       "meshes together. The paper shows its errors as bars without numbers."});
-  section.blocks.emplace_back(charts(worlds));
-  section.blocks.emplace_back(error_table(worlds));
-  if (ReportFigures row = pictures(input, worlds); !row.figures.empty())
-    section.blocks.emplace_back(std::move(row));
+  if (!worlds.empty()) {
+    section.blocks.emplace_back(charts(worlds));
+    section.blocks.emplace_back(error_table(worlds));
+  }
+  if (!drawn.figures.empty()) section.blocks.emplace_back(std::move(drawn));
   for (const auto& world : worlds) {
     const auto& [before, after] = world.results->mesh;
     add_target(input, world, "error of the merged mesh", centimetres(before.error_m),

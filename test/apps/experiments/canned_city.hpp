@@ -1,0 +1,195 @@
+#pragma once
+
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "apps/experiments/report.hpp"
+#include "apps/experiments/step_record.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+
+inline constexpr const char* kCannedLabels = R"("labels": {"accuracy": )";
+
+// A mesh of whom everything is said by two numbers.
+inline std::string canned_mesh(double error_m, double accuracy) {
+  std::ostringstream text;
+  text << R"({"truth_to_estimate": {"point": {"mean_m": )" << error_m << "}, " << kCannedLabels
+       << accuracy << R"(}}, "seen_truth_to_estimate": {"point": {"mean_m": )" << 0.5 * error_m
+       << "}, " << kCannedLabels << accuracy << "}}}";
+  return text.str();
+}
+
+inline std::string canned_meshes(double error_m, double accuracy) {
+  const std::string own = canned_mesh(error_m, accuracy);
+  std::string robots;
+  for (const char* name : {"robot0", "robot1", "robot2"})
+    robots +=
+        (robots.empty() ? "" : ", ") + std::string("{\"name\": \"") + name + "\", " + own.substr(1);
+  return "{\"robots\": [" + robots + "], \"merged\": " + own + '}';
+}
+
+// Small results of every step in City: three robots that drive straight on, 1 m/s.
+class CannedCity {
+ public:
+  explicit CannedCity(bool quick = false) : config_(read_experiments("config/experiments", false)) {
+    config_.quick = quick;
+    config_.alone.world = "city";
+    config_.alone.robot = "robot0";
+    for (auto* worlds : {&config_.trajectory_worlds, &config_.resources_worlds,
+                         &config_.mesh_worlds, &config_.semantics_worlds})
+      *worlds = {"city"};
+    write_recordings();
+    for (const char* run : {"city", "city-run2", "city-run3"}) {
+      write_run(run);
+      for (const PgoMethodConfig& method : config_.methods) write_method(run, method);
+    }
+    write_alone();
+    for (const unsigned seed : config_.pcm.seeds) write_pcm(seed);
+    folder_.write("results/figures/mesh-city-before.png", "\x89PNG before");
+    folder_.write("results/figures/mesh-city-after.png", "\x89PNG after");
+    write_records();
+  }
+
+  ReportSummary report() const { return write_report(config_, paths()); }
+  std::string read(const std::string& name) const { return folder_.read("results/" + name); }
+  void write(const std::string& name, const std::string& text) const {
+    folder_.write("results/" + name, text);
+  }
+  void forget(const std::string& step) const {
+    std::filesystem::remove(folder_.path() / "results/steps" / (step + ".json"));
+  }
+
+ private:
+  static constexpr int kKeyframes = 4;
+
+  ExperimentPaths paths() const {
+    return {.programs = "/programs",
+            .data = folder_.path() / "data",
+            .results = folder_.path() / "results",
+            .graphs = folder_.path() / "data",
+            .euroc = {}};
+  }
+
+  // y of robot r at x, so that the three paths are not on one line.
+  static double sideways(int robot, int x) { return robot + 0.1 * x * x; }
+
+  void write_recordings() const {
+    folder_.write("data/city/simulation.json",
+                  R"({"complete": true, "parameters": {"resolution": "376x240", "seed": "7"}})");
+    std::string team = "robots:\n";
+    for (int r = 0; r < 3; ++r) {
+      const std::string name = "robot" + std::to_string(r);
+      std::ostringstream truth;
+      for (int x = 0; x < kKeyframes; ++x)
+        truth << x + 1 << "000000000," << x << ',' << sideways(r, x) << ",0,1,0,0,0\n";
+      folder_.write("data/city/" + name + "/truth.csv", truth.str());
+      team += "  - {id: " + std::to_string(r) + ", name: " + name + ", dataset: " + name +
+              ", truth: " + name + "/truth.csv}\n";
+    }
+    folder_.write("data/city/team.yaml", team);
+  }
+
+  void write_run(const std::string& world) const {
+    std::string robots, optimized;
+    for (int r = 0; r < 3; ++r) {
+      const std::string name = "robot" + std::to_string(r);
+      const std::string run = "data/" + world + "_res/" + name;
+      std::string keyframes = "robot,keyframe,stamp_ns,median_depth_m\n";
+      for (int x = 0; x < kKeyframes; ++x)
+        keyframes += std::to_string(r) + ',' + std::to_string(x) + ',' + std::to_string(x + 1) +
+                     "000000000,5\n";
+      folder_.write(run + "/keyframes.csv", keyframes);
+      folder_.write(run + "/summary.json",
+                    R"({"process": {"cpu_s": 2.4, "peak_memory_bytes": 250000000}})");
+      folder_.write(run + "/traffic.csv",
+                    "time_s,direction,topic,category,peer,messages,bytes,retransmitted_bytes\n"
+                    "1,out,keyframe_replies,geometric_verification,1,1,30000,0\n"
+                    "2,out,keyframe_replies,geometric_verification,1,2,80000,0\n");
+      folder_.write(run + "/timing.csv",
+                    "module,calls,median_ms,p95_ms,max_ms,total_s\nvio,3,1,1,1,1.2\n");
+      folder_.write(run + "/pose_graph.g2o", "");
+      robots += (r == 0 ? "" : ", ") + std::string("{\"name\": \"") + name +
+                R"(", "keyframes": 4, "traffic": {"place_recognition": 1000000,
+                "geometric_verification": 2000000, "pgo": 9000000},
+                "odometry": {"position_m": {"rmse": 0.0123}}})";
+      optimized += (r == 0 ? "" : ", ") + std::string("{\"name\": \"") + name +
+                   R"(", "position_m": {"rmse": 0.0045}})";
+    }
+    folder_.write(
+        "results/team-" + world + ".json",
+        "{\"robots\": [" + robots + "], \"optimized\": {\"robots\": [" + optimized +
+            "], \"joint\": {\"position_m\": {\"rmse\": 0.006}}}, \"closures\": {\"inliers\": "
+            "{\"judged\": 817, \"correct\": 816}}, \"meshes\": " +
+            canned_meshes(0.08, 0.9) + ", \"optimized_meshes\": " + canned_meshes(0.06, 0.95) +
+            '}');
+  }
+
+  // Poses bent off the truth: local PGO the most, RBCD half of it, all others not at all.
+  // The further runs bend less.
+  void write_method(const std::string& world, const PgoMethodConfig& method) const {
+    const double share = world == "city" ? 1.0 : world == "city-run2" ? 0.9 : 0.8;
+    const double bend_m = method.name == "local" ? share : method.name == "rbcd" ? 0.5 : 0.0;
+    std::ostringstream poses;
+    for (int i = 0; i < 3 * kKeyframes; ++i) {
+      const int r = i / kKeyframes, x = i % kKeyframes;
+      poses << i << ' ' << x << ' ' << sideways(r, x) + (x == 0 || x == 3 ? bend_m : -bend_m)
+            << " 0 0 0 0 1\n";
+    }
+    folder_.write("results/poses/pgo-" + world + '-' + method.name + ".tum", poses.str());
+    const double cost = method.name == "rbcd" ? 1060.0 : 1000.0;
+    std::ostringstream json;
+    json << R"({"poses": 12, "edges": 34, "rounds": [{"cost": 2000, "bytes": 0},
+             {"cost": 1000, "bytes": 4321000,
+             "critical_path_s": 0.125}], "rounded_cost": )"
+         << cost << R"(, "optimum": 1000.0})";
+    folder_.write("results/pgo-" + world + '-' + method.name + ".json", json.str());
+  }
+
+  void write_alone() const {
+    folder_.write("data/city_alone/summary.json",
+                  R"({"process": {"cpu_s": 0.6, "peak_memory_bytes": 120000000}})");
+    folder_.write("data/city_alone/timing.csv",
+                  "module,calls,median_ms,p95_ms,max_ms,total_s\nvio,3,1,1,1,0.3\n"
+                  "sensors,3,1,1,1,0.1\n");
+    folder_.write("data/city_alone/odometry.tum", "1 0 0 0 0 0 0 1\n4 3 0 0 0 0 0 1\n");
+  }
+
+  // Batch takes 4, 8, 12 times as long as the others.
+  void write_pcm(unsigned seed) const {
+    std::ostringstream runs;
+    for (const std::string search : {"batch", "incremental", "exact"}) {
+      runs << (search == "batch" ? "[" : ", ") << "{\"search\": \"" << search
+           << "\", \"additions\": [";
+      for (int k = 1; k <= 120; ++k)
+        runs << (k == 1 ? "" : ", ")
+             << "{\"search_s\": " << (search == "batch" ? 0.004 * seed : 0.001)
+             << ", \"clique\": " << k << '}';
+      runs << "]}";
+    }
+    runs << ']';
+    const std::string name = "pcm-" + std::to_string(seed);
+    folder_.write("results/" + name + ".json", runs.str());
+    folder_.write("results/figures/" + name + ".svg",
+                  "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"9\" height=\"9\"></svg>");
+  }
+
+  void write_records() const {
+    std::vector<std::string> names;
+    for (const ExperimentName& experiment : kExperiments) names.emplace_back(experiment.name);
+    for (const Step& step : plan_experiments(names, config_, paths()))
+      write_record(paths().results, {.step = step.name,
+                                     .fingerprint = fingerprint_of(step),
+                                     .command = step.command,
+                                     .started = "2026-01-01 00:00 UTC",
+                                     .seconds = 12.5,
+                                     .commit = "abc123",
+                                     .machine = {"TestChip", 2, 8.0, 0.5}});
+  }
+
+  TemporaryFolder folder_;
+  ExperimentConfig config_;
+};
+
+}  // namespace km
