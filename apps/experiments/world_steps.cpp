@@ -89,6 +89,19 @@ std::vector<fs::path> of_robots(const WorldConfig& world, const fs::path& run, c
   return paths;
 }
 
+// Of each robot; nothing if they are not known of all.
+std::vector<fs::path> true_poses(const WorldConfig& world, const WorldFiles& files,
+                                 const ExperimentPaths& paths) {
+  if (!files.original)
+    return of_robots(world, files.recordings, "mav0/state_groundtruth_estimate0/data.csv");
+  std::vector<fs::path> truths;
+  for (const std::string& robot : world.robots) {
+    truths.push_back(find_recorded_flight(paths.euroc, robot).truth);
+    if (truths.back().empty()) return {};
+  }
+  return truths;
+}
+
 bool all_exist(const std::vector<fs::path>& files) {
   return std::all_of(files.begin(), files.end(), [](const fs::path& f) { return fs::exists(f); });
 }
@@ -163,6 +176,7 @@ std::vector<Step> world_steps(const WorldConfig& world, const ExperimentPaths& p
 
 std::vector<Step> picture_steps(const WorldConfig& world, const ExperimentPaths& paths) {
   const WorldFiles files = world_files(world, paths);
+  const std::vector<fs::path> truths = true_poses(world, files, paths);
   std::vector<Step> steps;
   for (const bool corrected : {false, true}) {
     const fs::path picture = picture_file(world, corrected, paths);
@@ -180,11 +194,9 @@ std::vector<Step> picture_steps(const WorldConfig& world, const ExperimentPaths&
     for (const fs::path& trajectory : trajectories) step.command.push_back(trajectory.string());
     step.inputs = meshes;
     step.inputs.insert(step.inputs.end(), trajectories.begin(), trajectories.end());
-    if (!files.original) {  // the truth stands the map upright
+    if (!truths.empty()) {  // they stand the map upright
       step.command.emplace_back("--reference");
-      for (const fs::path& truth :
-           of_robots(world, files.recordings, "mav0/state_groundtruth_estimate0/data.csv"))
-        step.command.push_back(truth.string());
+      for (const fs::path& truth : truths) step.command.push_back(truth.string());
     }
     append(step.command, world.picture);
     append(step.command, {"--output", picture.string()});
