@@ -59,6 +59,7 @@ struct Options {
   km::PgoOptions pgo;
   double optimum = 0.0;
   bool robust = false;
+  std::string noise;
   km::GncAgentOptions gnc;
 };
 
@@ -146,10 +147,11 @@ void define_robust(CLI::App& app, Options& options) {
                  "gnc: factor between two updates of the weights, above 1; small is careful")
       ->check(CLI::Range(1.01, 1e3))
       ->capture_default_str();
-  app.add_flag(
-      "--noise-scale", options.gnc.gnc.estimate_scale,
-      "gnc: estimate from the residuals how many times larger the noise is than the graph\n"
-      "says, and multiply --barc by it");
+  app.add_option(
+         "--noise-scale", options.noise,
+         "gnc: multiply --barc by how many times larger the noise of closures is than the graph\n"
+         "says, estimated from pairs of them: larger (never less than 1) or any")
+      ->check(CLI::IsMember({"larger", "any"}));
   app.add_flag("--reject-odometry", options.gnc.reject_odometry,
                "gnc: steps of odometry inside a robot can be false, too");
 }
@@ -210,8 +212,11 @@ km::TeamGraph read_and_check(const Options& options, const CLI::App& app) {
 }
 
 void run_and_write_robust(const Options& options, const km::TeamGraph& graph) {
+  const auto noise = options.noise.empty()       ? km::NoiseModel::kNominal
+                     : options.noise == "larger" ? km::NoiseModel::kLarger
+                                                 : km::NoiseModel::kEstimated;
   const km::RobustRun run =
-      km::run_robust(graph, options.gnc, options.pgo.run.max_rounds, km::wire_meter());
+      km::run_robust(graph, options.gnc, noise, options.pgo.run.max_rounds, km::wire_meter());
   std::cout << km::robust_text(graph, run);
   km::write_output(options.json,
                    [&](std::ostream& out) { km::write_robust_json(out, graph, run); });

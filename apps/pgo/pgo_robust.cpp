@@ -1,5 +1,6 @@
 #include "apps/pgo/pgo_robust.hpp"
 
+#include <algorithm>
 #include <ostream>
 #include <sstream>
 
@@ -21,20 +22,28 @@ std::string kept_of(const RobustRun& run, const auto& counts) {
   return std::to_string(kept) + " of " + std::to_string(all);
 }
 
+std::string noise_text(const RobustRun& run) {
+  if (!run.noise) return {};
+  return "closures are " + fixed(run.noise->scale, 3) + " times as noisy as the graph says, by " +
+         std::to_string(run.noise->pairs) + " pairs of them, " +
+         fixed(100.0 * run.noise->consistent, 0) + " % consistent\n";
+}
+
 }  // namespace
 
-RobustRun run_robust(const TeamGraph& graph, const GncAgentOptions& options, int max_rounds,
-                     const TeamMeter& meter) {
-  StagedGncTeam team(graph, 3, options);
+RobustRun run_robust(const TeamGraph& graph, GncAgentOptions options, NoiseModel noise,
+                     int max_rounds, const TeamMeter& meter) {
   RobustRun run;
-  run.rounds = run_team(graph, team, {.max_rounds = max_rounds}, meter);
   run.odometry = odometry_edges(graph);
-  run.kept = team.kept();
-  const auto& schedule = team.agent(0).schedule();
   run.barc = options.gnc.barc > 0.0 ? options.gnc.barc : default_barc(graph.dimension);
-  if (schedule) {
-    run.scale = schedule->scale();
-  }
+  if (noise != NoiseModel::kNominal) run.noise = noise_scale(graph, run.odometry);
+  if (run.noise)
+    run.scale = noise == NoiseModel::kLarger ? std::max(1.0, run.noise->scale) : run.noise->scale;
+  options.gnc.barc = run.barc * run.scale;
+  StagedGncTeam team(graph, 3, options);
+  // The team ends by itself: that there is no gradient says nothing of the weights.
+  run.rounds = run_team(graph, team, {.max_rounds = max_rounds, .gradient_tolerance = -1.0}, meter);
+  run.kept = team.kept();
   run.updates = team.updates();
   run.isolated = team.isolated();
   run.decided = team.done();
@@ -57,10 +66,9 @@ std::string robust_text(const TeamGraph& graph, const RobustRun& run) {
        << " inside a robot, "
        << kept_of(run, [&](std::size_t k) { return static_cast<bool>(run.odometry[k]); })
        << " steps of odometry\n"
-       << "threshold " << fixed(run.barc, 2) << " sigma, noise " << fixed(run.scale, 2)
-       << " times as large as the graph says\n"
-       << run.updates << " updates of the weights in " << run.rounds.size() - 1 << " rounds, "
-       << bytes_text(static_cast<double>(work.bytes)) << " sent, critical path "
+       << "threshold " << fixed(run.barc * run.scale, 2) << " sigma of the graph\n"
+       << noise_text(run) << run.updates << " updates of the weights in " << run.rounds.size() - 1
+       << " rounds, " << bytes_text(static_cast<double>(work.bytes)) << " sent, critical path "
        << fixed(work.critical_path_s, 3) << " s, CPU " << fixed(work.total_cpu_s, 3) << " s\n";
   if (run.isolated > 0)
     text << run.isolated << " closures have none beside them that agrees: heard in the end only\n";

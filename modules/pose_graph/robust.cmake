@@ -7,7 +7,7 @@ add_library(km_pose_graph_robust STATIC
 target_link_libraries(km_pose_graph_robust PUBLIC km_pose_graph_newton km_outlier_rejection)
 
 add_library(km_pose_graph_robust_team STATIC
-  robust/central_gnc.cpp robust/gnc_team.cpp robust/isolated_closures.cpp
+  robust/central_gnc.cpp robust/gnc_team.cpp robust/isolated_closures.cpp robust/noise_scale.cpp
   robust/staged_gnc_team.cpp)
 target_link_libraries(km_pose_graph_robust_team PUBLIC km_pose_graph_robust km_pose_graph_team)
 

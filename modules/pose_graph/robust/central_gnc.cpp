@@ -72,8 +72,7 @@ CentralGnc gnc_centrally(const TeamGraph& graph, const GncAgentOptions& options,
   }
   CentralGnc result{.kept = std::vector<bool>(graph.edges.size(), true),
                     .T_world_kf = std::move(poses),
-                    .updates = schedule.updates(),
-                    .scale = schedule.scale()};
+                    .updates = schedule.updates()};
   for (std::size_t c = 0; c < edge_of.size(); ++c) result.kept[edge_of[c]] = schedule.kept(c);
   return result;
 }

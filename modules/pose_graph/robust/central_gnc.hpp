@@ -11,7 +11,6 @@ struct [[nodiscard]] CentralGnc {
   std::vector<bool> kept;  ///< Of the graph's edges; trusted ones are.
   std::vector<SE3> T_world_kf;
   int updates = 0;
-  double scale = 1.0;  ///< Of the noise, see GncOptions.
 };
 
 /// The reference for GncAgent: the same schedule for the whole graph on one computer, the weighted

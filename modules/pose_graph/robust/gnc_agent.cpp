@@ -62,10 +62,11 @@ std::optional<GncShare> GncAgent::advance() {
 
 GncShare GncAgent::share(bool fresh) {
   decided_told_ = schedule_->decided();
-  fresh = fresh || (decided_told_ && !full_told_) || block_.stale();
+  const bool full = decided_told_ && !convex_;
+  fresh = fresh || (full && !full_told_) || block_.stale();
   std::optional<Curvature> curvature;
-  if (fresh) curvature = decided_told_ ? Curvature::kFull : Curvature::kGaussNewton;
-  full_told_ = decided_told_;
+  if (fresh) curvature = full ? Curvature::kFull : Curvature::kGaussNewton;
+  full_told_ = full;
   GncShare share = block_.share(candidate_.own, curvature);
   share.base_cost = told_cost(base_);
   share.cost = told_cost(candidate_);
@@ -102,27 +103,38 @@ std::optional<GncShare> GncAgent::step_on() {
   else if (!schedule_->decided() && !std::exchange(hold_weights_, false))
     update_weights(inside);
   at_base_ = false;
-  const PublicSystem::Solution solution = solve();
-  decrement_ = solution.decrement;
+  const std::optional<PublicSystem::Solution> solution = solve();
+  if (!solution) {
+    convex_ = true;
+    return share_at_base();
+  }
+  decrement_ = solution->decrement;
   if (final_weights) {
-    if (0.5 * solution.decrement <= options_.tolerance * cost + kNegligible) {
+    if (0.5 * decrement_ <= options_.tolerance * cost + kNegligible) {
       phase_ = Phase::kDone;
       return std::nullopt;
     }
-    if (worth_refreshing(solution.decrement, cost)) return share_at_base();
+    if (worth_refreshing(decrement_, cost)) {
+      convex_ = false;
+      return share_at_base();
+    }
   }
   const Index first = graph_->first(edges_.edges.self);
   step_ = {.nodes = block_.substitute_back(
-               solution.x.middleCols(first, graph_->sizes().at(edges_.edges.self))),
-           .separators = solution.x};
+               solution->x.middleCols(first, graph_->sizes().at(edges_.edges.self))),
+           .separators = solution->x};
   remove_drift(step_, base_.own, base_.all_public);
   take_step(1.0);
   return share(false);
 }
 
-PublicSystem::Solution GncAgent::solve() {
-  system_->factorise(base_.all_public, link_weights_,
-                     decided_told_ ? Curvature::kFull : Curvature::kGaussNewton);
+// nullopt if full second derivatives, far from the optimum, are indefinite: all find so alike.
+std::optional<PublicSystem::Solution> GncAgent::solve() {
+  if (!system_->factorise(base_.all_public, link_weights_,
+                          full_told_ ? Curvature::kFull : Curvature::kGaussNewton)) {
+    if (full_told_) return std::nullopt;
+    throw std::runtime_error("GncAgent: the graph of the team is not connected");
+  }
   const Index block = tangent_size(dimension_);
   Eigen::VectorXd reduced = Eigen::VectorXd::Zero(block * graph_->nodes());
   double decrement = 0.0;

@@ -91,7 +91,7 @@ class GncAgent {
   [[nodiscard]] std::optional<GncShare> go_back();
   [[nodiscard]] GncShare share_at_base();
   [[nodiscard]] bool worth_refreshing(double decrement, double cost);
-  [[nodiscard]] PublicSystem::Solution solve();
+  [[nodiscard]] std::optional<PublicSystem::Solution> solve();
   void take_step(double scale);
 
   GncEdges edges_;
@@ -126,6 +126,7 @@ class GncAgent {
   int all_in_ = 0;                        // steps before the weights are first set
   bool decided_told_ = false;             // the last shares are of the weights decided
   bool full_told_ = false;                // and have full second derivatives
+  bool convex_ = false;                   // those were indefinite: Gauss-Newton's until it is slow
   std::optional<double> last_decrement_;  // found with the present second derivatives
 };
 

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "modules/core/precision.hpp"
+
 namespace km {
 
 double edge_residual(const SE3& T_world_i, const SE3& T_world_j, const SE3& T_i_j, double kappa,
@@ -46,6 +48,14 @@ std::vector<SE3> start_from_odometry(const GncEdges& edges) {
     poses.push_back(*T);
   }
   return poses;
+}
+
+Matrix6 edge_covariance(const BlockEdge& e, int dimension) {
+  Matrix6 Sigma = covariance_of({e.kappa, e.tau});
+  if (dimension == 3) return Sigma;
+  Sigma(0, 0) = Sigma(1, 1) = Sigma(5, 5) = 0.0;  // roll, pitch, z
+  Sigma(2, 2) = 1.0 / e.kappa;
+  return Sigma;
 }
 
 }  // namespace km

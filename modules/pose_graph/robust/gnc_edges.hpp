@@ -24,4 +24,8 @@ struct GncEdges {
 [[nodiscard]] double edge_residual(const SE3& T_world_i, const SE3& T_world_j, const SE3& T_i_j,
                                    double kappa, double tau);
 
+/// What the weights of an edge say of its covariance, tangent [rotation; translation]. In the plane
+/// kappa is that of the angle (see precision_of_blocks()), and other directions have none.
+[[nodiscard]] Matrix6 edge_covariance(const BlockEdge& e, int dimension);
+
 }  // namespace km

@@ -96,7 +96,6 @@ GncSchedule::GncSchedule(std::vector<GncCandidate> candidates, std::size_t robot
       robots_(robots),
       options_(options),
       barc_(options.barc > 0.0 ? options.barc : default_barc(dimension)),
-      median_(length_quantile(0.5, dimension)),
       weights_(candidates_.size(), 1.0),
       bridge_(candidates_.size(), false) {
   check(options);
@@ -116,8 +115,7 @@ bool GncSchedule::update(std::span<const float> residuals) {
   if (!std::all_of(residuals.begin(), residuals.end(), [](float r) { return r >= 0.0F; }))
     throw std::invalid_argument("GncSchedule: a residual is negative or not a number");
   if (decided_) return false;
-  if (options_.estimate_scale) estimate_scale(residuals);
-  const double c2 = barc_ * barc_ * scale_ * scale_;
+  const double c2 = barc_ * barc_;
   const float largest =
       residuals.empty() ? 0.0F : *std::max_element(residuals.begin(), residuals.end());
   mu_ = updates_ == 0 ? gnc_first_mu(static_cast<double>(largest) * largest, c2)
@@ -137,29 +135,8 @@ bool GncSchedule::update(std::span<const float> residuals) {
   return true;
 }
 
-void GncSchedule::estimate_scale(std::span<const float> residuals) {
-  std::vector<std::size_t> order;
-  double total = 0.0;
-  for (std::size_t k = 0; k < residuals.size(); ++k) {
-    if (candidates_[k].odometry || bridge_[k] || weights_[k] == 0.0) continue;
-    order.push_back(k);
-    total += weights_[k];
-  }
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return std::pair(residuals[a], a) < std::pair(residuals[b], b);
-  });
-  double sum = 0.0;
-  for (const std::size_t k : order) {
-    sum += weights_[k];
-    if (sum < 0.5 * total) continue;
-    scale_ = std::max(static_cast<double>(residuals[k]) / median_,
-                      std::numeric_limits<float>::epsilon() * 1.0);
-    return;
-  }
-}
-
 void GncSchedule::set_weights(std::span<const float> residuals) {
-  const double c2 = barc_ * barc_ * scale_ * scale_;
+  const double c2 = barc_ * barc_;
   const bool last = mu_ >= kHardMu || updates_ + 1 >= options_.max_updates;
   for (std::size_t k = 0; k < weights_.size(); ++k) {
     const double r = residuals[k];

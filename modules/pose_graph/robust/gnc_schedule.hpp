@@ -13,9 +13,6 @@ namespace km {
 struct GncOptions {
   double barc = 0.0;     ///< Largest residual of an inlier [sigma]; 0: default_barc().
   double mu_step = 1.4;  ///< Factor by which the surrogate comes closer to the truncated cost, > 1.
-  /// Sigmas are taken `scale` times as large as the graph says, where `scale` is what makes the
-  /// (weighted) median of the candidates' residuals that of Gaussian noise.
-  bool estimate_scale = false;
   int max_updates = 100;  ///< Of the weights; then they are decided as they are.
 };
 
@@ -76,11 +73,9 @@ class GncSchedule {
   [[nodiscard]] bool decided() const { return decided_; }
   [[nodiscard]] int updates() const { return updates_; }
   [[nodiscard]] double mu() const { return mu_; }
-  [[nodiscard]] double scale() const { return scale_; }  ///< 1 unless estimated.
-  [[nodiscard]] double barc() const { return barc_; }    ///< Of scaled residuals.
+  [[nodiscard]] double barc() const { return barc_; }
 
  private:
-  void estimate_scale(std::span<const float> residuals);
   void set_weights(std::span<const float> residuals);
   void join_parts(std::span<const float> residuals);
 
@@ -89,9 +84,7 @@ class GncSchedule {
   std::size_t robots_;
   GncOptions options_;
   double barc_;
-  double median_;  // of the length of normal noise
   double mu_ = 0.0;
-  double scale_ = 1.0;
   int updates_ = 0;
   int hard_updates_ = 0;  // since mu is so large that no weight lies between 0 and 1
   bool decided_ = false;

@@ -95,11 +95,10 @@ void PublicSystem::add_link(std::size_t k, const EdgeModel& model) {
     sum_.between(pair_of_link_[k]) += part(model.H_ij).transpose();
 }
 
-void PublicSystem::factorise(std::span<const SE3> poses, std::span<const double> weights,
+bool PublicSystem::factorise(std::span<const SE3> poses, std::span<const double> weights,
                              Curvature curvature) {
-  if (curvature == Curvature::kFull && try_factorise(poses, weights, curvature)) return;
-  if (!try_factorise(poses, weights, Curvature::kGaussNewton))
-    throw std::runtime_error("PublicSystem: the graph of the team is not connected");
+  if (curvature == Curvature::kFull && try_factorise(poses, weights, curvature)) return true;
+  return try_factorise(poses, weights, Curvature::kGaussNewton);
 }
 
 bool PublicSystem::try_factorise(std::span<const SE3> poses, std::span<const double> weights,

@@ -33,10 +33,12 @@ class PublicSystem {
   /// not that of the pattern told.
   void set_part(RobotId robot, const BlockMatrix& schur);
 
-  /// Linearises the links at `poses` of the nodes and factorises. Full second derivatives that turn
-  /// out indefinite give way to Gauss-Newton's. Throws std::runtime_error if the links with a
-  /// weight above zero do not join all robots.
-  void factorise(std::span<const SE3> poses, std::span<const double> weights, Curvature curvature);
+  /// Linearises the links at `poses` of the nodes and factorises. Full second derivatives of the
+  /// links that turn out indefinite give way to Gauss-Newton's. False if it is indefinite even so:
+  /// the robots' parts are, or the links with a weight above zero do not join all robots. Nothing
+  /// may be solved then.
+  [[nodiscard]] bool factorise(std::span<const SE3> poses, std::span<const double> weights,
+                               Curvature curvature);
 
   /// `reduced`: right-hand sides of the robots' parts, B nodes. Conjugate gradients end once the
   /// residual, as the preconditioner measures it, has fallen by `accuracy`.

@@ -5,7 +5,9 @@
 #include <set>
 
 #include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/newton/elimination_plan.hpp"
 #include "modules/pose_graph/robust/isolated_closures.hpp"
+#include "modules/pose_graph/robust/noise_scale.hpp"
 
 namespace km {
 namespace {
@@ -14,9 +16,12 @@ namespace {
 constexpr std::size_t kFewIsolated = 32;
 // With fewer closures left per pose, the others are needed from the start.
 constexpr double kClosuresPerPose = 0.25;
-// Of all closures, from here on: where most have others beside them, the few that do not have no
-// cause to be false, and the team does better to hear all at once.
+// Where most closures have others beside them, the few that do not have no cause to be false, and
+// the team does better to hear all at once: unless they are so many of all closures, or make so
+// much more work to eliminate the poses, if that is more than a few milliseconds.
 constexpr double kManyIsolated = 0.2;
+constexpr double kMuchMoreWork = 3.0;
+constexpr double kLittleWork = 3e5;  // multiplications of blocks
 // Of barc: what comes back in may lie so far off poses that were found without it.
 constexpr double kSecondChance = 3.0;
 
@@ -32,6 +37,33 @@ bool joins_all(const TeamGraph& graph, const std::vector<bool>& taking_part) {
   return std::all_of(part.begin(), part.end(), [&](std::size_t p) { return p == part[0]; });
 }
 
+// Of a Cholesky factorisation of all poses' system, in multiplications of blocks. Who eliminates
+// which pose changes it little, and closures between far ends cost everyone.
+double elimination_work(const TeamGraph& graph, const std::vector<bool>& taking_part) {
+  std::set<NodePair> pairs;
+  for (std::size_t k = 0; k < graph.edges.size(); ++k) {
+    const auto [i, j] = std::minmax(graph.edges[k].i, graph.edges[k].j);
+    if (taking_part[k]) pairs.insert({static_cast<int>(i), static_cast<int>(j)});
+  }
+  const EliminationPlan plan(std::vector<bool>(static_cast<std::size_t>(graph.poses()), false),
+                             {pairs.begin(), pairs.end()});
+  double work = 0.0;
+  for (const EliminationPlan::Front& front : plan.fronts()) {
+    const auto size = static_cast<double>(front.nodes.size());
+    work += size * size * static_cast<double>(front.pivots);
+  }
+  return work;
+}
+
+bool do_harm(const TeamGraph& graph, const std::vector<bool>& taking_part, std::size_t isolated,
+             std::size_t closures) {
+  if (isolated <= kFewIsolated) return false;
+  if (static_cast<double>(isolated) >= kManyIsolated * static_cast<double>(closures)) return true;
+  const std::vector<bool> all(graph.edges.size(), true);
+  const double work = elimination_work(graph, all);
+  return work > kLittleWork && work > kMuchMoreWork * elimination_work(graph, taking_part);
+}
+
 }  // namespace
 
 StagedGncTeam::StagedGncTeam(const TeamGraph& graph, Eigen::Index rank,
@@ -44,15 +76,18 @@ StagedGncTeam::StagedGncTeam(const TeamGraph& graph, Eigen::Index rank,
 
 void StagedGncTeam::set_aside(double barc) {
   const std::vector<bool> odometry = odometry_edges(graph_);
-  std::vector<bool> corroborated = isolated_closures(graph_, odometry, barc);
+  // Where closures are much better than the graph says, so must their neighbours agree.
+  const std::optional<NoiseScale> noise = noise_scale(graph_, odometry);
+  const double agreement = barc * std::min(1.0, noise ? noise->scale : 1.0);
+  std::vector<bool> corroborated = isolated_closures(graph_, odometry, agreement);
   corroborated.flip();
-  const auto steps = std::count(odometry.begin(), odometry.end(), true);
-  const auto left = std::count(corroborated.begin(), corroborated.end(), true) - steps;
-  const std::size_t isolated = graph_.edges.size() - static_cast<std::size_t>(left + steps);
-  const double closures = static_cast<double>(graph_.edges.size()) - static_cast<double>(steps);
-  if (isolated <= kFewIsolated || static_cast<double>(isolated) < kManyIsolated * closures ||
-      !joins_all(graph_, corroborated) ||
-      static_cast<double>(left) < kClosuresPerPose * static_cast<double>(graph_.poses()))
+  const auto closures =
+      static_cast<std::size_t>(std::count(odometry.begin(), odometry.end(), false));
+  const auto isolated =
+      static_cast<std::size_t>(std::count(corroborated.begin(), corroborated.end(), false));
+  if (!do_harm(graph_, corroborated, isolated, closures) || !joins_all(graph_, corroborated) ||
+      static_cast<double>(closures - isolated) <
+          kClosuresPerPose * static_cast<double>(graph_.poses()))
     return;
   taking_part_ = std::move(corroborated);
   isolated_ = isolated;
@@ -77,7 +112,7 @@ bool StagedGncTeam::step(RoundMeter& meter) {
 
 void StagedGncTeam::bring_back(RoundMeter& meter) {
   tell_ends(meter);
-  const double barc = team_->agent(0).schedule()->barc() * team_->agent(0).schedule()->scale();
+  const double barc = team_->agent(0).schedule()->barc();
   std::vector<bool> next = kept();
   bool any = false;
   for (std::size_t k = 0; k < next.size(); ++k) {

@@ -8,11 +8,12 @@
 namespace km {
 
 /// GncAgents of a whole team in one process, in two stages where many closures are isolated (see
-/// isolated_closures()): these first stand aside, so that random false ones neither pull at the
-/// poses nor couple everything with everything. Those whose residual at the result is not far from
-/// that of an inlier come back in, and the team decides once more from there. Which closures are
-/// isolated their two robots can tell from the edges and odometry that they know of each other; for
-/// the residuals every robot tells where the poses at their ends are, which counts as a round.
+/// isolated_closures()), or few but costly ones: these first stand aside, so that random false ones
+/// neither pull at the poses nor couple everything with everything. Those whose residual at the
+/// result is not far from that of an inlier come back in, and the team decides once more from
+/// there. Which closures are isolated their two robots can tell from the edges and odometry that
+/// they know of each other; for the residuals every robot tells where the poses at their ends are,
+/// which counts as a round.
 class StagedGncTeam : public TeamSolver {
  public:
   /// Throws as GncTeam does.

@@ -75,7 +75,9 @@ std::vector<RecordedGraph> read_parts(const std::filesystem::path& folder) {
     });
     if (same != parts.end() - 1)
       throw std::runtime_error(file.string() + ": is a second file of robot " +
-                               std::to_string(same->robot));
+                               std::to_string(same->robot) +
+                               "; a folder is one team's, with one file per robot: of several "
+                               "graphs, name one");
   }
   std::sort(parts.begin(), parts.end(),
             [](const RecordedGraph& a, const RecordedGraph& b) { return a.robot < b.robot; });

@@ -112,6 +112,23 @@ TEST_CASE("A graph without noise has no gap to report, and is certified", "[pgo]
   CHECK_THAT(text_of(json), !Contains("nan") && Contains("\"certified\": true"));
 }
 
+TEST_CASE("GNC decides, and says how noisy closures are where enough of them tell", "[pgo]") {
+  const TemporaryFolder folder;
+  const std::string square = folder.write("square.g2o", square_g2o()).string();
+  const std::string step = folder.write("step.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n").string();
+  const auto json = folder.path() / "out.json";
+  for (const std::string& arguments :
+       {step, step + " --noise-scale any", square + " --robots 2 --noise-scale larger",
+        square + " --reject-odometry"}) {
+    const CommandResult result =
+        run_command(kTool + arguments + " --robust gnc --json " + json.string());
+    CAPTURE(arguments, result.output);
+    CHECK(result.exit_code == 0);
+    CHECK_THAT(result.output, !Contains("not decided"));
+    CHECK_THAT(text_of(json), Contains("\"decided\": true") && Contains("\"scale\": 1"));
+  }
+}
+
 TEST_CASE("What cannot be done is told with the reason", "[pgo]") {
   const TemporaryFolder folder;
   const std::string graph = folder.write("square.g2o", square_g2o()).string();

@@ -100,22 +100,6 @@ TEST_CASE("robots that lose all their closures keep the best one as a rejected b
   CHECK(schedule.weight(3) == 0.0);
 }
 
-TEST_CASE("GNC estimates the scale of the noise by the median residual", "[gnc]") {
-  std::mt19937 rng(17);
-  std::vector<float> residuals;
-  for (int k = 0; k < 500; ++k)
-    residuals.push_back(static_cast<float>(4.0 * random_vector<6>(rng).norm()));
-  residuals.resize(600, 500.0F);
-  GncSchedule schedule = inside(600, {.estimate_scale = true});
-  while (schedule.update(residuals)) {
-  }
-  CHECK(schedule.scale() == Approx(4.0).epsilon(0.1));  // the median's sigma here is 2 %
-  int kept = 0;
-  for (std::size_t k = 0; k < 500; ++k) kept += schedule.kept(k) ? 1 : 0;
-  CHECK(kept >= 480);  // 495 expected
-  for (std::size_t k = 500; k < 600; ++k) CHECK(!schedule.kept(k));
-}
-
 TEST_CASE("GNC refuses what cannot be", "[gnc]") {
   CHECK_THROWS_AS(inside(1, {.barc = -1.0}), std::invalid_argument);
   CHECK_THROWS_AS(inside(1, {.mu_step = 1.0}), std::invalid_argument);
