@@ -128,6 +128,13 @@ std::vector<std::string> chosen(const Options& options) {
   return all == options.names.end() && !options.names.empty() ? options.names : all_names();
 }
 
+// Some of it may be kept from an earlier run.
+void print(const km::ExperimentPaths& paths) {
+  std::cout << "data: " << paths.data.string() << ", graphs: " << paths.graphs.string();
+  if (!paths.euroc.empty()) std::cout << ", euroc: " << paths.euroc.string();
+  std::cout << ", results: " << paths.results.string() << std::endl;
+}
+
 void list(const km::ExperimentConfig& config, const km::ExperimentPaths& paths) {
   for (const km::ExperimentName& experiment : km::kExperiments) {
     std::cout << experiment.name << ": " << experiment.about << '\n';
@@ -144,18 +151,19 @@ void list(const km::ExperimentConfig& config, const km::ExperimentPaths& paths) 
     }
     std::cout << km::align_columns(rows) << missing << '\n';
   }
-  std::cout << "data: " << paths.data.string() << ", graphs: " << paths.graphs.string();
-  if (!paths.euroc.empty()) std::cout << ", euroc: " << paths.euroc.string();
-  std::cout << ", results: " << paths.results.string() << '\n';
+  print(paths);
 }
 
 void print(const km::ReportSummary& summary) {
-  std::cout << "report: " << summary.html.string() << " and " << summary.markdown.string() << "; "
-            << summary.met << " of " << summary.targets << " numbers to reach are met\n";
+  std::cout << "report: " << summary.html.string() << " and " << summary.markdown.string();
+  if (summary.targets > 0)
+    std::cout << "; " << summary.met << " of " << summary.targets << " numbers to reach are met";
+  std::cout << '\n';
 }
 
 int run(const Options& options, const Setup& setup, const km::ExperimentConfig& config) {
   keep(options, setup);
+  print(setup.paths);
   km::SignalWatch signals;
   const std::vector<km::Step> steps = km::plan_experiments(chosen(options), config, setup.paths);
   km::StepDisplay display = km::StepDisplay::standard_output();
