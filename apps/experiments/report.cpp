@@ -35,7 +35,8 @@ ReportDocument make_document(ReportInput& input) {
     if (auto section = kSections[k](input))
       sections.push_back(std::move(*section));
     else
-      missing += (missing.empty() ? " No results so far: " : ", ") + std::string(kExperiments[k].name);
+      missing +=
+          (missing.empty() ? " No results so far: " : ", ") + std::string(kExperiments[k].name);
   if (!missing.empty()) document.lead += missing + '.';
   document.sections.push_back(targets_section(input));
   for (ReportSection& section : sections) document.sections.push_back(std::move(section));

@@ -134,6 +134,12 @@ ReportTable computation_table(ReportInput& input, const std::vector<ReportInput:
   return table;
 }
 
+std::vector<Communication> of_all_runs(ReportInput& input, const ReportInput::World& world) {
+  std::vector<Communication> runs;
+  for (const auto& run : input.runs_of(*world.config)) runs.push_back(communication(input, run));
+  return runs;
+}
+
 // Of worlds whose team was run more than once.
 ReportTable spread_table(ReportInput& input, const std::vector<ReportInput::World>& worlds) {
   ReportTable table{
@@ -141,8 +147,7 @@ ReportTable spread_table(ReportInput& input, const std::vector<ReportInput::Worl
       .columns = {"world", "runs", "place recognition", "verification", "all solves of the run",
                   "one solve by RBCD", "total, one solve / keypoints [%]"}};
   for (const auto& world : worlds) {
-    std::vector<Communication> runs;
-    for (const auto& run : input.runs_of(*world.config)) runs.push_back(communication(input, run));
+    const std::vector<Communication> runs = of_all_runs(input, world);
     if (runs.size() < 2) continue;
     const auto cell = [&](const auto& value, int decimals) {
       std::vector<double> values;
@@ -162,19 +167,22 @@ ReportTable spread_table(ReportInput& input, const std::vector<ReportInput::Worl
 
 // The paper counts one solve; what the team sent in fact is judged by the same number.
 void add_targets(ReportInput& input, const ReportInput::World& world) {
-  const Communication mb = communication(input, world);
-  if (!(mb.keypoints > 0.0)) return;
-  const auto add = [&](const char* what, double sent, const std::string& wanted) {
-    const double percent = mb.of_keypoints_percent(sent);
-    if (!std::isfinite(percent)) return;
+  const std::vector<Communication> runs = of_all_runs(input, world);
+  const auto add = [&](const char* what, const std::string& wanted, const auto& sent) {
+    std::vector<double> percents;
+    for (const Communication& mb : runs)
+      if (mb.keypoints > 0.0) percents.push_back(mb.of_keypoints_percent(sent(mb)));
+    const Spread percent = spread_of(std::move(percents));
+    if (percent.count == 0) return;
     input.add_target({std::string("communication over all keypoints sent, ") + what,
-                      world.config->title, wanted, fixed(percent, 0) + " %",
-                      percent <= kMostShare_percent, true});
+                      world.config->title, wanted,
+                      fixed(percent.median, 0) + " %" + range_text(percent, 0),
+                      percent.median <= kMostShare_percent, true});
   };
   const std::string most = "at most " + fixed(kMostShare_percent, 0) + " %";
-  add("one solve, as the paper counts", mb.total(),
-      most + ", aim " + fixed(kAimedShare_percent, 0) + " %");
-  add("all solves of the run", mb.whole_run(), most);
+  add("one solve, as the paper counts", most + ", aim " + fixed(kAimedShare_percent, 0) + " %",
+      [](auto& mb) { return mb.total(); });
+  add("all solves of the run", most, [](auto& mb) { return mb.whole_run(); });
 }
 
 }  // namespace

@@ -26,4 +26,10 @@ ReportCell spread_cell(const Spread& spread, int decimals) {
   return cell;
 }
 
+std::string range_text(const Spread& spread, int decimals) {
+  if (spread.count < 2) return {};
+  return " (" + fixed(spread.lowest, decimals) + " to " + fixed(spread.highest, decimals) + " in " +
+         std::to_string(spread.count) + " runs)";
+}
+
 }  // namespace km

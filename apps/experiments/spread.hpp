@@ -22,4 +22,7 @@ struct Spread {
 /// brackets in the Markdown). "-" without values.
 [[nodiscard]] ReportCell spread_cell(const Spread& spread, int decimals);
 
+/// " (30 to 39 in 3 runs)", to stand behind the median; empty for a single value.
+[[nodiscard]] std::string range_text(const Spread& spread, int decimals);
+
 }  // namespace km
