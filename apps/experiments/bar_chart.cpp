@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kLeft_px = 56.0, kTop_px = 58.0, kHeight_px = 190.0, kBottom_px = 34.0;
 constexpr double kBar_px = 34.0, kGap_px = 26.0;
+constexpr double kLeast_px = 452.0;  // of three robots and all: charts side by side are alike
 constexpr std::array kColours = {"#b9c3d0", "#1f5fa8", "#d98a2b"};
 
 // The next of 1, 2, 2.5, 5 times a power of ten above a quarter of the range.
@@ -35,7 +36,7 @@ class Drawing {
     high_ = step_ * std::max(1.0, std::ceil(high / step_ - 1e-9));
     group_px_ = kBar_px * static_cast<double>(chart.series.size()) + kGap_px;
     width_px_ =
-        std::max(360.0, kLeft_px + 20.0 + group_px_ * static_cast<double>(chart.groups.size()));
+        std::max(kLeast_px, kLeft_px + 20.0 + group_px_ * static_cast<double>(chart.groups.size()));
   }
 
   std::string draw() {
