@@ -155,12 +155,15 @@ NewtonShare NewtonAgent::share_of(const RobotSystem& system, bool with_schur) {
   const Index block = share.block = forwarded_.rows() / graph_->nodes();
   const auto& kept = graph_->plan()->kept();
   share.reduced.resize(block * static_cast<Index>(kept.size()), forwarded_.cols());
-  share.decrement = forwarded_.squaredNorm();
-  for (std::size_t k = 0; k < kept.size(); ++k) {
-    const auto rows = forwarded_.middleRows(block * kept[k], block);
-    share.reduced.middleRows(block * static_cast<Index>(k), block) = rows;
-    share.decrement -= rows.squaredNorm();
-  }
+  for (std::size_t k = 0; k < kept.size(); ++k)
+    share.reduced.middleRows(block * static_cast<Index>(k), block) =
+        forwarded_.middleRows(block * kept[k], block);
+  // Not the whole norm less that of the kept rows: they are large where only the team's sum is
+  // small, and what rounding left of the difference would be taken for a decrease to come.
+  const std::vector<int>& place = graph_->plan()->place_of_kept();
+  for (std::size_t v = 0; v < place.size(); ++v)
+    if (place[v] < 0)
+      share.decrement += forwarded_.middleRows(block * static_cast<Index>(v), block).squaredNorm();
   return share;
 }
 

@@ -132,6 +132,19 @@ TEST_CASE("the team ends at a minimum, the cost never rising", "[newton]") {
   CHECK(*team.agent(0).cost() == Approx(rounds.back().cost).epsilon(1e-12));
 }
 
+TEST_CASE("the decrease to come is known far below the rounding of the cost", "[newton]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const TeamGraph graph = grid(rng, 6, 4, 3, 0.1);
+  // Each robot's gradient is large at its separators; only their sum vanishes.
+  NewtonTeam team(graph, 3, chordal_start(graph, 3), {.tolerance = 1e-22});
+  CHECK(solve(team, 4) < 40);
+  CHECK(team.agent(0).done());
+  CHECK(team.agent(0).decrement() >= 0.0);
+  CHECK(team.agent(0).decrement() <= 2e-22 * *team.agent(0).cost());
+}
+
 TEST_CASE("the team finds its own start as the chordal initialisation", "[newton]") {
   const int dimension = GENERATE(2, 3);
   CAPTURE(dimension);
