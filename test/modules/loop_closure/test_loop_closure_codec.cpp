@@ -174,8 +174,11 @@ TEST_CASE("Hostile closures and requests are refused with a reason", "[codec]") 
   }
   CHECK(Codec<Closure>::decode(encoded.wire).refusal != nullptr);
 
-  auto request = encoded_by<KeyframeRequest>(kOwner, {kOwner, 1, {9, 5}});
-  CHECK(Codec<KeyframeRequest>::decode(request.wire).value.has_value());
+  auto request = encoded_by<KeyframeRequest>(kOwner, {kOwner, 1, {9, 5}, 17});
+  const auto decoded = Codec<KeyframeRequest>::decode(request.wire).value;
+  REQUIRE(decoded);
+  CHECK(decoded->keyframe == KeyframeId{9, 5});
+  CHECK(decoded->own == 17);
   request.wire.header.robot = 5;
   CHECK(Codec<KeyframeRequest>::decode(request.wire).refusal != nullptr);
 }
