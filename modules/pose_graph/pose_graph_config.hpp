@@ -33,7 +33,7 @@ struct PoseGraphConfig {
   /// newton, gnc: it also waits until it is worth its bytes: until another robot takes part, the
   /// closures have grown in number by this part of those of the last session, or nothing new has
   /// come for two seconds.
-  double session_growth = 0.5;
+  double session_growth = 1.0;
 
   /// newton, gnc: but for neither reason longer than this [s].
   double session_wait_s = 60.0;
