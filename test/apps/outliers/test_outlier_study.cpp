@@ -1,0 +1,101 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <set>
+
+#include "apps/outliers/outlier_study.hpp"
+#include "apps/outliers/pairwise_consistency.hpp"
+#include "apps/outliers/spoiled_graph.hpp"
+#include "test/support/team_graphs.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kSigma = 0.01;
+
+// Of a few hundred poses, with weights as its noise has them.
+TeamGraph clean_graph(unsigned seed) {
+  std::mt19937 rng(seed);
+  TeamGraph graph = noisy_chain(90, 3, kSigma, rng);
+  for (BlockEdge& e : graph.edges) {
+    e.kappa = 0.5 / (kSigma * kSigma);
+    e.tau = 1.0 / (kSigma * kSigma);
+  }
+  return graph;
+}
+
+TEST_CASE("false closures come after a graph's own edges, and from the seed alone", "[outliers]") {
+  TeamGraph graph = clean_graph(1);
+  graph.edges[1].kappa = 7.0;
+  const SpoiledGraph spoiled = spoil(graph, 50, 4.0, 3);
+  REQUIRE(spoiled.graph.edges.size() == graph.edges.size() + 50);
+  const SpoiledGraph again = spoil(graph, 50, 4.0, 3);
+  std::set<double> kappas;
+  for (std::size_t k = 0; k < spoiled.graph.edges.size(); ++k) {
+    const BlockEdge& e = spoiled.graph.edges[k];
+    CHECK(spoiled.is_false(k) == (k >= graph.edges.size()));
+    CHECK(e.T_i_j.matrix() == again.graph.edges[k].T_i_j.matrix());
+    if (!spoiled.is_false(k)) continue;
+    CHECK(std::abs(e.i - e.j) > 1);
+    CHECK(e.T_i_j.translation().cwiseAbs().maxCoeff() <= 4.0);
+    kappas.insert(e.kappa);
+  }
+  CHECK(kappas.contains(0.5 / (kSigma * kSigma)));
+  CHECK(spoil(graph, 1, 4.0, 4).graph.edges.back().T_i_j.matrix() !=
+        spoiled.graph.edges[graph.edges.size()].T_i_j.matrix());
+  std::erase_if(graph.edges, [](const BlockEdge& e) { return e.j != e.i + 1; });
+  CHECK_THROWS_AS(spoil(graph, 1, 4.0, 3), std::invalid_argument);
+}
+
+TEST_CASE("pairwise consistency keeps what agrees, robot pair by robot pair", "[outliers]") {
+  const unsigned seed = GENERATE(1U, 2U);
+  CAPTURE(seed);
+  const SpoiledGraph spoiled = spoil(clean_graph(seed), 40, 30.0, seed);
+  const std::vector<bool> kept = pairwise_consistent(spoiled.graph, {});
+  std::size_t true_lost = 0, false_kept = 0;
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    if (spoiled.is_false(k) && kept[k]) ++false_kept;
+    if (!spoiled.is_false(k) && !kept[k]) ++true_lost;
+  }
+  CHECK(false_kept == 0);
+  CHECK(true_lost < spoiled.own_edges / 4);  // a pair of true ones passes at 99 % only
+}
+
+TEST_CASE("a robot without odometry has no pairwise consistency", "[outliers]") {
+  TeamGraph graph = clean_graph(1);
+  std::erase_if(graph.edges, [](const BlockEdge& e) { return e.i == 4 && e.j == 5; });
+  CHECK_THROWS_WITH(pairwise_consistent(graph, {}), Catch::Contains("0:5"));
+}
+
+TEST_CASE("what is rejected does not bend the map, what is kept does", "[outliers]") {
+  OutlierStudyOptions options{
+      .shares = {0.0, 0.3},
+      .methods = {Rejection::kNone, Rejection::kPcm, Rejection::kGnc, Rejection::kPcmGnc}};
+  options.gnc.gnc.barc = 6.0;
+  std::vector<std::size_t> told;
+  const OutlierStudy study =
+      run_outlier_study(clean_graph(5), options, {},
+                        [&](std::size_t done, std::size_t all) { told.push_back(all - done); });
+  CHECK(study.certified);
+  CHECK(study.half_side_m > 1.0);
+  REQUIRE(study.results.size() == 8);
+  CHECK(told.size() == 9);
+  CHECK(told.back() == 0);
+  for (const OutlierResult& result : study.results) {
+    CAPTURE(to_string(result.method), result.share);
+    CHECK(result.true_kept <= study.true_closures);
+    if (result.share == 0.0) CHECK(result.false_closures == 0);
+    if (result.method == Rejection::kNone) {
+      CHECK(result.true_kept == study.true_closures);
+      CHECK(result.false_kept == result.false_closures);
+      CHECK((result.rmse_m < 1e-4) == (result.share == 0.0));
+    } else {
+      CHECK(result.decided);
+      CHECK(result.false_kept == 0);
+      CHECK(result.rmse_m < kSigma);  // true ones lost cost less than the noise of one
+    }
+    if (result.method == Rejection::kGnc) CHECK(result.true_kept == study.true_closures);
+  }
+}
+
+}  // namespace
+}  // namespace km
