@@ -61,6 +61,59 @@ std::optional<std::vector<KeptEdge>> edges_of(std::span<const km_wire_KeptEdge> 
   return result;
 }
 
+struct SecondDerivatives {
+  BlockMatrix schur;
+  Curvature curvature = Curvature::kGaussNewton;
+  std::vector<KeptEdge> edges;
+};
+
+std::size_t count(const std::vector<bool>& there, std::size_t from, std::size_t to) {
+  const auto at = [&](std::size_t k) { return there.begin() + static_cast<std::ptrdiff_t>(k); };
+  return static_cast<std::size_t>(std::count(at(from), at(to), true));
+}
+
+// What a share with so many kept poses says of them; empty if nothing. Precondition: the block size
+// is in range.
+Decoded<SecondDerivatives> second_derivatives_of(const km_wire_NewtonShare& wire,
+                                                 std::size_t poses) {
+  using Result = Decoded<SecondDerivatives>;
+  const Index B = wire.block;
+  const auto block = static_cast<std::size_t>(B * B);
+  const auto triangle = static_cast<std::size_t>(B * (B + 1) / 2);
+  const auto diagonal = elements_of(wire.diagonal, kMaxKeptPoses * triangle);
+  const auto coupling = elements_of(wire.coupling, kMaxCouplings * block);
+  const auto present = elements_of(wire.present, (kMaxKeptPoses + kMaxCouplings) / 8);
+  const auto edges = elements_of(wire.edges, kMaxCouplings);
+  const auto measured = elements_of(wire.measured, kMaxCouplings);
+  if (!diagonal || !coupling || !present || !edges || !measured)
+    return Result::refuse("a list is missing or too long");
+  // Every coupling has a block or an edge: nobody makes room for more than he has sent.
+  if (wire.couplings > coupling->size() / block + edges->size())
+    return Result::refuse("couplings of which nothing is said");
+  const std::size_t blocks = present->empty() ? 0 : poses + wire.couplings;
+  if (present->size() != (blocks + 7) / 8 || (blocks == 0 && wire.couplings > 0))
+    return Result::refuse("right-hand side and Schur complement differ in size");
+  const std::vector<bool> there = unpacked(*present, blocks);
+  const std::size_t of_poses = std::min(poses, blocks);
+  if (count(there, 0, of_poses) * triangle != diagonal->size() ||
+      count(there, of_poses, blocks) * block != coupling->size())
+    return Result::refuse("other blocks than are said to be there");
+  if (!measured->empty() && measured->size() != edges->size())
+    return Result::refuse("edges and what was measured differ in number");
+  if (!all_finite(*diagonal) || !all_finite(*coupling))
+    return Result::refuse("a number is not finite");
+  auto kept_edges = edges_of(*edges, *measured, wire.couplings);
+  if (!kept_edges) return Result::refuse("an edge between kept poses makes no sense");
+
+  SecondDerivatives second;
+  if (blocks > 0)
+    second.schur = {scattered(from_lower_triangles(*diagonal, B), poses, there, 0),
+                    scattered(matrix_of(*coupling, B), wire.couplings, there, poses)};
+  second.curvature = measured->empty() ? Curvature::kGaussNewton : Curvature::kFull;
+  second.edges = *std::move(kept_edges);
+  return Result::accept(std::move(second));
+}
+
 }  // namespace
 
 Codec<NewtonHello>::Encoded Codec<NewtonHello>::encode(const NewtonHello& hello) {
@@ -146,58 +199,29 @@ Decoded<NewtonShare> Codec<NewtonShare>::decode(const Wire& wire) {
   if (wire.robot != wire.header.robot) return Result::refuse("written by another robot");
   if (B < 1 || B > kMaxBlock || columns < 1 || columns > kMaxBlock)
     return Result::refuse("unknowns per pose or right-hand sides are out of range");
-  const auto block = static_cast<std::size_t>(B * B);
-  const auto triangle = static_cast<std::size_t>(B * (B + 1) / 2);
   const auto rows = static_cast<std::size_t>(B * columns);
   const auto reduced = elements_of(wire.reduced, kMaxKeptPoses * rows);
-  const auto diagonal = elements_of(wire.diagonal, kMaxKeptPoses * triangle);
-  const auto coupling = elements_of(wire.coupling, kMaxCouplings * block);
   const auto kept = elements_of(wire.kept, kMaxKeptPoses);
   const auto pairs = elements_of(wire.pairs, kMaxCouplings);
-  const auto present = elements_of(wire.present, (kMaxKeptPoses + kMaxCouplings) / 8);
-  const auto edges = elements_of(wire.edges, kMaxCouplings);
-  const auto measured = elements_of(wire.measured, kMaxCouplings);
-  if (!reduced || !diagonal || !coupling || !kept || !pairs || !present || !edges || !measured)
-    return Result::refuse("a list is missing or too long");
-  if (reduced->size() % rows != 0 || coupling->size() % block != 0 ||
-      diagonal->size() % triangle != 0)
-    return Result::refuse("a matrix is not made of blocks");
+  if (!reduced || !kept || !pairs) return Result::refuse("a list is missing or too long");
+  if (reduced->size() % rows != 0) return Result::refuse("a matrix is not made of blocks");
   const std::size_t poses = reduced->size() / rows;
-  const std::size_t couplings = wire.couplings;
-  const bool with_schur = !present->empty();
-  // Every coupling has a block or an edge: nobody makes room for more than he has sent.
-  if (couplings > coupling->size() / block + edges->size() || (couplings > 0 && !with_schur))
-    return Result::refuse("couplings of which nothing is said");
-  if (with_schur && present->size() != (poses + couplings + 7) / 8)
-    return Result::refuse("right-hand side and Schur complement differ in size");
-  const std::vector<bool> there = unpacked(*present, with_schur ? poses + couplings : 0);
-  const auto first_coupling = there.begin() + static_cast<std::ptrdiff_t>(with_schur ? poses : 0);
-  if (std::count(there.begin(), first_coupling, true) * static_cast<std::ptrdiff_t>(triangle) !=
-          static_cast<std::ptrdiff_t>(diagonal->size()) ||
-      std::count(first_coupling, there.end(), true) * static_cast<std::ptrdiff_t>(block) !=
-          static_cast<std::ptrdiff_t>(coupling->size()))
-    return Result::refuse("other blocks than are said to be there");
-  if (!kept->empty() && (kept->size() != poses || pairs->size() != couplings))
+  if (!kept->empty() && (kept->size() != poses || pairs->size() != wire.couplings))
     return Result::refuse("Schur complement and pattern differ in size");
-  if (!measured->empty() && measured->size() != edges->size())
-    return Result::refuse("edges and what was measured differ in number");
-  auto kept_edges = edges_of(*edges, *measured, couplings);
-  if (!kept_edges) return Result::refuse("an edge between kept poses makes no sense");
-  if (!all_finite(*reduced) || !all_finite(*diagonal) || !all_finite(*coupling) ||
-      !std::isfinite(wire.cost) || !std::isfinite(wire.decrement))
+  if (!all_finite(*reduced) || !std::isfinite(wire.cost) || !std::isfinite(wire.decrement))
     return Result::refuse("a number is not finite");
+  auto second = second_derivatives_of(wire, poses);
+  if (!second.value) return Result::refuse(second.refusal);
 
   NewtonShare share{.robot = wire.robot,
                     .round = wire.round,
                     .cost = wire.cost,
                     .decrement = wire.decrement,
-                    .block = B};
-  share.reduced = matrix_of(*reduced, static_cast<Index>(reduced->size()) / columns);
-  if (with_schur)
-    share.schur = {scattered(from_lower_triangles(*diagonal, B), poses, there, 0),
-                   scattered(matrix_of(*coupling, B), couplings, there, poses)};
-  share.curvature = measured->empty() ? Curvature::kGaussNewton : Curvature::kFull;
-  share.edges = *std::move(kept_edges);
+                    .block = B,
+                    .reduced = matrix_of(*reduced, static_cast<Index>(reduced->size()) / columns),
+                    .schur = std::move(second.value->schur),
+                    .curvature = second.value->curvature,
+                    .edges = std::move(second.value->edges)};
   for (const km_wire_KeyframeRef& id : *kept) share.kept.push_back(from_wire(id));
   for (const km_wire_KeptPair& pair : *pairs) {
     if (pair.i >= pair.j || pair.j >= poses)
