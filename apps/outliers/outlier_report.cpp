@@ -166,7 +166,7 @@ std::string outlier_plot(const OutlierStudy& study) {
                   panel(study, cells, "True closures lost", "closures", false, lost),
                   panel(study, cells, "False closures kept", "closures", false,
                         [](const Cell& cell) { return static_cast<double>(cell.false_kept()); }),
-                  panel(study, cells, "CPU time of all robots", "s", true, &Cell::cpu_s)});
+                  panel(study, cells, "CPU time of all robots", "s", false, &Cell::cpu_s)});
 }
 
 }  // namespace km
