@@ -58,7 +58,7 @@ struct LoopClosureConfig {
 
   /// Of candidates whose like have failed n times beyond the first few, this times n are passed
   /// over before one is asked for; 0: all are.
-  double failure_patience = 1.0;
+  double failure_patience = 2.0;
 
   /// Keypoints of a keyframe that a peer is sent at most, 40 bytes each: those most likely to
   /// correspond, see chosen_by_words().

@@ -68,6 +68,7 @@ TEST_CASE("What was asked for is not asked for again beside it", "[request_econo
 TEST_CASE("A kind that fails is asked for ever less, and no other with it", "[request_economy]") {
   LoopClosureConfig config;
   config.attempt_separation = 0;
+  config.failure_patience = 1.0;
   RequestEconomy economy(config);
   int asked = 0;
   for (KeyframeIndex query = 0; query < 500; ++query) {
