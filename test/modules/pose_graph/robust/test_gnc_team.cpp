@@ -230,6 +230,18 @@ TEST_CASE("GNC in stages rejects as many false closures as there are true ones",
   CHECK(team.kept() == kept);
 }
 
+TEST_CASE("few isolated closures stand aside where they make much more work", "[gnc]") {
+  std::mt19937 rng(43);
+  GncAgentOptions options;
+  options.gnc.barc = kBarc;
+  // Of 870 + 150 closures 15 % are false: by their number alone they would be heard.
+  const SpoiledGrid large = spoiled_grid(rng, 30, 4, 150);
+  CHECK(StagedGncTeam(large.graph, 3, options).isolated() >= 130);
+  // More than an eighth of 182 + 40, on a map that is eliminated in no time.
+  const SpoiledGrid small = spoiled_grid(rng, 14, 4, 40);
+  CHECK(StagedGncTeam(small.graph, 3, options).isolated() == 0);
+}
+
 TEST_CASE("two edges between the same keyframes are a step of odometry and a closure", "[gnc]") {
   TeamGraph graph{.first = {0, 3}, .ids = {{4, 0}, {4, 1}, {5, 2}}};
   for (const auto& [i, j] : {std::pair{0, 1}, {0, 1}, {1, 2}, {1, 0}})
