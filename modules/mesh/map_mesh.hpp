@@ -21,6 +21,10 @@ struct MapMesh {
   /// that are in two updates are in the same order in both, and new ones come last.
   std::vector<std::uint64_t> ids = {};
 
+  /// How well each vertex was measured, in steps of a factor of four of the weight behind it; as
+  /// long as the vertices, or empty: all alike.
+  std::vector<std::uint8_t> certainty = {};
+
   /// Side of the voxels the mesh was made from [m]; 0: unknown.
   double voxel_m = 0.0;
 };

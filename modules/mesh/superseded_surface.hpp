@@ -5,8 +5,8 @@
 
 namespace km {
 
-/// A vertex of a robot's map whose surface was seen anew on a later visit, and the vertex of that
-/// visit which stands for it now. Ids are those of MapMesh.
+/// A vertex of a robot's map whose surface another visit mapped too, and better, and the vertex of
+/// that visit which stands for it now. Ids are those of MapMesh.
 struct SupersededVertex {
   std::uint64_t id = 0;
   std::uint64_t heir = 0;

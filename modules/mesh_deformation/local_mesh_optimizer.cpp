@@ -76,8 +76,8 @@ struct LocalMeshOptimizer::State {
   // Nodes whose vertex was seen again; indices of their vertices in the new mesh.
   std::vector<std::uint32_t> follow_vertices(const VertexMatch& matched, const MapMesh& map);
 
-  // More than a third of the nodes stands for no surface any more.
-  [[nodiscard]] bool outgrown() const;
+  // Half as many vertices have gone as there are: many a node stands for little surface, or none.
+  [[nodiscard]] bool outgrown() const { return 2 * gone > known.positions.size(); }
 
   // Brings nodes, regions and bindings up to date with `map`. Returns the number of new nodes.
   std::size_t take_over(const MapMesh& map);
@@ -93,6 +93,7 @@ struct LocalMeshOptimizer::State {
   KeyframeIndex window;
   Interpolation interpolation;
   KnownVertices known;
+  std::size_t gone = 0;  // of the vertices ever known
   SimplifiedMesh simplified;
   bool solved = false;
   DeformationPoses last;             // for
@@ -133,6 +134,8 @@ std::size_t LocalMeshOptimizer::State::take_over(const MapMesh& map) {
   interpolation.update(map.mesh.vertices, map.seen_by, simplified.nodes, matched.unchanged,
                        changed);
   known = {map.mesh.vertices, map.seen_by, map.ids};
+  gone +=
+      static_cast<std::size_t>(std::count(matched.after.begin(), matched.after.end(), kNoIndex));
   return simplified.nodes.size() - old_nodes;
 }
 
@@ -146,14 +149,6 @@ DeformationGraph LocalMeshOptimizer::State::make_graph(const MapMesh& map,
   graph.ties =
       choose_ties(simplified.nodes, static_cast<std::size_t>(config.keyframes_per_node), window);
   return graph;
-}
-
-bool LocalMeshOptimizer::State::outgrown() const {
-  std::vector<char> stands(simplified.nodes.size(), 0);
-  for (const std::uint32_t node : simplified.node_of_vertex)
-    if (node != kNoIndex) stands[node] = 1;
-  const auto empty = std::count(stands.begin(), stands.end(), 0);
-  return 3 * static_cast<std::size_t>(empty) > stands.size();
 }
 
 LocalMeshOptimizer::LocalMeshOptimizer(const MeshDeformationConfig& config)

@@ -40,8 +40,8 @@ struct [[nodiscard]] DeformedMesh {
 ///
 /// Incremental: the graph is kept from call to call. Surface that is new extends it, known vertices
 /// keep their nodes, and the last solution starts the next. Vertices are known again by their ids,
-/// else by index and position. Where more than a third of the nodes has lost its surface, the graph
-/// is made anew, and the solution starts from the keyframes. reset() forgets all.
+/// else by index and position. Once half as many vertices have gone as the mesh has, the graph is
+/// made anew, and the solution starts from the keyframes. reset() forgets all.
 ///
 /// Deviations from the paper: surfaces seen at distant times (see MeshDeformationConfig) neither
 /// share an edge of the graph nor move each other's vertices, for drift lies between them; and the

@@ -19,6 +19,9 @@ void check_vertices(const MapMesh& map, std::size_t keyframes) {
   if (map.seen_by.size() != vertices.size())
     refuse("seen_by has " + std::to_string(map.seen_by.size()) + " entries for " +
            std::to_string(vertices.size()) + " vertices");
+  if (!map.certainty.empty() && map.certainty.size() != vertices.size())
+    refuse("certainty has " + std::to_string(map.certainty.size()) + " entries for " +
+           std::to_string(vertices.size()) + " vertices");
   for (std::size_t v = 0; v < vertices.size(); ++v) {
     if (!(vertices[v].cwiseAbs().maxCoeff() < kFarthest_m) || !vertices[v].allFinite())
       refuse("vertex " + std::to_string(v) + " is not finite or beyond 10,000 km");

@@ -12,7 +12,7 @@ namespace km {
 /// Throws std::invalid_argument that names the first problem: `seen_by` not as long as the
 /// vertices, first after last keyframe, a keyframe from `keyframes` on, a vertex that is not finite
 /// or beyond 10,000 km, a face that names a vertex which does not exist, ids not as long as the
-/// vertices or not ascending.
+/// vertices or not ascending, certainty not as long as the vertices.
 void check_map_mesh(const MapMesh& map, std::size_t keyframes);
 
 /// Throws std::invalid_argument that names the first pose that is not finite or not rigid; `what`

@@ -40,7 +40,7 @@ std::vector<std::uint32_t> MeshCorrector::heirs_in(const LabelledMesh& mesh,
   if (duplicate_voxels_ <= 0.0 || map.voxel_m <= 0.0 || map.ids.empty())
     return std::vector(mesh.vertices.size(), kNoIndex);
   return find_heirs(
-      mesh, map.seen_by,
+      mesh, {map.seen_by, map.certainty},
       {duplicate_voxels_ * map.voxel_m, kLongestEdge_voxels * map.voxel_m, window_keyframes_});
 }
 

@@ -34,7 +34,7 @@ struct [[nodiscard]] MeshCorrection {
 /// moved by the configured threshold, one rigid motion where all of them moved alike, as they do
 /// when the origin of `world` changes, and Local Mesh Optimization otherwise. After that, drift is
 /// out of the mesh and copies of surface that was seen on several visits coincide: of these the
-/// newest stays (see find_heirs()).
+/// best stays (see find_heirs()).
 ///
 /// Not thread-safe.
 class MeshCorrector {

@@ -19,9 +19,9 @@ struct MeshDeformationConfig {
   /// visits: it may be close in space but moves on its own.
   int time_window_keyframes = 15;
 
-  /// Surface of which a later visit made a newer copy, no further from it than so many voxels of
-  /// the map once both are corrected, is dropped from the mesh, and from the map for good: in a
-  /// place that is seen again and again, memory stays bounded. 0: all copies stay.
+  /// Of surface that several visits mapped, the copies no further from the best one than so many
+  /// voxels of the map, once all are corrected, are dropped from the mesh, and from the map for
+  /// good: in a place that is seen again and again, memory stays bounded. 0: all copies stay.
   double duplicate_voxels = 1.0;
 
   /// Keyframes that hold a node, of those that saw it.
@@ -55,7 +55,7 @@ struct MeshDeformationConfig {
     visitor.field("time_window_keyframes", time_window_keyframes, {0, 1000000},
                   "further apart: another visit");
     visitor.field("duplicate_voxels", duplicate_voxels, {0.0, 8.0},
-                  "[voxels] to a newer copy: dropped; 0: never");
+                  "[voxels] to a better copy: dropped; 0: never");
     visitor.field("keyframes_per_node", keyframes_per_node, {1, 64}, "that hold a node");
     visitor.field("anchor_rotation_rad", anchor_rotation_rad, {1e-9, 10.0}, "[rad] std. dev.");
     visitor.field("anchor_translation_m", anchor_translation_m, {1e-9, 100.0}, "[m] std. dev.");

@@ -14,7 +14,7 @@ struct OptimizedMesh {
   MeshDeformationReport report;  ///< Of the last optimisation.
   bool deformed = true;  ///< False: no optimisation was due, the mesh before was moved as a whole.
   double seconds = 0.0;  ///< Time this took.
-  std::size_t superseded_faces = 0;  ///< Of the map, left out: a later visit saw them anew.
+  std::size_t superseded_faces = 0;  ///< Of the map, left out: another visit saw them better.
 };
 
 }  // namespace km

@@ -43,24 +43,28 @@ float squared_distance_in_plane(const Eigen::Vector3f& p, const std::array<Eigen
 
 class HeirSearch {
  public:
-  HeirSearch(const LabelledMesh& mesh, std::span<const SeenBy> seen_by, const SameSurface& same)
+  HeirSearch(const LabelledMesh& mesh, const Sightings& sightings, const SameSurface& same)
       : mesh_(mesh),
-        seen_by_(seen_by),
+        seen_by_(sightings.seen_by),
+        certainty_(sightings.certainty),
         window_(same.window_keyframes),
         distance_(static_cast<float>(same.distance_m)),
-        // Of the first corner of a face from where it counts.
-        reach_((1.0F + kBeside) * distance_ + static_cast<float>(same.longest_edge_m)),
+        // Of the centroid of a face from where it counts: no corner is further from the centroid
+        // than two thirds of a median, and that is shorter than the longest edge.
+        reach_(std::hypot(distance_, kBeside * distance_ +
+                                         static_cast<float>(same.longest_edge_m) * 2.0F / 3.0F)),
         heirs_(mesh.vertices.size(), kNoIndex),
         asked_(mesh.vertices.size(), 0) {
     compute_normals();
+    for (const LabelledMesh::Face& face : mesh.faces) add_rank(face);
   }
 
   std::vector<std::uint32_t> run() {
     std::vector<std::uint32_t> order(mesh_.faces.size());
     std::iota(order.begin(), order.end(), 0U);
     std::stable_sort(order.begin(), order.end(),
-                     [this](auto a, auto b) { return first_[a] > first_[b]; });
-    // All faces that can supersede a corner are newer than this one: they have been judged.
+                     [this](auto a, auto b) { return rank_[a] > rank_[b]; });
+    // All faces that can supersede a corner rank above this one: they have been judged.
     for (const std::uint32_t f : order) {
       const LabelledMesh::Face& face = mesh_.faces[f];
       for (const std::uint32_t v : face)
@@ -78,9 +82,26 @@ class HeirSearch {
       const Eigen::Vector3f area = (mesh_.vertices[b] - p).cross(mesh_.vertices[c] - p);
       face_normals_.push_back(area.normalized());  // zero stays zero
       for (const std::uint32_t v : {a, b, c}) normals_[v] += area;
-      first_.push_back(std::min({seen_by_[a][0], seen_by_[b][0], seen_by_[c][0]}));
     }
     for (Eigen::Vector3f& normal : normals_) normal.normalize();
+  }
+
+  // By certainty, then by time. A face ranks no higher than any of its corners.
+  static std::uint64_t rank(std::uint8_t certainty, KeyframeIndex keyframe) {
+    return std::uint64_t{certainty} << 32U | keyframe;
+  }
+  [[nodiscard]] std::uint8_t certainty_of(std::uint32_t v) const {
+    return certainty_.empty() ? std::uint8_t{0} : certainty_[v];
+  }
+  void add_rank(const LabelledMesh::Face& face) {
+    SeenBy seen = seen_by_[face[0]];
+    std::uint8_t certainty = certainty_of(face[0]);
+    for (const std::uint32_t v : {face[1], face[2]}) {
+      seen = {std::min(seen[0], seen_by_[v][0]), std::max(seen[1], seen_by_[v][1])};
+      certainty = std::min(certainty, certainty_of(v));
+    }
+    face_seen_by_.push_back(seen);
+    rank_.push_back(rank(certainty, seen[0]));
   }
 
   [[nodiscard]] GridCell cell_of(const Eigen::Vector3f& point) const {
@@ -88,31 +109,37 @@ class HeirSearch {
   }
 
   void insert(std::uint32_t face) {
-    cells_[cell_of(mesh_.vertices[mesh_.faces[face][0]])].push_back(face);
+    const auto& [a, b, c] = mesh_.faces[face];
+    const Eigen::Vector3f centroid =
+        (mesh_.vertices[a] + mesh_.vertices[b] + mesh_.vertices[c]) / 3.0F;
+    cells_[cell_of(centroid)].push_back(face);
   }
 
   [[nodiscard]] std::uint32_t heir_of(std::uint32_t v) const {
     const Eigen::Vector3f reach = Eigen::Vector3f::Constant(reach_);
     const GridCell low = cell_of(mesh_.vertices[v] - reach);
     const GridCell high = cell_of(mesh_.vertices[v] + reach);
+    const std::uint64_t own_rank = rank(certainty_of(v), seen_by_[v][1]);
     float nearest = std::numeric_limits<float>::infinity();
     std::uint32_t nearest_face = kNoIndex;
     for (std::int64_t x = low[0]; x <= high[0]; ++x)
       for (std::int64_t y = low[1]; y <= high[1]; ++y)
         for (std::int64_t z = low[2]; z <= high[2]; ++z)
           if (const auto cell = cells_.find({x, y, z}); cell != cells_.end())
-            for (const std::uint32_t face : cell->second)
+            for (const std::uint32_t face : cell->second) {
+              if (rank_[face] <= own_rank) break;  // as do those after it
+              if (keyframe_gap(face_seen_by_[face], seen_by_[v]) <= window_) continue;
               if (const float d = distance_to(face, v); d < nearest) {
                 nearest = d;
                 nearest_face = face;
               }
+            }
     return nearest_face == kNoIndex ? kNoIndex : nearest_corner(nearest_face, v);
   }
 
-  // Along the normal of the face; infinite if it does not supersede the vertex.
+  // Along the normal of the face; infinite if they are not the same surface.
   [[nodiscard]] float distance_to(std::uint32_t face, std::uint32_t v) const {
     constexpr float kNot = std::numeric_limits<float>::infinity();
-    if (first_[face] <= seen_by_[v][1] + window_) return kNot;
     const Eigen::Vector3f& normal = face_normals_[face];
     const auto& [a, b, c] = mesh_.faces[face];
     const Eigen::Vector3f& p = mesh_.vertices[v];
@@ -134,14 +161,17 @@ class HeirSearch {
 
   const LabelledMesh& mesh_;
   std::span<const SeenBy> seen_by_;
+  std::span<const std::uint8_t> certainty_;
   KeyframeIndex window_;
   float distance_;
   float reach_;
   std::vector<Eigen::Vector3f> normals_, face_normals_;
-  std::vector<KeyframeIndex> first_;  // of each face
+  std::vector<SeenBy> face_seen_by_;
+  std::vector<std::uint64_t> rank_;  // of each face
   std::vector<std::uint32_t> heirs_;
   std::vector<char> asked_;
-  std::unordered_map<GridCell, std::vector<std::uint32_t>, GridCellHash> cells_;  // faces that stay
+  // Faces that stay, by falling rank.
+  std::unordered_map<GridCell, std::vector<std::uint32_t>, GridCellHash> cells_;
 };
 
 template <typename T>
@@ -153,9 +183,9 @@ void keep(std::vector<T>& values, const std::vector<std::uint32_t>& kept) {
 
 }  // namespace
 
-std::vector<std::uint32_t> find_heirs(const LabelledMesh& mesh, std::span<const SeenBy> seen_by,
+std::vector<std::uint32_t> find_heirs(const LabelledMesh& mesh, const Sightings& sightings,
                                       const SameSurface& same) {
-  return HeirSearch(mesh, seen_by, same).run();
+  return HeirSearch(mesh, sightings, same).run();
 }
 
 LabelledMesh without_superseded(const LabelledMesh& mesh, std::span<const std::uint32_t> heirs) {

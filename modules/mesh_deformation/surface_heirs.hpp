@@ -11,24 +11,32 @@
 
 namespace km {
 
-/// When an older piece of surface and a newer one are the same.
+/// When two pieces of surface are the same.
 struct SameSurface {
-  double distance_m = 0.1;      ///< Of the old vertex from the new face at most, along its normal.
-  double longest_edge_m = 0.2;  ///< Newer faces with longer ones may be overlooked.
-  KeyframeIndex window_keyframes = 0;  ///< The new face was first seen more than this later.
+  double distance_m = 0.1;      ///< Of a vertex from a face of the other at most, along its normal.
+  double longest_edge_m = 0.2;  ///< Faces with longer ones may be overlooked.
+  KeyframeIndex window_keyframes = 0;  ///< Seen no further apart in time, they are one visit's.
 };
 
-/// For each vertex of a corrected mesh the one that stands for its surface since a later visit, or
-/// kNoIndex for those that stay. A vertex has an heir if a newer face that stays lies within the
-/// distance, is met by the vertex's normal inside its triangle (or within a quarter of the distance
-/// of it), and is turned by at most 60 degrees against the vertex: the other side of a wall is
-/// another surface. The heir is the nearest corner of the nearest such face. A face stays unless
-/// all its vertices have heirs: what was seen once only, and the rim of it, is never lost.
+/// When and how well the vertices of a mesh were seen: see MapMesh. Views of equal length, but that
+/// `certainty` may be empty.
+struct Sightings {
+  std::span<const SeenBy> seen_by;
+  std::span<const std::uint8_t> certainty;
+};
+
+/// For each vertex of a corrected mesh the one that stands for its surface, or kNoIndex for those
+/// that stay. Of the copies of a surface that several visits made the most certain one stays, of
+/// equally certain ones the newest. A vertex has an heir if a face of another visit that stays and
+/// ranks higher lies within the distance, is met by the normal through the vertex inside its
+/// triangle (or within a quarter of the distance of it), and is turned by at most 60 degrees
+/// against the vertex: the other side of a wall is another surface. The heir is the nearest corner
+/// of the nearest such face. A face stays unless all its vertices have heirs: what was seen once
+/// only, and the rim of it, is never lost.
 ///
-/// Faces are judged from the newest to the oldest, so that what supersedes stays. `mesh` [m] and
-/// `seen_by` have equal length. n log n.
+/// Faces are judged by falling rank, so that what supersedes stays. `mesh` [m]. n log n.
 [[nodiscard]] std::vector<std::uint32_t> find_heirs(const LabelledMesh& mesh,
-                                                    std::span<const SeenBy> seen_by,
+                                                    const Sightings& sightings,
                                                     const SameSurface& same);
 
 /// True if all corners have heirs.

@@ -1,6 +1,8 @@
 #include "modules/semantic_mapping/incremental_mesh.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 namespace km {
 namespace {
@@ -27,6 +29,12 @@ bool reaches(std::uint16_t cell, int offset) {
 
 VoxelLabels labels_of(const VoxelBlock& block, std::size_t voxel) {
   return block.labels == nullptr ? VoxelLabels() : (*block.labels)[voxel];
+}
+
+// In steps of a factor of four, from 4^-8 on.
+std::uint8_t certainty_of(float weight) {
+  const float steps = 0.5F * std::log2(std::max(weight, std::numeric_limits<float>::min())) + 8.0F;
+  return static_cast<std::uint8_t>(std::clamp(steps, 0.0F, 255.0F));
 }
 
 void mark_changed(VoxelBlock& block, KeyframeIndex since) {
@@ -179,6 +187,9 @@ void IncrementalMesh::compute(Vertex& vertex, const BlockCells& cells, const Eig
   const VoxelLabels far_labels = labels_of(far_block, far_voxel);
   vertex.labels = a < 0.0F ? near_labels : far_labels;
   if (label_of(vertex.labels) == 0) vertex.labels = a < 0.0F ? far_labels : near_labels;
+
+  vertex.certainty =
+      certainty_of(std::min(near_block.weight[near_voxel], far_block.weight[far_voxel]));
 
   const auto seen = [](const VoxelBlock& block, std::size_t v) {
     return (block.near_rows[v / kBlockSide] >> v % kBlockSide & 1U) != 0;

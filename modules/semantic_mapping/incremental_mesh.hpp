@@ -74,6 +74,7 @@ class IncrementalMesh {
     KeyframeIndex first = 0, last = 0;
     std::uint32_t computed = 0;  // update in which position and labels were computed
     std::uint16_t edge = 0;      // of the owner
+    std::uint8_t certainty = 0;  // see MapMesh
   };
 
   MeshUpdateReport mesh_blocks(const std::vector<VoxelBlock*>& blocks, BlockMap& map);

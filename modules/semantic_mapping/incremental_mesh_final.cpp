@@ -73,6 +73,7 @@ MapMesh IncrementalMesh::snapshot(const BlockMap& map, bool labelled) const {
     if (labelled) mesh.labels.push_back(label_of(vertex.labels));
     map_mesh.seen_by.push_back({vertex.first, vertex.last});
     map_mesh.ids.push_back(vertex.id);
+    map_mesh.certainty.push_back(vertex.certainty);
   }
   mesh.faces.reserve(faces_);
   const auto add = [&](const std::vector<Face>& faces) {

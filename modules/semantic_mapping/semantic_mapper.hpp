@@ -91,7 +91,7 @@ class SemanticMapper {
   /// came up in between has the first of these frames' keyframe as its first.
   MeshUpdateReport update_mesh();
 
-  /// Drops final surface that a later visit has mapped again (see IncrementalMesh::drop()): its
+  /// Drops final surface that another visit has mapped better (see IncrementalMesh::drop()): its
   /// labels vote on, its faces are gone for good. Surface in the window stays.
   SurfaceDrop drop(const SupersededSurface& superseded);
 

@@ -38,7 +38,7 @@ MapMesh sheet_at(const Eigen::Vector3d& t) {
 }
 
 LabelledMesh cleaned(const MapMesh& map) {
-  return without_superseded(map.mesh, find_heirs(map.mesh, map.seen_by, kSame));
+  return without_superseded(map.mesh, find_heirs(map.mesh, {map.seen_by, map.certainty}, kSame));
 }
 
 TEST_CASE("Of two copies of a surface the newer stays, whichever comes first in the mesh",
@@ -57,10 +57,32 @@ TEST_CASE("Of two copies of a surface the newer stays, whichever comes first in 
   CHECK(cleaned(other_order).vertices == older.mesh.vertices);
 }
 
+TEST_CASE("Of two copies the more certain stays, where it is", "[mesh_deformation]") {
+  const MapMesh older = sheet_at({0, 0, 0}), newer = sheet_at({0, 0, 0.1});
+  MapMesh map = visits({older, newer});
+  map.certainty.assign(map.ids.size(), 5);
+  const std::size_t count = older.ids.size();
+  SECTION("the older everywhere") {
+    std::fill(map.certainty.begin() + std::ssize(older.ids), map.certainty.end(), 4);
+    CHECK(cleaned(map).vertices == older.mesh.vertices);
+  }
+  SECTION("the older on one side: nothing is lost between them") {
+    for (std::size_t v = 0; v < count; ++v)
+      if (older.mesh.vertices[v].x() > 2.6F) map.certainty[count + v] = 4;
+    const LabelledMesh result = cleaned(map);
+    CHECK(result.faces.size() >= older.mesh.faces.size());
+    CHECK(result.faces.size() <= older.mesh.faces.size() + 4 * 2 * kSheet.rows);  // the seam
+    for (std::size_t f = 0; f < result.faces.size(); ++f) {
+      const Eigen::Vector3f& p = result.vertices[result.faces[f][0]];
+      if (std::abs(p.x() - 2.6F) > 2.0F * float{kVoxel_m}) CHECK((p.z() > 0.05F) == (p.x() < 2.6F));
+    }
+  }
+}
+
 TEST_CASE("The heir of a vertex is its copy, by name", "[mesh_deformation]") {
   const MapMesh map = visits({sheet_at({0, 0, 0}), sheet_at({0.05, 0.03, 0.1})});
   const auto count = static_cast<std::uint32_t>(map.ids.size() / 2);
-  const auto heirs = find_heirs(map.mesh, map.seen_by, kSame);
+  const auto heirs = find_heirs(map.mesh, {map.seen_by, map.certainty}, kSame);
   for (std::uint32_t v = 0; v < count; ++v) CHECK(heirs[v] == v + count);  // at the rim too
   for (std::uint32_t v = count; v < 2 * count; ++v) CHECK(heirs[v] == kNoIndex);
 
@@ -131,7 +153,7 @@ TEST_CASE("Of many noisy copies about one is left, and all are near it", "[mesh_
   for (MapMesh& copy : copies)
     for (Eigen::Vector3f& p : copy.mesh.vertices) p += Eigen::Vector3f(0, 0, noise(rng));
   const MapMesh map = visits(copies);
-  const auto heirs = find_heirs(map.mesh, map.seen_by, kSame);
+  const auto heirs = find_heirs(map.mesh, {map.seen_by, map.certainty}, kSame);
   const std::size_t one = copies[0].mesh.faces.size();
   std::size_t left = 0;
   for (const auto& face : map.mesh.faces) left += is_superseded(face, heirs) ? 0 : 1;
@@ -146,12 +168,12 @@ TEST_CASE("Of many noisy copies about one is left, and all are near it", "[mesh_
 
 TEST_CASE("A mesh without faces, and one of a face without area, have no heirs",
           "[mesh_deformation]") {
-  CHECK(find_heirs({}, {}, kSame).empty());
+  CHECK(find_heirs({}, {{}, {}}, kSame).empty());
   LabelledMesh mesh;
   mesh.vertices.assign(6, Eigen::Vector3f::Zero());
   mesh.faces = {{0, 1, 2}, {3, 4, 5}};
   const std::vector<SeenBy> seen_by = {{0, 0}, {0, 0}, {0, 0}, {90, 90}, {90, 90}, {90, 90}};
-  CHECK(find_heirs(mesh, seen_by, kSame) == std::vector(6, kNoIndex));
+  CHECK(find_heirs(mesh, {seen_by, {}}, kSame) == std::vector(6, kNoIndex));
 }
 
 }  // namespace
