@@ -79,9 +79,7 @@ class Watch {
     const TrafficSnapshot traffic = robot_.bridge().traffic();
     const bool ended = robot_.input_ended();
     robot_.recorder().with_record([&](const RunRecord& record) {
-      status_line_.update(status_text(robot_.dataset_time_s(), record,
-                                      robot_.bridge().peers().list(), traffic,
-                                      process_usage().resident_bytes));
+      say(now_s, record, traffic);
       if (leaving_since_s_) return;
       const std::vector<RobotPhase> peers = present_peers();
       robot_.set_phase(departure_.update(now_s, {.input_ended = ended,
@@ -99,7 +97,7 @@ class Watch {
   [[nodiscard]] const char* reason() const { return departure_.reason(); }
 
  private:
-  static constexpr double kInterval_s = 1.0;  // between rows of a CSV
+  static constexpr double kInterval_s = 1.0;  // between rows of a CSV, and status lines
   static constexpr double kGoodbye_s = 1.5;   // three times the period of the status
 
   // Tells the others before going, so that they go with the same solution.
@@ -110,6 +108,14 @@ class Watch {
       robot_.set_phase(RobotPhase::kLeaving);
     }
     return robot_.bridge().peers().list().empty() || now_s - *leaving_since_s_ >= kGoodbye_s;
+  }
+
+  // Less often than poll(): counting closures takes the longer the more there are.
+  void say(double now_s, const RunRecord& record, const TrafficSnapshot& traffic) {
+    if (now_s - said_s_ < kInterval_s) return;
+    said_s_ = now_s;
+    status_line_.update(status_text(robot_.dataset_time_s(), record, robot_.bridge().peers().list(),
+                                    traffic, process_usage().resident_bytes));
   }
 
   // A peer that is there but has not said how far it is counts as running.
@@ -139,6 +145,7 @@ class Watch {
   std::ofstream process_file_;
   ProcessCsv process_csv_;
   double written_s_ = 0.0;
+  double said_s_ = -kInterval_s;
   std::optional<double> leaving_since_s_;
   StatusLine status_line_;
 };
