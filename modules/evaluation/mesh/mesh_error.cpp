@@ -98,9 +98,8 @@ class Evaluation {
     const auto estimates = sampled_estimates(per_m2);
     const SurfaceSamples truth = sampled_truth(per_m2, options_.registration.reach_m, estimates);
     const NearestSurface nearest(truth_, truth);
-    SurfaceSamples all;
-    for (const SurfaceSamples& samples : estimates)
-      all.points.insert(all.points.end(), samples.points.begin(), samples.points.end());
+    OrientedPoints all;
+    for (std::size_t i = 0; i < estimates.size(); ++i) all.add(moved_[i], estimates[i]);
     report_.registration =
         register_mesh(truth_, nearest, all, SE3::Identity(), options_.registration);
     note_registration(report_.registration);

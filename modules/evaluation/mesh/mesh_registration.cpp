@@ -17,6 +17,7 @@ constexpr double kStop_m = 1e-5;  // step that ends the iterations
 constexpr double kShrink = 0.7;   // of the gate from one iteration to the next
 constexpr double kOpen = 1e-3;    // share of the pairs' weight below which a direction is open
 constexpr std::size_t kMinPairs = 6;
+constexpr double kMinCosine = 0.7071;  // of 45 degrees, between the normals of a pair
 
 // An estimated point, moved by the present transform, and the plane of the true face near it.
 struct Pair {
@@ -28,13 +29,15 @@ struct Pair {
 
 class Pairing {
  public:
-  Pairing(const LabelledMesh& truth, const NearestSurface& nearest, const SurfaceSamples& estimate,
+  Pairing(const LabelledMesh& truth, const NearestSurface& nearest, const OrientedPoints& estimate,
           const RegistrationOptions& options)
       : truth_(truth), nearest_(nearest), options_(options) {
     const std::size_t step = std::max<std::size_t>(
         1, estimate.points.size() / std::max<std::size_t>(1, options.max_points));
-    for (std::size_t i = 0; i < estimate.points.size(); i += step)
+    for (std::size_t i = 0; i < estimate.points.size(); i += step) {
       points_.emplace_back(estimate.points[i].cast<double>());
+      normals_.emplace_back(estimate.normals[i].cast<double>());
+    }
   }
 
   // The pairs that count, in the order of the points.
@@ -43,7 +46,7 @@ class Pairing {
     cv::parallel_for_(cv::Range(0, static_cast<int>(points_.size())), [&](const cv::Range& range) {
       for (int i = range.start; i < range.end; ++i) {
         const auto at = static_cast<std::size_t>(i);
-        found[at] = pair_of(T * points_[at]);
+        found[at] = pair_of(T * points_[at], T.linear() * normals_[at]);
       }
     });
     std::vector<Pair> result;
@@ -53,7 +56,8 @@ class Pairing {
   }
 
  private:
-  [[nodiscard]] std::optional<Pair> pair_of(const Eigen::Vector3d& point) const {
+  [[nodiscard]] std::optional<Pair> pair_of(const Eigen::Vector3d& point,
+                                            const Eigen::Vector3d& point_normal) const {
     const auto near = nearest_.find(point.cast<float>(), options_.reach_m);
     if (!near) return std::nullopt;
     const LabelledMesh::Face& face = truth_.faces[near->face];
@@ -63,6 +67,7 @@ class Pairing {
     const Eigen::Vector3d normal = (corner(1) - corner(0)).cross(corner(2) - corner(0));
     if (!(normal.norm() > 0.0)) return std::nullopt;
     const Eigen::Vector3d unit = normal.normalized();
+    if (std::abs(unit.dot(point_normal)) < kMinCosine) return std::nullopt;
     return Pair{point, unit, unit.dot(point - corner(0)), near->surface_m};
   }
 
@@ -83,7 +88,7 @@ class Pairing {
   const LabelledMesh& truth_;
   const NearestSurface& nearest_;
   const RegistrationOptions& options_;
-  std::vector<Eigen::Vector3d> points_;
+  std::vector<Eigen::Vector3d> points_, normals_;
 };
 
 struct Step {
@@ -140,8 +145,19 @@ double rms_of(const std::vector<Pair>& pairs) {
 
 }  // namespace
 
+void OrientedPoints::add(const LabelledMesh& mesh, const SurfaceSamples& samples) {
+  for (std::size_t i = 0; i < samples.points.size(); ++i) {
+    const auto& [a, b, c] = mesh.faces[samples.faces[i]];
+    const Eigen::Vector3f& corner = mesh.vertices[a];
+    const Eigen::Vector3f area = (mesh.vertices[b] - corner).cross(mesh.vertices[c] - corner);
+    if (!(area.norm() > 0.0F)) continue;
+    points.push_back(samples.points[i]);
+    normals.push_back(area.normalized());
+  }
+}
+
 Registration register_mesh(const LabelledMesh& truth, const NearestSurface& nearest_truth,
-                           const SurfaceSamples& estimate, const SE3& T_truth_estimate,
+                           const OrientedPoints& estimate, const SE3& T_truth_estimate,
                            const RegistrationOptions& options) {
   const Pairing pairing(truth, nearest_truth, estimate, options);
   Registration result;

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
+#include <vector>
 
 #include "modules/core/geometry.hpp"
 #include "modules/evaluation/mesh/nearest_surface.hpp"
@@ -18,6 +20,14 @@ struct RegistrationOptions {
   std::size_t max_points = 50'000;  ///< Of the estimate that are paired, evenly chosen.
 };
 
+/// Points on an estimate and the unit normals of its faces there.
+struct OrientedPoints {
+  std::vector<Eigen::Vector3f> points, normals;
+
+  /// Adds samples of `mesh`; those on faces without area have no normal and are left out.
+  void add(const LabelledMesh& mesh, const SurfaceSamples& samples);
+};
+
 /// What registration found.
 struct [[nodiscard]] Registration {
   SE3 T_truth_estimate = SE3::Identity();
@@ -28,14 +38,16 @@ struct [[nodiscard]] Registration {
   std::size_t pairs = 0;    ///< Kept in the last iteration.
 };
 
-/// Iterative closest points: pairs of an estimated sample and the nearest true face within a
-/// gate that shrinks from iteration to iteration, distances to the plane of that face (Chen and
+/// Iterative closest points: pairs of an estimated sample and the nearest true face, turned by at
+/// most 45 degrees against it (ground beside a kerb is not the kerb: in streets, wrong pairs of
+/// that kind outnumber the walls that hold the map along the street), within a gate that shrinks
+/// from iteration to iteration, distances to the plane of that face (Chen and
 /// Medioni, "Object modelling by registration of multiple range images", 1992), Gauss-Newton on
 /// [rotation; translation]. Directions in which the surfaces slide along themselves, as a single
 /// plane's three, keep what the guess has. Works from `T_truth_estimate` on; converged when a step
 /// is below 10 micrometres.
 Registration register_mesh(const LabelledMesh& truth, const NearestSurface& nearest_truth,
-                           const SurfaceSamples& estimate, const SE3& T_truth_estimate,
+                           const OrientedPoints& estimate, const SE3& T_truth_estimate,
                            const RegistrationOptions& options = {});
 
 }  // namespace km

@@ -96,6 +96,25 @@ TEST_CASE("Registration is not drawn off by a part that is not in the truth", "[
   CHECK(difference(found.T_truth_estimate, T_truth_estimate) < kError_m);
 }
 
+// Rough ground whose rim hangs over beside a kerb: the kerb is the nearest face of it.
+TEST_CASE("Registration does not take ground beside a kerb for the kerb", "[mesh_error]") {
+  const LabelledMesh ground = square(8.0F, 0.0F, 16);
+  LabelledMesh upright = rectangle({2, 0, 0}, {0, 8, 0}, {0, 0, 0.3F}, 32);  // the kerb
+  upright.append(rectangle({8, 0, 0}, {0, 8, 0}, {0, 0, 1}));
+  upright.append(rectangle({0, 8, 0}, {8, 0, 0}, {0, 0, 1}));
+  LabelledMesh truth = ground;
+  truth.append(upright);
+  LabelledMesh estimate = ground;
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> height(-0.1F, 0.1F);
+  for (Eigen::Vector3f& vertex : estimate.vertices) vertex.z() += height(random);
+  estimate.append(upright);
+  estimate.append(rectangle({1.9F, 0, 0.15F}, {0.1F, 0, 0}, {0, 8, 0}));
+  const SE3 found = report_of(truth, estimate).registration.T_truth_estimate;
+  const Eigen::Vector3d middle(5.0, 4.0, 0.3);  // rough ground tilts the map a little
+  CHECK(std::abs((found * middle - middle).x()) < 1e-3);
+}
+
 TEST_CASE("A large move is noted", "[mesh_error]") {
   LabelledMesh estimate = room();
   estimate.transform(make_pose(Eigen::Matrix3d::Identity(), {0.6, 0.0, 0.0}));
