@@ -97,7 +97,8 @@ Setup setup_of(const Options& options, bool is_run) {
   };
   paths.results = options.results.empty() ? below(kResults) : options.results;
   const km::RunInputs kept = km::read_run_inputs(paths.results).value_or(km::RunInputs{});
-  if (!is_run) setup.quick = setup.quick || kept.quick;
+  // A folder that was named holds one kind of results: a full run would replace the quick one's.
+  if (!is_run || !options.results.empty()) setup.quick = setup.quick || kept.quick;
   const auto first = [](const fs::path& given, const fs::path& then) {
     return given.empty() ? then : given;
   };
