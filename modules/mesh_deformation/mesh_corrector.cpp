@@ -9,6 +9,7 @@ namespace km {
 
 MeshCorrector::MeshCorrector(const MeshDeformationConfig& config)
     : duplicate_voxels_(config.duplicate_voxels),
+      duplicate_faces_(static_cast<std::size_t>(config.duplicate_faces)),
       window_keyframes_(static_cast<KeyframeIndex>(config.time_window_keyframes)),
       scale_{config.min_move_m, config.min_rotation_rad},
       optimizer_(config) {}
@@ -37,7 +38,8 @@ MeshCorrection MeshCorrector::correct_afresh(const CorrectionInput& input) {
 std::vector<std::uint32_t> MeshCorrector::heirs_in(const LabelledMesh& mesh,
                                                    const MapMesh& map) const {
   constexpr double kLongestEdge_voxels = 2.0;  // sqrt(3), and what bending adds
-  if (duplicate_voxels_ <= 0.0 || map.voxel_m <= 0.0 || map.ids.empty())
+  if (duplicate_voxels_ <= 0.0 || mesh.faces.size() <= duplicate_faces_ || map.voxel_m <= 0.0 ||
+      map.ids.empty())
     return std::vector(mesh.vertices.size(), kNoIndex);
   return find_heirs(
       mesh, {map.seen_by, map.certainty},

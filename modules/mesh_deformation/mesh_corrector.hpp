@@ -56,6 +56,7 @@ class MeshCorrector {
                                                     const MapMesh& map) const;
 
   const double duplicate_voxels_;
+  const std::size_t duplicate_faces_;
   const KeyframeIndex window_keyframes_;
   MotionScale scale_;
   LocalMeshOptimizer optimizer_;

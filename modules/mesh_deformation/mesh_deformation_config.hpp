@@ -24,6 +24,10 @@ struct MeshDeformationConfig {
   /// good: in a place that is seen again and again, memory stays bounded. 0: all copies stay.
   double duplicate_voxels = 1.0;
 
+  /// Faces of a mesh up to which all copies stay: together they lie nearer to the true surface than
+  /// the best of them, so none is dropped for want of memory before it is wanted.
+  int duplicate_faces = 1'200'000;
+
   /// Keyframes that hold a node, of those that saw it.
   int keyframes_per_node = 4;
 
@@ -56,6 +60,8 @@ struct MeshDeformationConfig {
                   "further apart: another visit");
     visitor.field("duplicate_voxels", duplicate_voxels, {0.0, 8.0},
                   "[voxels] to a better copy: dropped; 0: never");
+    visitor.field("duplicate_faces", duplicate_faces, {0, 100'000'000},
+                  "of a mesh, up to which all copies stay");
     visitor.field("keyframes_per_node", keyframes_per_node, {1, 64}, "that hold a node");
     visitor.field("anchor_rotation_rad", anchor_rotation_rad, {1e-9, 10.0}, "[rad] std. dev.");
     visitor.field("anchor_translation_m", anchor_translation_m, {1e-9, 100.0}, "[m] std. dev.");

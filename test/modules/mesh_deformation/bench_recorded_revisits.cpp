@@ -101,6 +101,7 @@ class Mapping {
   static MeshDeformationConfig lmo(const Task& task) {
     MeshDeformationConfig config;
     config.duplicate_voxels = task.duplicate_voxels;
+    config.duplicate_faces = 0;
     return config;
   }
   MeshCorrection correct(std::size_t keyframes, bool afresh) {

@@ -178,6 +178,7 @@ TEST_CASE("Of two visits that coincide once they are corrected, the newer stays"
           "[mesh_deformation]") {
   TwoVisits visits;
   MeshDeformationConfig config;
+  config.duplicate_faces = 0;
   SECTION("corrected") {
     MeshCorrector corrector(config);
     const auto first = corrector.correct(visits.input());
@@ -210,6 +211,12 @@ TEST_CASE("Of two visits that coincide once they are corrected, the newer stays"
     config.duplicate_voxels = 0.0;
     CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == 0);
   }
+  SECTION("as long as there is room, both stay") {
+    config.duplicate_faces = static_cast<int>(visits.map.mesh.faces.size());
+    CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == 0);
+    --config.duplicate_faces;
+    CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == visits.one());
+  }
   SECTION("of voxels of unknown size, both stay") {
     visits.map.voxel_m = 0.0;
     CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == 0);
@@ -221,7 +228,9 @@ TEST_CASE("The deformation graph does not grow in a place seen again and again",
           "[mesh_deformation]") {
   TwoVisits visits;
   const std::uint64_t count = visits.map.ids.size() / 2;
-  MeshCorrector corrector(MeshDeformationConfig{});
+  MeshDeformationConfig config;
+  config.duplicate_faces = 0;
+  MeshCorrector corrector(config);
   std::size_t nodes_at_first = 0, most_nodes = 0;
   for (std::uint64_t visit = 0; visit < 8; ++visit) {
     const auto result = corrector.correct(visits.input());

@@ -51,6 +51,7 @@ class Flight {
   static MeshDeformationConfig config(double duplicate_voxels) {
     MeshDeformationConfig config;
     config.duplicate_voxels = duplicate_voxels;
+    config.duplicate_faces = 0;
     return config;
   }
   void correct() {
