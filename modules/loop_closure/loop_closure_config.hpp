@@ -61,12 +61,13 @@ struct LoopClosureConfig {
   double failure_patience = 2.0;
 
   /// Keypoints of a keyframe that a peer is sent at most, 40 bytes each: those most likely to
-  /// correspond, see chosen_by_words().
+  /// correspond, see chosen_by_words(). Three times as many in the first dozen
+  /// replies to a robot.
   int reply_keypoints = 200;
 
-  /// Of own keyframes, so many of the newest are kept with all their keypoints, 48 bytes each; older
-  /// ones with twice reply_keypoints, those that reduced() takes: where a robot works for hours,
-  /// keyframes are what its memory goes on growing by.
+  /// Of own keyframes, so many of the newest are kept with all their keypoints, 48 bytes each;
+  /// older ones with twice reply_keypoints, those that reduced() takes: where a robot works for
+  /// hours, keyframes are what its memory goes on growing by.
   int full_keyframes = 500;
 
   /// Keyframes of peers kept for further candidates; each takes about 10 kB with the default

@@ -15,6 +15,8 @@ namespace {
 // Robots that meet again after a while produce candidates in bursts.
 constexpr std::size_t kQueueCapacity = 16384;
 constexpr std::chrono::milliseconds kTickPeriod(100);
+// Of so many replies to each robot: what joins two that have hardly met is worth its bytes.
+constexpr int kFirstReplies = 12;
 
 }  // namespace
 
@@ -163,11 +165,12 @@ LoopClosureNode::KeyframePtr LoopClosureNode::find(const KeyframeId& id) {
 }
 
 KeyframeFeatures LoopClosureNode::worth_sending(const KeyframeFeatures& features,
-                                                const KeyframeId& to) const {
+                                                const KeyframeId& to) {
+  const bool strangers = ++replies_[to.robot] <= kFirstReplies;
+  const std::size_t count = strangers ? 3 * reply_keypoints_ : reply_keypoints_;
   const auto words = words_.find(to);
-  return words == words_.end()
-             ? reduced(features, reply_keypoints_)
-             : chosen_by_words(features, reply_keypoints_, *vocabulary_, words->second);
+  return words == words_.end() ? reduced(features, count)
+                               : chosen_by_words(features, count, *vocabulary_, words->second);
 }
 
 // Goes on with what is there; waits for what is not, a peer's keyframe by asking for it.

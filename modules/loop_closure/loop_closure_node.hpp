@@ -107,13 +107,14 @@ class LoopClosureNode final : public Node {
               const Verification& numbers = {}) const;
   void send_due_requests();
   [[nodiscard]] KeyframeFeatures worth_sending(const KeyframeFeatures& features,
-                                               const KeyframeId& to) const;
+                                               const KeyframeId& to);
 
   const RobotId self_;
   const std::shared_ptr<const Vocabulary> vocabulary_;
   const LoopClosureTopics topics_;
   const Verifier verifier_;
   std::map<KeyframeId, KeyframePtr> own_;
+  std::map<RobotId, int> replies_;                          // sent
   std::map<KeyframeId, std::vector<std::uint32_t>> words_;  // of the peers' keyframes, ascending
   KeyframeCache peers_;
   KeyframeRequests requests_;

@@ -169,6 +169,7 @@ TEST_CASE("of a keyframe those points are sent that the requester's own one has 
   CAPTURE(told);
   const Scene scene(13);
   constexpr std::uint32_t kSent = 50;
+  constexpr std::size_t kFirst = 12;  // replies, with three times as many
   Robot robot(kSelf), peer(kPeer, {.reply_keypoints = kSent});
   Keyframe full = scene.peer;
   const auto words = static_cast<std::uint32_t>(full.features.descriptors.size());
@@ -186,15 +187,17 @@ TEST_CASE("of a keyframe those points are sent that the requester's own one has 
   robot.give(scene.candidate());
   REQUIRE(robot.requests.size() == 1);
   CHECK(robot.requests[0].message->own == 0);
-  peer.node.step(robot.requests[0].message);
-  REQUIRE(peer.replies.size() == 1);
+  for (std::size_t reply = 0; reply <= kFirst; ++reply) peer.node.step(robot.requests[0].message);
+  REQUIRE(peer.replies.size() == kFirst + 1);
+  for (std::size_t reply = 0; reply < kFirst; ++reply)
+    CHECK(peer.replies[reply].message->keyframe.features.descriptors.size() == 3 * kSent);
 
   std::vector<OrbDescriptor> expected;  // the strongest come first, and those without depth last
   for (std::uint32_t word = words - kSent; told && word + 1 < words; ++word)
     if (word != 100) expected.push_back(toy_descriptor(word));
   for (std::uint32_t word = 0; expected.size() < kSent; ++word)
     expected.push_back(toy_descriptor(word));
-  const KeyframeFeatures& sent = peer.replies[0].message->keyframe.features;
+  const KeyframeFeatures& sent = peer.replies[kFirst].message->keyframe.features;
   CHECK(sent.descriptors == expected);
   CHECK(sent.keypoints.size() == kSent);
 }
