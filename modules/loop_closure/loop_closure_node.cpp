@@ -15,8 +15,10 @@ namespace {
 // Robots that meet again after a while produce candidates in bursts.
 constexpr std::size_t kQueueCapacity = 16384;
 constexpr std::chrono::milliseconds kTickPeriod(100);
-// Of so many replies to each robot: what joins two that have hardly met is worth its bytes.
+// The first replies to a robot hold more keypoints: what joins two that have hardly met is worth
+// its bytes.
 constexpr int kFirstReplies = 12;
+constexpr std::size_t kFirstFactor = 3;
 
 }  // namespace
 
@@ -167,7 +169,7 @@ LoopClosureNode::KeyframePtr LoopClosureNode::find(const KeyframeId& id) {
 KeyframeFeatures LoopClosureNode::worth_sending(const KeyframeFeatures& features,
                                                 const KeyframeId& to) {
   const bool strangers = ++replies_[to.robot] <= kFirstReplies;
-  const std::size_t count = strangers ? 3 * reply_keypoints_ : reply_keypoints_;
+  const std::size_t count = strangers ? kFirstFactor * reply_keypoints_ : reply_keypoints_;
   const auto words = words_.find(to);
   return words == words_.end() ? reduced(features, count)
                                : chosen_by_words(features, count, *vocabulary_, words->second);
