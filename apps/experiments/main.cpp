@@ -163,6 +163,7 @@ void print(const km::ReportSummary& summary) {
 }
 
 int run(const Options& options, const Setup& setup, const km::ExperimentConfig& config) {
+  const auto before = km::read_run_inputs(setup.paths.results);
   keep(options, setup);
   print(setup.paths);
   km::SignalWatch signals;
@@ -172,7 +173,12 @@ int run(const Options& options, const Setup& setup, const km::ExperimentConfig& 
       km::run_steps(steps, setup.paths.results, options.again, signals, display);
   std::cout << outcome.made << " steps made, " << outcome.kept << " were done before\n";
   for (const std::string& problem : outcome.problems) std::cerr << problem << '\n';
-  print(km::write_report(config, setup.paths));
+  // Results stay with the inputs they are of, and so does their report, until others make some.
+  const bool fruitless = outcome.made == 0 && !outcome.problems.empty();
+  if (before && fruitless && before != km::read_run_inputs(setup.paths.results))
+    km::write_run_inputs(setup.paths.results, *before);
+  else
+    print(km::write_report(config, setup.paths));
   if (outcome.stopped) return 130;
   return outcome.problems.empty() ? 0 : 3;
 }

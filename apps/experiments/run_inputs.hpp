@@ -13,6 +13,8 @@ struct RunInputs {
   std::filesystem::path euroc;
   std::filesystem::path config;
   bool quick = false;
+
+  bool operator==(const RunInputs&) const = default;
 };
 
 /// nullopt if nothing was kept in `results`, or nothing that can be read.

@@ -34,6 +34,16 @@ std::string now_text() {
   return text;
 }
 
+// The files beside those that a step makes, and when each was last written.
+std::map<fs::path, fs::file_time_type> written(const Step& step) {
+  std::map<fs::path, fs::file_time_type> times;
+  std::error_code error;  // of folders and files that are not there (any more)
+  for (const fs::path& output : step.outputs)
+    for (const auto& file : fs::directory_iterator(fs::absolute(output).parent_path(), error))
+      if (const auto time = file.last_write_time(error); !error) times[file.path()] = time;
+  return times;
+}
+
 class StepsRun {
  public:
   StepsRun(const std::vector<Step>& steps, const fs::path& results, bool again,
@@ -135,6 +145,8 @@ class StepsRun {
                       .started = now_text(),
                       .commit = built_commit(),
                       .machine = this_machine()};
+    const auto earlier = read_record(results_, step.name);
+    const auto written_before = written(step);
     const double start_s = steady_now_s();
     display_.start(index + 1, steps_.size(), step.title, expected_s_[index], later_s, start_s);
     std::string problem;
@@ -151,6 +163,8 @@ class StepsRun {
       write_record(results_, record);
       ++outcome_.made;
     } else {
+      // What was not touched still is what the earlier record says.
+      if (earlier && written(step) == written_before) write_record(results_, *earlier);
       fail(step, problem);
     }
     display_.finish(problem.empty()    ? "done"

@@ -20,9 +20,10 @@ struct StepsOutcome {
 };
 
 /// Runs the steps that are not done, in order; each writes its record below `results` when it is.
-/// With `again` also those that are. A step that fails leaves no record, those that need it are not
-/// run, the others are. A signal is passed on to the running program, a second one ends it at once;
-/// no further step is begun. Throws std::runtime_error if nothing can be written to `results`.
+/// With `again` also those that are. A step that fails loses its record unless it failed before it
+/// wrote anything beside its outputs; those that need it are not run, the others are. A signal is
+/// passed on to the running program, a second one ends it at once; no further step is begun. Throws
+/// std::runtime_error if nothing can be written to `results`.
 [[nodiscard]] StepsOutcome run_steps(const std::vector<Step>& steps,
                                      const std::filesystem::path& results, bool again,
                                      SignalWatch& signals, StepDisplay& display);

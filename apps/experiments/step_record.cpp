@@ -79,6 +79,17 @@ std::string last_name(const fs::path& path) {
   return (path.has_filename() ? path : path.parent_path()).filename().string();
 }
 
+// A text without the folders of what it names.
+std::string without_folders(const std::string& text) {
+  std::string names;
+  for (const char c : text)
+    if (c == '/')
+      names.erase(names.find_last_of(" \n\"'[{,:") + 1);
+    else
+      names += c;
+  return names;
+}
+
 bool all_exist(const std::vector<fs::path>& files) {
   return std::all_of(files.begin(), files.end(), [](const fs::path& f) { return fs::exists(f); });
 }
@@ -99,7 +110,7 @@ std::string fingerprint_of(const Step& step) {
   Fingerprint fingerprint;
   for (const std::string& word : step.command)
     fingerprint.add(word.find('/') == word.npos ? word : last_name(word));
-  for (const auto& [file, text] : step.writes) fingerprint.add(text);
+  for (const auto& [file, text] : step.writes) fingerprint.add(without_folders(text));
   for (const fs::path& input : step.inputs) fingerprint.add_file(input);
   return fingerprint.text();
 }

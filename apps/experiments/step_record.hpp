@@ -31,8 +31,9 @@ struct StepRecord {
   Machine machine;
 };
 
-/// A text that changes with the command and with the content of the inputs. Of a path in the
-/// command only the last name counts: it does not matter where things lie, or how that was typed.
+/// A text that changes with the command, what it writes, and the content of the inputs. Of a path
+/// in the first two only the last name counts: it does not matter where things lie, or how that was
+/// typed.
 /// An input that is not there counts as such.
 [[nodiscard]] std::string fingerprint_of(const Step& step);
 

@@ -92,6 +92,26 @@ TEST_CASE("What a run was given is kept with its results", "[experiments]") {
   CHECK(laboratory.folder.read("results/numbers.json") == before);
 }
 
+TEST_CASE("A run with another folder that makes nothing leaves all as it was", "[experiments]") {
+  const Laboratory laboratory;
+  REQUIRE(laboratory.run("run pcm").exit_code == 0);
+  const std::string report = laboratory.folder.read("results/report.md");
+  // Another graph, with which the program fails; and a folder without any.
+  laboratory.folder.write("other/polygon.g2o", "VERTEX_SE2 0 0 0\n");
+  fs::create_directory(laboratory.folder.path() / "none");
+  const std::string other = (laboratory.folder.path() / GENERATE("other", "none")).string();
+  CAPTURE(other);
+  CHECK(laboratory.bare("run pcm --graphs " + other).exit_code == 3);
+  const CommandResult list = laboratory.bare("list");
+  CHECK_THAT(list.output, Contains("pcm-1   done") && Contains("pcm-2   done"));
+  CHECK(laboratory.folder.read("results/report.md") == report);
+  // What makes something stays.
+  laboratory.folder.write("other/polygon.g2o", polygon_graph() + "\n");
+  REQUIRE(laboratory.bare("run pcm --graphs " + (laboratory.folder.path() / "other").string())
+              .exit_code == 0);
+  CHECK_THAT(laboratory.bare("list").output, Contains("pcm-1   done") && Contains("other"));
+}
+
 TEST_CASE("The tool says what is wrong or missing", "[experiments]") {
   const Laboratory laboratory;
   const auto fails_with = [&](const std::string& arguments, int code, const std::string& message) {

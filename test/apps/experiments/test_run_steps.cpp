@@ -160,6 +160,40 @@ TEST_CASE("A signal ends the running step and begins no other", "[experiments]")
   CHECK(state_of(steps[1], results) == StepState::kOutdated);  // its output is there, but not whole
 }
 
+TEST_CASE("What a stopped or failed step did not touch keeps its record", "[experiments]") {
+  Workshop workshop;
+  const auto results = workshop.folder.path() / "results";
+  const char* const fate = GENERATE("kill -INT $PPID; exec sleep 600", "exit 7");
+  const bool touches = GENERATE(false, true);
+  CAPTURE(fate, touches);
+  const std::string input = workshop.folder.write("input.txt", "exit 0").string();
+  Step step = workshop.step("a");
+  const std::string beside = touches ? "touch " + workshop.path("beside.txt") + "; " : "";
+  step.command.back() = "if test -e " + step.outputs[0].string() + "; then " + beside + ". " +
+                        input + "; fi; " + step.command.back();
+  step.inputs = {input};
+  REQUIRE(workshop.run({step}).made == 1);
+  workshop.folder.write("input.txt", fate);
+  CHECK(workshop.run({step}).made == 0);
+  CHECK(state_of(step, results) == StepState::kOutdated);
+  workshop.folder.write("input.txt", "exit 0");
+  CHECK(state_of(step, results) == (touches ? StepState::kOutdated : StepState::kDone));
+}
+
+TEST_CASE("It does not matter in which folder lies what a step writes about", "[experiments]") {
+  Step step{.name = "a", .title = "a", .command = {"/bin/true"}};
+  const auto fingerprint_with = [&](const std::string& text) {
+    step.writes = {{"team.yaml", text}};
+    return fingerprint_of(step);
+  };
+  const std::string here =
+      fingerprint_with("config: /here/euroc.yaml\ndataset: \"/recorded/V1_01\"\n");
+  CHECK(here ==
+        fingerprint_with("config: /else/where/euroc.yaml\ndataset: \"/moved/there/V1_01\"\n"));
+  CHECK(here != fingerprint_with("config: /here/euroc.yaml\ndataset: \"/recorded/V1_02\"\n"));
+  CHECK(here != fingerprint_with("config: /here/euroc.yaml\ntruth: \"/recorded/V1_01\"\n"));
+}
+
 TEST_CASE("A record keeps how a result was made", "[experiments]") {
   Workshop workshop;
   const Step step = workshop.step("a", "echo '\"quoted\"'");
