@@ -117,6 +117,7 @@ PcmExperiment read_pcm(YamlSource source, bool quick) {
   pcm.outliers = keys.get<std::size_t>("outliers", "a number").value_or(0);
   pcm.seeds = keys.require<std::vector<unsigned>>("seeds", "a list of numbers");
   pcm.searches = keys.require<Texts>("searches", kTexts);
+  pcm.seed_s = keys.get<double>("seed_s", "a number of seconds").value_or(pcm.seed_s);
   for (const std::string& search : pcm.searches)
     if (search != "exact" && search != "incremental" && search != "batch")
       source.problem(keys.child("searches"), search + " is not exact, incremental or batch");

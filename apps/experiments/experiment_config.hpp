@@ -39,6 +39,7 @@ struct PcmExperiment {
   std::size_t outliers = 0;
   std::vector<unsigned> seeds;
   std::vector<std::string> searches;  ///< As kimera_multi_pcm names them.
+  double seed_s = 50.0;               ///< How long a seed takes, roughly, for the time left.
 };
 
 /// One robot without others and without a map.

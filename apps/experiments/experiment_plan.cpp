@@ -22,7 +22,7 @@ std::vector<Step> pcm_steps(const PcmExperiment& pcm, const ExperimentPaths& pat
                           std::to_string(pcm.closures), "--seed", std::to_string(seed), "--search"},
               .inputs = {graph},
               .outputs = {files.json, files.plot},
-              .expected_s = 20.0};
+              .expected_s = pcm.seed_s};
     append(step.command, pcm.searches);
     append(step.command, {"--json", files.json.string(), "--plot", files.plot.string()});
     if (!fs::exists(graph))

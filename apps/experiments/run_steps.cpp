@@ -12,6 +12,7 @@
 #include <set>
 
 #include "apps/experiments/step_record.hpp"
+#include "apps/experiments/step_times.hpp"
 #include "apps/output_file.hpp"
 #include "apps/team/robot_process.hpp"
 #include "runtime/clock.hpp"
@@ -50,7 +51,7 @@ class StepsRun {
            SignalWatch& signals, StepDisplay& display)
       : steps_(steps), results_(results), again_(again), signals_(signals), display_(display) {
     fs::create_directories(results / "logs");
-    for (const Step& step : steps) expected_s_.push_back(expected_s(step));
+    for (const Step& step : steps) times_.add(step.command.front(), thought_s(step));
   }
 
   StepsOutcome run() {
@@ -78,7 +79,7 @@ class StepsRun {
 
  private:
   // What it took last time, or what is thought of it; nothing if it is done.
-  double expected_s(const Step& step) {
+  double thought_s(const Step& step) {
     const StepState state = state_of(step, results_);
     if (state == StepState::kMissing) return 0.0;
     const bool waits =
@@ -138,8 +139,6 @@ class StepsRun {
 
   void make(std::size_t index) {
     const Step& step = steps_[index];
-    double later_s = 0.0;
-    for (std::size_t k = index + 1; k < steps_.size(); ++k) later_s += expected_s_[k];
     StepRecord record{.step = step.name,
                       .command = step.command,
                       .started = now_text(),
@@ -148,7 +147,8 @@ class StepsRun {
     const auto earlier = read_record(results_, step.name);
     const auto written_before = written(step);
     const double start_s = steady_now_s();
-    display_.start(index + 1, steps_.size(), step.title, expected_s_[index], later_s, start_s);
+    display_.start(index + 1, steps_.size(), step.title, times_.expected_s(index),
+                   times_.later_s(index), start_s);
     std::string problem;
     try {
       prepare(step, record);
@@ -161,6 +161,7 @@ class StepsRun {
     record.seconds = steady_now_s() - start_s;
     if (problem.empty()) {
       write_record(results_, record);
+      times_.note(index, record.seconds);
       ++outcome_.made;
     } else {
       // What was not touched still is what the earlier record says.
@@ -212,7 +213,7 @@ class StepsRun {
   bool again_;
   SignalWatch& signals_;
   StepDisplay& display_;
-  std::vector<double> expected_s_;
+  StepTimes times_;
   std::set<std::string> pending_;                  // steps that will be run, for the time left
   std::map<std::string, std::string> failure_of_;  // step: the one whose failure holds it up
   std::map<std::string, std::string> held_up_;     // that one: the names of those it holds up

@@ -48,9 +48,12 @@ void StepDisplay::start(std::size_t index, std::size_t count, const std::string&
 
 std::string StepDisplay::text(const std::string& line, double now_s) const {
   const double elapsed_s = now_s - start_s_;
-  // A step that takes longer than expected is taken to be nearly done.
-  const double left_s = std::max(expected_s_ - elapsed_s, 0.1 * elapsed_s) + later_s_;
-  return heading_ + ": " + duration(elapsed_s) + ", " + rough_duration(left_s) + " left" +
+  // What takes longer than expected may end at once or late: no promise then.
+  const std::string left =
+      elapsed_s <= expected_s_
+          ? rough_duration(expected_s_ - elapsed_s + later_s_) + " left"
+          : "longer than expected" + (later_s_ > 0.0 ? ", then " + rough_duration(later_s_) : "");
+  return heading_ + ": " + duration(elapsed_s) + ", " + left +
          (line.empty() ? std::string() : " | " + line);
 }
 

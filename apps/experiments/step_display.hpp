@@ -6,8 +6,9 @@
 
 namespace km {
 
-/// Shows which step runs, what it says, and how long all will still take: one line redrawn on a
-/// terminal, elsewhere a line every kPlainInterval_s. Times are of any clock [s].
+/// Shows which step runs, what it says, and how long all will still take, unless the step already
+/// takes longer than expected: one line redrawn on a terminal, elsewhere a line every
+/// kPlainInterval_s. Times are of any clock [s].
 class StepDisplay {
  public:
   static constexpr double kPlainInterval_s = 10.0;
