@@ -144,6 +144,14 @@ class PanelDrawing {
       begun = true;
     }
     svg_ << "\"/>\n";
+    if (curve.marks) draw_marks(curve);
+  }
+
+  void draw_marks(const Curve& curve) const {
+    for (const CurvePoint& point : curve.points)
+      if (drawable(point))
+        svg_ << "<circle r=\"3\" fill=\"" << colour_of(curve) << "\" cx=\"" << px_of_x(point.x)
+             << "\" cy=\"" << px_of_scaled(scaled(point.y)) << "\"/>\n";
   }
 
   std::ostream& svg_;

@@ -17,6 +17,7 @@ struct Curve {
   std::vector<CurvePoint> points;
   std::size_t colour = 0;  ///< Number of it; curves of one matter share theirs.
   bool dots = false;       ///< Faint single points in place of a line.
+  bool marks = false;      ///< A disc at every point of a line: few points, or only one.
 };
 
 /// Curves over common axes.

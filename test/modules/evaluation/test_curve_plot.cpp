@@ -42,6 +42,16 @@ TEST_CASE("A logarithmic axis has decades and leaves out what has no logarithm",
   CHECK(count(svg, "L") == 1);  // two points, one line
 }
 
+TEST_CASE("Marks show every point, also a single one", "[plot]") {
+  CurvePanel one = panel({{10, 4}}, false);
+  CHECK(count(plot_curves(std::vector{one}), "<circle") == 0);
+  one.curves[0].marks = true;
+  CHECK_THAT(plot_curves(std::vector{one}), Contains("cx=\"630.0\" cy=\"34.0\""));
+  CurvePanel three = panel({{1, 0.02}, {2, 0.0}, {4, 50.0}}, true);
+  three.curves[0].marks = true;
+  CHECK(count(plot_curves(std::vector{three}), "<circle") == 2);  // 0 has no logarithm
+}
+
 TEST_CASE("Panels without a finite point, or without any, are drawn empty", "[plot]") {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const bool log_y = GENERATE(false, true);
