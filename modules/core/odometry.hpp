@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "modules/core/frame.hpp"
 #include "modules/core/geometry.hpp"
@@ -17,6 +18,12 @@ struct OdometryState {
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< [m/s^2]
 };
 
+/// Which way is up, as inertial sensing knows it.
+struct Vertical {
+  Eigen::Vector3d up_body = Eigen::Vector3d::UnitZ();  ///< Unit, against gravity.
+  double sigma_rad = 0.0;                              ///< Of the tilt about each horizontal axis.
+};
+
 /// A new keyframe as odometry hands it on. Its pose is chained from the relative poses, so that
 /// T_odom_kf is constant once published although odometry refines its recent past.
 struct KeyframeOdometry {
@@ -25,6 +32,7 @@ struct KeyframeOdometry {
   SE3 T_odom_kf = SE3::Identity();           ///< Product of the relative poses up to here.
   SE3 T_previous_kf = SE3::Identity();       ///< Pose in the keyframe before; odom for the first.
   Matrix6 covariance = Matrix6::Zero();      ///< Of T_previous_kf; zero for the first.
+  std::optional<Vertical> vertical = {};     ///< Here; none where there is no inertial sensing.
   std::shared_ptr<const StereoFrame> frame;  ///< Null where there are no images (recorded graphs).
 };
 

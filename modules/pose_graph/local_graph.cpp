@@ -1,6 +1,7 @@
 #include "modules/pose_graph/local_graph.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "modules/core/config.hpp"
@@ -40,6 +41,17 @@ std::optional<BlockEdge> block_edge(const RelativePose& measured) {
                    weight.tau};
 }
 
+VerticalPrior vertical_prior(const KeyframeId& keyframe, const Vertical& vertical) {
+  constexpr Bounds<double> kSigma{1e-4, 1.6};
+  constexpr double kUnit = 1e-3;
+  const double norm = vertical.up_body.norm();
+  if (!(std::abs(norm - 1.0) < kUnit) || !kSigma.contains(vertical.sigma_rad))
+    throw std::invalid_argument("LocalGraph: the vertical of keyframe " + to_string(keyframe) +
+                                " is not a direction with a usable sigma");
+  return {Eigen::Index{keyframe.index}, vertical.up_body / norm,
+          1.0 / (vertical.sigma_rad * vertical.sigma_rad)};
+}
+
 }  // namespace
 
 ClosureId closure_id(RobotId self, const BlockEdge& edge) {
@@ -54,6 +66,8 @@ ClosureId closure_id(RobotId self, RobotId peer, const InterEdge& edge) {
 
 bool LocalGraph::add(const KeyframeOdometry& keyframe) {
   if (keyframe.id.robot != self_ || keyframe.id.index != keyframes_) return false;
+  std::optional<VerticalPrior> vertical;
+  if (keyframe.vertical) vertical = vertical_prior(keyframe.id, *keyframe.vertical);
   if (keyframes_ > 0) {
     const auto step = block_edge(
         {{self_, keyframes_ - 1}, keyframe.id, keyframe.T_previous_kf, keyframe.covariance});
@@ -66,6 +80,7 @@ bool LocalGraph::add(const KeyframeOdometry& keyframe) {
       throw std::invalid_argument("LocalGraph: the first keyframe's pose is not finite");
     T_odom_first_ = keyframe.T_odom_kf;
   }
+  if (vertical) verticals_.push_back(*vertical);
   ++keyframes_;
   ++revision_;
   complete_sets();

@@ -35,7 +35,7 @@ class LocalGraph {
   explicit LocalGraph(RobotId self) : self_(self) {}
 
   /// False, and ignored, unless it is this robot's next keyframe.
-  /// Throws std::invalid_argument if its pose or covariance is not usable.
+  /// Throws std::invalid_argument if its pose, covariance or vertical is not usable.
   bool add(const KeyframeOdometry& keyframe);
   /// False, and ignored, if it does not touch this robot, is known, or has no usable covariance.
   bool add(const Closure& closure);
@@ -60,6 +60,10 @@ class LocalGraph {
   [[nodiscard]] std::vector<BlockEdge> own_edges() const;
   /// Pose of keyframe 0 in the frame of odometry; the identity before there is one.
   [[nodiscard]] const SE3& T_odom_first() const { return T_odom_first_; }
+  /// Of all keyframes that told a vertical.
+  [[nodiscard]] const std::vector<VerticalPrior>& verticals() const { return verticals_; }
+  /// True if keyframe 0 told a vertical: then odometry's frame has z up.
+  [[nodiscard]] bool upright() const { return !verticals_.empty() && verticals_[0].pose == 0; }
   /// Odometry step from keyframe i - 1 to i. Precondition: 0 < i < keyframes().
   [[nodiscard]] const SE3& step_to(std::uint32_t i) const { return odometry_[i - 1].T_i_j; }
 
@@ -77,6 +81,7 @@ class LocalGraph {
   std::uint32_t keyframes_ = 0;
   std::uint32_t revision_ = 0;
   std::vector<BlockEdge> odometry_;
+  std::vector<VerticalPrior> verticals_;
   std::vector<BlockEdge> intra_;
   std::map<ClosureId, BlockEdge> closures_;  // i, j: keyframes of different robots or of one
   std::map<RobotId, InlierSet> pending_;     // newest per peer, not yet complete

@@ -142,9 +142,15 @@ PgoOutput PgoAgent::step(double now_s) {
 }
 
 PgoStatus PgoAgent::make_status() const {
-  return {
-      self_,           frame_,         frame_version_,       graph_.keyframes(), graph_.revision(),
-      graph_.offers(), config_.method, graph_.T_odom_first()};
+  return {.sender = self_,
+          .frame = frame_,
+          .frame_version = frame_version_,
+          .keyframes = graph_.keyframes(),
+          .revision = graph_.revision(),
+          .offers = graph_.offers(),
+          .method = config_.method,
+          .T_odom_first = graph_.T_odom_first(),
+          .upright = graph_.upright()};
 }
 
 void PgoAgent::send_status(PgoOutput& output) {
@@ -162,8 +168,11 @@ std::optional<Eigen::MatrixXd> PgoAgent::world_of(RobotId anchor) const {
   if (running_ && running_->exchange && running_->session.finished &&
       anchor == running_->session.anchor && running_->session.anchor_pose.cols() == 4)
     return running_->session.anchor_pose;
-  const auto before = [](const LiftedPoses& X, const SE3& T_odom_first) {
-    return lift(Eigen::MatrixXd(X.leftCols<4>()), T_odom_first.inverse());
+  // Upright, the optimum knows better than keyframe 0 did how that was tilted.
+  const bool upright = running_ && running_->session.upright;
+  const auto before = [upright](const LiftedPoses& X, const SE3& T_odom_first) {
+    const Eigen::MatrixXd world = lift(Eigen::MatrixXd(X.leftCols<4>()), T_odom_first.inverse());
+    return upright ? level(world, T_odom_first.translation()) : world;
   };
   // What the others know it as: then all are in one frame to the last digit.
   if (anchor == self_.robot)

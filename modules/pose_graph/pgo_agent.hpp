@@ -57,6 +57,9 @@ struct [[nodiscard]] PgoOutput {
 ///   is worth its own. If the solver of any member gives up, all of them go on by kRbcd from where
 ///   the session began.
 ///
+/// Where all members know which way is up, that is part of what kNewton and kRbcd minimise, and
+/// `world` has z up. kGnc does without.
+///
 /// Closures that kGnc has rejected hold nothing to speak of in kRbcd until the next session of kGnc
 /// weighs them anew: they keep a weight of kJointWeight, and so their ends stay public.
 ///
@@ -140,6 +143,7 @@ class PgoAgent {
   void coordinate(PgoOutput& output);
   void make_plan();
   [[nodiscard]] PgoMethod method_for(const SessionPlan& plan) const;
+  [[nodiscard]] bool all_upright(const SessionPlan& plan) const;
   [[nodiscard]] bool should_open() const;
   [[nodiscard]] bool paid_for() const;
   [[nodiscard]] bool worthwhile() const;
@@ -153,7 +157,7 @@ class PgoAgent {
   [[nodiscard]] std::optional<EdgesTo> edges_in(const SessionPlan& plan) const;
   [[nodiscard]] EdgesTo edges_to_absent(const SessionPlan& plan) const;
   [[nodiscard]] LiftedPoses extended_poses() const;
-  void start_block(const SessionPlan& plan, EdgesTo edges, const EdgesTo& absent);
+  void start_block(const PgoSession& session, EdgesTo edges, const EdgesTo& absent);
   void loosen_rejected(std::vector<BlockEdge>& own, EdgesTo& edges) const;
   void advance(PgoOutput& output);
   void align(PgoOutput& output);

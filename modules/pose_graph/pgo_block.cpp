@@ -47,16 +47,18 @@ LiftedPoses PgoAgent::extended_poses() const {
   X.leftCols(4 * known) = block_ ? block_->X() : LiftedPoses(config_.rank, 0);
   for (Eigen::Index i = known; i < pose_count(X); ++i)
     X.middleCols<4>(4 * i) =
-        i == 0 ? lifted_identity(config_.rank)
+        i == 0 ? lift(lifted_identity(config_.rank), graph_.T_odom_first())
                : lift(X.middleCols<4>(4 * (i - 1)), graph_.step_to(static_cast<std::uint32_t>(i)));
   return X;
 }
 
-void PgoAgent::start_block(const SessionPlan& plan, EdgesTo edges, const EdgesTo& absent) {
+void PgoAgent::start_block(const PgoSession& session, EdgesTo edges, const EdgesTo& absent) {
+  const SessionPlan& plan = session.plan;
   edges.insert(absent.begin(), absent.end());
   std::vector<BlockEdge> own_edges = graph_.own_edges();
   loosen_rejected(own_edges, edges);
-  block_.emplace(extended_poses(), own_edges, edges);
+  const auto verticals = session.upright ? graph_.verticals() : std::vector<VerticalPrior>();
+  block_.emplace(extended_poses(), own_edges, edges, verticals);
   for (const auto& [robot, to_absent] : absent) {
     const PublicPoses& poses = *peers_.at(robot).poses;
     (void)block_->set_neighbour(robot, poses.keyframes, poses.X);
@@ -67,7 +69,8 @@ void PgoAgent::start_block(const SessionPlan& plan, EdgesTo edges, const EdgesTo
   const bool trusted = config_.method != PgoMethod::kGnc;
   if (trusted && plan.members.size() == 1 && edges.empty() &&
       intra_closures != intra_closures_tried_) {
-    const auto poses = chordal_initialisation(Eigen::Index{graph_.keyframes()}, own_edges);
+    auto poses = chordal_initialisation(Eigen::Index{graph_.keyframes()}, own_edges);
+    for (SE3& T : poses) T = graph_.T_odom_first() * T;
     block_->offer(lift(poses, config_.rank));
     intra_closures_tried_ = intra_closures;
   }
@@ -94,8 +97,9 @@ bool PgoAgent::join(const PgoSession& session) {
   std::optional<Exchange> exchange;
   if (session.method != PgoMethod::kRbcd)
     exchange.emplace(Exchange{
-        .edges = {self_.robot, Eigen::Index{graph_.keyframes()}, graph_.own_edges(), *edges}});
-  start_block(plan, std::move(*edges), absent);
+        .edges = {self_.robot, Eigen::Index{graph_.keyframes()}, graph_.own_edges(), *edges,
+                  session.upright ? graph_.verticals() : std::vector<VerticalPrior>()}});
+  start_block(session, std::move(*edges), absent);
   if (running_) optimising_s_ += running_->moved_s - running_->started_s;
   Running& running = running_.emplace(Running{.session = session});
   running.exchange = std::move(exchange);

@@ -33,9 +33,9 @@ bool PgoAgent::start_solver(PgoOutput& output) {
   exchange.anchor = *pose;
   std::set<RobotId> members;
   for (const auto& [robot, position] : running_->position_of) members.insert(robot);
-  exchange.solver =
-      make_session_solver(running_->session.method, config_.gnc_barc, std::move(exchange.edges),
-                          std::move(members), round_to_poses(block_->X(), exchange.anchor));
+  exchange.solver = make_session_solver(
+      running_->session.method, config_.gnc_barc, std::move(exchange.edges), std::move(members),
+      round_to_poses(block_->X(), exchange.anchor), running_->session.upright);
   send(exchange.solver->hello(), output);
   for (const auto& [robot, peer] : peers_)
     for (const SolverMessagePtr& message : peer.exchange)

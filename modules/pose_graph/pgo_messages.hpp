@@ -50,10 +50,11 @@ struct PgoStatus {
   PgoMethod method = PgoMethod::kRbcd;  ///< Its configuration's; only equal ones go together.
   /// Of its keyframe 0. Odometry's frame is upright, keyframe 0 need not be.
   SE3 T_odom_first = SE3::Identity();
+  bool upright = false;  ///< Its keyframes have vertical priors in that frame.
   friend bool operator==(const PgoStatus& a, const PgoStatus& b) {
     const auto rest = [](const PgoStatus& s) {
       return std::tie(s.sender, s.frame, s.frame_version, s.keyframes, s.revision, s.offers,
-                      s.method);
+                      s.method, s.upright);
     };
     return rest(a) == rest(b) && a.T_odom_first.matrix() == b.T_odom_first.matrix();
   }
@@ -96,6 +97,7 @@ struct PgoSession {
   PgoSessionId id;
   SessionPlan plan;
   PgoMethod method = PgoMethod::kRbcd;
+  bool upright = false;  ///< Members use their vertical priors: the solution has z up.
   std::uint32_t rank = 0;
   std::uint32_t max_rounds = 0;  ///< 0: no limit.
   RobotId anchor = 0;            ///< The frame of its odometry is `world`.

@@ -95,6 +95,12 @@ PgoMethod PgoAgent::method_for(const SessionPlan& plan) const {
   return any_fixed ? PgoMethod::kRbcd : config_.method;
 }
 
+bool PgoAgent::all_upright(const SessionPlan& plan) const {
+  return std::all_of(plan.members.begin(), plan.members.end(), [&](const SessionMember& member) {
+    return member.peer == self_ ? graph_.upright() : peers_.at(member.peer.robot).status->upright;
+  });
+}
+
 bool PgoAgent::paid_for() const {
   std::size_t most = 0;
   for (const auto& [robot, bytes] : running_->bytes) most = std::max(most, bytes);
@@ -129,6 +135,7 @@ bool PgoAgent::should_open() const {
 void PgoAgent::open_session() {
   PgoSession session{.id = {self_, ++sessions_opened_}, .plan = plan_};
   session.method = method_for(plan_);
+  session.upright = session.method != PgoMethod::kGnc && all_upright(plan_);
   session.rank = static_cast<std::uint32_t>(config_.rank);
   session.max_rounds = static_cast<std::uint32_t>(config_.max_rounds);
   session.anchor = coordinator_of(plan_);

@@ -50,6 +50,7 @@ Codec<PgoStatus>::Encoded Codec<PgoStatus>::encode(const PgoStatus& status) {
   encoded.wire.revision = status.revision;
   encoded.wire.method = static_cast<std::uint8_t>(status.method);
   encoded.wire.origin = to_wire(status.T_odom_first);
+  encoded.wire.upright = status.upright;
   borrow(encoded.wire.offers, encoded.offers);
   return encoded;
 }
@@ -72,7 +73,8 @@ Decoded<PgoStatus> Codec<PgoStatus>::decode(const Wire& wire) {
                    .revision = wire.revision,
                    .offers = {},
                    .method = *method,
-                   .T_odom_first = *T_odom_first};
+                   .T_odom_first = *T_odom_first,
+                   .upright = wire.upright};
   for (const km_wire_EdgeSetOffer& offer : *offers) {
     if (offer.edges == 0 || offer.peer == wire.robot)
       return Result::refuse("an offer without edges or to its own robot");
@@ -101,6 +103,7 @@ Codec<PgoSession>::Encoded Codec<PgoSession>::encode(const PgoSession& session) 
   wire.cost = session.cost;
   wire.gradient_norm = session.gradient_norm;
   wire.finished = session.finished;
+  wire.upright = session.upright;
   wire.method = static_cast<std::uint8_t>(session.method);
   borrow(wire.members, encoded.members);
   borrow(wire.pairs, encoded.pairs);
@@ -131,6 +134,7 @@ Decoded<PgoSession> Codec<PgoSession>::decode(const Wire& wire) {
   for (const km_wire_SessionPair& pair : *pairs)
     session.plan.pairs.push_back({pair.a, pair.b, {pair.set_version, pair.hash}});
   session.method = *method;
+  session.upright = wire.upright;
   session.rank = wire.rank;
   session.max_rounds = wire.max_rounds;
   session.anchor = wire.anchor;

@@ -21,7 +21,7 @@ template <>
 struct Codec<PgoStatus> {
   using Wire = km_wire_PgoStatus;
   static constexpr const char* kTopic = "pgo_status";
-  static constexpr std::uint16_t kVersion = 3;
+  static constexpr std::uint16_t kVersion = 4;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_PgoStatus_desc; }
 
   struct Encoded {
@@ -37,7 +37,7 @@ template <>
 struct Codec<PgoSession> {
   using Wire = km_wire_PgoSession;
   static constexpr const char* kTopic = "pgo_sessions";
-  static constexpr std::uint16_t kVersion = 2;
+  static constexpr std::uint16_t kVersion = 3;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_PgoSession_desc; }
 
   struct Encoded {

@@ -50,32 +50,43 @@ double edge_cost(const Eigen::Ref<const Eigen::MatrixXd>& X_i,
 
 QuadraticProblem::QuadraticProblem(Eigen::Index rank, Eigen::Index poses,
                                    std::vector<BlockEdge> edges,
-                                   std::vector<PublicEdge> public_edges)
+                                   std::vector<PublicEdge> public_edges,
+                                   std::vector<VerticalPrior> verticals)
     : rank_(rank),
       poses_(poses),
       edges_(std::move(edges)),
       public_edges_(std::move(public_edges)),
-      Q_(4 * poses, 4 * poses),
-      G_(LiftedPoses::Zero(rank, 4 * poses)) {
+      verticals_(std::move(verticals)),
+      Q_(4 * poses, 4 * poses) {
   check();
   build();
+  reset_linear_part();
 }
 
 void QuadraticProblem::check() const {
   const auto refuse = [](const char* kind, std::size_t k, const char* why) {
-    throw std::invalid_argument(std::string("QuadraticProblem: ") + kind + " edge " +
-                                std::to_string(k) + ' ' + why);
+    throw std::invalid_argument(std::string("QuadraticProblem: ") + kind + ' ' + std::to_string(k) +
+                                ' ' + why);
   };
   const auto outside = [&](Eigen::Index i) { return i < 0 || i >= poses_; };
   for (std::size_t k = 0; k < edges_.size(); ++k) {
     const BlockEdge& e = edges_[k];
-    if (outside(e.i) || outside(e.j) || e.i == e.j) refuse("block", k, "names no pair of poses");
-    if (!usable(e.T_i_j, e.kappa, e.tau)) refuse("block", k, "is not finite with positive weights");
+    if (outside(e.i) || outside(e.j) || e.i == e.j)
+      refuse("block edge", k, "names no pair of poses");
+    if (!usable(e.T_i_j, e.kappa, e.tau))
+      refuse("block edge", k, "is not finite with positive weights");
   }
   for (std::size_t k = 0; k < public_edges_.size(); ++k) {
     const PublicEdge& e = public_edges_[k];
-    if (outside(e.own) || e.fixed < 0) refuse("public", k, "names no pair of poses");
-    if (!usable(e.T, e.kappa, e.tau)) refuse("public", k, "is not finite with positive weights");
+    if (outside(e.own) || e.fixed < 0) refuse("public edge", k, "names no pair of poses");
+    if (!usable(e.T, e.kappa, e.tau))
+      refuse("public edge", k, "is not finite with positive weights");
+  }
+  for (std::size_t k = 0; k < verticals_.size(); ++k) {
+    const VerticalPrior& v = verticals_[k];
+    if (outside(v.pose)) refuse("vertical prior", k, "names no pose");
+    if (!v.up.allFinite() || !(v.weight > 0.0) || !std::isfinite(v.weight))
+      refuse("vertical prior", k, "is not finite with a positive weight");
   }
 }
 
@@ -108,7 +119,7 @@ void QuadraticProblem::set_fixed(LiftedPoses fixed) {
                                 ", not " + std::to_string(rank_) + "x(at least " +
                                 std::to_string(4 * fixed_count_) + ')');
   fixed_ = std::move(fixed);
-  G_.setZero();
+  reset_linear_part();
   for (const PublicEdge& e : public_edges_) {
     const Eigen::Matrix4d Omega = weights(e.kappa, e.tau).asDiagonal();
     const Eigen::Matrix4d T = e.T.matrix();
@@ -116,6 +127,15 @@ void QuadraticProblem::set_fixed(LiftedPoses fixed) {
         e.from_own ? Eigen::Matrix4d(Omega * T.transpose()) : Eigen::Matrix4d(T * Omega);
     G_.middleCols<4>(4 * e.own).noalias() -= fixed_.middleCols<4>(4 * e.fixed) * M;
   }
+}
+
+// The part that no fixed pose has to do with: w ||Y u - z||^2 = 2 w - 2 w z^T Y u.
+void QuadraticProblem::reset_linear_part() {
+  G_ = LiftedPoses::Zero(rank_, 4 * poses_);
+  if (verticals_.empty()) return;
+  const Eigen::VectorXd z = lifting_matrix(rank_).col(2);
+  for (const VerticalPrior& v : verticals_)
+    G_.middleCols<3>(4 * v.pose).noalias() -= v.weight * z * v.up.transpose();
 }
 
 double QuadraticProblem::public_edge_cost(std::size_t k, const LiftedPoses& X) const {
@@ -132,6 +152,7 @@ double QuadraticProblem::cost(const LiftedPoses& X) const {
   for (const BlockEdge& e : edges_)
     sum += edge_cost(X.middleCols<4>(4 * e.i), X.middleCols<4>(4 * e.j), e.T_i_j, e.kappa, e.tau);
   for (std::size_t k = 0; k < public_edges_.size(); ++k) sum += public_edge_cost(k, X);
+  for (const VerticalPrior& v : verticals_) sum += vertical_cost(v, X.middleCols<3>(4 * v.pose));
   return sum;
 }
 

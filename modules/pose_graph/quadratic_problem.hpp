@@ -7,6 +7,7 @@
 #include "modules/core/geometry.hpp"
 #include "modules/pose_graph/block_cholesky.hpp"
 #include "modules/pose_graph/stiefel.hpp"
+#include "modules/pose_graph/vertical_prior.hpp"
 
 namespace km {
 
@@ -38,15 +39,16 @@ struct PublicEdge {
 
 /// The part of the pose graph cost that one block of poses decides, all others fixed:
 ///     f(X) = sum kappa ||Y_j - Y_i R_ij||_F^2 + tau ||p_j - p_i - Y_i t_ij||^2
-/// over the edges inside the block and those to fixed poses, without a factor 1/2 (Tian et al.,
-/// "Distributed Certifiably Correct Pose-Graph Optimization", TRO 2021, Problem 2 and Eq. (14);
-/// = tr(X Q X^T) + 2 tr(X G^T) + const with Q sparse 4n x 4n and G r x 4n). Not thread-safe.
+/// over the edges inside the block and those to fixed poses, and the costs of its vertical priors,
+/// without a factor 1/2 (Tian et al., "Distributed Certifiably Correct Pose-Graph Optimization",
+/// TRO 2021, Problem 2 and Eq. (14); = tr(X Q X^T) + 2 tr(X G^T) + const with Q sparse 4n x 4n and
+/// G r x 4n). Not thread-safe.
 class QuadraticProblem {
  public:
-  /// Throws std::invalid_argument if an edge names a pose outside [0, poses), if a measurement is
-  /// not finite, or if a precision is not positive and finite.
+  /// Throws std::invalid_argument if an edge or a prior names a pose outside [0, poses), if a
+  /// measurement is not finite, or if a precision is not positive and finite.
   QuadraticProblem(Eigen::Index rank, Eigen::Index poses, std::vector<BlockEdge> edges,
-                   std::vector<PublicEdge> public_edges);
+                   std::vector<PublicEdge> public_edges, std::vector<VerticalPrior> verticals = {});
 
   /// Sets the fixed poses, r x 4m. O(public edges); nothing is factorised.
   /// Throws std::invalid_argument if the shape does not cover the public edges.
@@ -74,6 +76,7 @@ class QuadraticProblem {
   [[nodiscard]] Eigen::Index poses() const { return poses_; }
   [[nodiscard]] const std::vector<BlockEdge>& edges() const { return edges_; }
   [[nodiscard]] const std::vector<PublicEdge>& public_edges() const { return public_edges_; }
+  [[nodiscard]] const std::vector<VerticalPrior>& verticals() const { return verticals_; }
   [[nodiscard]] const LiftedPoses& fixed() const { return fixed_; }
   /// Q, both triangles.
   [[nodiscard]] const Eigen::SparseMatrix<double>& data_matrix() const { return Q_; }
@@ -83,6 +86,7 @@ class QuadraticProblem {
  private:
   void check() const;
   void build();
+  void reset_linear_part();
 
   Eigen::Index rank_;
   Eigen::Index poses_;
@@ -90,6 +94,7 @@ class QuadraticProblem {
   double rotation_shift_ = 1e-3;
   std::vector<BlockEdge> edges_;
   std::vector<PublicEdge> public_edges_;
+  std::vector<VerticalPrior> verticals_;
   Eigen::SparseMatrix<double> Q_;  // 4n x 4n, symmetric, both triangles
   LiftedPoses fixed_;
   LiftedPoses G_;

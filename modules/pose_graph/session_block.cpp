@@ -20,9 +20,11 @@ double growing_relaxation(std::uint32_t round, double max) {
 }
 
 SessionBlock::SessionBlock(LiftedPoses X, std::vector<BlockEdge> own_edges,
-                           const std::map<RobotId, std::vector<InterEdge>>& edges_to)
+                           const std::map<RobotId, std::vector<InterEdge>>& edges_to,
+                           std::vector<VerticalPrior> verticals)
     : X_(std::move(X)),
-      problem_(X_.rows(), pose_count(X_), std::move(own_edges), make_public_edges(edges_to)) {
+      problem_(X_.rows(), pose_count(X_), std::move(own_edges), make_public_edges(edges_to),
+               std::move(verticals)) {
   Eigen::Index slots = 0;
   for (const auto& [robot, of_robot] : neighbours_)
     slots += static_cast<Eigen::Index>(of_robot.of_keyframe.size());
@@ -95,7 +97,8 @@ void SessionBlock::align(const AlignmentTolerance& tolerance,
     X_.middleCols<4>(4 * static_cast<Eigen::Index>(i)) = lift(L, poses[i]);
   std::mt19937 rng(kPerturbationSeed);
   X_ = perturb_rotations(X_, kPerturbation, rng);
-  QuadraticProblem problem(X_.rows(), pose_count(X_), problem_.edges(), heard);
+  QuadraticProblem problem(X_.rows(), pose_count(X_), problem_.edges(), heard,
+                           problem_.verticals());
   problem.set_fixed(fixed_);
   X_ = minimise(problem, std::move(X_), options).X;
 }

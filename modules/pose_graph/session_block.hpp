@@ -23,7 +23,8 @@ class SessionBlock {
  public:
   /// `X` r x 4n feasible. `edges_to`: robots at the other ends, none of them empty.
   SessionBlock(LiftedPoses X, std::vector<BlockEdge> own_edges,
-               const std::map<RobotId, std::vector<InterEdge>>& edges_to);
+               const std::map<RobotId, std::vector<InterEdge>>& edges_to,
+               std::vector<VerticalPrior> verticals = {});
 
   /// Takes a neighbour's poses. False, and no change, if it lacks a keyframe that an edge ends on.
   /// Robots that are not neighbours are accepted without effect.

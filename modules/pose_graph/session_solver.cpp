@@ -10,11 +10,11 @@ namespace km {
 
 std::unique_ptr<SessionSolver> make_session_solver(PgoMethod method, double gnc_barc,
                                                    RobotEdges edges, std::set<RobotId> members,
-                                                   std::vector<SE3> start) {
+                                                   std::vector<SE3> start, bool upright) {
   switch (method) {
     case PgoMethod::kNewton:
       return std::make_unique<NewtonSessionSolver>(std::move(edges), std::move(members),
-                                                   std::move(start));
+                                                   std::move(start), upright);
     case PgoMethod::kGnc:
       return std::make_unique<GncSessionSolver>(std::move(edges), std::move(members),
                                                 std::move(start), gnc_barc);

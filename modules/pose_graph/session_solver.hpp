@@ -44,11 +44,13 @@ class SessionSolver {
 };
 
 /// The solver of `method`, which must be one that goes by exchanges. `start`: this robot's poses,
-/// in the frame of the session. `gnc_barc`: see PoseGraphConfig. The first edges of its own are its
+/// in the frame of the session. `upright`: that has z up, and some member has vertical priors (not
+/// used by kGnc). `gnc_barc`: see PoseGraphConfig. The first edges of its own are its
 /// odometry, one per pose but the first.
 [[nodiscard]] std::unique_ptr<SessionSolver> make_session_solver(PgoMethod method, double gnc_barc,
                                                                  RobotEdges edges,
                                                                  std::set<RobotId> members,
-                                                                 std::vector<SE3> start);
+                                                                 std::vector<SE3> start,
+                                                                 bool upright);
 
 }  // namespace km

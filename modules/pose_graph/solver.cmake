@@ -3,7 +3,8 @@
 km_module(pose_graph
   SOURCES block_cholesky.cpp certificate.cpp certificate_agent.cpp chordal.cpp frame_alignment.cpp
           local_graph.cpp quadratic_problem.cpp round_ledger.cpp rounding.cpp session_block.cpp
-          session_plan.cpp staircase.cpp stiefel.cpp truncated_newton.cpp)
+          session_plan.cpp staircase.cpp stiefel.cpp truncated_newton.cpp
+          vertical_prior.cpp)
 
 add_library(km_pose_graph_agent STATIC
   newton/newton_session_solver.cpp pgo_agent.cpp pgo_block.cpp pgo_exchange.cpp pgo_session.cpp

@@ -80,6 +80,7 @@ class Vio {
   void continue_from_last_pose(std::vector<OdometryState>& states) const;
   void hand_on_first(const OdometryState& state, const Frame& frame, VioResult& result);
   void hand_on(const OdometryState& state, const Frame& frame, VioResult& result);
+  [[nodiscard]] std::optional<Vertical> vertical_at(const OdometryState& state) const;
   void locate(const OdometryState& state, const Frame& frame, VioResult& result);
   [[nodiscard]] bool locates_points(const StereoFrame& frame) const;
   [[nodiscard]] bool due(const OdometryState& state, const StereoFrame& frame) const;

@@ -10,6 +10,8 @@ namespace {
 constexpr double kRestartRotation = 0.3;
 constexpr double kRestartTranslation = 1.0;
 
+constexpr double kLeastTiltSigma = 1e-4;  // [rad]; no inertial sensor knows better
+
 Matrix6 restart_covariance() {
   Vector6 sigma;
   sigma << Eigen::Vector3d::Constant(kRestartRotation),
@@ -42,12 +44,19 @@ bool Vio::due(const OdometryState& state, const StereoFrame& frame) const {
          angle_of(T.linear()) >= config_.output_rotation_rad;
 }
 
+std::optional<Vertical> Vio::vertical_at(const OdometryState& state) const {
+  if (config_.tilt_sigma < kLeastTiltSigma) return std::nullopt;
+  return Vertical{state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ(),
+                  config_.tilt_sigma};
+}
+
 void Vio::hand_on_first(const OdometryState& state, const Frame& frame, VioResult& result) {
   KeyframeOdometry keyframe;
   keyframe.stamp = state.stamp;
   keyframe.T_odom_kf = T_chain_odom_ * state.T_odom_body;
   keyframe.T_previous_kf = keyframe.T_odom_kf;
   keyframe.id = {robot_, 0};
+  keyframe.vertical = vertical_at(state);
   if (last_keyframe_) {  // a new start
     keyframe.id.index = last_keyframe_->id.index + 1;
     keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * keyframe.T_odom_kf;
@@ -63,6 +72,7 @@ void Vio::hand_on(const OdometryState& state, const Frame& frame, VioResult& res
   KeyframeOdometry keyframe;
   keyframe.id = {robot_, last_keyframe_->id.index + 1};
   keyframe.stamp = state.stamp;
+  keyframe.vertical = vertical_at(state);
   keyframe.T_previous_kf =
       relative ? relative->T
                : last_keyframe_->T_odom_kf.inverse() * T_chain_odom_ * state.T_odom_body;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <vector>
 
@@ -16,6 +17,7 @@ struct SplitGraph {
   std::vector<RelativePose> odometry;        ///< Keyframe i to i + 1 of one robot, ascending.
   std::vector<RelativePose> closures;        ///< All others.
   std::map<RobotId, SE3> T_odom_first = {};  ///< Of keyframe 0; the identity if not given.
+  std::map<RobotId, std::function<Vertical(std::uint32_t)>> up = {};  ///< At its keyframes.
 
   /// Poses of all robots one after the other, ascending by id, as one block.
   [[nodiscard]] WholeGraph whole() const {
@@ -91,9 +93,14 @@ inline void feed_odometry(PgoAgent& agent, RobotId robot, const SplitGraph& grap
   first.id = {robot, 0};
   if (const auto origin = graph.T_odom_first.find(robot); origin != graph.T_odom_first.end())
     first.T_odom_kf = first.T_previous_kf = origin->second;
-  (void)agent.add(first);
+  const auto add = [&](KeyframeOdometry keyframe) {
+    if (const auto up = graph.up.find(robot); up != graph.up.end())
+      keyframe.vertical = up->second(keyframe.id.index);
+    (void)agent.add(keyframe);
+  };
+  add(first);
   for (const RelativePose& e : graph.odometry)
-    if (e.from.robot == robot) (void)agent.add(keyframe_odometry(e));
+    if (e.from.robot == robot) add(keyframe_odometry(e));
 }
 
 /// Gives an agent all its measurements, with every closure an inlier.

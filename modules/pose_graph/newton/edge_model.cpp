@@ -87,6 +87,22 @@ EdgeModel model_edge(const BlockEdge& edge, const SE3& T_i, const SE3& T_j, Curv
   return model;
 }
 
+VerticalModel model_vertical(const VerticalPrior& prior, const Eigen::Matrix3d& R,
+                             Curvature curvature) {
+  const Eigen::Vector3d& u = prior.up;
+  const Eigen::Vector3d z = R.row(2).transpose();  // the vertical in the pose's frame
+  VerticalModel model;
+  model.cost = prior.weight * (u - z).squaredNorm();
+  model.g = 2.0 * prior.weight * z.cross(u);
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  if (curvature ==
+      Curvature::kGaussNewton)  // a turn of everything about the vertical costs nothing
+    model.H = 2.0 * prior.weight * (I - z * z.transpose());
+  else
+    model.H = prior.weight * (2.0 * u.dot(z) * I - u * z.transpose() - z * u.transpose());
+  return model;
+}
+
 SE3 move_along(const SE3& T, const Vector6& xi) {
   return make_pose(T.linear() * so3_exp(xi.head<3>()), T.translation() + T.linear() * xi.tail<3>());
 }

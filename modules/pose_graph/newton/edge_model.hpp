@@ -2,6 +2,7 @@
 
 #include "modules/core/geometry.hpp"
 #include "modules/pose_graph/quadratic_problem.hpp"
+#include "modules/pose_graph/vertical_prior.hpp"
 
 namespace km {
 
@@ -29,6 +30,16 @@ struct EdgeModel {
 
 /// The same without second derivatives; those are left as they are.
 void slope_edge(const BlockEdge& edge, const SE3& T_i, const SE3& T_j, EdgeModel& model);
+
+/// Cost of a vertical prior to second order in the tangent vector w of its pose's rotation.
+struct VerticalModel {
+  double cost = 0.0;
+  Eigen::Vector3d g;
+  Eigen::Matrix3d H;
+};
+
+[[nodiscard]] VerticalModel model_vertical(const VerticalPrior& prior, const Eigen::Matrix3d& R,
+                                           Curvature curvature);
 
 /// The pose reached from `T` along tangent vector `xi`: R exp(w), t + R v.
 [[nodiscard]] SE3 move_along(const SE3& T, const Vector6& xi);

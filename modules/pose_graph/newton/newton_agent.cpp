@@ -29,6 +29,9 @@ NewtonAgent::NewtonAgent(RobotEdges edges, std::set<RobotId> team, int dimension
     throw std::invalid_argument("NewtonAgent of robot " + std::to_string(edges_.self) + ": " +
                                 std::to_string(accepted_.size()) + " start poses for " +
                                 std::to_string(edges_.poses));
+  if (accepted_.empty() && options_.upright)
+    throw std::invalid_argument("NewtonAgent of robot " + std::to_string(edges_.self) +
+                                ": without start poses nothing is upright");
 }
 
 NewtonHello NewtonAgent::hello() const {
@@ -223,7 +226,9 @@ std::optional<NewtonShare> NewtonAgent::descend() {
     stale_ = true;
   }
   const MatrixXd given = MatrixXd::Zero(tangent_size(dimension_), 1);
-  const SeparatorSystem::Solution solution = separator_system_.solve(shares, given);
+  const SeparatorSystem::Solution solution = options_.upright
+                                                 ? separator_system_.solve_upright(shares)
+                                                 : separator_system_.solve(shares, given);
   decrement_ = solution.decrement;
   if (0.5 * solution.decrement <= options_.tolerance * cost + options_.absolute_tolerance) {
     phase_ = Phase::kDone;
@@ -257,7 +262,7 @@ TeamStep NewtonAgent::make_step(const MatrixXd& separators) const {
   step.separators =
       separators.reshaped(block, separators.rows() / block)(Eigen::all, public_separators_);
   step.nodes = substitute_back(separators).reshaped(block, graph_->nodes());
-  remove_drift(step, nodes_, separator_poses_);
+  remove_drift(step, nodes_, separator_poses_, options_.upright);
   return step;
 }
 

@@ -19,7 +19,10 @@ struct NewtonOptions {
   /// Second derivatives are computed anew, which costs an elimination and its bytes, when at the
   /// rate seen with the old ones more rounds than this would still be needed.
   double patience_rounds = 8.0;
-  int max_backtracks = 12;        ///< In a row, each to a quarter of the step.
+  int max_backtracks = 12;  ///< In a row, each to a quarter of the step.
+  /// Some robot of the team has vertical priors, and the frame of the start has z up: the team's
+  /// tilt is found, not held. All robots must say the same.
+  bool upright = false;
   std::uint32_t first_round = 0;  ///< Number of the first exchange: tells solves in a row apart.
 };
 
@@ -47,7 +50,8 @@ class NewtonAgent {
  public:
   /// `team` are all robots, this one included; `dimension` 2: poses and measurements are planar.
   /// `start` has this robot's poses in the frame of the team, or is empty, for all robots alike.
-  /// Throws std::invalid_argument if it has another number of poses.
+  /// Throws std::invalid_argument if it has another number of poses, or if there is none although
+  /// the team is to be upright.
   NewtonAgent(RobotEdges edges, std::set<RobotId> team, int dimension, const NewtonOptions& options,
               std::vector<SE3> start = {});
 

@@ -19,10 +19,12 @@ constexpr double kPatience = 30.0;
 }  // namespace
 
 NewtonSessionSolver::NewtonSessionSolver(RobotEdges edges, std::set<RobotId> members,
-                                         std::vector<SE3> start)
-    : agent_(std::move(edges), std::move(members), kDimension,
-             NewtonOptions{.absolute_tolerance = kNegligible, .patience_rounds = kPatience},
-             std::move(start)) {}
+                                         std::vector<SE3> start, bool upright)
+    : agent_(
+          std::move(edges), std::move(members), kDimension,
+          NewtonOptions{
+              .absolute_tolerance = kNegligible, .patience_rounds = kPatience, .upright = upright},
+          std::move(start)) {}
 
 void NewtonSessionSolver::receive(const SolverMessagePtr& message) {
   if (const auto* hello = std::get_if<NewtonHello>(&message->content)) agent_.receive(*hello);

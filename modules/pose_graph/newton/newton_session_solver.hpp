@@ -11,7 +11,8 @@ namespace km {
 /// A session's graph by Newton's method: one NewtonAgent from its start to convergence.
 class NewtonSessionSolver final : public SessionSolver {
  public:
-  NewtonSessionSolver(RobotEdges edges, std::set<RobotId> members, std::vector<SE3> start);
+  NewtonSessionSolver(RobotEdges edges, std::set<RobotId> members, std::vector<SE3> start,
+                      bool upright);
 
   [[nodiscard]] SolverContent hello() const override { return agent_.hello(); }
   void receive(const SolverMessagePtr& message) override;

@@ -20,6 +20,14 @@ void check(const RobotEdges& robot, const BlockEdge& e) {
                            std::to_string(e.j) + " of " + std::to_string(robot.poses));
 }
 
+void check(const RobotEdges& robot, const VerticalPrior& v) {
+  if (v.pose < 0 || v.pose >= robot.poses)
+    refuse(robot.self, "a vertical prior names pose " + std::to_string(v.pose) + " of " +
+                           std::to_string(robot.poses));
+  if (!v.up.allFinite() || !(v.weight > 0.0) || !std::isfinite(v.weight))
+    refuse(robot.self, "a vertical prior is not finite with a positive weight");
+}
+
 void check_measurement(RobotId self, const BlockEdge& e) {
   const bool usable = e.T_i_j.matrix().allFinite() && e.kappa > 0.0 && e.tau > 0.0 &&
                       std::isfinite(e.kappa) && std::isfinite(e.tau);
@@ -98,6 +106,8 @@ RobotGraph::RobotGraph(const RobotEdges& robot, std::span<const KeyframeId> cove
   }
   add_edges_between(robot, cover, keep);
   for (const Edge& e : edges_) check_measurement(robot.self, e);
+  for (const VerticalPrior& v : robot.verticals) check(robot, v);
+  verticals_ = robot.verticals;
   const std::vector<NodePair> pairs = couple(edges_);
   if (policy == Keep::kSparse && !cover.empty()) keep = keep_sparse(std::move(keep), pairs);
   plan_ = std::make_shared<const EliminationPlan>(std::move(keep), pairs);

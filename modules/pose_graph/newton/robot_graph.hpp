@@ -20,6 +20,7 @@ struct RobotEdges {
   Eigen::Index poses = 0;
   std::vector<BlockEdge> own = {};
   std::map<RobotId, std::vector<InterEdge>> to = {};
+  std::vector<VerticalPrior> verticals = {};  ///< Of its own poses.
 };
 
 /// Links of a robot's edges to its peers with a higher id, ascending, each once: all robots' lists
@@ -48,7 +49,7 @@ class RobotGraph {
   /// its middle pose.
   /// Throws std::invalid_argument if there are no poses, if an edge names one that is not there, if
   /// a measurement is not finite or a precision not positive, or if an edge to a peer has no end in
-  /// the cover.
+  /// the cover. The same holds of vertical priors.
   RobotGraph(const RobotEdges& edges, std::span<const KeyframeId> cover, Keep keep = Keep::kSparse);
 
   /// Takes the precisions of the robot's own edges from `own`, which lists the same edges. Here
@@ -56,6 +57,7 @@ class RobotGraph {
   void set_precisions(std::span<const BlockEdge> own);
 
   [[nodiscard]] const std::vector<Edge>& edges() const { return edges_; }
+  [[nodiscard]] const std::vector<VerticalPrior>& verticals() const { return verticals_; }
   [[nodiscard]] int nodes() const { return plan_->nodes(); }
   [[nodiscard]] const std::shared_ptr<const EliminationPlan>& plan() const { return plan_; }
   /// Which poses the plan's kept() are.
@@ -70,6 +72,7 @@ class RobotGraph {
   void find_kept_edges();
 
   std::vector<Edge> edges_;
+  std::vector<VerticalPrior> verticals_;
   std::vector<KeyframeId> ids_;  // of the nodes
   std::shared_ptr<const EliminationPlan> plan_;
 };

@@ -65,6 +65,26 @@ void add_model(RobotSystem& system, const RobotGraph::Edge& e, const EdgeModel& 
   block == 3 ? add_model<3>(system, e, model) : add_model<6>(system, e, model);
 }
 
+// Planar poses stand upright as they are.
+std::span<const VerticalPrior> verticals(const RobotGraph& graph, int dimension) {
+  if (dimension == 2) return {};
+  return graph.verticals();
+}
+
+void add_slope(RobotSystem& system, const VerticalPrior& prior, const VerticalModel& model) {
+  system.cost += model.cost;
+  system.C.middleRows<3>(6 * prior.pose) -= model.g;
+}
+
+void add_verticals(RobotSystem& system, const RobotGraph& graph, std::span<const SE3> poses,
+                   int dimension, Curvature curvature) {
+  for (const VerticalPrior& v : verticals(graph, dimension)) {
+    const VerticalModel model = model_vertical(v, pose(poses, v.pose).linear(), curvature);
+    add_slope(system, v, model);
+    system.A.diagonal.block<3, 3>(0, 6 * v.pose) += model.H;
+  }
+}
+
 }  // namespace
 
 RobotSystem newton_system(const RobotGraph& graph, std::span<const SE3> poses, int dimension,
@@ -73,6 +93,7 @@ RobotSystem newton_system(const RobotGraph& graph, std::span<const SE3> poses, i
   for (const RobotGraph::Edge& e : graph.edges())
     add_model(system, e, model_edge(e, pose(poses, e.i), pose(poses, e.j), curvature),
               tangent_size(dimension));
+  add_verticals(system, graph, poses, dimension, curvature);
   return system;
 }
 
@@ -89,6 +110,7 @@ RobotSystem eliminated_system(const RobotGraph& graph, std::span<const SE3> pose
       add_slope(system, e, slope, block);
     }
   }
+  add_verticals(system, graph, poses, dimension, curvature);
   return system;
 }
 
@@ -109,6 +131,8 @@ RobotSystem newton_slope(const RobotGraph& graph, std::span<const SE3> poses, in
     slope_edge(e, pose(poses, e.i), pose(poses, e.j), model);
     add_slope(system, e, model, tangent_size(dimension));
   }
+  for (const VerticalPrior& v : verticals(graph, dimension))
+    add_slope(system, v, model_vertical(v, pose(poses, v.pose).linear(), Curvature::kGaussNewton));
   return system;
 }
 

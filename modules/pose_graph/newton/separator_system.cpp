@@ -1,5 +1,6 @@
 #include "modules/pose_graph/newton/separator_system.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <stdexcept>
 #include <string>
@@ -100,16 +101,15 @@ void SeparatorSystem::add_kept_edges(const NewtonShare& share, const Member& mem
   }
 }
 
-SeparatorSystem::Solution SeparatorSystem::solve(const NewtonShares& shares,
-                                                 const Eigen::MatrixXd& given) const {
-  const Eigen::Index block = given.rows();
+SeparatorSystem::Solution SeparatorSystem::reduce(const NewtonShares& shares, Eigen::Index block,
+                                                  Eigen::Index columns) const {
   Solution solution;
   solution.x =
-      Eigen::MatrixXd::Zero(block * static_cast<Eigen::Index>(separators_.size()), given.cols());
+      Eigen::MatrixXd::Zero(block * static_cast<Eigen::Index>(separators_.size()), columns);
   for (const auto& [robot, share] : shares) {
     const std::vector<int>& kept = members_.at(robot).kept;
     if (share->reduced.rows() != block * static_cast<Eigen::Index>(kept.size()) ||
-        share->reduced.cols() != given.cols())
+        share->reduced.cols() != columns)
       refuse(robot, "has a right-hand side of another size");
     for (std::size_t k = 0; k < kept.size(); ++k)
       solution.x.middleRows(block * kept[k], block) +=
@@ -117,10 +117,43 @@ SeparatorSystem::Solution SeparatorSystem::solve(const NewtonShares& shares,
     solution.decrement += share->decrement;
   }
   factor_->forward(solution.x);
-  const auto anchor = block * static_cast<Eigen::Index>(separators_.size() / 2);
-  solution.x.middleRows(anchor, block).setZero();
+  return solution;
+}
+
+// The one whose unknowns are not eliminated.
+Eigen::Index SeparatorSystem::middle_row(Eigen::Index block) const {
+  return block * static_cast<Eigen::Index>(separators_.size() / 2);
+}
+
+SeparatorSystem::Solution SeparatorSystem::solve(const NewtonShares& shares,
+                                                 const Eigen::MatrixXd& given) const {
+  Solution solution = reduce(shares, given.rows(), given.cols());
+  auto middle = solution.x.middleRows(middle_row(given.rows()), given.rows());
+  middle.setZero();
   solution.decrement += solution.x.squaredNorm();
-  solution.x.middleRows(anchor, block) = given;
+  middle = given;
+  factor_->backward(solution.x);
+  return solution;
+}
+
+SeparatorSystem::Solution SeparatorSystem::solve_upright(const NewtonShares& shares) const {
+  Solution solution = reduce(shares, 6, 1);
+  auto middle = solution.x.middleRows<6>(middle_row(6));
+  const Eigen::Vector3d c = middle.topRows<3>();
+  middle.setZero();
+  solution.decrement += solution.x.squaredNorm();
+  // What is left of the turns of the team as a whole: none of it resists the one about the
+  // vertical.
+  const Eigen::Matrix3d S = factor_->schur().at(0).topLeftCorner<3, 3>();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> turns(S);
+  const Eigen::Matrix<double, 3, 2> tilts = turns.eigenvectors().rightCols<2>();
+  const Eigen::Vector2d stiffness = turns.eigenvalues().tail<2>();
+  if (stiffness.minCoeff() > 0.0) {
+    const Eigen::Vector2d reduced = tilts.transpose() * c;
+    const Eigen::Vector2d step = reduced.cwiseQuotient(stiffness);
+    solution.decrement += reduced.dot(step);
+    middle.topRows<3>() = tilts * step;
+  }
   factor_->backward(solution.x);
   return solution;
 }

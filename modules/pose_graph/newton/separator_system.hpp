@@ -32,6 +32,10 @@ class SeparatorSystem {
   /// the middle separator's unknowns.
   [[nodiscard]] Solution solve(const NewtonShares& shares, const Eigen::MatrixXd& given) const;
 
+  /// The same for a step of an upright team (B = 6, k = 1): vertical priors say how the middle
+  /// separator is tilted; its place and its turn about the vertical are held.
+  [[nodiscard]] Solution solve_upright(const NewtonShares& shares) const;
+
   /// All poses that some robot keeps, ascending; empty before the first factorise().
   [[nodiscard]] const std::vector<KeyframeId>& separators() const { return separators_; }
 
@@ -42,6 +46,9 @@ class SeparatorSystem {
     std::vector<bool> transposed;
   };
   void learn_pattern(const NewtonShares& shares);
+  [[nodiscard]] Solution reduce(const NewtonShares& shares, Eigen::Index block,
+                                Eigen::Index columns) const;
+  [[nodiscard]] Eigen::Index middle_row(Eigen::Index block) const;
   void add_kept_edges(const NewtonShare& share, const Member& member, BlockMatrix& sum) const;
 
   std::vector<KeyframeId> separators_;

@@ -21,12 +21,13 @@ struct Drift {
   }
 };
 
-Drift opposite_of_mean(const std::vector<SE3>& poses, const MatrixXd& step) {
+Drift opposite_of_mean(const std::vector<SE3>& poses, const MatrixXd& step, bool upright) {
   const double share = 1.0 / static_cast<double>(poses.size());
   const auto xi = [&](std::size_t s) { return tangent_of(step.col(static_cast<Index>(s))); };
   Drift drift;
   for (std::size_t s = 0; s < poses.size(); ++s)
     drift.w -= share * (poses[s].linear() * xi(s).head<3>());
+  if (upright) drift.w.head<2>().setZero();
   for (std::size_t s = 0; s < poses.size(); ++s)
     drift.u -=
         share * (poses[s].linear() * xi(s).tail<3>() + drift.w.cross(poses[s].translation()));
@@ -41,8 +42,8 @@ void add(const Drift& drift, const std::vector<SE3>& poses, MatrixXd& step) {
 }  // namespace
 
 void remove_drift(TeamStep& step, const std::vector<SE3>& node_poses,
-                  const std::vector<SE3>& separator_poses) {
-  const Drift drift = opposite_of_mean(separator_poses, step.separators);
+                  const std::vector<SE3>& separator_poses, bool upright) {
+  const Drift drift = opposite_of_mean(separator_poses, step.separators, upright);
   add(drift, separator_poses, step.separators);
   add(drift, node_poses, step.nodes);
 }

@@ -123,7 +123,7 @@ std::optional<GncShare> GncAgent::step_on() {
   step_ = {.nodes = block_.substitute_back(
                solution->x.middleCols(first, graph_->sizes().at(edges_.edges.self))),
            .separators = solution->x};
-  remove_drift(step_, base_.own, base_.all_public);
+  remove_drift(step_, base_.own, base_.all_public, false);
   take_step(1.0);
   return share(false);
 }

@@ -101,6 +101,14 @@ TEST_CASE("what does not concern a robot, or cannot be weighed, is ignored", "[p
   CHECK_FALSE(graph.add(gap));
   gap.id = {5, 3};
   CHECK_THROWS_AS(graph.add(gap), std::invalid_argument);  // covariance zero
+  gap.covariance = Matrix6::Identity();
+  for (const Vertical& vertical :
+       {Vertical{Eigen::Vector3d::Zero(), 0.01}, Vertical{Eigen::Vector3d::UnitZ(), 0.0},
+        Vertical{Eigen::Vector3d::Constant(NAN), 0.01}, Vertical{{0.0, 0.0, 2.0}, 0.01}}) {
+    gap.vertical = vertical;
+    CHECK_THROWS_AS(graph.add(gap), std::invalid_argument);
+  }
+  CHECK(graph.keyframes() == 3);
   CHECK(graph.keyframes() == 3);
   CHECK(graph.own_edges().size() == 2);
 }

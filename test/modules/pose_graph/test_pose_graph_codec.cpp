@@ -29,7 +29,8 @@ PgoStatus some_status() {
           .offers = {{3, 5, {2, 99}}, {65535, 1, {1, 1}}},
           .method = PgoMethod::kNewton,
           .T_odom_first = make_pose(Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5).toRotationMatrix(),
-                                    {1.0, -2.0, 3.0})};
+                                    {1.0, -2.0, 3.0}),
+          .upright = true};
 }
 
 PgoSession some_session(bool with_anchor) {
@@ -37,6 +38,7 @@ PgoSession some_session(bool with_anchor) {
   session.plan.members = {{{700, 8}, 1}, {{3, 9}, 2}};
   session.plan.pairs = {{3, 700, {4, 0xffffffffffffffffU}}};
   session.method = PgoMethod::kNewton;
+  session.upright = true;
   session.rank = 5;
   session.max_rounds = 50;
   session.anchor = 3;
@@ -78,6 +80,7 @@ TEST_CASE("a session comes back as it was sent", "[pose_graph][codec]") {
   CHECK(decoded.value->id == session.id);
   CHECK(decoded.value->plan == session.plan);
   CHECK(decoded.value->method == PgoMethod::kNewton);
+  CHECK(decoded.value->upright);
   CHECK(decoded.value->rank == 5);
   CHECK(decoded.value->max_rounds == 50);
   CHECK(decoded.value->anchor == 3);

@@ -89,6 +89,9 @@ TEST_CASE("Keyframes are numbered without gaps and chain by their relative poses
     CHECK(keyframe.frame->stamp == keyframe.stamp);
     CHECK(is_covariance(keyframe.covariance));
     CHECK((keyframe.covariance.trace() > 0.0) == (k > 0));
+    REQUIRE(keyframe.vertical);
+    CHECK(keyframe.vertical->up_body.dot(Eigen::Vector3d::UnitX()) > 1.0 - 1e-8);  // as it lies
+    CHECK(keyframe.vertical->sigma_rad == VioConfig().tilt_sigma);
   }
 }
 

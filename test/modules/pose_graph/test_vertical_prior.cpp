@@ -1,0 +1,211 @@
+#include <catch2/catch.hpp>
+
+#include "modules/core/lie.hpp"
+#include "modules/pose_graph/newton/edge_model.hpp"
+#include "modules/pose_graph/quadratic_problem.hpp"
+#include "modules/pose_graph/truncated_newton.hpp"
+#include "modules/pose_graph/vertical_prior.hpp"
+#include "test/support/pgo_team.hpp"
+#include "test/support/pose_graph_problems.hpp"
+#include "test/support/split_graph.hpp"
+
+// Which way is up, as part of pose graph optimisation.
+
+namespace km {
+namespace {
+
+constexpr double kWeight = 1.0 / (0.005 * 0.005);
+
+Eigen::Vector3d up_at(const SE3& T_world_kf) {
+  return T_world_kf.linear().transpose() * Eigen::Vector3d::UnitZ();
+}
+
+// Angle between the z axes of two rotations.
+double tilt_between(const SE3& a, const SE3& b) {
+  return std::acos(std::min(1.0, up_at(a).dot(up_at(b))));
+}
+
+}  // namespace
+
+TEST_CASE("a vertical prior costs the squared tilt over sigma, and turns about z cost nothing",
+          "[pose_graph][vertical]") {
+  const double tilt = GENERATE(0.0, 1e-3, 2e-2);
+  const double heading = GENERATE(0.0, 1.0, -3.0);
+  const VerticalPrior prior{0, Eigen::Vector3d::UnitZ(), kWeight};
+  const Eigen::Matrix3d R = so3_exp({0.0, 0.0, heading}) * so3_exp({tilt, 0.0, 0.0});
+  const double expected = tilt * tilt * kWeight;
+  CHECK(vertical_cost(prior, R) == Approx(expected).epsilon(1e-3).margin(1e-9));
+  Eigen::MatrixXd lifted = lifting_matrix(5) * R;
+  CHECK(vertical_cost(prior, lifted) == Approx(vertical_cost(prior, R)).margin(1e-9));
+}
+
+TEST_CASE("slope and curvature of a vertical prior are those of differences",
+          "[newton][vertical]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const Eigen::Matrix3d R = random_pose(rng).linear();
+  const VerticalPrior prior{0, random_vector<3>(rng).normalized(), 1.7};
+  const VerticalModel model = model_vertical(prior, R, Curvature::kFull);
+  const auto cost = [&](const Eigen::Vector3d& w) { return vertical_cost(prior, R * so3_exp(w)); };
+  CHECK(model.cost == Approx(cost(Eigen::Vector3d::Zero())));
+  constexpr double h = 1e-4;
+  for (int k = 0; k < 10; ++k) {
+    const Eigen::Vector3d d = random_vector<3>(rng);
+    const double up = cost(h * d);
+    const double down = cost(-h * d);
+    CHECK((up - down) / (2.0 * h) == Approx(model.g.dot(d)).margin(1e-5));
+    CHECK((up - 2.0 * model.cost + down) / (h * h) == Approx(d.dot(model.H * d)).margin(1e-4));
+  }
+  const VerticalModel convex = model_vertical(prior, R, Curvature::kGaussNewton);
+  CHECK(convex.g == model.g);
+  CHECK((convex.H * R.row(2).transpose()).norm() < 1e-12);  // no turn about the vertical resists
+}
+
+TEST_CASE("a block's vertical priors are part of its cost, gradient and Hessian",
+          "[pose_graph][vertical]") {
+  const Eigen::Index rank = GENERATE(3, 5);
+  std::mt19937 rng(2);
+  const std::vector<BlockEdge> edges{{0, 1, random_pose(rng), 2.0, 3.0},
+                                     {1, 2, random_pose(rng), 1.0, 0.5}};
+  const std::vector<VerticalPrior> priors{{0, random_vector<3>(rng).normalized(), 4.0},
+                                          {2, random_vector<3>(rng).normalized(), 0.7}};
+  const QuadraticProblem with(rank, 3, edges, {}, priors);
+  const QuadraticProblem without(rank, 3, edges, {});
+  const LiftedPoses X = random_lifted_poses(rng, rank, 3);
+  double expected = without.cost(X);
+  for (const VerticalPrior& v : priors) expected += vertical_cost(v, X.middleCols<3>(4 * v.pose));
+  CHECK(with.cost(X) == Approx(expected).epsilon(1e-12));
+  const LiftedPoses gradient = with.euclidean_gradient(X);
+  constexpr double h = 1e-4;
+  for (int k = 0; k < 5; ++k) {
+    const LiftedPoses V = project_tangent(X, random_lifted_poses(rng, rank, 3));
+    const double up = with.cost(retract(X, h * V));
+    const double down = with.cost(retract(X, -h * V));
+    CHECK((up - down) / (2.0 * h) == Approx(gradient.cwiseProduct(V).sum()).margin(1e-4));
+    CHECK((up - 2.0 * with.cost(X) + down) / (h * h) ==
+          Approx(with.hessian_product(X, gradient, V).cwiseProduct(V).sum()).margin(1e-2));
+  }
+  const auto make = [&](VerticalPrior v) { return QuadraticProblem(rank, 3, edges, {}, {v}); };
+  CHECK_THROWS_AS(make({3, Eigen::Vector3d::UnitZ(), 1.0}), std::invalid_argument);
+  CHECK_THROWS_AS(make({0, Eigen::Vector3d::UnitZ(), 0.0}), std::invalid_argument);
+  CHECK_THROWS_AS(make({0, Eigen::Vector3d::Constant(NAN), 1.0}), std::invalid_argument);
+}
+
+TEST_CASE("levelling keeps the origin's place and the heading", "[pose_graph][vertical]") {
+  const Eigen::Vector3d origin(1.0, 2.0, 3.0);
+  const SE3 truth = make_pose(so3_exp({0.0, 0.0, 0.7}), {4.0, -1.0, 0.5});
+  SE3 tilted = truth;
+  tilted.linear() = so3_exp({0.02, -0.01, 0.0}) * truth.linear();
+  tilted.translation() += (truth.linear() - tilted.linear()) * origin;
+  const Eigen::MatrixXd L = level(lift(lifted_identity(5), tilted), origin);
+  CHECK(L.isApprox(lift(lifted_identity(5), truth), 1e-4));  // to second order in the tilt
+  CHECK(stiefel_error(L) < 1e-12);
+  CHECK((L.col(2) - lifting_matrix(5).col(2)).norm() < 1e-15);
+}
+
+namespace {
+
+// Two robots that drive side by side over level ground, joined at many places. Odometry takes each
+// for pitching ever further, and their first keyframes for tilted otherwise than they are.
+struct Drive {
+  std::map<RobotId, std::vector<SE3>> truth;
+  SplitGraph graph;
+};
+
+Drive level_drive(double tilt_of_first) {
+  constexpr std::uint32_t kLength = 30;
+  Drive drive;
+  const auto measured = [](const KeyframeId& from, const KeyframeId& to, const SE3& T,
+                           double sigma) {
+    Matrix6 covariance = Matrix6::Identity() * sigma * sigma;
+    return RelativePose{from, to, T, covariance};
+  };
+  const SE3 drift = make_pose(so3_exp({0.0, 0.002, 0.0}), Eigen::Vector3d::Zero());
+  for (const RobotId robot : {RobotId{1}, RobotId{2}}) {
+    std::vector<SE3>& truth = drive.truth[robot];
+    for (std::uint32_t k = 0; k < kLength; ++k)
+      truth.push_back(make_pose(Eigen::Matrix3d::Identity(), {1.0 * k, 2.0 * robot, 0.0}));
+    drive.graph.keyframes[robot] = kLength;
+    drive.graph.T_odom_first[robot] =
+        make_pose(so3_exp({0.0, tilt_of_first * robot, 0.0}), Eigen::Vector3d::Zero());
+    for (std::uint32_t k = 1; k < kLength; ++k)
+      drive.graph.odometry.push_back(
+          measured({robot, k - 1}, {robot, k}, truth[k - 1].inverse() * truth[k] * drift, 2e-3));
+    drive.graph.up[robot] = [&truth](std::uint32_t k) { return Vertical{up_at(truth[k]), 5e-3}; };
+  }
+  for (std::uint32_t k = 0; k < kLength; k += 5)
+    drive.graph.closures.push_back(
+        measured({1, k}, {2, k}, drive.truth[1][k].inverse() * drive.truth[2][k], 1e-2));
+  return drive;
+}
+
+}  // namespace
+
+TEST_CASE("a team that knows which way is up ends level", "[pose_graph][agent][vertical]") {
+  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
+  CAPTURE(to_string(method));
+  const Drive drive = level_drive(0.01);
+  PoseGraphConfig config;
+  config.method = method;
+  PgoTeam team;
+  for (const auto& [robot, count] : drive.graph.keyframes)
+    feed(team.add({robot, robot + 1000U}, config), robot, drive.graph);
+  REQUIRE(team.run(3600.0, [&] { return team.all_settled(); }));
+  CHECK(team.notices.empty());
+  double worst = 0.0;
+  for (const auto& [robot, truth] : drive.truth)
+    for (std::size_t k = 0; k < truth.size(); ++k)
+      worst = std::max(worst, tilt_between(team.trajectory(robot)->T_world_kf[k], truth[k]));
+  // Odometry alone would be pitched by 58 mrad at the end.
+  CHECK(worst < 0.012);
+  // Where odometry says that keyframe 0 of the anchor is, there it is; its tilt is the team's.
+  const SE3& first = team.trajectory(1)->T_world_kf[0];
+  CHECK(first.translation().norm() < 1e-6);
+  CHECK(std::abs(so3_log(first.linear()).z()) < 1e-6);
+}
+
+TEST_CASE("the vertical leads block descent and Newton's method to one optimum",
+          "[pose_graph][agent][vertical]") {
+  const Drive drive = level_drive(0.01);
+  std::map<PgoMethod, std::vector<SE3>> result;
+  for (const PgoMethod method : {PgoMethod::kRbcd, PgoMethod::kNewton}) {
+    PoseGraphConfig config;
+    config.method = method;
+    config.max_rounds = 2000;
+    PgoTeam team;
+    for (const auto& [robot, count] : drive.graph.keyframes)
+      feed(team.add({robot, robot + 1000U}, config), robot, drive.graph);
+    REQUIRE(team.run(3600.0, [&] { return team.all_settled(); }));
+    for (const RobotId robot : {RobotId{1}, RobotId{2}})
+      for (const SE3& T : team.trajectory(robot)->T_world_kf) result[method].push_back(T);
+  }
+  const auto& a = result[PgoMethod::kRbcd];
+  const auto& b = result[PgoMethod::kNewton];
+  REQUIRE(a.size() == b.size());
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    CAPTURE(k);
+    CHECK((a[k].translation() - b[k].translation()).norm() < 2e-2);
+    CHECK(tilt_between(a[k], b[k]) < 2e-3);
+  }
+}
+
+TEST_CASE("one robot that does not know which way is up leaves the team as it was",
+          "[pose_graph][agent][vertical]") {
+  Drive drive = level_drive(0.0);
+  drive.graph.up.erase(2);
+  Drive without = level_drive(0.0);
+  without.graph.up.clear();
+  std::vector<std::vector<SE3>> result;
+  for (const Drive* d : {&drive, &without}) {
+    PgoTeam team;
+    for (const auto& [robot, count] : d->graph.keyframes)
+      feed(team.add({robot, robot + 1000U}, PoseGraphConfig()), robot, d->graph);
+    REQUIRE(team.run(3600.0, [&] { return team.all_settled(); }));
+    result.push_back(team.trajectory(1)->T_world_kf);
+  }
+  for (std::size_t k = 0; k < result[0].size(); ++k)
+    CHECK(result[0][k].isApprox(result[1][k], 1e-5));
+}
+
+}  // namespace km
