@@ -6,6 +6,7 @@
 #include <map>
 
 #include "apps/output_file.hpp"
+#include "apps/pgo/noise_option.hpp"
 #include "apps/pgo/pgo_output.hpp"
 #include "apps/pgo/pgo_report.hpp"
 #include "apps/pgo/pgo_robust.hpp"
@@ -59,7 +60,7 @@ struct Options {
   km::PgoOptions pgo;
   double optimum = 0.0;
   bool robust = false;
-  std::string noise;
+  km::NoiseModel noise;
   km::GncAgentOptions gnc;
 };
 
@@ -127,8 +128,10 @@ void define(CLI::App& app, Options& options) {
   app.add_option("--optimum", options.optimum, "The optimum, if known: it is not computed then")
       ->check(CLI::PositiveNumber);
   app.add_option("--json", options.json, "Also write every round to this file, as JSON");
-  app.add_option("--plot", options.plot,
-                 "Also draw the gap against rounds, bytes and time, as SVG");
+  app.add_option(
+      "--plot", options.plot,
+      "Also draw the gap against rounds, bytes and time, as SVG; not with --robust gnc,\n"
+      "whose graph has no optimum to compare with until it has decided");
   app.add_option("--output", options.output,
                  "Also write the rounded poses: *.tum (numbers of the poses as times) or *.g2o");
 }
@@ -147,11 +150,7 @@ void define_robust(CLI::App& app, Options& options) {
                  "gnc: factor between two updates of the weights, above 1; small is careful")
       ->check(CLI::Range(1.01, 1e3))
       ->capture_default_str();
-  app.add_option(
-         "--noise-scale", options.noise,
-         "gnc: multiply --barc by how many times larger the noise of closures is than the graph\n"
-         "says, estimated from pairs of them: larger (never less than 1) or any")
-      ->check(CLI::IsMember({"larger", "any"}));
+  km::add_noise_scale(app, options.noise, "gnc: multiply --barc");
   app.add_flag("--reject-odometry", options.gnc.reject_odometry,
                "gnc: steps of odometry inside a robot can be false, too");
 }
@@ -212,11 +211,8 @@ km::TeamGraph read_and_check(const Options& options, const CLI::App& app) {
 }
 
 void run_and_write_robust(const Options& options, const km::TeamGraph& graph) {
-  const auto noise = options.noise.empty()       ? km::NoiseModel::kNominal
-                     : options.noise == "larger" ? km::NoiseModel::kLarger
-                                                 : km::NoiseModel::kEstimated;
-  const km::RobustRun run =
-      km::run_robust(graph, options.gnc, noise, options.pgo.run.max_rounds, km::wire_meter());
+  const km::RobustRun run = km::run_robust(graph, options.gnc, options.noise,
+                                           options.pgo.run.max_rounds, km::wire_meter());
   std::cout << km::robust_text(graph, run);
   km::write_output(options.json,
                    [&](std::ostream& out) { km::write_robust_json(out, graph, run); });

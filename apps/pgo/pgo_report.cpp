@@ -1,6 +1,7 @@
 #include "apps/pgo/pgo_report.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iomanip>
 #include <ostream>
 #include <sstream>
@@ -12,6 +13,8 @@
 namespace km {
 namespace {
 
+constexpr std::size_t kMostMarks = 40;  // rounds beyond which their marks would hide the line
+
 std::string digits(double value, int precision) {
   std::ostringstream text;
   text << std::setprecision(precision) << value;
@@ -22,6 +25,15 @@ std::string digits(double value, int precision) {
 double gap(const PgoRun& run, const TeamRound& round) {
   constexpr double kNoCost = 1e-9;
   return (round.cost - run.optimum) / std::max(run.optimum, kNoCost);
+}
+
+// Bottom of a logarithmic axis of gaps: the decade below the least that is above 0. Once there is
+// no gap left, rounding makes it 0 or less.
+double gap_floor(const PgoRun& run) {
+  double least = 1.0;
+  for (const TeamRound& round : run.rounds)
+    if (const double g = gap(run, round); g > 0.0) least = std::min(least, g);
+  return std::pow(10.0, std::floor(std::log10(least)));
 }
 
 std::vector<std::string> row(const std::string& name, const PgoRun& run, std::size_t k) {
@@ -111,15 +123,20 @@ void write_pgo_json(std::ostream& out, const TeamGraph& graph, const PgoRun& run
 }
 
 std::string pgo_plot(const PgoRun& run) {
+  const double floor = gap_floor(run);
+  const bool clipped = std::any_of(run.rounds.begin(), run.rounds.end(),
+                                   [&](const TeamRound& round) { return gap(run, round) < floor; });
   const auto panel = [&](const char* label, const auto& abscissa) {
-    CurvePanel result{.title = std::string(to_string(run.method)) + ": gap to the optimum",
+    CurvePanel result{.title = std::string(to_string(run.method)) + ": gap to the optimum" +
+                               (clipped ? " (none: at the bottom)" : ""),
                       .x_label = label,
                       .y_label = "(F - F*) / F*",
                       .log_y = true,
                       .curves = {}};
     Curve& curve = result.curves.emplace_back();
+    curve.marks = run.rounds.size() <= kMostMarks;
     for (std::size_t k = 0; k < run.rounds.size(); ++k)
-      curve.points.push_back({abscissa(k), gap(run, run.rounds[k])});
+      curve.points.push_back({abscissa(k), std::max(floor, gap(run, run.rounds[k]))});
     return result;
   };
   return plot_curves(std::vector{

@@ -15,7 +15,8 @@ namespace km {
 /// "optimum", "start_cpu_s"}. rounds[0] is the start; bytes and times are sums up to the round.
 void write_pgo_json(std::ostream& out, const TeamGraph& graph, const PgoRun& run);
 
-/// SVG: the relative gap to the optimum against rounds, bytes and critical-path time.
+/// SVG: the relative gap to the optimum against rounds, bytes and critical-path time, on a
+/// logarithmic axis; where there is no gap, at the bottom of it.
 [[nodiscard]] std::string pgo_plot(const PgoRun& run);
 
 }  // namespace km

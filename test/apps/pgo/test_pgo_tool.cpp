@@ -4,7 +4,7 @@
 #include <regex>
 #include <sstream>
 
-#include "apps/pgo/pgo_run.hpp"
+#include "apps/pgo/pgo_report.hpp"
 #include "apps/pgo/wire_meter.hpp"
 #include "modules/pose_graph/g2o_io.hpp"
 #include "test/support/command.hpp"
@@ -112,6 +112,44 @@ TEST_CASE("A graph without noise has no gap to report, and is certified", "[pgo]
   CHECK_THAT(text_of(json), !Contains("nan") && Contains("\"certified\": true"));
 }
 
+TEST_CASE("The plot goes on to the last round where no gap is left", "[pgo]") {
+  PgoRun run;
+  run.optimum = 1.0;
+  for (const double gap : {0.02, 3e-5, 0.0, -1e-15}) {
+    TeamRound round;
+    round.cost = 1.0 + gap;
+    run.rounds.push_back(round);
+  }
+  const std::string svg = pgo_plot(run);
+  CHECK_THAT(svg, Contains(">1e-5<") && !Contains(">1e-6<"));
+  CHECK_THAT(svg, Contains("cx=\"630.0\" cy=\"294.0\""));  // round 3, lower right corner
+  run.rounds.resize(2);
+  CHECK_THAT(pgo_plot(run), !Contains("bottom"));
+}
+
+TEST_CASE("A method without rounds has a plot to look at", "[pgo]") {
+  PgoRun run;
+  run.optimum = run.rounds.emplace_back().cost = 1.0;
+  CHECK_THAT(pgo_plot(run), Contains("<circle"));
+}
+
+TEST_CASE("GNC that rejects much says that noise may be the reason", "[pgo]") {
+  const TemporaryFolder folder;
+  const std::string square = folder.write("square.g2o", square_g2o()).string() + " --robots 2";
+  const auto json = folder.path() / "out.json";
+  const auto output = [&](const std::string& more) {
+    const std::string command = kTool + square + " --robust gnc --json " + json.string() + more;
+    return run_command(command).output;
+  };
+  CHECK_THAT(output(" --barc 5"), !Contains("more than a tenth"));
+  CHECK_THAT(output(" --barc 0.001"), Contains("4 of 4 closures rejected, more than a tenth") &&
+                                          Contains("--noise-scale larger tells"));
+  CHECK_THAT(output(" --barc 0.001 --noise-scale larger"), !Contains("more than a tenth"));
+  (void)output(" --barc 2 --noise-scale 2.5");
+  CHECK_THAT(text_of(json), Contains("\"barc\": 2,") && Contains("\"scale\": 2.5") &&
+                                Contains("\"scaled_barc\": 5,"));
+}
+
 TEST_CASE("GNC decides, and says how noisy closures are where enough of them tell", "[pgo]") {
   const TemporaryFolder folder;
   const std::string square = folder.write("square.g2o", square_g2o()).string();
@@ -141,6 +179,9 @@ TEST_CASE("What cannot be done is told with the reason", "[pgo]") {
        {"FILE --robots 2 --method centralized --schedule greedy", "--schedule greedy is for"},
        {"FILE --method dgs --over-relaxation 1.5", "--over-relaxation is for"},
        {"FILE --method dgs --verify", "--verify is for"},
+       {"FILE --robust gnc --plot gap.svg", "--plot does not go with --robust gnc"},
+       {"FILE --robust gnc --noise-scale much", "much is not off, larger, any, or a number"},
+       {"FILE --noise-scale any", "--noise-scale is for --robust gnc only"},
        {"FILE --max-delay 2", "--max-delay is for --method rbcd-asynchronous only"},
        {"FILE --method rbcd-asynchronous --loss 1", "--loss"},
        {"FILE --json /nowhere/out.json", "there is no folder /nowhere"},
