@@ -9,6 +9,7 @@
 
 #include "apps/outliers/outlier_report.hpp"
 #include "apps/output_file.hpp"
+#include "apps/pgo/noise_option.hpp"
 #include "apps/pgo/wire_meter.hpp"
 #include "modules/pose_graph/team/team_graph_file.hpp"
 
@@ -40,11 +41,10 @@ constexpr const char* kAbout =
 struct Options {
   fs::path file, json, plot;
   std::size_t robots = 5;
-  std::vector<double> percents{10, 20, 30, 40, 50, 60, 70, 80};
-  double noise_scale = 1.0;
   km::OutlierStudyOptions study;
 
   Options() {
+    study.shares_percent = {10, 20, 30, 40, 50, 60, 70, 80};
     study.methods = {km::Rejection::kPcm, km::Rejection::kGnc, km::Rejection::kPcmGnc};
     study.gnc.gnc.barc = 5.0;
   }
@@ -55,7 +55,8 @@ void define_graph(CLI::App& app, Options& options) {
   app.add_option("--robots", options.robots, "Number of robots that it is dealt out to")
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();
-  app.add_option("--shares", options.percents, "False closures for every 100 true ones [%]")
+  app.add_option("--shares", options.study.shares_percent,
+                 "False closures for every 100 true ones [%]")
       ->check(CLI::Range(0.0, 10000.0))
       ->delimiter(',')
       ->capture_default_str();
@@ -93,11 +94,7 @@ void define_methods(CLI::App& app, Options& options) {
                  "pcm: share of true cycles that pass the test")
       ->check(CLI::Range(0.01, 1.0 - 1e-12))
       ->capture_default_str();
-  app.add_option("--noise-scale", options.noise_scale,
-                 "Sigmas are this many times what the file says; kimera_multi_pgo --robust gnc\n"
-                 "--noise-scale any estimates it")
-      ->check(CLI::Range(0.01, 1000.0))
-      ->capture_default_str();
+  km::add_noise_scale(app, options.study.noise, "multiply --barc, and the sigmas of pcm,");
   app.add_option("--rounds", options.study.max_rounds, "At most so many")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
@@ -138,13 +135,8 @@ int main(int argc, char** argv) try {
   }
   km::check_output_folder(options.json);
   km::check_output_folder(options.plot);
-  options.study.pcm.odometry_noise_scale = options.noise_scale;
-  options.study.pcm.closure_noise_scale = options.noise_scale;
-  for (const double percent : options.percents) options.study.shares.push_back(0.01 * percent);
   const km::TeamGraph graph =
       km::deal_contiguously(km::read_g2o(options.file), options.robots, options.file.string());
-  double& barc = options.study.gnc.gnc.barc;
-  barc = (barc > 0.0 ? barc : km::default_barc(graph.dimension)) * options.noise_scale;
   const km::OutlierStudy study =
       km::run_outlier_study(graph, options.study, km::wire_meter(), ProgressLine());
   std::cout << km::outlier_text(study);

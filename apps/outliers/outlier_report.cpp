@@ -17,7 +17,7 @@ namespace {
 // The seeds of one share and method.
 struct Cell {
   Rejection method = Rejection::kNone;
-  double share = 0.0;
+  double share_percent = 0.0;
   std::vector<OutlierResult> results;
 
   [[nodiscard]] double median(const std::function<double(const OutlierResult&)>& of) const {
@@ -57,29 +57,50 @@ std::vector<Cell> cells_of(const OutlierStudy& study) {
   std::vector<Cell> cells;
   for (const OutlierResult& result : study.results) {
     const auto found = std::find_if(cells.begin(), cells.end(), [&](const Cell& cell) {
-      return cell.method == result.method && cell.share == result.share;
+      return cell.method == result.method && cell.share_percent == result.share_percent;
     });
     if (found != cells.end())
       found->results.push_back(result);
     else
-      cells.push_back({result.method, result.share, {result}});
+      cells.push_back({result.method, result.share_percent, {result}});
   }
   return cells;
 }
 
-std::string metres(double value) {
+// Two of them that count.
+std::string digits(double value) {
   std::ostringstream text;
   text << std::setprecision(2) << value;
   return text.str();
 }
 
+// With the decimals it has: "30 %", "2.5 %".
+std::string percent_text(double percent) {
+  std::ostringstream text;
+  text << percent << " %";
+  return text.str();
+}
+
+// What the sigmas of all runs were multiplied by; nothing if by 1.
+std::string noise_text(const OutlierStudy& study) {
+  const auto [least, most] = std::minmax_element(
+      study.results.begin(), study.results.end(),
+      [](const auto& a, const auto& b) { return a.noise_scale < b.noise_scale; });
+  if (least == study.results.end() || (least->noise_scale == 1.0 && most->noise_scale == 1.0))
+    return {};
+  const std::string from = digits(least->noise_scale);
+  const std::string to = digits(most->noise_scale);
+  return "closures taken to be " + from + (to == from ? "" : " to " + to) +
+         " times as noisy as the file says\n";
+}
+
 std::vector<std::string> row(const Cell& cell) {
   return {to_string(cell.method),
-          fixed(100.0 * cell.share, 0) + " %",
+          percent_text(cell.share_percent),
           std::to_string(cell.results.front().false_closures),
           std::to_string(cell.true_kept()),
           std::to_string(cell.false_kept()),
-          metres(cell.rmse_m()),
+          digits(cell.rmse_m()),
           fixed(cell.rounds(), 0) + (cell.decided() ? "" : "+"),
           bytes_text(cell.bytes()),
           fixed(cell.cpu_s(), 2)};
@@ -98,11 +119,11 @@ CurvePanel panel(const OutlierStudy& study, const std::vector<Cell>& cells, cons
   for (const Cell& cell : cells) {
     auto found = std::find(methods.begin(), methods.end(), cell.method);
     if (found == methods.end()) {
-      panel.curves.push_back({to_string(cell.method), {}, methods.size(), false});
+      panel.curves.push_back({to_string(cell.method), {}, methods.size(), false, true});
       found = methods.insert(methods.end(), cell.method);
     }
     panel.curves[static_cast<std::size_t>(found - methods.begin())].points.push_back(
-        {100.0 * cell.share, ordinate(cell)});
+        {cell.share_percent, ordinate(cell)});
   }
   return panel;
 }
@@ -119,7 +140,8 @@ std::string outlier_text(const OutlierStudy& study) {
        << (study.robots == 1 ? " robot" : " robots") << "; translations of false closures within "
        << fixed(study.half_side_m, 1) << " m along every axis\n"
        << "rmse: of positions to the optimum of the graph without false closures, which is "
-       << (study.certified ? "certified\n" : "NOT certified\n") << align_columns(rows);
+       << (study.certified ? "certified\n" : "NOT certified\n") << noise_text(study)
+       << align_columns(rows);
   const auto undecided = [](const Cell& cell) { return !cell.decided(); };
   if (std::any_of(cells.begin(), cells.end(), undecided))
     text << "+: came to no end within --rounds\n";
@@ -139,11 +161,12 @@ void write_outlier_json(std::ostream& out, const OutlierStudy& study) {
   for (const OutlierResult& result : study.results) {
     json.begin_object();
     json.field("method", to_string(result.method));
-    json.field("share", result.share);
+    json.field("share_percent", result.share_percent);
     json.field("seed", result.seed);
     json.field("false_closures", result.false_closures);
     json.field("true_kept", result.true_kept);
     json.field("false_kept", result.false_kept);
+    json.field("noise_scale", result.noise_scale);
     json.field("rmse_m", result.rmse_m);
     json.field("rounds", result.rounds);
     json.field("decided", result.decided);

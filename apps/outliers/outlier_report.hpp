@@ -11,9 +11,9 @@ namespace km {
 /// and medians of the rest.
 [[nodiscard]] std::string outlier_text(const OutlierStudy& study);
 
-/// {"poses", "robots", "true_closures", "certified", "half_side_m", "results": [{"method", "share",
-/// "seed", "false_closures", "true_kept", "false_kept", "rmse_m", "rounds", "decided", "bytes",
-/// "cpu_s"}]}
+/// {"poses", "robots", "true_closures", "certified", "half_side_m", "results": [{"method",
+/// "share_percent", "seed", "false_closures", "true_kept", "false_kept", "noise_scale", "rmse_m",
+/// "rounds", "decided", "bytes", "cpu_s"}]}
 void write_outlier_json(std::ostream& out, const OutlierStudy& study);
 
 /// SVG: error, closures kept, and CPU time against the share of false closures.

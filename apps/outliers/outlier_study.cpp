@@ -66,7 +66,12 @@ class Attempt {
       : spoiled_(spoiled),
         options_(options),
         meter_(meter),
-        kept_(spoiled.graph.edges.size(), true) {}
+        odometry_(odometry_edges(spoiled.graph)),
+        kept_(spoiled.graph.edges.size(), true) {
+    result_.noise_scale = closure_noise(spoiled.graph, odometry_, options.noise).scale;
+    double& barc = options_.gnc.gnc.barc;
+    barc = (barc > 0.0 ? barc : default_barc(spoiled.graph.dimension)) * result_.noise_scale;
+  }
 
   OutlierResult run(Rejection method, const std::vector<SE3>& truth) {
     result_.method = method;
@@ -79,9 +84,8 @@ class Attempt {
     result_.bytes = work.bytes;
     result_.cpu_s += work.total_cpu_s;
     result_.rmse_m = rmse_m(truth, poses);
-    const std::vector<bool> odometry = odometry_edges(spoiled_.graph);
     for (std::size_t k = 0; k < kept_.size(); ++k)
-      if (kept_[k] && !odometry[k])
+      if (kept_[k] && !odometry_[k])
         ++(spoiled_.is_false(k) ? result_.false_kept : result_.true_kept);
     return result_;
   }
@@ -89,7 +93,7 @@ class Attempt {
  private:
   void reject_inconsistent() {
     const double begin_s = meter_.cpu_s();
-    kept_ = pairwise_consistent(spoiled_.graph, options_.pcm);
+    kept_ = pairwise_consistent(spoiled_.graph, options_.pcm, result_.noise_scale);
     result_.cpu_s += meter_.cpu_s() - begin_s;
   }
 
@@ -118,8 +122,9 @@ class Attempt {
   }
 
   const SpoiledGraph& spoiled_;
-  const OutlierStudyOptions& options_;
+  OutlierStudyOptions options_;
   const TeamMeter& meter_;
+  std::vector<bool> odometry_;
   std::vector<bool> kept_;
   OutlierResult result_;
 };
@@ -142,9 +147,9 @@ const char* to_string(Rejection method) {
 
 OutlierStudy run_outlier_study(const TeamGraph& clean, const OutlierStudyOptions& options,
                                const TeamMeter& meter, const OutlierProgress& progress) {
-  for (const double share : options.shares)
-    if (!(share >= 0.0 && std::isfinite(share)))
-      throw std::invalid_argument("outlier study: a share of " + std::to_string(share));
+  for (const double percent : options.shares_percent)
+    if (!(percent >= 0.0 && std::isfinite(percent)))
+      throw std::invalid_argument("outlier study: a share of " + std::to_string(percent) + " %");
   Staircase staircase(clean.edges, lift(chordal_initialisation(clean.poses(), clean.edges), kRank));
   while (staircase.step()) {
   }
@@ -159,16 +164,17 @@ OutlierStudy run_outlier_study(const TeamGraph& clean, const OutlierStudyOptions
       .certified = staircase.certificate() && staircase.certificate()->certified,
       .half_side_m = options.half_side_m > 0.0 ? options.half_side_m : half_extent_m(truth),
       .results = {}};
-  const std::size_t all = options.shares.size() * options.methods.size() * options.seeds.size();
-  for (const double share : options.shares)
+  const std::size_t all =
+      options.shares_percent.size() * options.methods.size() * options.seeds.size();
+  for (const double percent : options.shares_percent)
     for (const Rejection method : options.methods)
       for (const unsigned seed : options.seeds) {
         if (progress) progress(study.results.size(), all);
-        const auto count =
-            static_cast<std::size_t>(std::lround(share * static_cast<double>(study.true_closures)));
+        const auto count = static_cast<std::size_t>(
+            std::lround(0.01 * percent * static_cast<double>(study.true_closures)));
         const SpoiledGraph spoiled = spoil(clean, count, study.half_side_m, seed);
         OutlierResult result = Attempt(spoiled, options, meter).run(method, truth);
-        result.share = share;
+        result.share_percent = percent;
         result.seed = seed;
         result.false_closures = count;
         study.results.push_back(result);

@@ -4,6 +4,7 @@
 #include <functional>
 #include <vector>
 
+#include "apps/pgo/closure_noise.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"
 #include "modules/pose_graph/robust/gnc_agent.hpp"
 #include "modules/pose_graph/team/round_meter.hpp"
@@ -22,24 +23,26 @@ enum class Rejection {
 [[nodiscard]] const char* to_string(Rejection method);
 
 struct OutlierStudyOptions {
-  std::vector<double> shares;  ///< False closures for every true one.
+  std::vector<double> shares_percent;  ///< False closures for every 100 true ones.
   std::vector<Rejection> methods;
   std::vector<unsigned> seeds = {1};
   double half_side_m = 0.0;  ///< Of the false ones' translations, see spoil(); 0: as the map's.
   PcmConfig pcm = {};
-  GncAgentOptions gnc = {};
+  GncAgentOptions gnc = {};  ///< barc 0: default_barc().
+  NoiseModel noise = {};     ///< Scales what both reject by.
   int max_rounds = 300;
 };
 
 /// What one method made of one spoiled graph.
 struct OutlierResult {
   Rejection method = Rejection::kNone;
-  double share = 0.0;
+  double share_percent = 0.0;
   unsigned seed = 0;
   std::size_t false_closures = 0;
   std::size_t true_kept = 0;
   std::size_t false_kept = 0;
-  double rmse_m = 0.0;  ///< Of positions to the optimum of the clean graph, rigidly aligned.
+  double noise_scale = 1.0;  ///< As used; where it is estimated, from the spoiled graph.
+  double rmse_m = 0.0;       ///< Of positions to the optimum of the clean graph, rigidly aligned.
   int rounds = 0;
   bool decided = true;    ///< False: max_rounds did not suffice.
   std::size_t bytes = 0;  ///< Sent by the solver; closures are known to their two robots anyway.

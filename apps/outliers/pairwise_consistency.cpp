@@ -17,7 +17,8 @@ namespace {
 // Poses of all robots along their odometry, in the numbering of the graph.
 class OdometryChains {
  public:
-  OdometryChains(const TeamGraph& graph, const std::vector<bool>& odometry) : graph_(graph) {
+  OdometryChains(const TeamGraph& graph, const std::vector<bool>& odometry, double noise_scale)
+      : graph_(graph), variance_scale_(noise_scale * noise_scale) {
     const auto n = static_cast<std::size_t>(graph.poses());
     std::vector<const BlockEdge*> step_to(n, nullptr);
     for (std::size_t k = 0; k < odometry.size(); ++k)
@@ -30,7 +31,7 @@ class OdometryChains {
         if (step == nullptr || step->i + 1 != step->j)
           throw std::invalid_argument("no odometry leads to pose " + to_string(graph.ids[i]));
         T = compose({poses_[i - 1].T_odom_kf, poses_[i - 1].covariance},
-                    {step->T_i_j, edge_covariance(*step, graph.dimension)});
+                    {step->T_i_j, covariance(*step)});
       }
       poses_.push_back({id, T.T, T.Sigma});
     }
@@ -40,26 +41,31 @@ class OdometryChains {
     return {poses_[static_cast<std::size_t>(e.i)],
             poses_[static_cast<std::size_t>(e.j)],
             e.T_i_j,
-            edge_covariance(e, graph_.dimension),
+            covariance(e),
             0,
             0.0};
   }
 
  private:
+  [[nodiscard]] Matrix6 covariance(const BlockEdge& e) const {
+    return variance_scale_ * edge_covariance(e, graph_.dimension);
+  }
   [[nodiscard]] KeyframeId id_of(Eigen::Index pose) const {
     const std::size_t robot = graph_.robot_of(pose);
     return {static_cast<RobotId>(robot), static_cast<KeyframeIndex>(pose - graph_.first[robot])};
   }
 
   const TeamGraph& graph_;
+  double variance_scale_;
   std::vector<OdometryPose> poses_;
 };
 
 }  // namespace
 
-std::vector<bool> pairwise_consistent(const TeamGraph& graph, const PcmConfig& config) {
+std::vector<bool> pairwise_consistent(const TeamGraph& graph, const PcmConfig& config,
+                                      double noise_scale) {
   std::vector<bool> kept = odometry_edges(graph);
-  const OdometryChains chains(graph, kept);
+  const OdometryChains chains(graph, kept, noise_scale);
   std::map<std::pair<RobotId, RobotId>, Pcm> pairs;
   std::map<ClosureId, std::size_t> edge_of;
   for (std::size_t k = 0; k < kept.size(); ++k) {

@@ -60,6 +60,19 @@ TEST_CASE("pairwise consistency keeps what agrees, robot pair by robot pair", "[
   CHECK(true_lost < spoiled.own_edges / 4);  // a pair of true ones passes at 99 % only
 }
 
+TEST_CASE("pairwise consistency counts in sigmas of the scale that it is told", "[outliers]") {
+  TeamGraph modest = clean_graph(1);
+  constexpr double kScale = 0.004;  // the graph says 250 times the noise that there is
+  for (BlockEdge& e : modest.edges) {
+    e.kappa *= kScale * kScale;
+    e.tau *= kScale * kScale;
+  }
+  const auto kept = pairwise_consistent(spoil(clean_graph(1), 40, 30.0, 1).graph, {});
+  const SpoiledGraph spoiled = spoil(modest, 40, 30.0, 1);
+  CHECK(pairwise_consistent(spoiled.graph, {}, kScale) == kept);
+  CHECK(pairwise_consistent(spoiled.graph, {}) != kept);
+}
+
 TEST_CASE("a robot without odometry has no pairwise consistency", "[outliers]") {
   TeamGraph graph = clean_graph(1);
   std::erase_if(graph.edges, [](const BlockEdge& e) { return e.i == 4 && e.j == 5; });
@@ -68,7 +81,7 @@ TEST_CASE("a robot without odometry has no pairwise consistency", "[outliers]") 
 
 TEST_CASE("what is rejected does not bend the map, what is kept does", "[outliers]") {
   OutlierStudyOptions options{
-      .shares = {0.0, 0.3},
+      .shares_percent = {0.0, 30.0},
       .methods = {Rejection::kNone, Rejection::kPcm, Rejection::kGnc, Rejection::kPcmGnc}};
   options.gnc.gnc.barc = 6.0;
   std::vector<std::size_t> told;
@@ -81,13 +94,13 @@ TEST_CASE("what is rejected does not bend the map, what is kept does", "[outlier
   CHECK(told.size() == 9);
   CHECK(told.back() == 0);
   for (const OutlierResult& result : study.results) {
-    CAPTURE(to_string(result.method), result.share);
+    CAPTURE(to_string(result.method), result.share_percent);
     CHECK(result.true_kept <= study.true_closures);
-    if (result.share == 0.0) CHECK(result.false_closures == 0);
+    if (result.share_percent == 0.0) CHECK(result.false_closures == 0);
     if (result.method == Rejection::kNone) {
       CHECK(result.true_kept == study.true_closures);
       CHECK(result.false_kept == result.false_closures);
-      CHECK((result.rmse_m < 1e-4) == (result.share == 0.0));
+      CHECK((result.rmse_m < 1e-4) == (result.share_percent == 0.0));
     } else {
       CHECK(result.decided);
       CHECK(result.false_kept == 0);

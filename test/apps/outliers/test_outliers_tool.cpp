@@ -27,19 +27,40 @@ TEST_CASE("The tool compares methods in a table, JSON and a plot", "[outliers]")
   const TemporaryFolder folder;
   const std::string graph = folder.write("laps.g2o", laps_g2o()).string();
   const CommandResult result = run_command(
-      kTool + graph + " --robots 2 --shares 25,50 --seeds 1,2 --outlier-range 20 " + "--json " +
+      kTool + graph + " --robots 2 --shares 12.5,25 --seeds 1,2 --outlier-range 20 " + "--json " +
       (folder.path() / "out.json").string() + " --plot " + (folder.path() / "out.svg").string());
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
-  CHECK_THAT(result.output, Contains("20 poses, 16 true closures, 2 robots") &&
-                                Contains("which is certified") &&
-                                Contains("pcm+gnc   25 %      4"));
+  CHECK_THAT(result.output,
+             Contains("20 poses, 16 true closures, 2 robots") && Contains("which is certified") &&
+                 Contains("pcm+gnc    25 %      4") && Contains("pcm+gnc  12.5 %      2"));
   const std::string json = folder.read("out.json");
   for (const char* key : {"poses", "robots", "true_closures", "certified", "half_side_m", "method",
-                          "share", "seed", "false_closures", "true_kept", "false_kept", "rmse_m",
-                          "rounds", "decided", "bytes", "cpu_s"})
+                          "share_percent", "noise_scale", "seed", "false_closures", "true_kept",
+                          "false_kept", "rmse_m", "rounds", "decided", "bytes", "cpu_s"})
     CHECK_THAT(json, Contains(std::string("\"") + key + "\":"));
-  CHECK_THAT(folder.read("out.svg"), Catch::StartsWith("<svg") && Contains(">pcm+gnc<"));
+  CHECK_THAT(json, Contains("\"share_percent\": 12.5"));
+  CHECK_THAT(folder.read("out.svg"),
+             Catch::StartsWith("<svg") && Contains(">pcm+gnc<") && Contains("<circle"));
+}
+
+TEST_CASE("Noise is given or estimated, in the words of kimera_multi_pgo", "[outliers]") {
+  const TemporaryFolder folder;
+  const std::string graph = folder.write("laps.g2o", laps_g2o()).string();
+  const std::string json = (folder.path() / "out.json").string();
+  const auto output = [&](const std::string& noise) {
+    const CommandResult result = run_command(kTool + graph + " --shares 25 --methods gnc --json " +
+                                             json + " --noise-scale " + noise);
+    CAPTURE(noise, result.output);
+    CHECK(result.exit_code == 0);
+    return result.output;
+  };
+  CHECK_THAT(output("off"), !Contains("as noisy"));
+  CHECK_THAT(output("2.5"), Contains("closures taken to be 2.5 times as noisy as the file says"));
+  CHECK_THAT(folder.read("out.json"), Contains("\"noise_scale\": 2.5"));
+  (void)output("any");
+  CHECK_THAT(folder.read("out.json"), !Contains("\"noise_scale\": 1,"));  // they agree far better
+  CHECK_THAT(output("larger"), !Contains("as noisy"));
 }
 
 TEST_CASE("The tool says what is wrong with its input", "[outliers]") {
@@ -54,6 +75,7 @@ TEST_CASE("The tool says what is wrong with its input", "[outliers]") {
   fails_with("", "FILE is required");
   fails_with(graph + " --methods best", "best not in");
   fails_with(graph + " --shares -5", "--shares");
+  fails_with(graph + " --noise-scale 0", "0 is not off, larger, any, or a number");
   fails_with(graph + " --robots 30", "20 poses, which cannot be dealt out to 30 robots");
   fails_with(graph + " --json /nowhere/out.json", "there is no folder /nowhere");
   fails_with(folder.write("steps.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n").string() + " --robots 1",
