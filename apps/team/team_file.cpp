@@ -9,6 +9,7 @@
 #include <set>
 
 #include "modules/evaluation/trajectory_file.hpp"
+#include "runtime/yaml_config.hpp"
 
 namespace km {
 namespace {
@@ -22,11 +23,14 @@ constexpr std::uint32_t kMaxDomain = 230;  // of DDS, with its default ports
 struct Source {
   fs::path file;
   fs::path dataset;
-  std::string problems;
-  std::vector<std::string> notes;
+  std::string unknown_keys = {}, problems = {};
+  std::vector<std::string> notes = {};
 
-  void problem(const YAML::Node& at, const std::string& text) {
-    problems += file.string() + " line " + std::to_string(at.Mark().line + 1) + ": " + text + '\n';
+  void problem(const YAML::Node& at, const std::string& text) { problems += line(at, text); }
+
+  // Comes before all others, which it may be the cause of.
+  void unknown(const YAML::Node& key, const std::set<std::string>& known) {
+    unknown_keys += line(key, "unknown key " + key.Scalar() + suggestion(key.Scalar(), known));
   }
 
   fs::path path(const YAML::Node& at, std::string text) {
@@ -40,6 +44,11 @@ struct Source {
     }
     const fs::path absolute = fs::absolute(file).parent_path() / text;
     return absolute.lexically_normal();
+  }
+
+ private:
+  [[nodiscard]] std::string line(const YAML::Node& at, const std::string& text) const {
+    return file.string() + " line " + std::to_string(at.Mark().line + 1) + ": " + text + '\n';
   }
 };
 
@@ -103,8 +112,7 @@ class Keys {
   void finish() {
     if (!map_.IsMap()) return;
     for (const auto& entry : map_)
-      if (!known_.contains(entry.first.Scalar()))
-        source_.problem(entry.first, "unknown key " + entry.first.Scalar());
+      if (!known_.contains(entry.first.Scalar())) source_.unknown(entry.first, known_);
   }
 
  private:
@@ -207,7 +215,7 @@ bool is_rate(const std::string& text) {
 }
 
 TeamPlan read_team_file(const fs::path& file, const fs::path& dataset) {
-  Source source{file, dataset, {}, {}};
+  Source source{.file = file, .dataset = dataset};
   Keys keys(source, load(file));
   TeamPlan plan;
   plan.configs = keys.existing_paths("config");
@@ -230,7 +238,8 @@ TeamPlan read_team_file(const fs::path& file, const fs::path& dataset) {
   else
     source.problems += file.string() + ": a team needs a list of robots\n";
   keys.finish();
-  if (!source.problems.empty()) throw TeamFileError(source.problems);
+  if (const std::string all = source.unknown_keys + source.problems; !all.empty())
+    throw TeamFileError(all);
   plan.notes = source.notes;
   for (RobotPlan& robot : plan.robots)
     robot.arguments.insert(robot.arguments.begin(), common.begin(), common.end());

@@ -145,6 +145,19 @@ TEST_CASE("Every problem of a team file is told with its line", "[team]") {
   }
 }
 
+TEST_CASE("Misspelt keys come before what they are the cause of", "[team]") {
+  const Inputs inputs;
+  const std::string robot = problems_of(
+      inputs.team("robots:\n  - {id: 1, datset: recording}\n  - {id: 1, graph: recording/g.csv}\n"),
+      {});
+  CHECK_THAT(robot, Catch::StartsWith((inputs.folder.path() / "team.yaml").string() +
+                                      " line 2: unknown key datset (did you mean dataset?)\n"));
+  CHECK_THAT(robot, Catch::Contains("robot robot1 needs either dataset or graph"));
+  CHECK_THAT(problems_of(inputs.team("robtos: []\n"), {}),
+             Catch::Contains("line 1: unknown key robtos (did you mean robots?)\n") &&
+                 Catch::EndsWith("a team needs a list of robots\n"));
+}
+
 TEST_CASE("A team file without robots or dataset is refused", "[team]") {
   const Inputs inputs;
   CHECK_THAT(problems_of(inputs.team("rate: fast\n"), {}),
