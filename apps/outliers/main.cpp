@@ -94,7 +94,7 @@ void define_methods(CLI::App& app, Options& options) {
                  "pcm: share of true cycles that pass the test")
       ->check(CLI::Range(0.01, 1.0 - 1e-12))
       ->capture_default_str();
-  km::add_noise_scale(app, options.study.noise, "multiply --barc, and the sigmas of pcm,");
+  km::add_noise_scale(app, options.study.noise, "Multiply --barc, and pcm's sigmas,");
   app.add_option("--rounds", options.study.max_rounds, "At most so many")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();

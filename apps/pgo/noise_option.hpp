@@ -14,9 +14,9 @@ inline CLI::Option* add_noise_scale(CLI::App& app, NoiseModel& model, const std:
       .add_option_function<std::string>(
           "--noise-scale", [&model](const std::string& text) { model = *parse_noise_model(text); },
           scaled +
-              " by how many times larger the noise of closures is\n"
-              "than the graph says, estimated from pairs of them: larger (never less than 1)\n"
-              "or any; or by this number; off: believe the graph")
+              " by how many times larger the noise of\n"
+              "closures is than the graph says, estimated from pairs of them: larger (never\n"
+              "less than 1) or any; or by this number; off: believe the graph")
       ->check([](const std::string& text) {
         return parse_noise_model(text)
                    ? std::string()
