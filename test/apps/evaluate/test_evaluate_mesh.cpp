@@ -111,13 +111,15 @@ TEST_CASE("render draws one picture per view", "[evaluate]") {
                                   meshes.png.string() + " --trajectory " + path.string());
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
+  const std::string second = (meshes.folder.path() / "out_2.png").string();
+  CHECK(result.output == meshes.png.string() + '\n' + second + '\n');
   const cv::Mat3b top = cv::imread(meshes.png.string());
   CHECK(top.cols == 320);
   CHECK(top.rows > 240);
   // The floor's red, away from the path; and the picture from within.
   const cv::Vec3b floor = top(60, 100);
   CHECK(static_cast<int>(floor[2]) > 2 * static_cast<int>(floor[1]) + 20);
-  CHECK(cv::imread((meshes.folder.path() / "out_2.png").string()).cols == 320);
+  CHECK(cv::imread(second).cols == 320);
 }
 
 TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]") {
