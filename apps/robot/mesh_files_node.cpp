@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "modules/mesh/ply_file.hpp"
-#include "modules/pose_graph/vertical_prior.hpp"
 #include "runtime/background_thread.hpp"
 
 namespace km {
@@ -42,9 +41,7 @@ void MeshFilesNode::take_latest() {
 }
 
 void MeshFilesNode::step(const KeyframeOdometry& keyframe) {
-  if (keyframe.id.index != 0) return;
-  T_odom_first_ = keyframe.T_odom_kf;
-  upright_ = keyframe.vertical.has_value();
+  if (keyframe.id.index == 0) T_odom_first_ = keyframe.T_odom_kf;
 }
 
 void MeshFilesNode::step(const Trajectory& trajectory) {
@@ -66,16 +63,7 @@ void MeshFilesNode::finish(const std::optional<Trajectory>& trajectory) {
 
 void MeshFilesNode::write_map(const LabelledMesh& map) const {
   LabelledMesh mesh = map;
-  if (T_world_first_ && T_odom_first_) {
-    SE3 T_world_odom = *T_world_first_ * T_odom_first_->inverse();
-    // Both have z up. The first keyframe's tilt, which the team has mended, is not the map's.
-    if (upright_) {
-      const Eigen::MatrixXd upright =
-          level(T_world_odom.matrix().topRows<3>(), T_odom_first_->translation());
-      T_world_odom = make_pose(upright.leftCols<3>(), upright.col(3));
-    }
-    mesh.transform(T_world_odom);
-  }
+  if (T_world_first_ && T_odom_first_) mesh.transform(*T_world_first_ * T_odom_first_->inverse());
   write_ply(folder_ / "mesh.ply", mesh);
 }
 

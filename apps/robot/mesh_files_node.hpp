@@ -64,7 +64,6 @@ class MeshFilesNode final : public Node {
 
   const std::filesystem::path folder_;
   std::optional<SE3> T_odom_first_;   // the first keyframe
-  bool upright_ = false;              // odometry's frame, and so the team's
   std::optional<SE3> T_world_first_;  // likewise, optimised
   std::shared_ptr<const MapMesh> map_;
   Latest<KeyframeOdometry> first_keyframe_;
