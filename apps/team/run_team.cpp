@@ -67,6 +67,11 @@ class RunningTeam {
   }
 
  private:
+  // Others may run on for long before the team says it.
+  static std::string why(const RobotProcess& robot) {
+    return robot.last_words().empty() ? std::string() : ", " + robot.last_words().back();
+  }
+
   bool is_running() const {
     return std::any_of(robots_.begin(), robots_.end(),
                        [](const auto& robot) { return !robot->exit(); });
@@ -84,7 +89,7 @@ class RunningTeam {
     if (robots_[i]->exit()) return;
     for (const std::string& line : robots_[i]->read()) display_.update(i, line);
     if (robots_[i]->exit() && !robots_[i]->exit()->ok())
-      display_.update(i, "FAILED: " + to_string(*robots_[i]->exit()));
+      display_.update(i, "FAILED: " + to_string(*robots_[i]->exit()) + why(*robots_[i]));
   }
 
   void send_to_all(int signal) {

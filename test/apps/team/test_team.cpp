@@ -72,7 +72,8 @@ TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
   const auto result = run_command(team.command);
   CAPTURE(result.output);
   CHECK(result.exit_code == 3);
-  CHECK_THAT(result.output, Catch::Contains("bob failed, exit code 9; its last words:") &&
+  CHECK_THAT(result.output, Catch::Contains("bob   | FAILED: exit code 9, out of luck\n") &&
+                                Catch::Contains("bob failed, exit code 9; its last words:") &&
                                 Catch::Contains("  out of luck"));
 }
 
