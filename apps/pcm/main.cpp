@@ -6,6 +6,7 @@
 #include <iostream>
 #include <map>
 
+#include "apps/evaluate/stage_progress.hpp"
 #include "apps/output_file.hpp"
 #include "apps/pcm/closure_input.hpp"
 #include "apps/pcm/pcm_report.hpp"
@@ -147,6 +148,14 @@ km::KeyframePairs labels_beside(const fs::path& file) {
   return pairs;
 }
 
+km::PcmRun run_one(const auto& vertices, const km::PcmConfig& config) {
+  km::StageProgress progress;
+  const std::string stage = to_string(config.search) + " search";
+  return km::run_pcm(vertices, config, [&](std::size_t done) {
+    progress(stage, static_cast<double>(done) / static_cast<double>(vertices.size()));
+  });
+}
+
 // One run per search; what is common to all is said once.
 std::vector<km::PcmRun> run(const Options& options) {
   km::PcmConfig config = options.config;
@@ -154,7 +163,7 @@ std::vector<km::PcmRun> run(const Options& options) {
     std::vector<km::PcmRun> runs;
     for (const km::CliqueMethod search : options.searches) {
       config.search = search;
-      runs.push_back(km::run_pcm(vertices, config));
+      runs.push_back(run_one(vertices, config));
       std::cout << '\n' << km::pcm_text(runs.back()) << std::flush;
     }
     return runs;
