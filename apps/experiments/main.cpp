@@ -25,8 +25,8 @@ constexpr const char* kAbout =
     "are used as they are.\n\n"
     "Configuration: config/experiments/*.yaml (worlds, seeds, methods). --data, --graphs, "
     "--euroc,\n"
-    "--config and --quick are kept with the results: `list`, `report` and later runs need only\n"
-    "--results, and take what they are given instead.\n"
+    "--config and --quick are kept with the results they led to: `list`, `report` and later runs\n"
+    "need only --results, and take what they are given instead.\n"
     "Exit code: 0 if all is done, 1 for input that cannot be used, 3 if a step failed or lacks\n"
     "something, 130 if it was stopped.\n\n"
     "Examples:\n"
@@ -175,10 +175,12 @@ int run(const Options& options, const Setup& setup, const km::ExperimentConfig& 
   for (const std::string& problem : outcome.problems) std::cerr << problem << '\n';
   // Results stay with the inputs they are of, and so does their report, until others make some.
   const bool fruitless = outcome.made == 0 && !outcome.problems.empty();
-  if (before && fruitless && before != km::read_run_inputs(setup.paths.results))
+  if (before && fruitless && before != km::read_run_inputs(setup.paths.results)) {
     km::write_run_inputs(setup.paths.results, *before);
-  else
+    std::cout << "nothing was made: the results, their report and their folders stay\n";
+  } else {
     print(km::write_report(config, setup.paths));
+  }
   if (outcome.stopped) return 130;
   return outcome.problems.empty() ? 0 : 3;
 }

@@ -101,7 +101,9 @@ TEST_CASE("A run with another folder that makes nothing leaves all as it was", "
   fs::create_directory(laboratory.folder.path() / "none");
   const std::string other = (laboratory.folder.path() / GENERATE("other", "none")).string();
   CAPTURE(other);
-  CHECK(laboratory.bare("run pcm --graphs " + other).exit_code == 3);
+  const CommandResult fruitless = laboratory.bare("run pcm --graphs " + other);
+  CHECK(fruitless.exit_code == 3);
+  CHECK_THAT(fruitless.output, Contains("nothing was made"));
   const CommandResult list = laboratory.bare("list");
   CHECK_THAT(list.output, Contains("pcm-1   done") && Contains("pcm-2   done"));
   CHECK(laboratory.folder.read("results/report.md") == report);
