@@ -75,7 +75,7 @@ void write_closures(const fs::path& file, const RunRecord& record) {
 }
 
 // The robot's own poses with every edge that touches them: odometry, and the inlier closures of
-// either finder. Poses of other robots stay in their files.
+// either finder; and the verticals. Poses of other robots stay in their files.
 G2oGraph graph_of(const RunRecord& record) {
   G2oGraph graph;
   const auto& keyframes = record.keyframes();
@@ -84,6 +84,7 @@ G2oGraph graph_of(const RunRecord& record) {
     const bool solved = trajectory && i < trajectory->T_world_kf.size();
     const SE3& T = solved ? trajectory->T_world_kf[i] : keyframes[i].T_odom_kf;
     graph.vertices.push_back({keyframes[i].id, T});
+    if (keyframes[i].vertical) graph.verticals.push_back({keyframes[i].id, *keyframes[i].vertical});
     if (i > 0)
       graph.edges.push_back({keyframes[i - 1].id, keyframes[i].id, keyframes[i].T_previous_kf,
                              keyframes[i].covariance});

@@ -14,7 +14,8 @@ namespace km {
 namespace {
 
 constexpr std::uint64_t kLetters = 26;
-constexpr double kUnitTolerance = 1e-3;  // files round their quaternions, some to 6 digits
+constexpr double kUnitTolerance = 1e-3;      // files round their quaternions, some to 6 digits
+constexpr double kVerticalTolerance = 1e-3;  // likewise, of information relative to its size
 
 KeyframeId read_id(TextFields& fields) {
   const std::uint64_t key = fields.integer("vertex id");
@@ -37,16 +38,29 @@ SE3 read_pose(TextFields& fields, int dimension) {
   return make_pose(q.normalized().toRotationMatrix(), t);
 }
 
-// Upper triangle of an NxN information matrix, inverted.
+// Upper triangle of an NxN information matrix.
 template <int N>
-Eigen::Matrix<double, N, N> read_inverse(TextFields& fields) {
+Eigen::Matrix<double, N, N> read_information(TextFields& fields) {
   Eigen::Matrix<double, N, N> information;
   for (int r = 0; r < N; ++r)
     for (int c = r; c < N; ++c)
       information(r, c) = information(c, r) = fields.number("information");
+  return information;
+}
+
+template <int N>
+Eigen::Matrix<double, N, N> read_inverse(TextFields& fields) {
+  const Eigen::Matrix<double, N, N> information = read_information<N>(fields);
   const Eigen::LLT<Eigen::Matrix<double, N, N>> llt(information);
   if (llt.info() != Eigen::Success) fields.fail("information matrix is not positive definite");
   return llt.solve(Eigen::Matrix<double, N, N>::Identity());
+}
+
+// What the prior of a vertical knows, [translation; rotation], in units of 1 / sigma^2.
+Matrix6 tilt_information(const Eigen::Vector3d& up) {
+  Matrix6 information = Matrix6::Zero();
+  information.bottomRightCorner<3, 3>() = Eigen::Matrix3d::Identity() - up * up.transpose();
+  return information;
 }
 
 // Exchanges [translation; rotation] and [rotation; translation].
@@ -73,15 +87,24 @@ class Reader {
   void read_line(TextFields& fields) {
     const std::string_view tag = fields.text("tag");
     if (tag == "FIX") return;
-    const bool is_vertex = tag == "VERTEX_SE3:QUAT" || tag == "VERTEX_SE2";
-    const bool is_edge = tag == "EDGE_SE3:QUAT" || tag == "EDGE_SE2";
-    if (!is_vertex && !is_edge) fields.fail("unknown tag '" + std::string(tag) + '\'');
+    const auto read_rest = reader_of(tag);
+    if (read_rest == nullptr) fields.fail("unknown tag '" + std::string(tag) + '\'');
     set_dimension(tag.ends_with("SE2") ? 2 : 3, fields);
-    is_vertex ? read_vertex(fields) : read_edge(fields);
+    (this->*read_rest)(fields);
     if (!fields.at_end()) fields.fail("more fields than " + std::string(tag) + " has");
   }
 
  private:
+  using ReadRest = void (Reader::*)(TextFields&);
+
+  static ReadRest reader_of(std::string_view tag) {
+    if (tag == "VERTEX_SE3:QUAT" || tag == "VERTEX_SE2") return &Reader::read_vertex;
+    if (tag == "EDGE_SE3:QUAT" || tag == "EDGE_SE2") return &Reader::read_edge;
+    if (tag == "PARAMS_SE3OFFSET") return &Reader::read_offset;
+    if (tag == "EDGE_SE3_PRIOR") return &Reader::read_vertical;
+    return nullptr;
+  }
+
   void set_dimension(int dimension, const TextFields& fields) {
     if (graph.dimension == 0) graph.dimension = dimension;
     if (graph.dimension != dimension) fields.fail("2D and 3D in one file");
@@ -103,13 +126,46 @@ class Reader {
         graph.dimension == 2 ? lift(read_inverse<3>(fields)) : swap_blocks(read_inverse<6>(fields));
   }
 
+  void read_offset(TextFields& fields) {
+    const std::uint64_t offset = fields.integer("offset id");
+    if (!read_pose(fields, 3).isApprox(SE3::Identity(), kUnitTolerance))
+      fields.fail("offset " + std::to_string(offset) +
+                  " is not the identity: priors are read of poses, not of sensors on them");
+    offsets_.insert(offset);
+  }
+
+  void read_vertical(TextFields& fields) {
+    const KeyframeId id = read_id(fields);
+    const std::uint64_t offset = fields.integer("offset id");
+    if (!offsets_.contains(offset))
+      fields.fail("no PARAMS_SE3OFFSET " + std::to_string(offset) + " before");
+    const Eigen::Vector3d up = read_pose(fields, 3).linear().row(2);
+    const Matrix6 information = read_information<6>(fields);
+    const double weight = 0.5 * information.bottomRightCorner<3, 3>().trace();
+    const Matrix6 error = information - weight * tilt_information(up);
+    if (!(weight > 0.0) || !(error.cwiseAbs().maxCoeff() <= kVerticalTolerance * weight))
+      fields.fail("prior on " + to_string(id) +
+                  " is not a vertical: its information must be k (I - u u^T) on the rotation, u "
+                  "the world's z axis seen from the pose, and zero on the translation");
+    if (!upright_.insert(id).second) fields.fail("second prior on " + to_string(id));
+    graph.verticals.push_back({id, {up, 1.0 / std::sqrt(weight)}});
+  }
+
   std::unordered_set<KeyframeId> seen_;
+  std::unordered_set<KeyframeId> upright_;
+  std::unordered_set<std::uint64_t> offsets_;
 };
 
 void write_pose(std::ostream& out, const SE3& T) {
   const Eigen::Quaterniond q(T.linear());
   for (const double c : T.translation()) out << ' ' << c;
   for (const double c : q.coeffs()) out << ' ' << c;
+}
+
+void write_information(std::ostream& out, const Matrix6& information) {
+  for (int r = 0; r < 6; ++r)
+    for (int c = r; c < 6; ++c) out << ' ' << information(r, c);
+  out << '\n';
 }
 
 void write_edge(std::ostream& out, const RelativePose& edge) {
@@ -120,9 +176,18 @@ void write_edge(std::ostream& out, const RelativePose& edge) {
   const Matrix6 information = llt.solve(Matrix6::Identity());
   out << "EDGE_SE3:QUAT " << key_of_keyframe(edge.from) << ' ' << key_of_keyframe(edge.to);
   write_pose(out, edge.T_from_to);
-  for (int r = 0; r < 6; ++r)
-    for (int c = r; c < 6; ++c) out << ' ' << information(r, c);
-  out << '\n';
+  write_information(out, information);
+}
+
+void write_vertical(std::ostream& out, const G2oVertical& prior) {
+  const auto& [up, sigma] = prior.vertical;
+  if (!(std::abs(up.norm() - 1.0) <= kUnitTolerance) || !(sigma > 0.0) || !std::isfinite(sigma))
+    throw std::invalid_argument("write_g2o: the vertical of " + to_string(prior.id) +
+                                " is not a unit vector with a positive sigma");
+  const auto R = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
+  out << "EDGE_SE3_PRIOR " << key_of_keyframe(prior.id) << " 0";
+  write_pose(out, make_pose(R.toRotationMatrix(), Eigen::Vector3d::Zero()));
+  write_information(out, tilt_information(up.normalized()) / (sigma * sigma));
 }
 
 }  // namespace
@@ -171,12 +236,14 @@ G2oGraph read_g2o(const std::filesystem::path& file) {
 void write_g2o(std::ostream& out, const G2oGraph& graph) {
   if (graph.dimension != 3) throw std::invalid_argument("write_g2o: the graph is not 3D");
   const auto precision = out.precision(std::numeric_limits<double>::max_digits10);
+  if (!graph.verticals.empty()) out << "PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n";
   for (const G2oVertex& vertex : graph.vertices) {
     out << "VERTEX_SE3:QUAT " << key_of_keyframe(vertex.id);
     write_pose(out, vertex.T_world_kf);
     out << '\n';
   }
   for (const RelativePose& edge : graph.edges) write_edge(out, edge);
+  for (const G2oVertical& vertical : graph.verticals) write_vertical(out, vertical);
   out.precision(precision);
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
 
 namespace km {
@@ -17,11 +18,18 @@ struct G2oVertex {
   SE3 T_world_kf = SE3::Identity();
 };
 
+/// Which way is up at a pose, where the frame of the file has z up.
+struct G2oVertical {
+  KeyframeId id;
+  Vertical vertical;
+};
+
 /// Contents of a g2o file, in its order.
 struct G2oGraph {
   int dimension = 3;  ///< 3: *_SE3:QUAT. 2: *_SE2, lifted to z = 0, see read_g2o().
   std::vector<G2oVertex> vertices;
   std::vector<RelativePose> edges;
+  std::vector<G2oVertical> verticals = {};  ///< At most one of a pose.
 };
 
 /// Keyframe of a vertex key. A gtsam symbol (letter in the top byte, index below) belongs to robot
@@ -41,15 +49,22 @@ struct G2oGraph {
 /// as that of the angle; so do we.) Edges of 2D files have zero variance in z, roll and pitch.
 /// FIX lines and comments (#) are skipped.
 ///
+/// Verticals are priors EDGE_SE3_PRIOR on a pose, with an offset PARAMS_SE3OFFSET that stands
+/// before them and is the identity: the inverse of the measured rotation carries z to `up`, and the
+/// information is (I - up up^T) / sigma^2 on the rotation and zero on everything else, i.e. on
+/// heading and place.
+///
 /// Throws std::runtime_error "file:line: what" for any other deviation: unknown tags, missing or
 /// surplus fields, numbers that are not finite, quaternions not of unit length within 1e-3,
 /// information matrices that are not positive definite, vertices given twice, edges from a pose to
-/// itself. Edges may name vertices that the file does not have (those of another robot).
+/// itself, priors of any other kind, two on one pose. Edges and priors may name vertices that the
+/// file does not have (those of another robot).
 [[nodiscard]] G2oGraph read_g2o(std::istream& in, const std::string& file);
 [[nodiscard]] G2oGraph read_g2o(const std::filesystem::path& file);
 
 /// Writes a 3D graph so that read_g2o() gives it back to rounding. Throws std::invalid_argument if
-/// the graph is 2D or a covariance is not positive definite, std::runtime_error if writing fails.
+/// the graph is 2D, a covariance is not positive definite, or a vertical is not a unit vector with
+/// a positive sigma; std::runtime_error if writing fails.
 void write_g2o(std::ostream& out, const G2oGraph& graph);
 void write_g2o(const std::filesystem::path& file, const G2oGraph& graph);
 

@@ -79,7 +79,12 @@ void GraphPlaybackNode::step(std::size_t index) {
   KeyframeOdometry odometry;
   odometry.id = {graph_.robot, static_cast<std::uint32_t>(index)};
   odometry.stamp = nanoseconds(static_cast<double>(index) / poses_per_second_);
-  if (index > 0) {
+  if (const auto vertical = graph_.verticals.find(odometry.id.index);
+      vertical != graph_.verticals.end())
+    odometry.vertical = vertical->second;
+  if (index == 0) {
+    T_odom_kf_.T = odometry.T_previous_kf = graph_.T_odom_first();
+  } else {
     const RelativePose& last_step = graph_.odometry[index - 1];
     odometry.T_previous_kf = last_step.T_from_to;
     odometry.covariance = last_step.covariance;

@@ -38,6 +38,8 @@ struct GraphPlaybackTopics {
 /// keyframe, each followed by the closures that it makes known. A closure inside the robot appears
 /// with the later of its keyframes. One between two robots is in the records of both: the robot it
 /// starts `from` publishes it, with its own keyframe, be the other robot there yet or not.
+/// Verticals go with their keyframes; with them odometry starts upright, see
+/// RecordedGraph::T_odom_first().
 class GraphPlaybackNode final : public Node {
  public:
   /// `rate`: recorded seconds per second; infinity: as fast as consumers take it.

@@ -87,11 +87,31 @@ std::size_t chain_length(const std::vector<RelativePose>& edges, RobotId robot,
                            to_string({robot, static_cast<std::uint32_t>(last)}));
 }
 
+RecordedGraph make_recorded_graph(const G2oGraph& g2o, const std::string& file) {
+  if (g2o.dimension != 3) throw std::runtime_error(file + ": the graph is not 3D");
+  RecordedGraph graph = make_recorded_graph(g2o.edges, file);
+  for (const G2oVertical& prior : g2o.verticals) {
+    if (prior.id.robot != graph.robot || prior.id.index >= graph.poses())
+      throw std::runtime_error(file + ": the prior on " + to_string(prior.id) +
+                               " is on no keyframe of robot " + std::to_string(graph.robot));
+    graph.verticals.emplace(prior.id.index, prior.vertical);
+  }
+  return graph;
+}
+
 }  // namespace
 
+SE3 RecordedGraph::T_odom_first() const {
+  const auto first = verticals.find(0);
+  if (first == verticals.end()) return SE3::Identity();
+  const auto R =
+      Eigen::Quaterniond::FromTwoVectors(first->second.up_body, Eigen::Vector3d::UnitZ());
+  return make_pose(R.toRotationMatrix(), Eigen::Vector3d::Zero());
+}
+
 std::vector<OdometryPose> odometry_poses(const RecordedGraph& graph) {
-  std::vector<OdometryPose> poses{{{graph.robot, 0}, SE3::Identity(), Matrix6::Zero()}};
-  UncertainPose T_odom_kf;
+  UncertainPose T_odom_kf{.T = graph.T_odom_first()};
+  std::vector<OdometryPose> poses{{{graph.robot, 0}, T_odom_kf.T, Matrix6::Zero()}};
   for (const RelativePose& step : graph.odometry) {
     T_odom_kf = compose(T_odom_kf, {step.T_from_to, step.covariance});
     T_odom_kf.T.linear() = nearest_rotation(T_odom_kf.T.linear());
@@ -139,11 +159,7 @@ std::vector<RelativePose> read_measurements_csv(std::istream& in, const std::str
 }
 
 RecordedGraph read_recorded_graph(const std::filesystem::path& file) {
-  if (file.extension() == ".g2o") {
-    const G2oGraph graph = read_g2o(file);
-    if (graph.dimension != 3) throw std::runtime_error(file.string() + ": the graph is not 3D");
-    return make_recorded_graph(graph.edges, file.string());
-  }
+  if (file.extension() == ".g2o") return make_recorded_graph(read_g2o(file), file.string());
   if (file.extension() != ".csv")
     throw std::runtime_error(file.string() + ": neither .g2o nor .csv");
   std::ifstream in(file);

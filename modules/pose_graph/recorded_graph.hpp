@@ -3,9 +3,11 @@
 #include <cstddef>
 #include <filesystem>
 #include <iosfwd>
+#include <map>
 #include <string>
 #include <vector>
 
+#include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
 
 namespace km {
@@ -16,11 +18,15 @@ struct RecordedGraph {
   std::vector<RelativePose> odometry;        ///< [i]: from keyframe i to i + 1 of `robot`.
   std::vector<RelativePose> intra_closures;  ///< Between keyframes of `robot`, as in the file.
   std::vector<RelativePose> inter_closures;  ///< `robot` at one end, either one; as in the file.
+  std::map<KeyframeIndex, Vertical> verticals = {};  ///< Of its keyframes, where known.
 
   [[nodiscard]] std::size_t poses() const { return odometry.size() + 1; }
+  /// Where odometry starts: the identity, turned the least that gives its frame z up if keyframe 0
+  /// has a vertical.
+  [[nodiscard]] SE3 T_odom_first() const;
 };
 
-/// The keyframes of `graph` along its odometry from the identity, [i] being keyframe i, with the
+/// The keyframes of `graph` along its odometry from T_odom_first(), [i] being keyframe i, with the
 /// covariance accumulated since keyframe 0.
 [[nodiscard]] std::vector<OdometryPose> odometry_poses(const RecordedGraph& graph);
 
@@ -41,8 +47,10 @@ struct RecordedGraph {
 [[nodiscard]] std::vector<RelativePose> read_measurements_csv(std::istream& in,
                                                               const std::string& file);
 
-/// Reads one robot's part from a 3D g2o file (*.g2o) or a table of measurements (*.csv).
-/// Throws std::runtime_error as the functions above.
+/// Reads one robot's part from a 3D g2o file (*.g2o), with its verticals, or a table of
+/// measurements
+/// (*.csv). Throws std::runtime_error as the functions above, and "file: what" if a vertical is not
+/// of a keyframe on the robot's chain.
 [[nodiscard]] RecordedGraph read_recorded_graph(const std::filesystem::path& file);
 
 }  // namespace km

@@ -85,6 +85,85 @@ TEST_CASE("A graph survives being written and read", "[g2o]") {
   }
 }
 
+TEST_CASE("Verticals survive being written and read", "[g2o][vertical]") {
+  const unsigned seed = GENERATE(range(0U, 5U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  G2oGraph graph;
+  for (const Eigen::Vector3d& up :
+       {random_vector<3>(rng).normalized().eval(), random_vector<3>(rng).normalized().eval(),
+        Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0, 0, -1)}) {
+    const auto index = static_cast<std::uint32_t>(graph.verticals.size());
+    graph.verticals.push_back({{3, index}, {up, 0.004 * (index + 1.0)}});
+  }
+  std::stringstream file;
+  write_g2o(file, graph);
+  const G2oGraph back = read_g2o(file, "written");
+  REQUIRE(back.verticals.size() == 4);
+  for (std::size_t i = 0; i < 4; ++i) {
+    CHECK(back.verticals[i].id == graph.verticals[i].id);
+    CHECK(back.verticals[i].vertical.up_body.isApprox(graph.verticals[i].vertical.up_body, 1e-14));
+    CHECK(back.verticals[i].vertical.sigma_rad == Approx(graph.verticals[i].vertical.sigma_rad));
+  }
+}
+
+const std::string kOffset = "PARAMS_SE3OFFSET 4 0 0 0 0 0 0 1\n";
+
+TEST_CASE("A prior on the tilt of a pose is its vertical, wherever else it looks",
+          "[g2o][vertical]") {
+  // Turned by 90 degrees about x: z of the world is y of the pose. Heading and place say nothing.
+  const std::string information = " 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 25 0 0 0 0 25";
+  const auto graph = read(kVertex + kOffset + "EDGE_SE3_PRIOR 0 4 7 8 9 " +
+                          "0.70710678 0 0 0.70710678" + information + '\n');
+  REQUIRE(graph.verticals.size() == 1);
+  CHECK(graph.verticals[0].id == KeyframeId{0, 0});
+  CHECK(graph.verticals[0].vertical.up_body.isApprox(Eigen::Vector3d::UnitY(), 1e-7));
+  CHECK(graph.verticals[0].vertical.sigma_rad == Approx(0.2));
+}
+
+TEST_CASE("Other priors than verticals are refused with the line and the reason",
+          "[g2o][vertical]") {
+  const std::string pose = " 0 0 0 0 0 0 1";
+  const std::string level = " 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 9 0 0 9 0 0\n";
+  const auto [lines, reason] = GENERATE_COPY(table<std::string, std::string>({
+      {"EDGE_SE3_PRIOR 0 4" + pose + " 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 9 0 0 9 0 0",
+       "not a vertical"},
+      {"EDGE_SE3_PRIOR 0 4" + pose + " 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 9 0 0 9 0 9",
+       "not a vertical"},
+      {"EDGE_SE3_PRIOR 0 4" + pose + " 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 9 0 0 4 0 0",
+       "not a vertical"},
+      {"EDGE_SE3_PRIOR 0 4" + pose + " 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 9 0 9",
+       "not a vertical"},
+      {"EDGE_SE3_PRIOR 0 4" + pose + " 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0",
+       "not a vertical"},
+      {"EDGE_SE3_PRIOR 0 4" + pose + " 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 -9 0 0 -9 0 0",
+       "not a vertical"},
+      {"EDGE_SE3_PRIOR 0 5" + pose + level, "no PARAMS_SE3OFFSET 5"},
+      {"PARAMS_SE3OFFSET 0 0.1 0 0 0 0 0 1", "offset 0 is not the identity"},
+      {"PARAMS_SE3OFFSET 0 0 0 0 0 0 0", "line ends before quaternion"},
+      {"EDGE_SE3_PRIOR 0 4" + pose + " 0 0 0", "line ends before information"},
+  }));
+  CAPTURE(lines);
+  CHECK_THROWS_WITH(read(kVertex + kOffset + lines + '\n'),
+                    Catch::StartsWith("test.g2o:3: ") && Catch::Contains(reason));
+  const std::string vertical = "EDGE_SE3_PRIOR 0 4" + pose + level;
+  CHECK_THROWS_WITH(read(kVertex + kOffset + vertical + vertical),
+                    "test.g2o:4: second prior on 0:0");
+  CHECK_THROWS_WITH(read("VERTEX_SE2 0 0 0 0\n" + kOffset), "test.g2o:2: 2D and 3D in one file");
+}
+
+TEST_CASE("A vertical that is no direction is not written", "[g2o][vertical]") {
+  const auto [up, sigma] = GENERATE(table<Eigen::Vector3d, double>({{{0, 0, 2}, 0.1},
+                                                                    {{0, 0, 0}, 0.1},
+                                                                    {{0, 0, 1}, 0.0},
+                                                                    {{0, 0, 1}, NAN},
+                                                                    {{0, NAN, 1}, 0.1}}));
+  G2oGraph graph;
+  graph.verticals.push_back({{2, 5}, {up, sigma}});
+  std::ostringstream out;
+  CHECK_THROWS_WITH(write_g2o(out, graph), Catch::Contains("vertical of 2:5"));
+}
+
 TEST_CASE("2D g2o is lifted to the plane z = 0", "[g2o]") {
   const auto graph = read("VERTEX_SE2 0 1 2 0.5\nEDGE_SE2 0 1 3 4 -0.25 2 0 0 4 0 8\n");
   CHECK(graph.dimension == 2);

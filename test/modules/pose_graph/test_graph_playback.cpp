@@ -90,6 +90,34 @@ TEST_CASE("A played graph chains its odometry with the covariance of the chain",
   CHECK(played.odometry[0].covariance.isZero());
 }
 
+TEST_CASE("Verticals are played with their keyframes, and odometry starts upright",
+          "[playback][vertical]") {
+  std::mt19937 rng(2);
+  RecordedGraph graph = recording(rng);
+  const bool at_first = GENERATE(true, false);
+  const Vertical first{random_vector<3>(rng).normalized(), 0.01};
+  const Vertical third{random_vector<3>(rng).normalized(), 0.02};
+  if (at_first) graph.verticals[0] = first;
+  graph.verticals[2] = third;
+  Played played;
+  GraphPlaybackNode node(GraphPlaybackConfig{}, kMax, graph, played.topics());
+  play_all(node, graph);
+  CHECK(played.odometry[0].vertical.has_value() == at_first);
+  CHECK_FALSE(played.odometry[1].vertical);
+  REQUIRE(played.odometry[2].vertical);
+  CHECK(played.odometry[2].vertical->up_body == third.up_body);
+  CHECK(played.odometry[2].vertical->sigma_rad == 0.02);
+  const SE3& T_odom_first = played.odometry[0].T_odom_kf;
+  if (at_first)
+    CHECK((T_odom_first.linear() * first.up_body - Eigen::Vector3d::UnitZ()).norm() < 1e-12);
+  if (!at_first) CHECK(T_odom_first.isApprox(SE3::Identity()));
+  CHECK(T_odom_first.translation().norm() == 0.0);
+  CHECK(played.odometry[0].T_previous_kf.isApprox(T_odom_first));
+  const std::vector<OdometryPose> poses = odometry_poses(graph);
+  for (std::uint32_t i = 0; i < 5; ++i)
+    CHECK(played.keyframes[i].odometry.T_odom_kf.isApprox(poses[i].T_odom_kf, 1e-12));
+}
+
 TEST_CASE("A closure is played with the keyframe that makes it known, by one robot", "[playback]") {
   std::mt19937 rng(1);
   const RecordedGraph graph = recording(rng);

@@ -4,8 +4,10 @@
 #include <sstream>
 
 #include "modules/core/precision.hpp"
+#include "modules/pose_graph/g2o_io.hpp"
 #include "modules/pose_graph/recorded_graph.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {
@@ -129,6 +131,29 @@ TEST_CASE("One robot's g2o files are read, each in its layout", "[recorded]") {
   CHECK(graph.poses() == poses);
   CHECK(graph.intra_closures.size() == intra);
   CHECK(graph.inter_closures.size() == inter);
+}
+
+TEST_CASE("A robot's verticals come with its part of the graph", "[recorded][vertical]") {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "7.g2o";
+  const Vertical second{{0.0, 1.0, 0.0}, 0.01};
+  G2oGraph graph;
+  graph.edges = {edge({7, 0}, {7, 1}), edge({7, 1}, {7, 2})};
+  graph.verticals = {{{7, 2}, {}}, {{7, 1}, second}};
+  for (G2oVertical& prior : graph.verticals) prior.vertical.sigma_rad = 0.01;
+  write_g2o(file, graph);
+  const RecordedGraph read = read_recorded_graph(file);
+  REQUIRE(read.verticals.size() == 2);
+  CHECK(read.verticals.at(1).up_body.isApprox(second.up_body, 1e-14));
+  CHECK(read.verticals.at(1).sigma_rad == Approx(0.01));
+  CHECK(read.verticals.at(2).up_body.isApprox(Eigen::Vector3d::UnitZ()));
+
+  const KeyframeId elsewhere = GENERATE(KeyframeId{7, 3}, KeyframeId{8, 0});
+  graph.verticals.push_back({elsewhere, second});
+  write_g2o(file, graph);
+  CHECK_THROWS_WITH(read_recorded_graph(file),
+                    Catch::EndsWith("7.g2o: the prior on " + to_string(elsewhere) +
+                                    " is on no keyframe of robot 7"));
 }
 
 TEST_CASE("Files that are not one robot's drive are refused by name", "[recorded]") {
