@@ -37,11 +37,13 @@ void ProcessCsv::append(double time_s, const ProcessUsage& usage) {
 }
 
 MemoryTrend ProcessCsv::memory() const {
+  constexpr double kLeastSpan_s = 60.0;
   MemoryTrend trend;
   if (samples_.empty()) return trend;
   trend.first_bytes = static_cast<std::uint64_t>(samples_.front().bytes);
   trend.last_bytes = static_cast<std::uint64_t>(samples_.back().bytes);
   const double half_s = 0.5 * (samples_.front().time_s + samples_.back().time_s);
+  if (samples_.back().time_s - half_s < kLeastSpan_s) return trend;
   double n = 0.0, t = 0.0, y = 0.0, tt = 0.0, ty = 0.0;
   for (const Sample& sample : samples_) {
     const double since_s = sample.time_s - half_s;
@@ -53,7 +55,7 @@ MemoryTrend ProcessCsv::memory() const {
     ty += since_s * sample.bytes;
   }
   const double spread = n * tt - t * t;
-  if (n >= 3.0 && spread > 0.0) trend.growth_bytes_per_minute = 60.0 * (n * ty - t * y) / spread;
+  if (spread > 0.0) trend.growth_bytes_per_minute = 60.0 * (n * ty - t * y) / spread;
   return trend;
 }
 

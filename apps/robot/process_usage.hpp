@@ -21,8 +21,8 @@ struct ProcessUsage {
 struct MemoryTrend {
   std::uint64_t first_bytes = 0;
   std::uint64_t last_bytes = 0;
-  /// Slope of the line of least squares through the second half of the time; absent before there
-  /// are three samples in it.
+  /// Slope of the line of least squares through the second half of the time; absent if that is less
+  /// than a minute: what is taken at the start is no growth.
   std::optional<double> growth_bytes_per_minute;
 };
 

@@ -78,7 +78,7 @@ struct PoseGraphConfig {
     visitor.field("exchange_budget_kb_s", exchange_budget_kb_s, {0.1, 1e6},
                   "[kB/s] newton, gnc: a robot's mean, paid for by waiting between sessions");
     visitor.field("session_growth", session_growth, {0.0, 100.0},
-                  "newton, gnc: of closures, as part of those before, that opens a session");
+                  "newton, gnc: a session opens when there are so many more closures; 1: twice as many");
     visitor.field("session_wait_s", session_wait_s, {0.0, 3600.0},
                   "[s] newton, gnc: longest wait of what is new for a session");
     visitor.field("min_relative_decrease", min_relative_decrease, {0.0, 0.1},

@@ -43,7 +43,8 @@ TEST_CASE("process.csv has a row for each sample", "[robot]") {
   csv.append(0.5, {.cpu_s = 0.25, .resident_bytes = 12345});
   csv.append(1.5, {.cpu_s = 1.0, .resident_bytes = 23456});
   CHECK(text.str() == "time_s,cpu_s,resident_bytes\n0.500,0.250,12345\n1.500,1.000,23456\n");
-  CHECK_FALSE(csv.memory().growth_bytes_per_minute);  // too few
+  for (int s = 2; s < 100; ++s) csv.append(1.0 * s, {.cpu_s = 1.0, .resident_bytes = 23456});
+  CHECK_FALSE(csv.memory().growth_bytes_per_minute);  // too short
 }
 
 }  // namespace
