@@ -67,10 +67,10 @@ std::vector<Cell> cells_of(const OutlierStudy& study) {
   return cells;
 }
 
-// Two of them that count.
-std::string digits(double value) {
+// So many of them that count.
+std::string digits(double value, int count) {
   std::ostringstream text;
-  text << std::setprecision(2) << value;
+  text << std::setprecision(count) << value;
   return text.str();
 }
 
@@ -88,8 +88,8 @@ std::string noise_text(const OutlierStudy& study) {
       [](const auto& a, const auto& b) { return a.noise_scale < b.noise_scale; });
   if (least == study.results.end() || (least->noise_scale == 1.0 && most->noise_scale == 1.0))
     return {};
-  const std::string from = digits(least->noise_scale);
-  const std::string to = digits(most->noise_scale);
+  const std::string from = digits(least->noise_scale, 3);
+  const std::string to = digits(most->noise_scale, 3);
   return "closures taken to be " + from + (to == from ? "" : " to " + to) +
          " times as noisy as the file says\n";
 }
@@ -100,7 +100,7 @@ std::vector<std::string> row(const Cell& cell) {
           std::to_string(cell.results.front().false_closures),
           std::to_string(cell.true_kept()),
           std::to_string(cell.false_kept()),
-          digits(cell.rmse_m()),
+          digits(cell.rmse_m(), 2),
           fixed(cell.rounds(), 0) + (cell.decided() ? "" : "+"),
           bytes_text(cell.bytes()),
           fixed(cell.cpu_s(), 2)};

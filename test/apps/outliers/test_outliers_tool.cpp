@@ -56,8 +56,8 @@ TEST_CASE("Noise is given or estimated, in the words of kimera_multi_pgo", "[out
     return result.output;
   };
   CHECK_THAT(output("off"), !Contains("as noisy"));
-  CHECK_THAT(output("2.5"), Contains("closures taken to be 2.5 times as noisy as the file says"));
-  CHECK_THAT(folder.read("out.json"), Contains("\"noise_scale\": 2.5"));
+  CHECK_THAT(output("250"), Contains("closures taken to be 250 times as noisy as the file says"));
+  CHECK_THAT(folder.read("out.json"), Contains("\"noise_scale\": 250"));
   (void)output("any");
   CHECK_THAT(folder.read("out.json"), !Contains("\"noise_scale\": 1,"));  // they agree far better
   CHECK_THAT(output("larger"), !Contains("as noisy"));
