@@ -40,23 +40,28 @@ void add_pair(std::vector<ReportCell>& row, const std::optional<double>& before,
 }
 
 ReportTable error_table(const std::vector<ReportInput::World>& worlds) {
-  ReportTable table{
-      .caption = "Fig. 7 as numbers: mesh error before and after the correction [cm]",
-      .groups = {{"", 1}, {"as the paper measures it", 2}, {"without what no robot saw", 2}},
-      .columns = {"mesh", "before", "after", "before", "after"}};
+  ReportTable table{.caption = "Fig. 7 as numbers: mesh error before and after the correction [cm]",
+                    .groups = {{"", 1},
+                               {"as the paper measures it", 2},
+                               {"without what no robot saw", 2},
+                               {"the way back", 2}},
+                    .columns = {"mesh", "before", "after", "before", "after", "before", "after"}};
   for (const auto& [config, results] : worlds)
     for (const NamedMesh& mesh : meshes_of(*results)) {
       std::vector<ReportCell> row{{config->title + ", " + mesh.name}};
       const auto& [before, after] = mesh.mesh;
       add_pair(row, centimetres(before.error_m), centimetres(after.error_m), 2, true);
       add_pair(row, centimetres(before.seen_error_m), centimetres(after.seen_error_m), 2, true);
+      add_pair(row, centimetres(before.back_error_m), centimetres(after.back_error_m), 2, true);
       table.rows.push_back(std::move(row));
     }
   table.note =
       "Mean distance from points of the true mesh, up to 1000 a square metre and two millions in "
       "all, to the nearest of the estimated one, after ICP of all together; only true points "
-      "within 0.5 m of it count. The right half leaves out true surface past the mesh's rim or "
-      "behind it.";
+      "within 0.5 m of it count. The middle leaves out true surface past the mesh's rim or behind "
+      "it. The way back: from points of the estimated mesh to the true one. Several copies of a "
+      "surface, spread about it, have a nearer one to most true points than copies that agree: of "
+      "a merged mesh only the way back tells the two apart.";
   return table;
 }
 

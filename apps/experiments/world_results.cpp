@@ -23,7 +23,8 @@ MeshNumbers mesh_numbers(const YAML::Node& mesh) {
   return {number_at(mesh, "truth_to_estimate.point.mean_m"),
           number_at(mesh, "seen_truth_to_estimate.point.mean_m"),
           scaled(number_at(mesh, "truth_to_estimate.labels.accuracy"), 100.0),
-          scaled(number_at(mesh, "seen_truth_to_estimate.labels.accuracy"), 100.0)};
+          scaled(number_at(mesh, "seen_truth_to_estimate.labels.accuracy"), 100.0),
+          number_at(mesh, "estimate_to_truth.point.mean_m")};
 }
 
 // The entry of a list of objects that has this name.

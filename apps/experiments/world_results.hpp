@@ -15,6 +15,7 @@ struct MeshNumbers {
   std::optional<double> seen_error_m;    ///< Without true surface that no robot can have seen.
   std::optional<double> labels_percent;  ///< Right ones, at the points of error_m.
   std::optional<double> seen_labels_percent;
+  std::optional<double> back_error_m;  ///< From every point of the mesh to the true one.
 };
 
 /// The same mesh as odometry built it, and after its correction.
