@@ -24,6 +24,9 @@ constexpr const char* kAbout =
     "FILE is a g2o file, 2D or 3D, dealt out to --robots robots, or a folder with one *.csv or\n"
     "*.g2o per robot. The cost is the chordal one without 1/2, weights as SE-Sync reads them:\n"
     "  F = sum kappa |R_j - R_i R_ij|^2 + tau |t_j - t_i - R_i t_ij|^2\n"
+    "Where a g2o file says which way is up at a pose (EDGE_SE3_PRIOR with information on the tilt\n"
+    "alone, as kimera_multi_robot writes it), |R_i up_i - z|^2 / sigma_i^2 is added; local, rbcd,\n"
+    "centralized and newton know of that. Other priors are refused.\n"
     "All methods start from the chordal initialisation of the whole graph, timed apart (local: "
     "from\n"
     "each robot's own).\n\n"
@@ -59,6 +62,7 @@ struct Options {
   std::size_t robots = 1;
   km::PgoOptions pgo;
   double optimum = 0.0;
+  bool no_vertical = false;
   bool robust = false;
   km::NoiseModel noise;
   km::GncAgentOptions gnc;
@@ -125,6 +129,8 @@ void define(CLI::App& app, Options& options) {
   app.add_flag("--verify", options.pgo.verify,
                "rbcd: the team verifies its result itself, and goes on one rank higher if a\n"
                "direction leads down");
+  app.add_flag("--no-vertical", options.no_vertical,
+               "Leave out what the files say of which way is up");
   app.add_option("--optimum", options.optimum, "The optimum, if known: it is not computed then")
       ->check(CLI::PositiveNumber);
   app.add_option("--json", options.json, "Also write every round to this file, as JSON");
@@ -207,6 +213,11 @@ km::TeamGraph read_and_check(const Options& options, const CLI::App& app) {
   if (app.count("--robots") > 0 && graph.robots() != options.robots)
     throw std::runtime_error("--robots " + std::to_string(options.robots) + ": there are " +
                              std::to_string(graph.robots()) + " robots in the folder or partition");
+  if (options.no_vertical) graph.verticals.clear();
+  if (options.robust && !graph.verticals.empty())
+    throw std::runtime_error("--robust gnc does not know verticals, and the graph has " +
+                             std::to_string(graph.verticals.size()) +
+                             ": leave them out by --no-vertical");
   return graph;
 }
 

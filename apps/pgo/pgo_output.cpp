@@ -1,5 +1,6 @@
 #include "apps/pgo/pgo_output.hpp"
 
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <stdexcept>
@@ -42,6 +43,9 @@ void write_poses(const std::filesystem::path& file, const TeamGraph& graph,
     result.edges.push_back({graph.ids[static_cast<std::size_t>(e.i)],
                             graph.ids[static_cast<std::size_t>(e.j)], e.T_i_j,
                             covariance_of({e.kappa, e.tau})});
+  for (const VerticalPrior& v : graph.verticals)
+    result.verticals.push_back(
+        {graph.ids[static_cast<std::size_t>(v.pose)], {v.up, 1.0 / std::sqrt(v.weight)}});
   write_g2o(file, result);
 }
 

@@ -77,15 +77,19 @@ std::string verification_text(const TeamVerification& verification) {
          digits(verification.lambda_min, 3) + ")\n";
 }
 
+std::string verticals_text(const TeamGraph& graph) {
+  return graph.verticals.empty() ? "" : std::to_string(graph.verticals.size()) + " verticals, ";
+}
+
 }  // namespace
 
 std::string pgo_text(const TeamGraph& graph, const PgoRun& run) {
   std::ostringstream text;
   text << to_string(run.method) << ": " << graph.poses() << " poses, " << graph.edges.size()
-       << " edges, " << graph.robots() << (graph.robots() == 1 ? " robot\n" : " robots\n")
-       << table(run) << "chordal start in " << fixed(run.start_s, 3) << " s, optimum "
-       << digits(run.optimum, 9) << ", rounded cost " << digits(run.rounded_cost, 9) << ", rank "
-       << run.rank << '\n';
+       << " edges, " << verticals_text(graph) << graph.robots()
+       << (graph.robots() == 1 ? " robot\n" : " robots\n") << table(run) << "chordal start in "
+       << fixed(run.start_s, 3) << " s, optimum " << digits(run.optimum, 9) << ", rounded cost "
+       << digits(run.rounded_cost, 9) << ", rank " << run.rank << '\n';
   text << (run.certificate.certified ? "certified" : "not certified")
        << ": the cost lies above that of any poses by at most "
        << digits(std::max(run.certificate.relative_gap, 1e-12), 2) << " of itself (lambda_min "
@@ -99,6 +103,7 @@ void write_pgo_json(std::ostream& out, const TeamGraph& graph, const PgoRun& run
   json.begin_object();
   json.field("poses", graph.poses());
   json.field("edges", graph.edges.size());
+  json.field("verticals", graph.verticals.size());
   json.field("robots", graph.robots());
   json.field("method", to_string(run.method));
   json.key("rounds");

@@ -10,8 +10,8 @@ namespace km {
 /// What was reached, and after how many rounds, bytes and seconds each gap to the optimum.
 [[nodiscard]] std::string pgo_text(const TeamGraph& graph, const PgoRun& run);
 
-/// {"poses", "edges", "robots", "method", "rounds": [{"cost", "gradient_norm", "bytes",
-/// "critical_path_s", "total_cpu_s"}], "rounded_cost", "lambda_min", "certified", "rank",
+/// {"poses", "edges", "verticals", "robots", "method", "rounds": [{"cost", "gradient_norm",
+/// "bytes", "critical_path_s", "total_cpu_s"}], "rounded_cost", "lambda_min", "certified", "rank",
 /// "optimum", "start_cpu_s"}. rounds[0] is the start; bytes and times are sums up to the round.
 void write_pgo_json(std::ostream& out, const TeamGraph& graph, const PgoRun& run);
 

@@ -62,10 +62,31 @@ Eigen::Index numerical_rank(const LiftedPoses& X, int dimension) {
 }
 
 double optimum_of(const TeamGraph& graph, const std::vector<SE3>& start) {
-  Staircase staircase(graph.edges, lift(start, 3));
+  Staircase staircase(graph.edges, lift(start, 3), {}, graph.verticals);
   while (staircase.step()) {
   }
   return staircase.cost();
+}
+
+// Methods that were published for edges alone, and know of nothing else.
+void check_verticals(const TeamGraph& graph, const PgoOptions& options) {
+  const auto refuse = [&](const std::string& what) {
+    throw std::invalid_argument(what + ", and the graph has " +
+                                std::to_string(graph.verticals.size()) +
+                                ": leave them out by --no-vertical");
+  };
+  if (graph.verticals.empty()) return;
+  if (options.method == SolveMethod::kDgs || options.method == SolveMethod::kRbcdAccelerated ||
+      options.method == SolveMethod::kRbcdAsynchronous)
+    refuse(std::string("method ") + to_string(options.method) + " does not know verticals");
+  if (options.verify) refuse("the team's own verification (--verify) does not know verticals");
+  if (options.own_start) refuse("the team's own start (--own-start) does not know verticals");
+}
+
+// In the frame of the first pose; with verticals, at its place and heading, with z up.
+Eigen::MatrixXd world_of(const TeamGraph& graph, const LiftedPoses& X) {
+  if (graph.verticals.empty()) return X.leftCols<4>();
+  return level(X.leftCols<4>(), Eigen::Vector3d::Zero());
 }
 
 // The method's own part of the run: rounds, poses, and what it has verified itself.
@@ -109,16 +130,17 @@ const char* to_string(SolveMethod method) {
 
 PgoRun run_pgo(const TeamGraph& graph, const PgoOptions& options, const TeamMeter& meter) {
   PgoRun run;
+  check_verticals(graph, options);
   run.method = options.method;
   const double begin_s = meter.cpu_s();
-  const std::vector<SE3> start = chordal_initialisation(graph.poses(), graph.edges);
+  const std::vector<SE3> start =
+      levelled(chordal_initialisation(graph.poses(), graph.edges), graph.verticals);
   run.start_s = meter.cpu_s() - begin_s;
   solve(graph, start, options, meter, run);
-  run.certificate = certify(QuadraticProblem(run.X.rows(), graph.poses(), graph.edges, {}), run.X);
+  run.certificate = certify(problem_of(graph, run.X.rows()), run.X);
   run.rank = numerical_rank(run.X, graph.dimension);
-  run.T_world_kf = round_to_poses(run.X, run.X.leftCols<4>());
-  run.rounded_cost =
-      QuadraticProblem(3, graph.poses(), graph.edges, {}).cost(lift(run.T_world_kf, 3));
+  run.T_world_kf = round_to_poses(run.X, world_of(graph, run.X));
+  run.rounded_cost = problem_of(graph, 3).cost(lift(run.T_world_kf, 3));
   run.optimum = options.optimum ? *options.optimum : optimum_of(graph, start);
   return run;
 }

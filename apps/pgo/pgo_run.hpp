@@ -40,7 +40,7 @@ struct PgoRun {
   double start_s = 0.0;           ///< CPU time of the chordal initialisation.
   std::vector<TeamRound> rounds;  ///< [0]: the start.
   LiftedPoses X;
-  std::vector<SE3> T_world_kf;  ///< Rounded, in the frame of the first pose.
+  std::vector<SE3> T_world_kf;  ///< Rounded, in the frame of the first pose; z up with verticals.
   double rounded_cost = 0.0;
   double optimum = 0.0;     ///< The certified one; the least cost known if none is.
   Certificate certificate;  ///< Central.
@@ -49,7 +49,7 @@ struct PgoRun {
 };
 
 /// Solves `graph` from its chordal initialisation, which is computed centrally and not counted,
-/// unless the team finds it itself.
+/// unless the team finds it itself; with verticals, levelled by them as a whole.
 /// Throws std::invalid_argument if method and graph do not go together.
 [[nodiscard]] PgoRun run_pgo(const TeamGraph& graph, const PgoOptions& options,
                              const TeamMeter& meter);

@@ -14,12 +14,27 @@ constexpr double kRounding = 1e-12;  // of the precisions that meet in a pose
 constexpr int kMaxProducts = 60;
 constexpr double kEigenTolerance = 1e-6;
 
-Eigen::SparseMatrix<double> rotations_shifted(const Eigen::SparseMatrix<double>& S, double shift,
-                                              double held) {
-  Eigen::SparseMatrix<double> A = S;
-  A.diagonal() += Eigen::Vector4d(shift, shift, shift, 0.0).replicate(S.rows() / 4, 1);
-  A.coeffRef(3, 3) += held;
-  return A;
+// 1 on the columns that are of unit length in every solution, the rotations' and the vertical's; 0
+// on translations and on what is only there to fill the vertical's block.
+Eigen::VectorXd unit_columns(const QuadraticProblem& problem) {
+  const Eigen::Index poses = problem.poses();
+  Eigen::VectorXd units = Eigen::Vector4d(1.0, 1.0, 1.0, 0.0).replicate(poses, 1);
+  if (problem.verticals().empty()) return units;
+  units.conservativeResize(4 * poses + 4);
+  units.tail<4>() = Eigen::Vector4d::Unit(2);
+  return units;
+}
+
+// `S` with what no cost depends on held: one translation, and the filling of the vertical's block.
+Eigen::SparseMatrix<double> hold(Eigen::SparseMatrix<double> S, const QuadraticProblem& problem,
+                                 double held) {
+  S.coeffRef(3, 3) += held;
+  if (!problem.verticals().empty())
+    for (const int filling : {0, 1, 3}) {
+      const Eigen::Index k = 4 * problem.poses() + filling;
+      S.coeffRef(k, k) += held;
+    }
+  return S;
 }
 
 struct Factor {
@@ -27,12 +42,14 @@ struct Factor {
   BlockCholesky cholesky;
 };
 
-// The least shift of a geometric series, from `shift` on, that makes S definite.
-Factor factorise(const Eigen::SparseMatrix<double>& S, double shift, double held) {
+// The least shift on `units` of a geometric series, from `shift` on, that makes S definite.
+Factor factorise(const Eigen::SparseMatrix<double>& S, const Eigen::VectorXd& units, double shift) {
   constexpr double kGrowth = 30.0;
-  for (;; shift *= kGrowth)
-    if (auto cholesky = BlockCholesky::try_factorise(rotations_shifted(S, shift, held)))
-      return {shift, std::move(*cholesky)};
+  for (;; shift *= kGrowth) {
+    Eigen::SparseMatrix<double> A = S;
+    A.diagonal() += shift * units;
+    if (auto cholesky = BlockCholesky::try_factorise(A)) return {shift, std::move(*cholesky)};
+  }
 }
 
 // The best translations for the rotations of X: with others, which over long chains differ by much
@@ -56,9 +73,26 @@ LiftedPoses with_best_translations(const QuadraticProblem& problem, LiftedPoses 
   return X;
 }
 
-Eigen::VectorXd without_translations(Eigen::VectorXd v) {
-  for (Eigen::Index i = 3; i < v.size(); i += 4) v(i) = 0.0;
-  return v;
+// The vertical's rows and columns of S. On the rotations the priors are linear, |Y up| being 1:
+// what they add to Q and to Lambda there is the same.
+void append_vertical(const QuadraticProblem& problem, const LiftedPoses& X,
+                     std::vector<Eigen::Triplet<double>>& entries) {
+  const Eigen::VectorXd z = lifting_matrix(X.rows()).col(2);
+  const int place = static_cast<int>(4 * problem.poses()) + 2;
+  for (const VerticalPrior& v : problem.verticals()) {
+    for (int c = 0; c < 3; ++c) {
+      const int row = static_cast<int>(4 * v.pose) + c;
+      entries.emplace_back(row, place, -v.weight * v.up(c));
+      entries.emplace_back(place, row, -v.weight * v.up(c));
+    }
+    entries.emplace_back(place, place, v.weight * z.dot(X.middleCols<3>(4 * v.pose) * v.up));
+  }
+}
+
+// A multiple of [X z]'s row along z, to which S is blind, puts the vertical back in its place.
+Eigen::VectorXd with_vertical_held(const Eigen::VectorXd& direction, const LiftedPoses& X) {
+  const double moved = direction.size() > X.cols() ? direction(X.cols() + 2) : 0.0;
+  return direction.head(X.cols()) - moved * X.row(2).transpose();
 }
 
 }  // namespace
@@ -66,36 +100,43 @@ Eigen::VectorXd without_translations(Eigen::VectorXd v) {
 Eigen::SparseMatrix<double> certificate_matrix(const QuadraticProblem& problem,
                                                const LiftedPoses& X) {
   const LiftedPoses XQ = 0.5 * problem.euclidean_gradient(X);
-  Eigen::SparseMatrix<double> S = problem.data_matrix();
+  const Eigen::SparseMatrix<double>& Q = problem.data_matrix();
   std::vector<Eigen::Triplet<double>> entries;
-  entries.reserve(static_cast<std::size_t>(9 * problem.poses()));
+  entries.reserve(static_cast<std::size_t>(Q.nonZeros() + 9 * problem.poses()) +
+                  7 * problem.verticals().size());
+  for (Eigen::Index j = 0; j < Q.cols(); ++j)
+    for (Eigen::SparseMatrix<double>::InnerIterator q(Q, j); q; ++q)
+      entries.emplace_back(static_cast<int>(q.row()), static_cast<int>(j), q.value());
   for (Eigen::Index i = 0; i < problem.poses(); ++i) {
     const Eigen::Matrix3d product = X.middleCols<3>(4 * i).transpose() * XQ.middleCols<3>(4 * i);
     const Eigen::Matrix3d Lambda = 0.5 * (product + product.transpose());
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c)
         entries.emplace_back(static_cast<int>(4 * i) + r, static_cast<int>(4 * i) + c,
-                             Lambda(r, c));
+                             -Lambda(r, c));
   }
-  Eigen::SparseMatrix<double> all(S.rows(), S.cols());
-  all.setFromTriplets(entries.begin(), entries.end());
-  S -= all;
+  append_vertical(problem, X, entries);
+  const Eigen::Index size = Q.rows() + (problem.verticals().empty() ? 0 : 4);
+  Eigen::SparseMatrix<double> S(size, size);
+  S.setFromTriplets(entries.begin(), entries.end());
   return S;
 }
 
 Certificate certify(const QuadraticProblem& problem, const LiftedPoses& X) {
   const Eigen::Vector2d degree = problem.largest_degrees();
   const LiftedPoses best = with_best_translations(problem, X, degree.y());
-  const Eigen::SparseMatrix<double> S = certificate_matrix(problem, best);
+  const Eigen::VectorXd units = unit_columns(problem);
+  const Eigen::SparseMatrix<double> S =
+      hold(certificate_matrix(problem, best), problem, degree.y());
   const double cost = problem.cost(X);
-  const double trace = 3.0 * static_cast<double>(problem.poses());
+  const double trace = units.sum();
   const double threshold = std::max(kCertifiedGap * cost / trace, kRounding * degree.x());
-  const Factor factor = factorise(S, threshold, degree.y());
+  const Factor factor = factorise(S, units, threshold);
 
   // Rotations of (S + shift)^-1 applied to rotations: the inverse of the shifted Schur complement.
   const auto inverse = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
-    return without_translations(
-        factor.cholesky.solve_rows(without_translations(v).transpose()).transpose());
+    const Eigen::VectorXd on_units = units.cwiseProduct(v);
+    return units.cwiseProduct(factor.cholesky.solve_rows(on_units.transpose()).transpose());
   };
   // Another start at every rank: a direction left in the last escape hides its multiples.
   const LanczosResult largest = largest_eigenpair(inverse, S.rows(), kMaxProducts, kEigenTolerance,
@@ -106,7 +147,8 @@ Certificate certify(const QuadraticProblem& problem, const LiftedPoses& X) {
   const double scale = std::max(cost, kRounding * degree.x() * trace);
   certificate.relative_gap = std::max(0.0, (cost - bound) / scale);
   certificate.certified = certificate.relative_gap <= kCertifiedGap;
-  certificate.direction = factor.cholesky.solve_rows(largest.vector.transpose()).transpose();
+  certificate.direction =
+      with_vertical_held(factor.cholesky.solve_rows(largest.vector.transpose()).transpose(), best);
   certificate.direction.normalize();
   return certificate;
 }

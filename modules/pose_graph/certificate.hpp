@@ -8,7 +8,12 @@ namespace km {
 /// pose i and 0 on its translation (Rosen et al., "SE-Sync", IJRR 2019, before the
 /// translations are eliminated). At a critical point X S = 0, and if S is positive semidefinite
 /// there, X is a global minimum of the relaxation at every rank.
-/// Precondition: `problem` has no public edges.
+///
+/// With vertical priors the vertical z is a variable, too, a unit vector: nothing is lost, since
+/// the cost does not change when everything turns, and w ||Y_i up_i - z||^2 becomes a quadratic
+/// form in [X z]. S is then 4(n + 1) x 4(n + 1): z is the third column of a last block whose other
+/// rows and columns are zero, and the multiplier of its length is z^T sum w (z - Y_i up_i). At a
+/// critical point [X 0 0 z 0] S = 0. Precondition: `problem` has no public edges.
 [[nodiscard]] Eigen::SparseMatrix<double> certificate_matrix(const QuadraticProblem& problem,
                                                              const LiftedPoses& X);
 
@@ -18,14 +23,16 @@ struct [[nodiscard]] Certificate {
   double lambda_min = 0.0;  ///< Smallest eigenvalue of S with the translations eliminated.
   double relative_gap =
       0.0;  ///< The cost lies above the relaxation's minimum by at most this part.
-  /// Direction of the smallest eigenvalue, 4n, its translations the best ones for its rotations.
+  /// Direction of the smallest eigenvalue, 4n, its translations the best ones for its rotations;
+  /// the vertical stays where it is.
   Eigen::VectorXd direction = {};
 };
 
 /// Bounds from below what any feasible point of any rank can cost, and with it how far feasible `X`
 /// lies above: with the translations eliminated, tr(Q Z) = tr(Lambda) + tr(S Z) >= tr(Lambda) +
-/// 3n lambda_min for every feasible Z, whose trace is 3n; at a critical point tr(Lambda) is the
-/// cost. Nothing costs less than 0. S is taken at the best translations for the rotations of `X`.
+/// 3n lambda_min for every feasible Z, whose trace is 3n (and 1 more for the vertical); tr(Lambda)
+/// is the cost. Nothing costs less than 0. S is taken at the best translations for the rotations of
+/// `X`.
 ///
 /// S, shifted on the rotations until a sparse Cholesky factorisation finds it definite (the test of
 /// Rosen, "Accelerating Certifiable Estimation with Preconditioned Eigensolvers", RA-L 2022), gives

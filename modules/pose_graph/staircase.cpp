@@ -19,9 +19,9 @@ constexpr int kMaxCgIterations = 2000;
 }  // namespace
 
 Staircase::Staircase(std::vector<BlockEdge> edges, LiftedPoses start,
-                     const StaircaseOptions& options)
+                     const StaircaseOptions& options, std::vector<VerticalPrior> verticals)
     : options_(options),
-      problem_(start.rows(), pose_count(start), std::move(edges), {}),
+      problem_(start.rows(), pose_count(start), std::move(edges), {}, std::move(verticals)),
       X_(std::move(start)) {
   problem_.set_rotation_shift(kRotationShift);
   restart();
@@ -66,7 +66,8 @@ bool Staircase::resume() {
 }
 
 void Staircase::climb() {
-  QuadraticProblem higher(X_.rows() + 1, problem_.poses(), problem_.edges(), {});
+  QuadraticProblem higher(X_.rows() + 1, problem_.poses(), problem_.edges(), {},
+                          problem_.verticals());
   higher.set_rotation_shift(kRotationShift);
   X_ = escape(higher, X_, certificate_->direction);
   problem_ = std::move(higher);

@@ -19,8 +19,9 @@ struct StaircaseOptions {
 /// where the relaxation is exact, and cheapest. Not thread-safe.
 class Staircase {
  public:
-  /// Throws std::invalid_argument if `edges` are not usable, see QuadraticProblem.
-  Staircase(std::vector<BlockEdge> edges, LiftedPoses start, const StaircaseOptions& options = {});
+  /// Throws std::invalid_argument if `edges` or `verticals` are not usable, see QuadraticProblem.
+  Staircase(std::vector<BlockEdge> edges, LiftedPoses start, const StaircaseOptions& options = {},
+            std::vector<VerticalPrior> verticals = {});
 
   /// One Newton step, or one verification. False: all is done.
   bool step();

@@ -1,5 +1,6 @@
 #include "modules/pose_graph/vertical_prior.hpp"
 
+#include <Eigen/Geometry>
 #include <Eigen/SVD>
 
 #include "modules/pose_graph/stiefel.hpp"
@@ -8,6 +9,17 @@ namespace km {
 
 double vertical_cost(const VerticalPrior& prior, const Eigen::Ref<const Eigen::MatrixXd>& Y) {
   return prior.weight * (Y * prior.up - lifting_matrix(Y.rows()).col(2)).squaredNorm();
+}
+
+std::vector<SE3> levelled(std::vector<SE3> poses, std::span<const VerticalPrior> priors) {
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  for (const VerticalPrior& prior : priors)
+    up += prior.weight * (poses[static_cast<std::size_t>(prior.pose)].linear() * prior.up);
+  if (up.isZero(0.0)) return poses;
+  const auto R = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
+  const SE3 turn = make_pose(R.toRotationMatrix(), Eigen::Vector3d::Zero());
+  for (SE3& pose : poses) pose = turn * pose;
+  return poses;
 }
 
 Eigen::MatrixXd level(const Eigen::MatrixXd& world, const Eigen::Vector3d& origin) {

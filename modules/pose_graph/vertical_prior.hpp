@@ -1,6 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "modules/core/geometry.hpp"
 
 namespace km {
 
@@ -17,6 +21,11 @@ struct VerticalPrior {
 /// Of lifted rotation `Y` (r x 3).
 [[nodiscard]] double vertical_cost(const VerticalPrior& prior,
                                    const Eigen::Ref<const Eigen::MatrixXd>& Y);
+
+/// `poses` turned as a whole, about the origin and the least, so that the weighted sum of what
+/// their priors hold for up, R_i up_i, points to z. As they are if there are no priors.
+[[nodiscard]] std::vector<SE3> levelled(std::vector<SE3> poses,
+                                        std::span<const VerticalPrior> priors);
 
 /// `world` = [Y p] (r x 4) turned the least, about its point `origin`, so that its z axis is the
 /// vertical z of the lifted frame.

@@ -12,9 +12,10 @@
 namespace km {
 
 /// A chain of `poses` with edges also to the fifth pose after each and to a far one; exact but for
-/// noise of `sigma` in each component.
+/// noise of `sigma` in each component. Every third pose knows which way is up, equally noisy, if
+/// `vertical_weight` is positive.
 inline TeamGraph noisy_chain(Eigen::Index poses, std::size_t robots, double sigma,
-                             std::mt19937& rng) {
+                             std::mt19937& rng, double vertical_weight = 0.0) {
   std::normal_distribution<double> normal(0.0, sigma);
   std::vector<SE3> truth(1, SE3::Identity());
   for (Eigen::Index i = 1; i < poses; ++i) truth.push_back(truth.back() * random_pose(rng));
@@ -31,6 +32,12 @@ inline TeamGraph noisy_chain(Eigen::Index poses, std::size_t robots, double sigm
           truth[static_cast<std::size_t>(i)].inverse() * truth[static_cast<std::size_t>(j)];
       graph.edges.push_back({i, j, T * se3_exp(noise), 2.0, 3.0});
     }
+  }
+  for (Eigen::Index i = 0; vertical_weight > 0.0 && i < poses; i += 3) {
+    const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d up = truth[static_cast<std::size_t>(i)].linear().transpose() * z;
+    const Eigen::Vector3d noise(normal(rng), normal(rng), normal(rng));
+    graph.verticals.push_back({i, (up + noise).normalized(), vertical_weight});
   }
   return graph;
 }

@@ -36,13 +36,14 @@ void check_connected(const TeamGraph& graph) {
 }  // namespace
 
 NewtonTeam::NewtonTeam(const TeamGraph& graph, Eigen::Index rank, const LiftedPoses& start,
-                       const NewtonOptions& options)
+                       NewtonOptions options)
     : rank_(rank) {
   if (rank < 3) throw std::invalid_argument("NewtonTeam: rank is " + std::to_string(rank));
   if (start.size() > 0 && (start.rows() != rank || start.cols() != 4 * graph.poses()))
     throw std::invalid_argument("NewtonTeam: start poses are " + std::to_string(start.rows()) +
                                 'x' + std::to_string(start.cols()));
   check_connected(graph);
+  options.upright = !graph.verticals.empty();
   std::set<RobotId> team;
   for (std::size_t k = 0; k < graph.robots(); ++k) team.insert(static_cast<RobotId>(k));
   for (std::size_t k = 0; k < graph.robots(); ++k) {
@@ -56,7 +57,7 @@ NewtonTeam::NewtonTeam(const TeamGraph& graph, Eigen::Index rank, const LiftedPo
       poses.clear();
     }
     agents_.emplace_back(RobotEdges{static_cast<RobotId>(k), part.poses, std::move(part.own_edges),
-                                    std::move(part.edges_to)},
+                                    std::move(part.edges_to), std::move(part.verticals)},
                          team, graph.dimension, options, std::move(poses));
   }
 }

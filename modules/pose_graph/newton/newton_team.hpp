@@ -12,11 +12,12 @@ class NewtonTeam : public TeamSolver {
  public:
   /// `start` is r x 4n in the numbering of `graph`, poses lifted as by lift(): the method stays
   /// among those, in which the gradient of the lifted cost lies. Empty: chordal initialisation by
-  /// the team itself; then blocks are lifted identities until it is done.
+  /// the team itself; then blocks are lifted identities until it is done. A graph with verticals
+  /// takes a start, with z up.
   /// Throws std::invalid_argument if the shape is not that, the rank is below 3, or the graph is
-  /// refused (see RobotGraph) or not connected.
+  /// refused (see RobotGraph) or not connected, or has verticals without a start.
   NewtonTeam(const TeamGraph& graph, Eigen::Index rank, const LiftedPoses& start,
-             const NewtonOptions& options);
+             NewtonOptions options);
 
   bool step(RoundMeter& meter) override;
   [[nodiscard]] const LiftedPoses& block(std::size_t robot) const override {

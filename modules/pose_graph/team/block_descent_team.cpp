@@ -16,7 +16,7 @@ BlockDescentTeam::BlockDescentTeam(const TeamGraph& graph, const LiftedPoses& st
   for (std::size_t k = 0; k < graph.robots(); ++k) {
     const RobotPart part = part_of(graph, k);
     const LiftedPoses X = start.middleCols(4 * graph.first[k], 4 * part.poses);
-    Robot robot{.block = SessionBlock(X, part.own_edges, part.edges_to),
+    Robot robot{.block = SessionBlock(X, part.own_edges, part.edges_to, part.verticals),
                 .neighbours = {},
                 .earlier = {},
                 .gradient_norm = 0.0,

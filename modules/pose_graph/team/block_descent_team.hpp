@@ -31,8 +31,8 @@ struct BlockDescentOptions {
 /// SessionBlock, and their messages. The first round tells all public poses.
 class BlockDescentTeam : public TeamSolver {
  public:
-  /// `start`: feasible poses of the whole graph, r x 4n. Throws std::invalid_argument if
-  /// acceleration is asked of the greedy schedule.
+  /// `start`: feasible poses of the whole graph, r x 4n, z up if it has verticals. Throws
+  /// std::invalid_argument if acceleration is asked of the greedy schedule.
   BlockDescentTeam(const TeamGraph& graph, const LiftedPoses& start,
                    const BlockDescentOptions& options);
 

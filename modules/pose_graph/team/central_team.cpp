@@ -4,7 +4,9 @@ namespace km {
 
 CentralTeam::CentralTeam(const TeamGraph& graph, const LiftedPoses& start,
                          const StaircaseOptions& options)
-    : first_(graph.first), staircase_(graph.edges, start, options), blocks_(graph.robots()) {
+    : first_(graph.first),
+      staircase_(graph.edges, start, options, graph.verticals),
+      blocks_(graph.robots()) {
   copy_blocks();
 }
 

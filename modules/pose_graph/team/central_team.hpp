@@ -12,6 +12,7 @@ namespace km {
 /// not counted.
 class CentralTeam : public TeamSolver {
  public:
+  /// `start`: r x 4n, z up if the graph has verticals.
   CentralTeam(const TeamGraph& graph, const LiftedPoses& start,
               const StaircaseOptions& options = {});
 

@@ -21,15 +21,24 @@ SE3 pose_at(const LiftedPoses& X, Eigen::Index i) {
   return make_pose(X.middleCols<3>(4 * i), X.col(4 * i + 3));
 }
 
+std::vector<SE3> start_of(const RobotPart& part) {
+  return levelled(chordal_initialisation(part.poses, part.own_edges), part.verticals);
+}
+
+SE3 levelled_frame(const SE3& T, const Eigen::Vector3d& origin) {
+  const Eigen::MatrixXd levelled = level(T.matrix().topRows<3>(), origin);
+  return make_pose(levelled.leftCols<3>(), levelled.col(3));
+}
+
 }  // namespace
 
 LocalTeam::LocalTeam(const TeamGraph& graph)
     : tree_(breadth_first_tree(neighbours_in(graph))), depth_(graph.robots(), 0) {
   for (std::size_t k = 0; k < graph.robots(); ++k) {
     parts_.push_back(part_of(graph, k));
+    upright_ = upright_ && !parts_[k].verticals.empty();
     try {
-      const auto start = chordal_initialisation(parts_[k].poses, parts_[k].own_edges);
-      blocks_.push_back(lift(start, kRank));
+      blocks_.push_back(lift(start_of(parts_[k]), kRank));
     } catch (const std::invalid_argument&) {
       throw std::invalid_argument("robot " + std::to_string(k) +
                                   " cannot solve alone: its own edges do not connect its poses");
@@ -51,9 +60,8 @@ bool LocalTeam::step(RoundMeter& meter) {
 
 void LocalTeam::solve(std::size_t k) {
   const RobotPart& part = parts_[k];
-  const auto start = chordal_initialisation(part.poses, part.own_edges);
-  const QuadraticProblem problem(kRank, part.poses, part.own_edges, {});
-  blocks_[k] = minimise(problem, lift(start, kRank), kExact).X;
+  const QuadraticProblem problem(kRank, part.poses, part.own_edges, {}, part.verticals);
+  blocks_[k] = minimise(problem, lift(start_of(part), kRank), kExact).X;
 }
 
 void LocalTeam::join(std::size_t k, RoundMeter& meter) {
@@ -66,7 +74,8 @@ void LocalTeam::join(std::size_t k, RoundMeter& meter) {
   meter.run(k, [&] {
     const SE3 T_other_own = closure.from_own ? closure.T_from_to.inverse() : closure.T_from_to;
     const SE3 T_frame_own = pose_at(blocks_[k], Eigen::Index{closure.own});
-    const SE3 T_world_frame = pose_at(told.X, 0) * T_other_own * T_frame_own.inverse();
+    SE3 T_world_frame = pose_at(told.X, 0) * T_other_own * T_frame_own.inverse();
+    if (upright_) T_world_frame = levelled_frame(T_world_frame, T_frame_own.translation());
     for (Eigen::Index i = 0; i < pose_count(blocks_[k]); ++i)
       blocks_[k].middleCols<4>(4 * i) =
           (T_world_frame * pose_at(blocks_[k], i)).matrix().topRows<3>();

@@ -9,7 +9,8 @@ namespace km {
 
 /// What cooperation is measured against: every robot solves its own graph alone (round 1); then the
 /// frames are joined along a tree of robots, each to its parent's by one closure between them, the
-/// first in the graph (one round for each level of the tree). Rank 3.
+/// first in the graph (one round for each level of the tree), level if all robots know which way is
+/// up. Rank 3.
 class LocalTeam : public TeamSolver {
  public:
   /// Throws std::invalid_argument, naming the robot, if the own edges of one do not connect its
@@ -26,6 +27,7 @@ class LocalTeam : public TeamSolver {
   void join(std::size_t k, RoundMeter& meter);
 
   std::vector<RobotPart> parts_;
+  bool upright_ = true;
   TeamTree tree_;
   std::vector<std::size_t> depth_;
   std::vector<LiftedPoses> blocks_;

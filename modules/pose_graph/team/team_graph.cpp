@@ -29,7 +29,14 @@ RobotPart part_of(const TeamGraph& graph, std::size_t robot) {
                                                            from_own, e.T_i_j, e.kappa, e.tau});
     }
   }
+  for (const VerticalPrior& prior : graph.verticals)
+    if (graph.robot_of(prior.pose) == robot)
+      part.verticals.push_back({prior.pose - begin, prior.up, prior.weight});
   return part;
+}
+
+QuadraticProblem problem_of(const TeamGraph& graph, Eigen::Index rank) {
+  return {rank, graph.poses(), graph.edges, {}, graph.verticals};
 }
 
 std::vector<Eigen::Index> separators_of(const TeamGraph& graph, std::size_t robot) {

@@ -18,6 +18,8 @@ struct TeamGraph {
   std::vector<Eigen::Index> first = {};  ///< N + 1 entries, ascending, from 0.
   std::vector<BlockEdge> edges = {};     ///< Each once; parallel ones all count.
   std::vector<KeyframeId> ids = {};      ///< Of the poses, as in the file.
+  /// Of poses that know which way is up, ascending. If there are any, solutions have z up.
+  std::vector<VerticalPrior> verticals = {};
 
   [[nodiscard]] std::size_t robots() const { return first.size() - 1; }
   [[nodiscard]] Eigen::Index poses() const { return first.back(); }
@@ -33,9 +35,13 @@ struct RobotPart {
   Eigen::Index poses = 0;
   std::vector<BlockEdge> own_edges = {};
   std::map<RobotId, std::vector<InterEdge>> edges_to = {};  ///< No empty entries.
+  std::vector<VerticalPrior> verticals = {};                ///< Numbered as the own edges.
 };
 
 [[nodiscard]] RobotPart part_of(const TeamGraph& graph, std::size_t robot);
+
+/// The cost of the whole graph at rank r. Throws std::invalid_argument as QuadraticProblem does.
+[[nodiscard]] QuadraticProblem problem_of(const TeamGraph& graph, Eigen::Index rank);
 
 /// Local numbers of the poses of `robot` that edges to others end on, ascending.
 [[nodiscard]] std::vector<Eigen::Index> separators_of(const TeamGraph& graph, std::size_t robot);

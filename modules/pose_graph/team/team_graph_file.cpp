@@ -52,6 +52,16 @@ void check_connected(const TeamGraph& graph, const std::string& file) {
                                to_string(graph.ids[static_cast<std::size_t>(i)]));
 }
 
+void add_vertical(TeamGraph& team, const std::map<KeyframeId, Eigen::Index>& number_of,
+                  const G2oVertical& prior, const std::string& file) {
+  const auto pose = number_of.find(prior.id);
+  if (pose == number_of.end())
+    throw std::runtime_error(file + ": the prior on " + to_string(prior.id) +
+                             " is on a vertex that the file lacks");
+  const auto& [up, sigma] = prior.vertical;
+  team.verticals.push_back({pose->second, up, 1.0 / (sigma * sigma)});
+}
+
 std::filesystem::path nonempty_folder(const std::filesystem::path& folder) {
   if (!std::filesystem::is_directory(folder))
     throw std::runtime_error(folder.string() + ": is not a folder");
@@ -144,6 +154,9 @@ TeamGraph deal(const G2oGraph& graph, const std::map<KeyframeId, std::size_t>& r
     team.edges.push_back(
         {number_of.at(e.from), number_of.at(e.to), e.T_from_to, weight.kappa, weight.tau});
   }
+  for (const G2oVertical& prior : graph.verticals) add_vertical(team, number_of, prior, file);
+  std::sort(team.verticals.begin(), team.verticals.end(),
+            [](const VerticalPrior& a, const VerticalPrior& b) { return a.pose < b.pose; });
   check_connected(team, file);
   return team;
 }
@@ -182,6 +195,8 @@ TeamGraph read_team_folder(const std::filesystem::path& folder) {
       all.vertices.push_back({{parts[k].robot, i}, SE3::Identity()});
       robot_of.emplace(KeyframeId{parts[k].robot, i}, k);
     }
+    for (const auto& [index, vertical] : parts[k].verticals)
+      all.verticals.push_back({{parts[k].robot, index}, vertical});
     for (const auto* edges : {&parts[k].odometry, &parts[k].intra_closures})
       all.edges.insert(all.edges.end(), edges->begin(), edges->end());
     for (const RelativePose& e : parts[k].inter_closures) {

@@ -21,8 +21,8 @@ namespace km {
 ///
 /// Rules: vertices may come in any order; estimates in the file are not used; parallel edges all
 /// count. Throws std::runtime_error "file: what" if there are fewer poses than robots, an edge
-/// names a vertex that the file lacks (a file without any vertices takes them from its edges), a
-/// weight is not usable, or the graph is not connected.
+/// or a prior names a vertex that the file lacks (a file without any vertices takes them from its
+/// edges), a weight is not usable, or the graph is not connected.
 [[nodiscard]] TeamGraph deal_contiguously(const G2oGraph& graph, std::size_t robots,
                                           const std::string& file);
 

@@ -19,8 +19,7 @@ std::vector<TeamRound> run_team(const TeamGraph& graph, TeamSolver& solver,
   TeamWork work;
   const auto record = [&] {
     const LiftedPoses X = team_poses(graph, solver);
-    if (!whole || whole->rank() != X.rows())
-      whole.emplace(X.rows(), graph.poses(), graph.edges, std::vector<PublicEdge>{});
+    if (!whole || whole->rank() != X.rows()) whole.emplace(problem_of(graph, X.rows()));
     const double gradient_norm = project_tangent(X, whole->euclidean_gradient(X)).norm();
     rounds.push_back({whole->cost(X), gradient_norm, work});
     return gradient_norm > options.gradient_tolerance;

@@ -25,7 +25,7 @@ class TeamSolver {
 
 /// State of the team after a round.
 struct TeamRound {
-  double cost = 0.0;           ///< Chordal, without 1/2, at the lifted poses.
+  double cost = 0.0;           ///< Chordal, without 1/2, at the lifted poses, with all verticals.
   double gradient_norm = 0.0;  ///< Riemannian, of the whole graph.
   TeamWork work;               ///< Up to and including this round.
 };

@@ -218,4 +218,79 @@ TEST_CASE("A planar graph costs what it costs in the plane", "[pgo]") {
   CHECK_THAT(result.output, Contains("\ncertified"));
 }
 
+namespace {
+
+// A square in space, twice round; every pose but the first knows which way is up.
+std::string upright_square_g2o() {
+  G2oGraph graph;
+  const auto edge = [&](std::uint32_t i, std::uint32_t j, double angle, double x) {
+    const Eigen::AngleAxisd R(angle, Eigen::Vector3d::UnitZ());
+    graph.edges.push_back({{0, i},
+                           {0, j},
+                           make_pose(R.toRotationMatrix(), {x, 0.02, 0.01}),
+                           1e-2 * Matrix6::Identity()});
+  };
+  for (std::uint32_t i = 0; i < 7; ++i) edge(i, i + 1, 1.58, 1.02);
+  for (std::uint32_t i = 0; i < 4; ++i) edge(i, i + 4, 0.005, 0.01);
+  for (std::uint32_t i = 1; i < 8; ++i)
+    graph.verticals.push_back({{0, i}, {Eigen::Vector3d(0.02, -0.01 * i, 1.0).normalized(), 0.01}});
+  std::ostringstream text;
+  write_g2o(text, graph);
+  return text.str();
+}
+
+}  // namespace
+
+TEST_CASE("Verticals of the file are used, told of, and written again", "[pgo][vertical]") {
+  const TemporaryFolder folder;
+  const auto graph = folder.write("square.g2o", upright_square_g2o());
+  const auto json = folder.path() / "out.json";
+  const auto solved = folder.path() / "solved.g2o";
+  const std::string method = GENERATE("newton", "rbcd", "centralized", "local");
+  CAPTURE(method);
+  const std::string options = graph.string() + " --robots 2 --rounds 100 --method " + method;
+  const CommandResult result =
+      run_command(kTool + options + " --json " + json.string() + " --output " + solved.string());
+  CAPTURE(result.output);
+  REQUIRE(result.exit_code == 0);
+  CHECK_THAT(result.output, Contains("8 poses, 11 edges, 7 verticals, 2 robots"));
+  CHECK_THAT(text_of(json), Contains("\"verticals\": 7"));
+  const G2oGraph written = read_g2o(solved);
+  CHECK(written.verticals.size() == 7);
+  const auto worst_tilt = [](const G2oGraph& g) {
+    double worst = 0.0;
+    for (const G2oVertex& v : g.vertices)
+      worst = std::max(worst, std::acos(std::min(1.0, v.T_world_kf.linear()(2, 2))));
+    return worst;
+  };
+  CHECK(worst_tilt(written) < 0.1);
+  if (method == "newton" || method == "centralized")
+    CHECK_THAT(result.output, Contains("\ncertified"));
+
+  const CommandResult without =
+      run_command(kTool + options + " --no-vertical --json " + json.string());
+  CHECK(without.exit_code == 0);
+  CHECK_THAT(without.output, Contains("8 poses, 11 edges, 2 robots"));
+  CHECK_THAT(text_of(json), Contains("\"verticals\": 0"));
+}
+
+TEST_CASE("What does not know verticals says so, and how to leave them out", "[pgo][vertical]") {
+  const TemporaryFolder folder;
+  const auto graph = folder.write("square.g2o", upright_square_g2o());
+  const auto [options, who] = GENERATE(table<std::string, std::string>(
+      {{"--method dgs", "method dgs does"},
+       {"--method rbcd-accelerated", "method rbcd-accelerated does"},
+       {"--method rbcd-asynchronous", "method rbcd-asynchronous does"},
+       {"--method newton --own-start", "(--own-start) does"},
+       {"--verify", "(--verify) does"},
+       {"--robust gnc", "--robust gnc does"}}));
+  CAPTURE(options);
+  const std::string command = kTool + graph.string() + " --robots 2 --rounds 20 " + options;
+  const CommandResult refused = run_command(command);
+  CHECK(refused.exit_code == 1);
+  CHECK_THAT(refused.output, Contains(who + " not know verticals, and the graph has 7: leave them "
+                                            "out by --no-vertical"));
+  CHECK(run_command(command + " --no-vertical").exit_code == 0);
+}
+
 }  // namespace km

@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "modules/core/lie.hpp"
 #include "modules/pose_graph/lanczos.hpp"
 #include "modules/pose_graph/rounding.hpp"
 #include "modules/pose_graph/staircase.hpp"
@@ -54,6 +55,80 @@ TEST_CASE("X S is half the Riemannian gradient", "[pose_graph]") {
   CHECK(XS.isApprox(0.5 * project_tangent(X, problem.euclidean_gradient(X)), 1e-12));
 }
 
+TEST_CASE("[X z] S is half the Riemannian gradient of poses and vertical",
+          "[pose_graph][vertical]") {
+  const unsigned seed = GENERATE(1U, 2U);
+  const Eigen::Index rank = GENERATE(3, 5);
+  CAPTURE(seed, rank);
+  std::mt19937 rng(seed);
+  const TeamGraph graph = noisy_chain(12, 1, 0.2, rng, 4.0);
+  const QuadraticProblem problem = problem_of(graph, rank);
+  const LiftedPoses X = random_lifted_poses(rng, rank, 12);
+  const Eigen::VectorXd z = lifting_matrix(rank).col(2);
+  LiftedPoses with_z = LiftedPoses::Zero(rank, 52);
+  with_z.leftCols(48) = X;
+  with_z.col(50) = z;
+  const Eigen::MatrixXd product = with_z * certificate_matrix(problem, X);
+  CHECK(product.leftCols(48).isApprox(0.5 * project_tangent(X, problem.euclidean_gradient(X)),
+                                      1e-12));
+  Eigen::VectorXd pull = Eigen::VectorXd::Zero(rank);
+  for (const VerticalPrior& v : graph.verticals)
+    pull += v.weight * (z - X.middleCols<3>(4 * v.pose) * v.up);
+  CHECK((product.col(50) - (pull - z * z.dot(pull))).norm() < 1e-12 * pull.norm());
+}
+
+TEST_CASE("The optimum of a graph with verticals is certified, and S is what proves it",
+          "[pose_graph][vertical]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const TeamGraph graph = noisy_chain(30, 1, 0.1, rng, 5.0);
+  const auto start = levelled(chordal_initialisation(30, graph.edges), graph.verticals);
+  const QuadraticProblem problem = problem_of(graph, 3);
+  const LiftedPoses X =
+      minimise(problem, lift(start, 3), {.max_iterations = 200, .gradient_tolerance = 1e-9}).X;
+  LiftedPoses with_z = LiftedPoses::Zero(3, 124);
+  with_z.leftCols(120) = X;
+  with_z(2, 122) = 1.0;
+  const Eigen::MatrixXd S = certificate_matrix(problem, X);
+  CHECK((with_z * S).norm() < 1e-5);  // of entries up to 100: where the descent has ended
+  const double least = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(S).eigenvalues()(0);
+  CHECK(least > -1e-6);
+  const Certificate certificate = certify(problem, X);
+  CHECK(certificate.certified);
+  CHECK(certificate.relative_gap < 1e-5);
+
+  // The same poses tilted as a whole are no optimum any more.
+  std::vector<SE3> tilted = round_to_poses(X, lifted_identity(3));
+  for (SE3& T : tilted) T = make_pose(so3_exp({0.05, 0.0, 0.0}), Eigen::Vector3d::Zero()) * T;
+  CHECK_FALSE(certify(problem, lift(tilted, 3)).certified);
+}
+
+TEST_CASE("Poses that stand on their heads have the negative eigenvalue they must have",
+          "[pose_graph][vertical]") {
+  const Eigen::Index n = GENERATE(2, 7, 30);
+  CAPTURE(n);
+  constexpr double kWeight = 3.0;
+  std::vector<BlockEdge> edges;
+  std::vector<VerticalPrior> verticals;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (i > 0) edges.push_back({i - 1, i, SE3::Identity(), 1.0, 1.0});
+    verticals.push_back({i, Eigen::Vector3d::UnitZ(), kWeight});
+  }
+  const SE3 overhead =
+      make_pose(Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal(), Eigen::Vector3d::Zero());
+  const LiftedPoses X = lift(std::vector<SE3>(static_cast<std::size_t>(n), overhead), 3);
+  const QuadraticProblem problem(3, n, edges, {}, verticals);
+  CHECK(project_tangent(X, problem.euclidean_gradient(X)).norm() < 1e-12);
+  // All z axes a, the vertical b: S gives -n w (a + b)^2 to n a^2 + b^2.
+  const Certificate certificate = certify(problem, X);
+  CHECK_FALSE(certificate.certified);
+  CHECK(certificate.lambda_min == Approx(-kWeight * (static_cast<double>(n) + 1.0)).epsilon(1e-6));
+  Staircase staircase(edges, X, {}, verticals);
+  CHECK(run(staircase) < 1e-9);
+  CHECK(staircase.certificate()->certified);
+}
+
 TEST_CASE("A ring wound once has the negative eigenvalue it must have", "[pose_graph]") {
   const Eigen::Index n = GENERATE(5, 12, 40);
   CAPTURE(n);
@@ -83,12 +158,14 @@ TEST_CASE("The staircase leaves the wound ring for the optimum", "[pose_graph]")
 
 TEST_CASE("No feasible point refutes the bound on the cost", "[pose_graph]") {
   const unsigned seed = GENERATE(1U, 2U, 3U, 4U);
-  CAPTURE(seed);
+  const double vertical_weight = GENERATE(0.0, 4.0);
+  CAPTURE(seed, vertical_weight);
   std::mt19937 rng(seed);
-  const TeamGraph graph = noisy_chain(20, 1, 0.3, rng);
-  Staircase staircase(graph.edges, lift(chordal_initialisation(20, graph.edges), 3));
+  const TeamGraph graph = noisy_chain(20, 1, 0.3, rng, vertical_weight);
+  const auto start = levelled(chordal_initialisation(20, graph.edges), graph.verticals);
+  Staircase staircase(graph.edges, lift(start, 3), {}, graph.verticals);
   const double optimum = run(staircase);
-  const QuadraticProblem problem(3, 20, graph.edges, {});
+  const QuadraticProblem problem = problem_of(graph, 3);
   LiftedPoses X = random_lifted_poses(rng, 3, 20);
   for (int step = 0; step < 10; ++step) {
     const Certificate certificate = certify(problem, X);

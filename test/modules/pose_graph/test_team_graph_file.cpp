@@ -139,6 +139,50 @@ TEST_CASE("The tunnels' edges between robots count once", "[pose_graph]") {
   CHECK(graph.edges.size() == 1247 + 96 + 3548);
 }
 
+TEST_CASE("Verticals go to the robots whose poses they are of", "[pose_graph][vertical]") {
+  const std::string level = " 0 0 0 0 0 0 1 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 9 0 0 9 0 0\n";
+  const std::string unit = " 1 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
+  std::string text = "PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n";
+  for (const char* prior : {"4", "1", "3"})
+    text += "EDGE_SE3_PRIOR " + std::string(prior) + " 0" + level;
+  for (const char* edge : {"0 1", "1 2", "2 3", "3 4"})
+    text += "EDGE_SE3:QUAT " + std::string(edge) + unit;
+  const TeamGraph graph = deal_contiguously(graph_of(text), 2, "graph.g2o");
+  REQUIRE(graph.verticals.size() == 3);
+  CHECK(graph.verticals[0].pose == 1);
+  CHECK(graph.verticals[1].pose == 3);
+  CHECK(graph.verticals[2].pose == 4);
+  CHECK(graph.verticals[0].weight == Approx(9.0));
+  REQUIRE(part_of(graph, 0).verticals.size() == 1);
+  CHECK(part_of(graph, 0).verticals[0].pose == 1);
+  REQUIRE(part_of(graph, 1).verticals.size() == 2);
+  CHECK(part_of(graph, 1).verticals[0].pose == 1);
+  CHECK(part_of(graph, 1).verticals[1].pose == 2);
+  CHECK(problem_of(graph, 3).verticals().size() == 3);
+  CHECK_THROWS_WITH(deal_contiguously(graph_of(text + "EDGE_SE3_PRIOR 7 0" + level), 2, "g.g2o"),
+                    "g.g2o: the prior on 0:7 is on a vertex that the file lacks");
+}
+
+TEST_CASE("A folder's verticals are those of all its files", "[pose_graph][vertical]") {
+  const TemporaryFolder folder;
+  for (const RobotId robot : {RobotId{4}, RobotId{2}}) {
+    const auto edge = [&](KeyframeId from, KeyframeId to) {
+      return RelativePose{from, to, SE3::Identity(), Matrix6::Identity()};
+    };
+    G2oGraph graph;
+    graph.edges = {edge({robot, 0}, {robot, 1}), edge({2, 0}, {4, 0})};
+    graph.verticals = {{{robot, 1}, {Eigen::Vector3d::UnitX(), 0.1 * robot}}};
+    write_g2o(folder.path() / (std::to_string(robot) + ".g2o"), graph);
+  }
+  const TeamGraph graph = read_team_folder(folder.path());
+  REQUIRE(graph.verticals.size() == 2);
+  CHECK(graph.verticals[0].pose == 1);
+  CHECK(graph.verticals[0].weight == Approx(25.0));
+  CHECK(graph.verticals[1].pose == 3);
+  CHECK(graph.verticals[1].weight == Approx(6.25));
+  CHECK(graph.verticals[1].up.isApprox(Eigen::Vector3d::UnitX(), 1e-12));
+}
+
 TEST_CASE("A folder that holds no team is refused", "[pose_graph]") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(read_team_folder(folder.path()), Contains("no *.csv and no *.g2o"));

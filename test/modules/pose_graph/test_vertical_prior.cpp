@@ -92,6 +92,27 @@ TEST_CASE("a block's vertical priors are part of its cost, gradient and Hessian"
   CHECK_THROWS_AS(make({0, Eigen::Vector3d::Constant(NAN), 1.0}), std::invalid_argument);
 }
 
+TEST_CASE("poses are levelled as a whole, by what most of their priors hold for up",
+          "[pose_graph][vertical]") {
+  std::mt19937 rng(3);
+  const SE3 tilt = make_pose(so3_exp({1.0, 0.4, 0.0}), Eigen::Vector3d::Zero());
+  std::vector<SE3> poses;
+  std::vector<VerticalPrior> priors;
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    const SE3 upright = random_pose(rng);
+    poses.push_back(tilt * upright);
+    if (i % 2 == 0) priors.push_back({i, up_at(upright), 1.0 + static_cast<double>(i)});
+  }
+  CHECK(levelled(poses, {}).front().isApprox(poses.front(), 0.0));
+  const std::vector<SE3> level = levelled(poses, priors);
+  for (const VerticalPrior& prior : priors)
+    CHECK(vertical_cost(prior, level[static_cast<std::size_t>(prior.pose)].linear()) < 1e-12);
+  for (std::size_t i = 1; i < poses.size(); ++i)
+    CHECK((level[0].inverse() * level[i]).isApprox(poses[0].inverse() * poses[i], 1e-12));
+  priors.push_back({1, -up_at(tilt.inverse() * poses[1]), 0.5});  // outvoted
+  CHECK(levelled(poses, priors)[0].isApprox(level[0], 1e-12));
+}
+
 TEST_CASE("levelling keeps the origin's place and the heading", "[pose_graph][vertical]") {
   const Eigen::Vector3d origin(1.0, 2.0, 3.0);
   const SE3 truth = make_pose(so3_exp({0.0, 0.0, 0.7}), {4.0, -1.0, 0.5});
