@@ -29,7 +29,7 @@ TEST_CASE("The shipped experiments are the paper's", "[experiments]") {
   const ExperimentConfig config = read_experiments("config/experiments", false);
   CHECK(config.trajectory_worlds == std::vector<std::string>{"city", "camp", "v1", "v2"});
   CHECK(config.pcm.outliers == 1000);
-  CHECK(config.methods.size() == 6);
+  CHECK(config.methods.size() == 7);
   CHECK(config.world("v1").flights);
   CHECK(config.world("v2").robots == std::vector<std::string>{"V2_01", "V2_02", "V2_03"});
 }
@@ -64,7 +64,7 @@ TEST_CASE("Worlds that are not there are named", "[experiments]") {
   CHECK_THAT(config.problems(), Contains("mesh.yaml line 1: no world moon") &&
                                     Contains("worlds.yaml line 1") && Contains("none.toml") &&
                                     Contains("unknown key rate") &&
-                                    Contains("trajectory.yaml line 3: no world camp"));
+                                    Contains("trajectory.yaml line 4: no world camp"));
   fs::remove(config.experiments() / "mesh.yaml");
   CHECK_THAT(config.problems(), Contains("mesh.yaml: no such file"));
 }
