@@ -68,7 +68,7 @@ double optimum_of(const TeamGraph& graph, const std::vector<SE3>& start) {
   return staircase.cost();
 }
 
-// Methods that were published for edges alone, and know of nothing else.
+// What knows of nothing but edges says so.
 void check_verticals(const TeamGraph& graph, const PgoOptions& options) {
   const auto refuse = [&](const std::string& what) {
     throw std::invalid_argument(what + ", and the graph has " +
@@ -76,8 +76,7 @@ void check_verticals(const TeamGraph& graph, const PgoOptions& options) {
                                 ": leave them out by --no-vertical");
   };
   if (graph.verticals.empty()) return;
-  if (options.method == SolveMethod::kDgs || options.method == SolveMethod::kRbcdAccelerated ||
-      options.method == SolveMethod::kRbcdAsynchronous)
+  if (options.method == SolveMethod::kDgs || options.method == SolveMethod::kRbcdAsynchronous)
     refuse(std::string("method ") + to_string(options.method) + " does not know verticals");
   if (options.verify) refuse("the team's own verification (--verify) does not know verticals");
   if (options.own_start) refuse("the team's own start (--own-start) does not know verticals");

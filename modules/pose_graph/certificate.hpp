@@ -32,7 +32,7 @@ struct [[nodiscard]] Certificate {
 /// lies above: with the translations eliminated, tr(Q Z) = tr(Lambda) + tr(S Z) >= tr(Lambda) +
 /// 3n lambda_min for every feasible Z, whose trace is 3n (and 1 more for the vertical); tr(Lambda)
 /// is the cost. Nothing costs less than 0. S is taken at the best translations for the rotations of
-/// `X`.
+/// `X` and, with priors, at its best tilt.
 ///
 /// S, shifted on the rotations until a sparse Cholesky factorisation finds it definite (the test of
 /// Rosen, "Accelerating Certifiable Estimation with Preconditioned Eigensolvers", RA-L 2022), gives

@@ -72,7 +72,9 @@ TEST_CASE("Newton's method, block descent and the centralised solver come to one
   CHECK(rounds.back().cost == Approx(optimum).epsilon(1e-6));
   CHECK(certify(problem_of(graph, 5), team_poses(graph, newton)).certified);
 
-  BlockDescentTeam descent(graph, lift(start, 5), {});
+  const bool accelerated = GENERATE(false, true);
+  CAPTURE(accelerated);
+  BlockDescentTeam descent(graph, lift(start, 5), {.accelerated = accelerated});
   CHECK(run_team(graph, descent, {.max_rounds = 400}, {}).back().cost ==
         Approx(optimum).epsilon(1e-6));
 
