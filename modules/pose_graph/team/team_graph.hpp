@@ -19,6 +19,7 @@ struct TeamGraph {
   std::vector<BlockEdge> edges = {};     ///< Each once; parallel ones all count.
   std::vector<KeyframeId> ids = {};      ///< Of the poses, as in the file.
   /// Of poses that know which way is up, ascending. If there are any, solutions have z up.
+  /// GaussSeidelTeam, AsynchronousTeam, GncTeam and verify_team() do without.
   std::vector<VerticalPrior> verticals = {};
 
   [[nodiscard]] std::size_t robots() const { return first.size() - 1; }
