@@ -22,7 +22,8 @@ constexpr const char* kAbout =
     "its part of the graph, and what it hears from the others are the messages that would cross\n"
     "the network.\n\n"
     "FILE is a g2o file, 2D or 3D, dealt out to --robots robots, or a folder with one *.csv or\n"
-    "*.g2o per robot. The cost is the chordal one without 1/2, weights as SE-Sync reads them:\n"
+    "*.g2o per robot, or what a team's run has left behind. The cost is the chordal one without\n"
+    "1/2, weights as SE-Sync reads them:\n"
     "  F = sum kappa |R_j - R_i R_ij|^2 + tau |t_j - t_i - R_i t_ij|^2\n"
     "Where a g2o file says which way is up at a pose (EDGE_SE3_PRIOR with information on the tilt\n"
     "alone, as kimera_multi_robot writes it), |R_i up_i - z|^2 / sigma_i^2 is added; all methods\n"
@@ -77,7 +78,8 @@ void define(CLI::App& app, Options& options) {
       {"rbcd-asynchronous", km::SolveMethod::kRbcdAsynchronous},
       {"centralized", km::SolveMethod::kCentralized},
       {"newton", km::SolveMethod::kNewton}};
-  app.add_option("FILE", options.file, "Pose graph (*.g2o), or a folder with one file per robot")
+  app.add_option("FILE", options.file,
+                 "Pose graph (*.g2o), or a folder with one file per robot, or a team's results")
       ->required()
       ->check(CLI::ExistingPath);
   app.add_option("--robots", options.robots, "Number of robots that a single file is dealt out to")

@@ -68,17 +68,27 @@ std::filesystem::path nonempty_folder(const std::filesystem::path& folder) {
   return folder;
 }
 
-std::vector<RecordedGraph> read_parts(const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> files;
+// What a team's run has left behind, or else files in the folder itself.
+std::vector<std::filesystem::path> part_files(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> results, files;
   for (const auto& entry : std::filesystem::directory_iterator(nonempty_folder(folder))) {
     const auto extension = entry.path().extension();
-    if ((extension == ".csv" || extension == ".g2o") && entry.path().stem() != "fullGraph")
+    if (std::filesystem::exists(entry.path() / "pose_graph.g2o"))
+      results.push_back(entry.path() / "pose_graph.g2o");
+    else if ((extension == ".csv" || extension == ".g2o") && entry.path().stem() != "fullGraph")
       files.push_back(entry.path());
   }
-  if (files.empty()) throw std::runtime_error(folder.string() + ": no *.csv and no *.g2o in it");
-  std::sort(files.begin(), files.end());
+  std::vector<std::filesystem::path>& chosen = results.empty() ? files : results;
+  if (chosen.empty())
+    throw std::runtime_error(folder.string() +
+                             ": no *.csv and no *.g2o in it, and no robot's pose_graph.g2o below");
+  std::sort(chosen.begin(), chosen.end());
+  return chosen;
+}
+
+std::vector<RecordedGraph> read_parts(const std::filesystem::path& folder) {
   std::vector<RecordedGraph> parts;
-  for (const auto& file : files) {
+  for (const auto& file : part_files(folder)) {
     parts.push_back(read_recorded_graph(file));
     const auto same = std::find_if(parts.begin(), parts.end() - 1, [&](const RecordedGraph& part) {
       return part.robot == parts.back().robot;

@@ -35,7 +35,8 @@ namespace km {
 /// Reads rows "vertex robot" for deal(). Throws std::runtime_error "file:line: what".
 [[nodiscard]] std::map<KeyframeId, std::size_t> read_partition(const std::filesystem::path& file);
 
-/// Reads a folder with one file per robot, *.csv or *.g2o, see read_recorded_graph()
+/// Reads what a team's run has left in `folder` (pose_graph.g2o of every robot, in folders of their
+/// own), or else one file per robot there, *.csv or *.g2o, see read_recorded_graph()
 /// (fullGraph.g2o, a copy of all, is left out). Robots are numbered by ascending id. An edge
 /// between two robots counts as often as the file of the robot it starts from has it; if that has
 /// none between the two poses, as often as the other robot's file has.

@@ -174,6 +174,16 @@ TEST_CASE("A folder's verticals are those of all its files", "[pose_graph][verti
     graph.verticals = {{{robot, 1}, {Eigen::Vector3d::UnitX(), 0.1 * robot}}};
     write_g2o(folder.path() / (std::to_string(robot) + ".g2o"), graph);
   }
+  const bool left_by_a_run = GENERATE(false, true);
+  CAPTURE(left_by_a_run);
+  if (left_by_a_run) {
+    for (const std::string robot : {"4", "2"}) {
+      std::filesystem::create_directory(folder.path() / robot);
+      std::filesystem::rename(folder.path() / (robot + ".g2o"),
+                              folder.path() / robot / "pose_graph.g2o");
+    }
+    folder.write("label_palette.csv", "id,name\n");
+  }
   const TeamGraph graph = read_team_folder(folder.path());
   REQUIRE(graph.verticals.size() == 2);
   CHECK(graph.verticals[0].pose == 1);
