@@ -1,7 +1,6 @@
 #include "modules/pose_graph/vertical_prior.hpp"
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 
 #include "modules/pose_graph/stiefel.hpp"
 
@@ -25,14 +24,17 @@ std::vector<SE3> levelled(std::vector<SE3> poses, std::span<const VerticalPrior>
 Eigen::MatrixXd level(const Eigen::MatrixXd& world, const Eigen::Vector3d& origin) {
   const Eigen::MatrixXd Y = world.leftCols<3>();
   const Eigen::VectorXd z = lifting_matrix(Y.rows()).col(2);
-  // The two horizontal axes nearest to the present ones: the polar factor of what is left of them
-  // without z.
-  const Eigen::MatrixXd horizontal = Y.leftCols<2>() - z * (z.transpose() * Y.leftCols<2>());
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(horizontal,
-                                              Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const Eigen::VectorXd up = Y.col(2);
   Eigen::MatrixXd levelled(Y.rows(), 4);
-  levelled.leftCols<2>() = svd.matrixU() * svd.matrixV().transpose();
-  levelled.col(2) = z;
+  constexpr double kUpsideDown = 1e-12;
+  if (const double bisected = 1.0 + up.dot(z); bisected > kUpsideDown) {
+    // The turn in the plane of the two that takes `up` to z.
+    const Eigen::VectorXd sum = up + z;
+    levelled.leftCols<3>() =
+        Y - sum * (sum.transpose() * Y) / bisected + 2.0 * z * (up.transpose() * Y);
+  } else {
+    levelled.leftCols<3>() << Y.col(0), -Y.col(1), -Y.col(2);
+  }
   levelled.col(3) = world.col(3) + (Y - levelled.leftCols<3>()) * origin;
   return levelled;
 }

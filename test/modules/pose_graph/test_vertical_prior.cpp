@@ -125,6 +125,18 @@ TEST_CASE("levelling keeps the origin's place and the heading", "[pose_graph][ve
   CHECK((L.col(2) - lifting_matrix(5).col(2)).norm() < 1e-15);
 }
 
+TEST_CASE("levelling turns a frame that lies on its side, and one upside down",
+          "[pose_graph][vertical]") {
+  const auto roll = GENERATE(0.3, 1.6, 3.0, M_PI);
+  CAPTURE(roll);
+  const SE3 tilted =
+      make_pose(so3_exp({0.0, 0.0, 0.7}) * so3_exp({roll, 0.0, 0.0}), {1.0, 2.0, 3.0});
+  const Eigen::MatrixXd L = level(tilted.matrix().topRows<3>(), Eigen::Vector3d::Zero());
+  // About the x axis, which is level.
+  const SE3 expected = make_pose(so3_exp({0.0, 0.0, 0.7}), {1.0, 2.0, 3.0});
+  CHECK(L.isApprox(expected.matrix().topRows<3>(), 1e-9));
+}
+
 namespace {
 
 // Two robots that drive side by side over level ground, joined at many places. Odometry takes each
