@@ -22,20 +22,22 @@ std::vector<SE3> levelled(std::vector<SE3> poses, std::span<const VerticalPrior>
 }
 
 Eigen::MatrixXd level(const Eigen::MatrixXd& world, const Eigen::Vector3d& origin) {
-  const Eigen::MatrixXd Y = world.leftCols<3>();
+  // Frames are levelled again and again, each from the last: what rounding has left of Y's
+  // orthonormality must not grow.
+  const Eigen::MatrixXd Y = nearest_stiefel(world.leftCols<3>());
   const Eigen::VectorXd z = lifting_matrix(Y.rows()).col(2);
   const Eigen::VectorXd up = Y.col(2);
-  Eigen::MatrixXd levelled(Y.rows(), 4);
+  Eigen::MatrixXd turned(Y.rows(), 3);
   constexpr double kUpsideDown = 1e-12;
   if (const double bisected = 1.0 + up.dot(z); bisected > kUpsideDown) {
     // The turn in the plane of the two that takes `up` to z.
     const Eigen::VectorXd sum = up + z;
-    levelled.leftCols<3>() =
-        Y - sum * (sum.transpose() * Y) / bisected + 2.0 * z * (up.transpose() * Y);
+    turned = Y - sum * (sum.transpose() * Y) / bisected + 2.0 * z * (up.transpose() * Y);
   } else {
-    levelled.leftCols<3>() << Y.col(0), -Y.col(1), -Y.col(2);
+    turned << Y.col(0), -Y.col(1), -Y.col(2);
   }
-  levelled.col(3) = world.col(3) + (Y - levelled.leftCols<3>()) * origin;
+  Eigen::MatrixXd levelled(Y.rows(), 4);
+  levelled << turned, world.col(3) + (world.leftCols<3>() - turned) * origin;
   return levelled;
 }
 
