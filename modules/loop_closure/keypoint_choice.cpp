@@ -6,11 +6,16 @@
 #include <vector>
 
 namespace km {
+namespace {
 
-KeyframeFeatures chosen_by_words(const KeyframeFeatures& features, std::size_t count,
+constexpr int kBest = 3;  // with depth, of a shared word
+
+}  // namespace
+
+KeyframeFeatures chosen_by_words(const KeyframeFeatures& features, const KeypointBudget& budget,
                                  const Vocabulary& vocabulary,
                                  std::span<const std::uint32_t> theirs) {
-  if (features.keypoints.size() <= count) return features;
+  if (features.keypoints.size() <= budget.least) return features;
   const std::vector<std::uint32_t> words = vocabulary.words(features.descriptors);
   std::vector<int> rank;
   for (std::size_t i = 0; i < words.size(); ++i) {
@@ -21,7 +26,8 @@ KeyframeFeatures chosen_by_words(const KeyframeFeatures& features, std::size_t c
   std::iota(order.begin(), order.end(), 0U);
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return rank[a] > rank[b]; });
-  order.resize(count);
+  const auto best = static_cast<std::size_t>(std::count(rank.begin(), rank.end(), kBest));
+  order.resize(std::min(order.size(), std::clamp(best, budget.least, budget.most)));
   KeyframeFeatures chosen = features;
   chosen.keypoints.clear();
   chosen.descriptors.clear();

@@ -61,8 +61,8 @@ struct LoopClosureConfig {
   double failure_patience = 2.0;
 
   /// Keypoints of a keyframe that a peer is sent at most, 40 bytes each: those most likely to
-  /// correspond, see chosen_by_words(). Three times as many in the first dozen
-  /// replies to a robot.
+  /// correspond, as far down as a quarter of it, see chosen_by_words(). Up to three times as many in
+  /// the first dozen replies to a robot.
   int reply_keypoints = 200;
 
   /// Of own keyframes, so many of the newest are kept with all their keypoints, 48 bytes each;

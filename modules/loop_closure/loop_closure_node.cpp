@@ -15,10 +15,11 @@ namespace {
 // Robots that meet again after a while produce candidates in bursts.
 constexpr std::size_t kQueueCapacity = 16384;
 constexpr std::chrono::milliseconds kTickPeriod(100);
-// The first replies to a robot hold more keypoints: what joins two that have hardly met is worth
-// its bytes.
+// The first replies to a robot may hold more keypoints: what joins two that have hardly met is
+// worth its bytes.
 constexpr int kFirstReplies = 12;
 constexpr std::size_t kFirstFactor = 3;
+constexpr std::size_t kLeastPart = 4;  // of reply_keypoints, whatever the words say
 
 }  // namespace
 
@@ -169,10 +170,11 @@ LoopClosureNode::KeyframePtr LoopClosureNode::find(const KeyframeId& id) {
 KeyframeFeatures LoopClosureNode::worth_sending(const KeyframeFeatures& features,
                                                 const KeyframeId& to) {
   const bool strangers = ++replies_[to.robot] <= kFirstReplies;
-  const std::size_t count = strangers ? kFirstFactor * reply_keypoints_ : reply_keypoints_;
+  const std::size_t most = strangers ? kFirstFactor * reply_keypoints_ : reply_keypoints_;
   const auto words = words_.find(to);
-  return words == words_.end() ? reduced(features, count)
-                               : chosen_by_words(features, count, *vocabulary_, words->second);
+  if (words == words_.end()) return reduced(features, most);
+  return chosen_by_words(features, {reply_keypoints_ / kLeastPart, most}, *vocabulary_,
+                         words->second);
 }
 
 // Goes on with what is there; waits for what is not, a peer's keyframe by asking for it.

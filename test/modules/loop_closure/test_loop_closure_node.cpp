@@ -189,17 +189,49 @@ TEST_CASE("of a keyframe those points are sent that the requester's own one has 
   CHECK(robot.requests[0].message->own == 0);
   for (std::size_t reply = 0; reply <= kFirst; ++reply) peer.node.step(robot.requests[0].message);
   REQUIRE(peer.replies.size() == kFirst + 1);
-  for (std::size_t reply = 0; reply < kFirst; ++reply)
-    CHECK(peer.replies[reply].message->keyframe.features.descriptors.size() == 3 * kSent);
-
-  std::vector<OrbDescriptor> expected;  // the strongest come first, and those without depth last
+  std::vector<OrbDescriptor> expected;  // the strongest come first, none of them without depth
   for (std::uint32_t word = words - kSent; told && word + 1 < words; ++word)
     if (word != 100) expected.push_back(toy_descriptor(word));
-  for (std::uint32_t word = 0; expected.size() < kSent; ++word)
+  for (std::uint32_t word = 0; !told && word < kSent; ++word)
     expected.push_back(toy_descriptor(word));
+  for (std::size_t reply = 0; reply < kFirst; ++reply)
+    CHECK(peer.replies[reply].message->keyframe.features.descriptors.size() ==
+          (told ? expected.size() : 3 * kSent));
   const KeyframeFeatures& sent = peer.replies[kFirst].message->keyframe.features;
   CHECK(sent.descriptors == expected);
-  CHECK(sent.keypoints.size() == kSent);
+  CHECK(sent.keypoints.size() == expected.size());
+}
+
+TEST_CASE("how many points are sent goes by the words that both images have",
+          "[loop_closure_node]") {
+  constexpr std::uint32_t kSent = 50;
+  constexpr std::size_t kFirst = 12;
+  struct Case {
+    std::uint32_t shared;
+    std::size_t first, later;
+  };
+  const auto [shared, first, later] =
+      GENERATE(Case{0, 12, 12}, Case{5, 12, 12}, Case{30, 30, 30}, Case{90, 90, 50},
+               Case{170, 150, 50});  // of 50: a quarter at least, at first three times at most
+  CAPTURE(shared);
+  const Scene scene(13);
+  Robot robot(kSelf), peer(kPeer, {.reply_keypoints = kSent});
+  Keyframe full = scene.peer;
+  for (std::uint32_t i = 0; i < full.features.descriptors.size(); ++i) {
+    full.features.descriptors[i] = toy_descriptor(i);
+    full.features.keypoints[i].inverse_depth = 0.2F;
+  }
+  REQUIRE(full.features.descriptors.size() >= 170);
+  peer.give(full);
+  BagOfWords theirs;
+  for (std::uint32_t word = 0; word < shared; ++word) theirs.push_back({word, 1});
+  peer.give(KeyframeBow{.id = {kSelf, 0}, .vocabulary = toy_vocabulary(200).id(), .words = theirs});
+  robot.give(scene.own);
+  robot.give(scene.candidate());
+  for (std::size_t reply = 0; reply <= kFirst; ++reply) peer.node.step(robot.requests[0].message);
+  REQUIRE(peer.replies.size() == kFirst + 1);
+  CHECK(peer.replies[0].message->keyframe.features.keypoints.size() == first);
+  CHECK(peer.replies[kFirst].message->keyframe.features.keypoints.size() == later);
 }
 
 TEST_CASE("a peer that returns is asked at once for what it owes", "[loop_closure_node]") {
