@@ -68,8 +68,13 @@ std::filesystem::path nonempty_folder(const std::filesystem::path& folder) {
   return folder;
 }
 
+struct PartFiles {
+  std::vector<std::filesystem::path> files;
+  EdgeWeights weights;
+};
+
 // What a team's run has left behind, or else files in the folder itself.
-std::vector<std::filesystem::path> part_files(const std::filesystem::path& folder) {
+PartFiles part_files(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> results, files;
   for (const auto& entry : std::filesystem::directory_iterator(nonempty_folder(folder))) {
     const auto extension = entry.path().extension();
@@ -78,17 +83,31 @@ std::vector<std::filesystem::path> part_files(const std::filesystem::path& folde
     else if ((extension == ".csv" || extension == ".g2o") && entry.path().stem() != "fullGraph")
       files.push_back(entry.path());
   }
-  std::vector<std::filesystem::path>& chosen = results.empty() ? files : results;
+  const bool of_a_run = !results.empty();
+  std::vector<std::filesystem::path>& chosen = of_a_run ? results : files;
   if (chosen.empty())
     throw std::runtime_error(folder.string() +
                              ": no *.csv and no *.g2o in it, and no robot's pose_graph.g2o below");
   std::sort(chosen.begin(), chosen.end());
-  return chosen;
+  return {chosen, of_a_run ? EdgeWeights::kAsTheTeam : EdgeWeights::kAsSeSync};
 }
 
-std::vector<RecordedGraph> read_parts(const std::filesystem::path& folder) {
+void check_complete(const std::vector<RecordedGraph>& parts, const std::filesystem::path& folder) {
+  std::set<RobotId> robots;
+  for (const RecordedGraph& part : parts) robots.insert(part.robot);
+  for (const RecordedGraph& part : parts)
+    for (const RelativePose& e : part.inter_closures)
+      for (const RobotId robot : {e.from.robot, e.to.robot})
+        if (!robots.contains(robot))
+          throw std::runtime_error(folder.string() + ": the graph of robot " +
+                                   std::to_string(part.robot) + " has edges to robot " +
+                                   std::to_string(robot) +
+                                   ", whose file is not there: a folder has those of all robots");
+}
+
+std::vector<RecordedGraph> read_parts(const std::vector<std::filesystem::path>& files) {
   std::vector<RecordedGraph> parts;
-  for (const auto& file : part_files(folder)) {
+  for (const auto& file : files) {
     parts.push_back(read_recorded_graph(file));
     const auto same = std::find_if(parts.begin(), parts.end() - 1, [&](const RecordedGraph& part) {
       return part.robot == parts.back().robot;
@@ -131,7 +150,7 @@ TeamGraph deal_contiguously(const G2oGraph& graph, std::size_t robots, const std
 }
 
 TeamGraph deal(const G2oGraph& graph, const std::map<KeyframeId, std::size_t>& robot_of,
-               const std::string& file) {
+               const std::string& file, EdgeWeights weights) {
   TeamGraph team{.dimension = graph.dimension};
   std::map<std::size_t, std::vector<KeyframeId>> poses_of_robot;
   const std::set<KeyframeId> poses = poses_of(graph, file);
@@ -160,7 +179,9 @@ TeamGraph deal(const G2oGraph& graph, const std::map<KeyframeId, std::size_t>& r
     team.first.push_back(static_cast<Eigen::Index>(team.ids.size()));
   }
   for (const RelativePose& e : graph.edges) {
-    const Precision weight = precision_of_blocks(e.covariance, graph.dimension);
+    const Precision weight = weights == EdgeWeights::kAsTheTeam
+                                 ? precision_of(e.covariance)
+                                 : precision_of_blocks(e.covariance, graph.dimension);
     team.edges.push_back(
         {number_of.at(e.from), number_of.at(e.to), e.T_from_to, weight.kappa, weight.tau});
   }
@@ -196,7 +217,9 @@ std::map<KeyframeId, std::size_t> read_partition(const std::filesystem::path& fi
 }
 
 TeamGraph read_team_folder(const std::filesystem::path& folder) {
-  const std::vector<RecordedGraph> parts = read_parts(folder);
+  const auto [files, weights] = part_files(folder);
+  const std::vector<RecordedGraph> parts = read_parts(files);
+  check_complete(parts, folder);
   G2oGraph all{.dimension = 3, .vertices = {}, .edges = {}};
   std::map<KeyframeId, std::size_t> robot_of;
   std::set<std::pair<KeyframeId, KeyframeId>> from_start;
@@ -218,7 +241,7 @@ TeamGraph read_team_folder(const std::filesystem::path& folder) {
   for (const RecordedGraph& part : parts)
     for (const RelativePose& e : part.inter_closures)
       if (e.to.robot == part.robot && !from_start.contains({e.from, e.to})) all.edges.push_back(e);
-  return deal(all, robot_of, folder.string());
+  return deal(all, robot_of, folder.string(), weights);
 }
 
 }  // namespace km

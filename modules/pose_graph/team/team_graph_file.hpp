@@ -16,6 +16,12 @@ namespace km {
 /// std::invalid_argument if it is not positive definite (in the plane, for dimension 2).
 [[nodiscard]] Precision precision_of_blocks(const Matrix6& covariance, int dimension);
 
+/// Who says what an edge weighs.
+enum class EdgeWeights {
+  kAsSeSync,   ///< precision_of_blocks(): of public graphs, to compare with published costs.
+  kAsTheTeam,  ///< precision_of(): as robots weigh what they measure.
+};
+
 /// Deals the poses of a graph out to robots in ascending order of their ids: `robots` runs of equal
 /// length, the last one with the rest. `file` names the source in errors.
 ///
@@ -30,16 +36,17 @@ namespace km {
 /// without a pose.
 [[nodiscard]] TeamGraph deal(const G2oGraph& graph,
                              const std::map<KeyframeId, std::size_t>& robot_of,
-                             const std::string& file);
+                             const std::string& file, EdgeWeights weights = EdgeWeights::kAsSeSync);
 
 /// Reads rows "vertex robot" for deal(). Throws std::runtime_error "file:line: what".
 [[nodiscard]] std::map<KeyframeId, std::size_t> read_partition(const std::filesystem::path& file);
 
 /// Reads what a team's run has left in `folder` (pose_graph.g2o of every robot, in folders of their
-/// own), or else one file per robot there, *.csv or *.g2o, see read_recorded_graph()
-/// (fullGraph.g2o, a copy of all, is left out). Robots are numbered by ascending id. An edge
-/// between two robots counts as often as the file of the robot it starts from has it; if that has
-/// none between the two poses, as often as the other robot's file has.
+/// own; edges weigh what they weighed in the run), or else one file per robot there, *.csv or
+/// *.g2o, see read_recorded_graph() (fullGraph.g2o, a copy of all, is left out; kAsSeSync). Robots
+/// are numbered by ascending id. An edge between two robots counts as often as the file of the
+/// robot it starts from has it; if that has none between the two poses, as often as the other
+/// robot's file has. Throws std::runtime_error as deal() does, and if a robot's file is not there.
 [[nodiscard]] TeamGraph read_team_folder(const std::filesystem::path& folder);
 
 }  // namespace km

@@ -193,6 +193,28 @@ TEST_CASE("A folder's verticals are those of all its files", "[pose_graph][verti
   CHECK(graph.verticals[1].up.isApprox(Eigen::Vector3d::UnitX(), 1e-12));
 }
 
+TEST_CASE("What a team's run has left weighs what it weighed there", "[pose_graph]") {
+  Matrix6 covariance = Matrix6::Identity();
+  covariance(1, 5) = covariance(5, 1) = 0.8;
+  G2oGraph graph;
+  graph.edges = {{{3, 0}, {3, 1}, SE3::Identity(), covariance}};
+  const TemporaryFolder folder;
+  write_g2o(folder.path() / "a.g2o", graph);
+  const Precision published = precision_of_blocks(covariance, 3);
+  CHECK(read_team_folder(folder.path()).edges.at(0).tau == Approx(published.tau));
+  std::filesystem::create_directory(folder.path() / "robot3");
+  std::filesystem::rename(folder.path() / "a.g2o", folder.path() / "robot3" / "pose_graph.g2o");
+  const Precision own = precision_of(covariance);
+  CHECK(own.tau < 0.9 * published.tau);
+  CHECK(read_team_folder(folder.path()).edges.at(0).tau == Approx(own.tau));
+  CHECK(read_team_folder(folder.path()).edges.at(0).kappa == Approx(own.kappa));
+
+  graph.edges.push_back({{3, 0}, {7, 2}, SE3::Identity(), covariance});
+  write_g2o(folder.path() / "robot3" / "pose_graph.g2o", graph);
+  CHECK_THROWS_WITH(read_team_folder(folder.path()),
+                    Contains("the graph of robot 3 has edges to robot 7, whose file is not there"));
+}
+
 TEST_CASE("A folder that holds no team is refused", "[pose_graph]") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(read_team_folder(folder.path()), Contains("no *.csv and no *.g2o"));
