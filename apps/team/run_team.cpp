@@ -67,9 +67,14 @@ class RunningTeam {
   }
 
  private:
-  // Others may run on for long before the team says it.
+  // Others may run on for long before the team says it. Indented lines are the details of the one
+  // above.
   static std::string why(const RobotProcess& robot) {
-    return robot.last_words().empty() ? std::string() : ", " + robot.last_words().back();
+    const auto& words = robot.last_words();
+    const auto cause = std::find_if(words.rbegin(), words.rend(), [](const std::string& line) {
+      return !line.empty() && line.front() != ' ';
+    });
+    return cause == words.rend() ? std::string() : ", " + *cause;
   }
 
   bool is_running() const {

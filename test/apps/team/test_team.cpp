@@ -68,7 +68,7 @@ TEST_CASE("A team runs its robots, shows their lines and prints the table", "[te
 }
 
 TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
-  const Team team("[ $name = bob ] && { echo 'out of luck' >&2; exit 9; }; exit 0");
+  const Team team("[ $name = bob ] && { echo 'out of luck'; echo '  or of fuel'; } >&2 && exit 9; exit 0");
   const auto result = run_command(team.command);
   CAPTURE(result.output);
   CHECK(result.exit_code == 3);
