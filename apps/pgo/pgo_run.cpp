@@ -82,7 +82,7 @@ void check_verticals(const TeamGraph& graph, const PgoOptions& options) {
   if (options.own_start) refuse("the team's own start (--own-start) does not know verticals");
 }
 
-// In the frame of the first pose; with verticals, at its place and heading, with z up.
+// The frame of the first pose; with verticals, that turned the least so that z is up.
 Eigen::MatrixXd world_of(const TeamGraph& graph, const LiftedPoses& X) {
   if (graph.verticals.empty()) return X.leftCols<4>();
   return level(X.leftCols<4>(), Eigen::Vector3d::Zero());

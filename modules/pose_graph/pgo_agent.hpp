@@ -156,6 +156,7 @@ class PgoAgent {
   bool join(const PgoSession& session);
   [[nodiscard]] std::optional<EdgesTo> edges_in(const SessionPlan& plan) const;
   [[nodiscard]] EdgesTo edges_to_absent(const SessionPlan& plan) const;
+  [[nodiscard]] std::vector<VerticalPrior> verticals_in(const PgoSession& session) const;
   [[nodiscard]] LiftedPoses extended_poses() const;
   void start_block(const PgoSession& session, EdgesTo edges, const EdgesTo& absent);
   void loosen_rejected(std::vector<BlockEdge>& own, EdgesTo& edges) const;

@@ -41,6 +41,10 @@ PgoAgent::EdgesTo PgoAgent::edges_to_absent(const SessionPlan& plan) const {
   return edges;
 }
 
+std::vector<VerticalPrior> PgoAgent::verticals_in(const PgoSession& session) const {
+  return session.upright ? graph_.verticals() : std::vector<VerticalPrior>();
+}
+
 LiftedPoses PgoAgent::extended_poses() const {
   const Eigen::Index known = block_ ? pose_count(block_->X()) : 0;
   LiftedPoses X(config_.rank, 4 * Eigen::Index{graph_.keyframes()});
@@ -57,8 +61,7 @@ void PgoAgent::start_block(const PgoSession& session, EdgesTo edges, const Edges
   edges.insert(absent.begin(), absent.end());
   std::vector<BlockEdge> own_edges = graph_.own_edges();
   loosen_rejected(own_edges, edges);
-  const auto verticals = session.upright ? graph_.verticals() : std::vector<VerticalPrior>();
-  block_.emplace(extended_poses(), own_edges, edges, verticals);
+  block_.emplace(extended_poses(), own_edges, edges, verticals_in(session));
   for (const auto& [robot, to_absent] : absent) {
     const PublicPoses& poses = *peers_.at(robot).poses;
     (void)block_->set_neighbour(robot, poses.keyframes, poses.X);
@@ -96,9 +99,8 @@ bool PgoAgent::join(const PgoSession& session) {
   const EdgesTo absent = edges_to_absent(plan);
   std::optional<Exchange> exchange;
   if (session.method != PgoMethod::kRbcd)
-    exchange.emplace(Exchange{
-        .edges = {self_.robot, Eigen::Index{graph_.keyframes()}, graph_.own_edges(), *edges,
-                  session.upright ? graph_.verticals() : std::vector<VerticalPrior>()}});
+    exchange.emplace(Exchange{.edges = {self_.robot, Eigen::Index{graph_.keyframes()},
+                                        graph_.own_edges(), *edges, verticals_in(session)}});
   start_block(session, std::move(*edges), absent);
   if (running_) optimising_s_ += running_->moved_s - running_->started_s;
   Running& running = running_.emplace(Running{.session = session});
