@@ -5,12 +5,13 @@
 #include <chrono>
 #include <cmath>
 #include <iostream>
+#include <string>
 #include <string_view>
 
 namespace km {
 
-/// A line on standard error that is rewritten, once the work takes more than two seconds; silent
-/// where nobody looks.
+/// A line on standard error that is rewritten, once the work takes more than two seconds, with
+/// the time that the stage will still take; silent where nobody looks.
 class StageProgress {
  public:
   StageProgress() = default;
@@ -21,15 +22,27 @@ class StageProgress {
   }
 
   void operator()(std::string_view stage, double share) {
-    if (!terminal_ || std::chrono::steady_clock::now() - start_ < std::chrono::seconds(2)) return;
+    const Clock::time_point now = Clock::now();
+    if (stage != stage_) {
+      stage_ = stage;
+      stage_start_ = now;
+    }
+    if (!terminal_ || now - start_ < std::chrono::seconds(2)) return;
     shown_ = true;
     std::cerr << "\r\x1b[K" << stage;
-    if (share > 0.0) std::cerr << ": " << std::lround(100.0 * share) << " %";
+    const std::chrono::duration<double> taken = now - stage_start_;
+    if (share > 0.0)
+      std::cerr << ": " << std::lround(100.0 * share) << " %, about "
+                << std::lround(taken.count() * (1.0 - share) / share) + 1 << " s left";
     std::cerr << std::flush;
   }
 
  private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  using Clock = std::chrono::steady_clock;
+
+  Clock::time_point start_ = Clock::now();
+  Clock::time_point stage_start_ = start_;
+  std::string stage_;
   bool terminal_ = isatty(STDERR_FILENO) == 1;
   bool shown_ = false;
 };

@@ -38,7 +38,7 @@ struct PcmExperiment {
   std::size_t closures = 0;
   std::size_t outliers = 0;
   std::vector<unsigned> seeds;
-  std::vector<std::string> searches;  ///< As kimera_multi_pcm names them.
+  std::vector<std::string> searches;  ///< As kimera_multi_pgo pcm names them.
   double seed_s = 50.0;               ///< How long a seed takes, roughly, for the time left.
 };
 
@@ -53,7 +53,7 @@ struct AloneExperiment {
 struct PgoMethodConfig {
   std::string name;  ///< local, rbcd, rbcd50, dgs and centralized are compared with the paper.
   std::string title;
-  std::vector<std::string> arguments;  ///< Of kimera_multi_pgo.
+  std::vector<std::string> arguments;  ///< Of kimera_multi_pgo solve.
 };
 
 /// What the files in config/experiments/ say.

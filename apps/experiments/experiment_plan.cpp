@@ -17,7 +17,7 @@ std::vector<Step> pcm_steps(const PcmExperiment& pcm, const ExperimentPaths& pat
     const PcmFiles files = pcm_files(seed, paths);
     Step step{.name = "pcm-" + std::to_string(seed),
               .title = "consistent closures, seed " + std::to_string(seed),
-              .command = {(paths.programs / "kimera_multi_pcm").string(), graph.string(),
+              .command = {(paths.programs / "kimera_multi_pgo").string(), "pcm", graph.string(),
                           "--outliers", std::to_string(pcm.outliers), "--closures",
                           std::to_string(pcm.closures), "--seed", std::to_string(seed), "--search"},
               .inputs = {graph},
@@ -40,7 +40,7 @@ std::vector<Step> pgo_steps(const WorldConfig& world, const std::vector<PgoMetho
     const fs::path folder = graph_folder(world, paths);
     Step step{.name = files.json.stem().string(),
               .title = method.title + ", " + world.title,
-              .command = {(paths.programs / "kimera_multi_pgo").string(), folder.string()},
+              .command = {(paths.programs / "kimera_multi_pgo").string(), "solve", folder.string()},
               .outputs = {files.json, files.poses},
               .needs = {team_step_name(world)},
               .expected_s = 2.0};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -10,23 +11,29 @@ namespace km {
 
 /// Decides how far a robot is with its run, and when it may leave its team.
 ///
-/// A robot whose input has ended goes on serving its peers: it leaves when it and every present
-/// peer have been settled for `settle_s`, or `serve_limit_s` after its input ended. Pure: time
-/// comes in [s], any origin.
+/// A robot whose input has ended goes on serving its team: it leaves when it and every robot of the
+/// team, heard or not, have been settled for `settle_s`, or `serve_limit_s` after its input ended.
+/// Pure: time comes in [s], any origin.
 class Departure {
  public:
   Departure(double settle_s, double serve_limit_s)
       : settle_s_(settle_s), serve_limit_s_(serve_limit_s) {}
 
+  /// A robot that is heard, as it tells of itself.
+  struct Present {
+    RobotPhase phase = RobotPhase::kRunning;
+    std::uint8_t settled_links = 0;  ///< See RobotStatus.
+  };
   struct Inputs {
     bool input_ended = false;    ///< And what was in flight has been processed.
     bool graph_settled = false;  ///< The optimiser has nothing left to do.
     std::uint64_t activity = 0;  ///< Changes whenever a module has done something new.
-    std::span<const RobotPhase> present_peers = {};
+    std::span<const Present> present_peers = {};
+    std::size_t unheard = 0;  ///< Robots of the team that only others hear.
   };
 
-  /// Takes the state at `now_s`; the phase to tell the others.
-  RobotPhase update(double now_s, const Inputs& inputs);
+  /// Takes the state at `now_s`; what to tell the others.
+  Present update(double now_s, const Inputs& inputs);
 
   /// Why the robot may leave, or nullptr if it should stay; as of the last update().
   [[nodiscard]] const char* reason() const { return reason_; }

@@ -49,13 +49,17 @@ void write_keyframes(const fs::path& file, const RunRecord& record) {
   close(out, file);
 }
 
-// tx,ty,tz,qx,qy,qz,qw of the closure's pose, all empty if it was not measured.
+// tx,ty,tz,qx,qy,qz,qw of the pose of `to` in the frame of `from`, all empty if it was not
+// measured.
 std::string pose_fields(const RunRecord& record, const ClosureOutcome& outcome) {
   const auto closure = record.closures().find(outcome.id);
   if (outcome.stage < ClosureStage::kVerified || closure == record.closures().end())
     return ",,,,,,";
-  const Eigen::Vector3d& t = closure->second.T_from_to.translation();
-  const Eigen::Quaterniond q(closure->second.T_from_to.linear());
+  const Closure& measured = closure->second;
+  const bool same_way = measured.from.id == outcome.id.from;
+  const SE3 T_from_to = same_way ? measured.T_from_to : measured.T_from_to.inverse();
+  const Eigen::Vector3d& t = T_from_to.translation();
+  const Eigen::Quaterniond q(T_from_to.linear());
   char text[192];
   std::snprintf(text, sizeof text, "%.6f,%.6f,%.6f,%.8f,%.8f,%.8f,%.8f", t.x(), t.y(), t.z(), q.x(),
                 q.y(), q.z(), q.w());

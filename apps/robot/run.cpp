@@ -1,6 +1,8 @@
 #include "apps/robot/run.hpp"
 
+#include <algorithm>
 #include <fstream>
+#include <map>
 #include <optional>
 #include <stdexcept>
 
@@ -38,6 +40,10 @@ RobotInput open_input(const RobotOptions& options, const RobotConfig& config,
     throw std::invalid_argument(options.graph.string() + " holds robot " +
                                 std::to_string(graph.robot) + ": start it with --robot " +
                                 std::to_string(graph.robot));
+  if (graph.indefinite_edges > 0)
+    log::warn("graph") << options.graph.string() << ": " << graph.indefinite_edges
+                       << " edges have an information matrix that is not positive definite: "
+                          "weighed by its blocks";
   return graph;
 }
 
@@ -81,11 +87,22 @@ class Watch {
     robot_.recorder().with_record([&](const RunRecord& record) {
       say(now_s, record, traffic);
       if (leaving_since_s_) return;
-      const std::vector<RobotPhase> peers = present_peers();
-      robot_.set_phase(departure_.update(now_s, {.input_ended = ended,
-                                                 .graph_settled = record.settled(),
-                                                 .activity = record.activity(),
-                                                 .present_peers = peers}));
+      const std::map<RobotId, Departure::Present> peers = present_peers();
+      std::vector<Departure::Present> present;
+      for (const auto& [robot, peer] : peers) present.push_back(peer);
+      const auto& team = record.progress().members;
+      const auto unheard = std::count_if(team.begin(), team.end(), [&](RobotId member) {
+        return member != record.robot() && !peers.contains(member);
+      });
+      const auto told = departure_.update(now_s, {.input_ended = ended,
+                                                  .graph_settled = record.settled(),
+                                                  .activity = record.activity(),
+                                                  .present_peers = present,
+                                                  .unheard = static_cast<std::size_t>(unheard)});
+      robot_.set_settled(told);
+      const auto running = [](const auto& peer) { return peer.phase == RobotPhase::kRunning; };
+      if (told.phase == RobotPhase::kSettled && std::ranges::none_of(present, running))
+        robot_.expect_no_more_closures();
     });
     if (now_s - written_s_ >= kInterval_s) write(now_s, traffic);
     return departure_.reason() != nullptr && said_goodbye(now_s);
@@ -105,7 +122,7 @@ class Watch {
     if (!leaving_since_s_) {
       leaving_since_s_ = now_s;
       robot_.freeze_record();
-      robot_.set_phase(RobotPhase::kLeaving);
+      robot_.set_settled({RobotPhase::kLeaving, kManyLinks});
     }
     return robot_.bridge().peers().list().empty() || now_s - *leaving_since_s_ >= kGoodbye_s;
   }
@@ -119,14 +136,14 @@ class Watch {
   }
 
   // A peer that is there but has not said how far it is counts as running.
-  std::vector<RobotPhase> present_peers() const {
-    std::map<RobotId, RobotPhase> told;
+  std::map<RobotId, Departure::Present> present_peers() const {
+    std::map<RobotId, Departure::Present> told;
     for (const RobotStatus& status : robot_.status_node().peers())
-      told[status.robot] = status.phase;
-    std::vector<RobotPhase> phases;
+      told[status.robot] = {status.phase, status.settled_links};
+    std::map<RobotId, Departure::Present> present;
     for (const Peer& peer : robot_.bridge().peers().list())
-      if (peer.state == PeerState::kAlive) phases.push_back(told[peer.identity.robot]);
-    return phases;
+      if (peer.state == PeerState::kAlive) present[peer.identity.robot] = told[peer.identity.robot];
+    return present;
   }
 
   void write(double now_s, const TrafficSnapshot& traffic) {

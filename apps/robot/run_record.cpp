@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "modules/core/odometry_correction.hpp"
+#include "modules/pose_graph/pose_edge.hpp"
 
 namespace km {
 
@@ -25,8 +26,12 @@ void RunRecord::add(const Keyframe& keyframe) {
 
 void RunRecord::add(const Closure& closure) {
   ++activity_;
-  if (closure.from.id.robot == robot_ || closure.to.id.robot == robot_)
-    closures_.insert_or_assign(closure.id(), closure);
+  if (closure.from.id.robot != robot_ && closure.to.id.robot != robot_) return;
+  const auto edge = pose_edge(closure.relative_pose());
+  if (!edge) return;  // the optimiser refuses it, too
+  const auto [known, is_new] = closures_.try_emplace(closure.id(), closure);
+  if (!is_new && is_better(*edge, *pose_edge(known->second.relative_pose())))
+    known->second = closure;
 }
 
 void RunRecord::add(const InlierSet& set) {
@@ -38,7 +43,8 @@ void RunRecord::add(const InlierSet& set) {
 
 void RunRecord::add(const ClosureOutcome& outcome) {
   ++activity_;
-  outcomes_[outcome.id] = outcome;
+  const ClosureId id = closure_id(outcome.id.from, outcome.id.to);
+  (outcomes_[id] = outcome).id = id;
 }
 
 void RunRecord::add(const OptimizerProgress& progress) {
@@ -95,7 +101,7 @@ std::vector<ClosureOutcome> RunRecord::outcomes() const {
       if (is_inlier(id))
         outcome.stage = ClosureStage::kInlier;
       else if (rejected_.contains(id))
-        outcome.reason = "rejected by graduated non-convexity";
+        outcome.reason = "rejected: the other closures contradict it";
       else if (outcome.reason.empty())
         outcome.reason = "inconsistent with the other closures of the robot pair";
     } else if (outcome.reason.empty()) {

@@ -15,9 +15,7 @@
 #include "modules/place_recognition/place_recognition_codec.hpp"
 #include "modules/place_recognition/place_recognition_node.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
-#include "modules/pose_graph/pose_graph_codec.hpp"
-#include "modules/pose_graph/pose_graph_node.hpp"
-#include "modules/pose_graph/solver_message_codec.hpp"
+#include "modules/pose_graph/team_node.hpp"
 #include "modules/semantic_mapping/semantic_mapping_node.hpp"
 #include "modules/vio/vio_node.hpp"
 #include "runtime/dds/robot_status_codec.hpp"
@@ -140,15 +138,13 @@ void Robot::add_back_end(const RobotConfig& config) {
                         topics_.own_closures, topics_.outcomes});
   topics_.own_closures.subscribe(
       [this](const auto& closure) { topics_.closures.publish(closure); });
-  add<PcmNode>(false, config.pcm, identity_.robot, topics_.closures, topics_.own_inlier_sets);
-  add<PoseGraphNode>(
-      false, config.pose_graph, PgoPeer{identity_.robot, identity_.boot},
-      PoseGraphTopics{topics_.keyframe_poses, topics_.closures, topics_.own_inlier_sets,
-                      topics_.peer_inlier_sets, bridge_->peers().events(), topics_.peer_pgo_status,
-                      topics_.peer_pgo_sessions, topics_.peer_poses, topics_.peer_exchanges,
-                      topics_.own_pgo_status, topics_.own_pgo_sessions, topics_.own_poses,
-                      topics_.own_exchanges, topics_.trajectory, topics_.progress,
-                      topics_.closure_verdicts});
+  pcm_ = &add<PcmNode>(false, config.pcm, identity_.robot, topics_.closures,
+                       topics_.own_inlier_sets, &bridge_->peers().events());
+  add<TeamNode>(false, config.pose_graph, TeamPeer{identity_.robot, identity_.boot},
+                TeamTopics{topics_.keyframe_poses, topics_.closures, topics_.own_inlier_sets,
+                           topics_.peer_inlier_sets, bridge_->peers().events(),
+                           topics_.peer_parcels, topics_.own_parcels, topics_.trajectory,
+                           topics_.progress, topics_.closure_verdicts});
 }
 
 // What crosses between robots, and how: the kinds of topic are those of runtime/dds/topic_kind.hpp.
@@ -175,14 +171,8 @@ void Robot::add_network() {
   });
   dds.send(t.inlier_sets_to_peers, kState, kPoseGraphOptimization);
   dds.receive_addressed(t.peer_inlier_sets, kState, kPoseGraphOptimization);
-  dds.send(t.own_pgo_status, kState, kPoseGraphOptimization);
-  dds.receive(t.peer_pgo_status, kState, kPoseGraphOptimization);
-  dds.send(t.own_pgo_sessions, kState, kPoseGraphOptimization);
-  dds.receive(t.peer_pgo_sessions, kState, kPoseGraphOptimization);
-  dds.send(t.own_poses, kState, kPoseGraphOptimization);
-  dds.receive(t.peer_poses, kState, kPoseGraphOptimization);
-  dds.send(t.own_exchanges, kState, kPoseGraphOptimization);
-  dds.receive(t.peer_exchanges, kState, kPoseGraphOptimization);
+  dds.send(t.own_parcels, kRequest, kPoseGraphOptimization);
+  dds.receive_addressed(t.peer_parcels, kRequest, kPoseGraphOptimization);
   dds.send(t.own_status, kStatus, kOther);
   dds.receive(t.peer_status, kStatus, kOther);
   dds.peers().events().subscribe([this](const auto& event) {
@@ -219,7 +209,7 @@ void Robot::add_records() {
 }
 
 RobotStatus Robot::own_status() const {
-  return {identity_.robot, identity_.name, phase_, dataset_time_s_, keyframes_};
+  return {identity_.robot, identity_.name, phase_, dataset_time_s_, keyframes_, settled_links_};
 }
 
 void Robot::freeze_record() {

@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "apps/robot/departure.hpp"
 #include "apps/robot/mapping_plan.hpp"
 #include "apps/robot/mesh_files_node.hpp"
 #include "apps/robot/recorder_node.hpp"
@@ -17,14 +18,14 @@
 #include "modules/mesh/superseded_surface.hpp"
 #include "modules/mesh/team_mesh_node.hpp"
 #include "modules/mesh_deformation/mesh_deformation_node.hpp"
+#include "modules/outlier_rejection/pcm_node.hpp"
 #include "modules/place_recognition/keyframe_bow.hpp"
 #include "modules/place_recognition/place_query.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 #include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/pose_graph/graph_playback_node.hpp"
-#include "modules/pose_graph/pgo_messages.hpp"
+#include "modules/pose_graph/parcel_codec.hpp"
 #include "modules/pose_graph/recorded_graph.hpp"
-#include "modules/pose_graph/solver_message.hpp"
 #include "modules/semantic_mapping/mapping_progress.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/sensors_node.hpp"
@@ -65,10 +66,8 @@ struct Topics {
   Topic<Addressed<Closure>> closures_to_peers;
   Topic<InlierSet> own_inlier_sets, peer_inlier_sets;
   Topic<Addressed<InlierSet>> inlier_sets_to_peers;
-  Topic<PgoStatus> own_pgo_status, peer_pgo_status;
-  Topic<PgoSession> own_pgo_sessions, peer_pgo_sessions;
-  Topic<PublicPoses> own_poses, peer_poses;
-  Topic<SolverMessage> own_exchanges, peer_exchanges;
+  Topic<Addressed<TeamParcel>> own_parcels;
+  Topic<TeamParcel> peer_parcels;
   Topic<Trajectory> trajectory;
   Topic<OptimizerProgress> progress;
   Topic<ClosureVerdicts> closure_verdicts;
@@ -106,7 +105,12 @@ class Robot {
   /// True if another living robot has claimed this robot's id.
   [[nodiscard]] bool id_taken() const { return id_taken_; }
   [[nodiscard]] const NetworkInterface& interface() const { return participant_.interface(); }
-  void set_phase(RobotPhase phase) { phase_ = phase; }
+  void set_settled(const Departure::Present& told) {
+    phase_ = told.phase;
+    settled_links_ = told.settled_links;
+  }
+  /// No robot will find another closure.
+  void expect_no_more_closures() { pcm_->expect_no_more(); }
   /// Nothing is recorded from now on, and the mesh is corrected by what is known now.
   void freeze_record();
   [[nodiscard]] double dataset_time_s() const { return dataset_time_s_; }
@@ -138,6 +142,7 @@ class Robot {
   std::atomic<double> dataset_time_s_ = 0.0;
   std::atomic<std::uint32_t> keyframes_ = 0;
   std::atomic<RobotPhase> phase_ = RobotPhase::kRunning;
+  std::atomic<std::uint8_t> settled_links_ = 0;
   bool drained_ = false;
   std::vector<Node*> feeding_;  // from the source to the last that makes keyframes
   std::vector<const Node*> nodes_;
@@ -146,6 +151,7 @@ class Robot {
   MeshDeformationNode* mesh_deformation_ = nullptr;
   MeshFilesNode* mesh_files_ = nullptr;
   TeamMeshNode* peer_meshes_ = nullptr;
+  PcmNode* pcm_ = nullptr;
   RobotStatusNode* status_ = nullptr;
   DdsBridge* bridge_ = nullptr;
   Supervisor supervisor_;  // last member: stops the nodes before what they use

@@ -34,6 +34,12 @@ std::string fixed(double value, int decimals) {
   return text.str();
 }
 
+std::string rounded(double value, int digits) {
+  std::ostringstream text;
+  text << std::setprecision(digits) << value;
+  return text.str();
+}
+
 std::string bytes_text(double bytes) {
   if (bytes < 1e3) return fixed(bytes, 0) + " B";
   if (bytes < 1e6) return fixed(bytes / 1e3, 1) + " kB";

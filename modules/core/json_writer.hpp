@@ -38,6 +38,26 @@ class JsonWriter {
     value(content);
   }
 
+  /// Fields one after the other: name, value, name, value, ...
+  template <typename T, typename... Rest>
+  void fields(std::string_view name, const T& content, const Rest&... rest) {
+    field(name, content);
+    if constexpr (sizeof...(rest) > 0) fields(rest...);
+  }
+
+  /// A field that is an array of objects; `write_fields(element)` writes those of one.
+  template <typename Range>
+  void objects(std::string_view name, const Range& elements, const auto& write_fields) {
+    key(name);
+    begin_array();
+    for (const auto& element : elements) {
+      begin_object();
+      write_fields(element);
+      end_object();
+    }
+    end_array();
+  }
+
   /// A field that is an array of plain values.
   template <typename Range>
   void array(std::string_view name, const Range& contents) {

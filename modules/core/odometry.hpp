@@ -21,7 +21,8 @@ struct OdometryState {
 /// Which way is up, as inertial sensing knows it.
 struct Vertical {
   Eigen::Vector3d up_body = Eigen::Vector3d::UnitZ();  ///< Unit, against gravity.
-  double sigma_rad = 0.0;                              ///< Of the tilt about each horizontal axis.
+  /// Of the tilt about each horizontal axis, errors of keyframes taken as independent.
+  double sigma_rad = 0.0;
 };
 
 /// A new keyframe as odometry hands it on. Its pose is chained from the relative poses, so that

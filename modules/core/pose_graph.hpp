@@ -29,13 +29,16 @@ struct LoopCandidate {
   int support = 1;          ///< See PlaceCandidate.
 };
 
-/// Identity of a loop closure. The direction counts: a pair of keyframes measured once from each
-/// side is two closures.
+/// Identity of a loop closure: a pair of keyframes, whoever measured it and from which side.
 struct ClosureId {
-  KeyframeId from;
+  KeyframeId from;  ///< The lower one: see closure_id().
   KeyframeId to;
   auto operator<=>(const ClosureId&) const = default;
 };
+
+[[nodiscard]] constexpr ClosureId closure_id(const KeyframeId& a, const KeyframeId& b) {
+  return b < a ? ClosureId{b, a} : ClosureId{a, b};
+}
 
 /// A geometrically verified loop closure with the odometry of both ends, so that every robot can
 /// test its consistency without having heard of those keyframes before.
@@ -47,7 +50,7 @@ struct Closure {
   int inliers = 0;          ///< Correspondences that support it.
   double similarity = 0.0;  ///< Normalised score of the bag of words; 0 if unknown.
 
-  [[nodiscard]] ClosureId id() const { return {from.id, to.id}; }
+  [[nodiscard]] ClosureId id() const { return closure_id(from.id, to.id); }
   [[nodiscard]] RelativePose relative_pose() const {
     return {from.id, to.id, T_from_to, covariance};
   }

@@ -48,7 +48,7 @@ struct LoopClosureTick {
   double now_s = 0.0;  ///< From any origin, not decreasing.
 };
 
-/// Turns candidates into verified closures (Tian et al., "Kimera-Multi", Sec. III-A): gets the
+/// Turns candidates into verified closures (Chang et al., "Kimera-Multi", Sec. III-A): gets the
 /// keyframes of peers from their owners, verifies, and publishes. A candidate is never given up for
 /// want of an answer, but not every one is worth asking for (see RequestEconomy). Measured closures
 /// go the same way, but need only the odometry of the other end. Serves the peers' requests for own

@@ -23,9 +23,10 @@ struct MatchRules {
   int max_distance = 64;    ///< [bit]
 };
 
-/// Pairs that are each other's nearest descriptor and pass `rules`, in ascending order of `a`. Of
-/// equally near descriptors the first counts. Without a second descriptor in `b` there is no ratio
-/// and so no match. O(|a| |b|): see the benchmark.
+/// Pairs that are each other's nearest descriptor and pass `rules` (the ratio is that of Lowe,
+/// "Distinctive Image Features from Scale-Invariant Keypoints", IJCV 2004), in ascending order of
+/// `a`. Of equally near descriptors the first counts. Without a second descriptor in `b` there is no
+/// ratio and so no match. O(|a| |b|): see the benchmark.
 [[nodiscard]] std::vector<Match> match_descriptors(std::span<const OrbDescriptor> a,
                                                    std::span<const OrbDescriptor> b,
                                                    const MatchRules& rules);

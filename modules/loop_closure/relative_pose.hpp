@@ -61,9 +61,10 @@ struct PoseFit {
                                                     double share);
 
 /// Relative pose of two stereo cameras from matches with outliers: Arun's method on three pairs
-/// with depth on both sides, polished on those three by their image errors (which count far more
-/// than the depths), inside RANSAC. Inliers are decided in the images (pair_error()), not by a
-/// metric radius, so that far points count for what they are worth.
+/// with depth on both sides (as Chang et al., "Kimera-Multi", ICRA 2021, Sec. III-A), polished on
+/// those three by their image errors (which count far more than the depths), inside RANSAC. Inliers
+/// are decided in the images (pair_error()), not by a metric radius, so that far points count for
+/// what they are worth.
 [[nodiscard]] RansacResult<SE3> ransac_pose(std::span<const ImagePair> pairs,
                                             const RansacOptions& options, std::mt19937& rng);
 

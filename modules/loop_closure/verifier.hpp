@@ -37,8 +37,8 @@ struct Verification {
 /// with its covariance, or why not.
 ///
 ///  1. Matches by descriptor alone (match_descriptors()).
-///  2. A pose that many of them agree with (ransac_pose(); Tian et al., "Kimera-Multi", Sec.
-///  III-A).
+///  2. A pose that many of them agree with (ransac_pose(); Chang et al., "Kimera-Multi", ICRA 2021,
+///     Sec. III-A).
 ///  3. Matching again where the pose says, in narrowing circles, and refinement on the inliers:
 ///     most correspondences are found only now, since similar corners elsewhere no longer compete.
 ///  4. Tests, each against a way of being wrong that was seen on recorded images.

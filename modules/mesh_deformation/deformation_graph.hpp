@@ -19,8 +19,9 @@ struct KeyframeTie {
   std::uint32_t node = 0;
 };
 
-/// What the energy of Kimera-Multi (TRO 2022), Sec. "Local Mesh Optimization", eq. (1) there, sums
-/// over, in the undeformed configuration: the robot's odometry frame.
+/// What the energy of Kimera-Multi (Chang et al., ICRA 2021, Sec. IV, Eq. (1)) sums over, in the
+/// undeformed configuration: the robot's odometry frame. It is a deformation graph as in Sumner,
+/// Schmid, Pauly, "Embedded Deformation for Shape Manipulation", SIGGRAPH 2007.
 struct DeformationGraph {
   std::vector<Eigen::Vector3d> nodes;               ///< g_k [m].
   std::vector<SE3> T_odom_kf;                       ///< Keyframe i's pose when it saw the nodes.

@@ -12,7 +12,8 @@ namespace km {
 using Matrix36 = Eigen::Matrix<double, 3, 6>;
 
 /// Where a pose a puts a point that it carries, against where vertex b is: second and third term of
-/// eq. (1) in Kimera-Multi (TRO 2022), Sec. "Local Mesh Optimization".
+/// Eq. (1) in Kimera-Multi (Chang et al., ICRA 2021, Sec. IV); between two nodes the regularisation
+/// of Sumner et al., "Embedded Deformation for Shape Manipulation", SIGGRAPH 2007.
 struct RigidityTerm {
   Eigen::Vector3d residual;  ///< T_world_a * point_a - t_world_b [m].
   Matrix36 by_a;

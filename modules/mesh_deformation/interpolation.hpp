@@ -12,8 +12,9 @@
 
 namespace km {
 
-/// Moves every vertex of a mesh with the nodes around it, as in Kimera-Multi (TRO 2022), Sec.
-/// "Local Mesh Optimization", eqs. (2) and (3) there:
+/// Moves every vertex of a mesh with the nodes around it, as in Kimera-Multi (Chang et al., ICRA
+/// 2021, Sec. IV, Eq. (2) and (3), after Sumner et al., "Embedded Deformation for Shape
+/// Manipulation", SIGGRAPH 2007):
 ///   v' = sum_j w_j [R_j (v - g_j) + t_j],   w_j = (1 - |v - g_j| / d_max)^2, normalised,
 /// over the k nearest nodes, d_max being the distance of the next one. Of these only nodes count
 /// whose time of sight is within a window of the vertex's. With k nodes or fewer in the window, the

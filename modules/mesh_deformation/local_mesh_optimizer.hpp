@@ -32,11 +32,10 @@ struct [[nodiscard]] DeformedMesh {
   MeshDeformationReport report;
 };
 
-/// Local Mesh Optimization (Chang, Tian, How, Carlone, "Kimera-Multi", TRO 2022, Sec. "Local Mesh
-/// Optimization"): bends the mesh that a robot's mapper built on odometry so that it agrees with
-/// the optimised poses of the keyframes. The mesh is simplified to the nodes of a deformation
-/// graph, the graph solved, and every vertex moved with the nodes around it. Faces, labels and
-/// colours are untouched.
+/// Local Mesh Optimization (Chang, Tian, How, Carlone, "Kimera-Multi", ICRA 2021, Sec. IV): bends
+/// the mesh that a robot's mapper built on odometry so that it agrees with the optimised poses of
+/// the keyframes. The mesh is simplified to the nodes of a deformation graph, the graph solved, and
+/// every vertex moved with the nodes around it. Faces, labels and colours are untouched.
 ///
 /// Incremental: the graph is kept from call to call. Surface that is new extends it, known vertices
 /// keep their nodes, and the last solution starts the next. Vertices are known again by their ids,

@@ -34,6 +34,7 @@ Decoded<InlierSet> Codec<InlierSet>::decode(const Wire& wire) {
     const auto [low, high] = std::minmax(id.from.robot, id.to.robot);
     if (low != set.a || high != set.b) return Result::refuse("a closure of another pair");
     if (id.from == id.to) return Result::refuse("a closure from a keyframe to itself");
+    if (id.to < id.from) return Result::refuse("a closure is named by its higher end first");
     if (!set.closures.empty() && !(set.closures.back() < id))
       return Result::refuse("closures are not ascending");
     set.closures.push_back(id);

@@ -24,6 +24,14 @@ bool is_usable(const Closure& closure) {
          is_covariance(closure.covariance);
 }
 
+void check_usable(const Closure& closure, RobotId a, RobotId b) {
+  const auto [low, high] = std::minmax(closure.from.id.robot, closure.to.id.robot);
+  if (low != a || high != b || !is_usable(closure))
+    throw std::invalid_argument("closure " + to_string(closure.from.id) + " -> " +
+                                to_string(closure.to.id) + " is malformed or not between robots " +
+                                std::to_string(a) + " and " + std::to_string(b));
+}
+
 Pcm::Pcm(RobotId a, RobotId b, const PcmConfig& config)
     : a_(std::min(a, b)),
       b_(std::max(a, b)),
@@ -32,11 +40,7 @@ Pcm::Pcm(RobotId a, RobotId b, const PcmConfig& config)
       clique_(static_cast<std::uint64_t>(config.max_search_nodes), config.search) {}
 
 PcmVerdict Pcm::add(const Closure& closure) {
-  const auto [low, high] = std::minmax(closure.from.id.robot, closure.to.id.robot);
-  if (low != a_ || high != b_ || !is_usable(closure))
-    throw std::invalid_argument("Pcm::add: closure " + to_string(closure.from.id) + " -> " +
-                                to_string(closure.to.id) + " is malformed or not between robots " +
-                                std::to_string(a_) + " and " + std::to_string(b_));
+  check_usable(closure, a_, b_);
   if (known_.contains(closure.id())) return PcmVerdict::kRepeated;
   if (known_.size() >= kMaxClosures) return PcmVerdict::kFull;
   known_.insert(closure.id());

@@ -13,7 +13,7 @@ namespace km {
 
 /// What became of a closure given to Pcm.
 enum class PcmVerdict {
-  kRepeated,         ///< A closure with this id is known; the first one counts.
+  kRepeated,         ///< Its pair of keyframes is known; the first measurement is tested.
   kAgainstOdometry,  ///< Refused by the odometry gate.
   kFull,             ///< Pcm::kMaxClosures are stored already.
   kAdded,            ///< Stored; the consistent set is as before.
@@ -24,13 +24,17 @@ enum class PcmVerdict {
 /// covariances that are covariances, two distinct ends.
 [[nodiscard]] bool is_usable(const Closure& closure);
 
+/// Throws std::invalid_argument unless the closure is_usable() and between robots `a` <= `b`.
+void check_usable(const Closure& closure, RobotId a, RobotId b);
+
 /// Incremental pairwise consistency maximisation (PCM) of the closures of one robot pair.
 ///
 /// Keeps the largest set of closures that agree pairwise: the maximum clique of the graph whose
 /// vertices are closures and whose edges are pairs consistent by CycleTest (Mangelson et al., ICRA
-/// 2018), updated after every closure (MaxClique). Closures count alike in either direction; a pair
-/// of keyframes measured once from each side is two closures. Deterministic in the order of add();
-/// of equally large sets the older one is kept. Not thread-safe. Copyable.
+/// 2018), updated after every closure (MaxClique). A closure is a pair of keyframes and counts
+/// once, from whichever side and however often it was measured; the first measurement is tested.
+/// Deterministic in the order of add(); of equally large sets the older one is kept. Not
+/// thread-safe. Copyable.
 class Pcm {
  public:
   /// Bounds the memory that a flood of closures can take: 30 MB.

@@ -13,9 +13,26 @@ enum class CycleCriterion {
   kBounds,       ///< Its translation and its rotation against fixed bounds.
 };
 
-/// Parameters of Pcm. Field names are the YAML keys below `pcm:`.
+/// Which closures of a robot pair are handed to the optimiser.
+enum class ClosureSelection {
+  kWitness,  ///< All, once independent ones agree or the wait for them is over (WitnessedPair).
+  kPcm,      ///< The largest set that agrees pairwise (Pcm).
+};
+
+/// Parameters of PcmNode, Pcm and WitnessedPair. Field names are the YAML keys below `pcm:`.
 struct PcmConfig {
   static constexpr const char* kSection = "pcm";
+
+  /// The optimiser weighs the closures that it is given and rejects false ones. What has to be
+  /// decided before is whether two robots are joined at all.
+  ClosureSelection selection = ClosureSelection::kWitness;
+
+  /// witness: so many closures that agree pairwise and share no neighbourhood join two robots.
+  int min_witnesses = 2;
+
+  /// witness: robots whose closures do not bear each other out so well are joined nevertheless
+  /// when so much time has passed since the first closure [s]; it is logged.
+  double witness_wait_s = 30.0;
 
   CycleCriterion criterion = CycleCriterion::kMahalanobis;
 
@@ -39,7 +56,7 @@ struct PcmConfig {
   /// jumps: such a closure is the correction.
   bool odometry_gate = false;
 
-  /// A smaller consistent set is not trusted and not published.
+  /// pcm: a smaller consistent set is not trusted and not published.
   int min_inliers = 3;
 
   /// How the largest set is searched. The heuristics are those of the papers, for comparison.
@@ -54,6 +71,13 @@ struct PcmConfig {
   double publish_period_s = 0.5;
 
   void visit_fields(auto& visitor) {
+    visitor.field("selection", selection,
+                  {{"witness", ClosureSelection::kWitness}, {"pcm", ClosureSelection::kPcm}},
+                  "witness: all of a pair that is joined; pcm: the largest set that agrees");
+    visitor.field("min_witnesses", min_witnesses, {1, 1000},
+                  "witness: independent closures that agree");
+    visitor.field("witness_wait_s", witness_wait_s, {0.0, 1e6},
+                  "[s] witness: then a pair is joined without");
     visitor.field(
         "criterion", criterion,
         {{"mahalanobis", CycleCriterion::kMahalanobis}, {"bounds", CycleCriterion::kBounds}},
@@ -68,7 +92,7 @@ struct PcmConfig {
                   "[rad]");
     visitor.field("bounds_per_transform", bounds_per_transform, "times transforms in the cycle");
     visitor.field("odometry_gate", odometry_gate, "closures inside one robot against its odometry");
-    visitor.field("min_inliers", min_inliers, {1, 1000}, "smaller sets are not trusted");
+    visitor.field("min_inliers", min_inliers, {1, 1000}, "pcm: smaller sets are not trusted");
     visitor.field("search", search,
                   {{"exact", CliqueMethod::kExact},
                    {"incremental", CliqueMethod::kIncremental},

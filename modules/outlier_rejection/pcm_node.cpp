@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
@@ -13,20 +12,25 @@ namespace {
 
 constexpr std::size_t kQueue = 256;
 
+std::string text_of(RobotId a, RobotId b) {
+  return "robots " + std::to_string(a) + ' ' + std::to_string(b) + ": ";
+}
+
 }  // namespace
 
 PcmNode::PcmNode(const PcmConfig& config, RobotId self, Topic<Closure>& closures,
-                 const Topic<InlierSet>& inlier_sets)
+                 const Topic<InlierSet>& inlier_sets, Topic<PeerEvent>* peer_events)
     : config_(checked(config)),
       self_(self),
       inlier_sets_(inlier_sets),
       worker_(
-          kQueue, Overflow::kBlock,
-          [this](const Input& closure) { closure ? step(*closure) : publish_changes(); },
+          kQueue, Overflow::kBlock, [this](const Input& input) { handle(input); },
           PcmConfig::kSection),
       ticks_(
-          steady_duration(config.publish_period_s), [this] { worker_.post(nullptr); }, "pcm tick") {
+          steady_duration(config.publish_period_s), [this] { worker_.post(Tick{}); }, "pcm tick") {
   closures.subscribe([this](const auto& message) { worker_.post(message); });
+  if (peer_events != nullptr)
+    peer_events->subscribe([this](const auto& message) { worker_.post(message); });
 }
 
 void PcmNode::start() {
@@ -37,11 +41,21 @@ void PcmNode::start() {
 void PcmNode::stop() noexcept {
   worker_.stop();  // refuses further ticks, so that none waits for room
   ticks_.stop();
-  if (worker_.error() == nullptr) publish_changes();
+  if (worker_.error() == nullptr) publish_changes(steady_now_s());
 }
 
 std::exception_ptr PcmNode::error() const {
   return worker_.error() != nullptr ? worker_.error() : ticks_.error();
+}
+
+void PcmNode::handle(const Input& input) {
+  if (const auto* closure = std::get_if<Topic<Closure>::Message>(&input)) return step(**closure);
+  if (const auto* event = std::get_if<Topic<PeerEvent>::Message>(&input)) return step(**event);
+  publish_changes(steady_now_s());
+}
+
+void PcmNode::step(const PeerEvent& event) {
+  if (event.kind == PeerEventKind::kRestarted) pairs_.erase(event.identity.robot);
 }
 
 void PcmNode::step(const Closure& closure) {
@@ -53,37 +67,73 @@ void PcmNode::step(const Closure& closure) {
         << " cannot be weighed: refused";
     return;
   }
-  const RobotId other = std::max(from, to);
-  Pcm& pcm = pcm_of_.try_emplace(other, self_, other, config_).first->second;
-  const PcmVerdict verdict = pcm.add(closure);
-  if (verdict == PcmVerdict::kGrew) changed_.insert(other);
-  report(closure, verdict, pcm);
+  Pair& pair = pair_with(std::max(from, to));
+  const PcmVerdict verdict = std::visit([&](auto& set) { return set.add(closure); }, pair.closures);
+  const bool takes_all = config_.selection == ClosureSelection::kWitness;
+  pair.changed |= verdict == PcmVerdict::kGrew || (takes_all && verdict == PcmVerdict::kAdded);
+  report(closure, verdict, pair);
 }
 
-void PcmNode::report(const Closure& closure, PcmVerdict verdict, const Pcm& pcm) const {
-  const RobotId other = std::max(closure.from.id.robot, closure.to.id.robot);
-  const std::string pair = "robots " + std::to_string(self_) + " " + std::to_string(other) + ": ";
+PcmNode::Pair& PcmNode::pair_with(RobotId other) {
+  const auto found = pairs_.find(other);
+  if (found != pairs_.end()) return found->second;
+  Pair pair{WitnessedPair(self_, other, config_)};
+  if (config_.selection == ClosureSelection::kPcm)
+    pair.closures.emplace<Pcm>(self_, other, config_);
+  return pairs_.emplace(other, std::move(pair)).first->second;
+}
+
+void PcmNode::report(const Closure& closure, PcmVerdict verdict, const Pair& pair) const {
+  const std::string robots = text_of(self_, std::max(closure.from.id.robot, closure.to.id.robot));
   if (verdict == PcmVerdict::kFull)
-    log::limited(log::Level::kWarn, name(), "full " + pair)
-        << pair << Pcm::kMaxClosures << " closures are stored, more are refused";
+    log::limited(log::Level::kWarn, name(), "full " + robots)
+        << robots << Pcm::kMaxClosures << " closures are stored, more are refused";
   if (verdict == PcmVerdict::kAgainstOdometry)
-    log::debug(name()) << pair << to_string(closure.from.id) << " -> " << to_string(closure.to.id)
+    log::debug(name()) << robots << to_string(closure.from.id) << " -> " << to_string(closure.to.id)
                        << " disagrees with odometry";
-  const MaxClique& clique = pcm.clique();
-  if (config_.search == CliqueMethod::kExact && !clique.proven())
-    log::limited(log::Level::kInfo, name(), "unproven " + pair)
-        << pair << clique.clique().size() << " closures agree, up to " << clique.bound()
-        << " may: a search ended at pcm.max_search_nodes and fell back to the heuristic";
+  const auto* pcm = std::get_if<Pcm>(&pair.closures);
+  if (pcm == nullptr || config_.search != CliqueMethod::kExact || pcm->clique().proven()) return;
+  log::limited(log::Level::kInfo, name(), "unproven " + robots)
+      << robots << pcm->clique().clique().size() << " closures agree, up to "
+      << pcm->clique().bound()
+      << " may: a search ended at pcm.max_search_nodes and fell back to the heuristic";
 }
 
-void PcmNode::publish_changes() {
-  for (const RobotId other : std::exchange(changed_, {})) {
-    std::vector<ClosureId> inliers = pcm_of_.at(other).inliers();
-    if (inliers.empty()) continue;
-    log::debug(name()) << "robots " << self_ << ' ' << other << ": " << inliers.size() << " of "
-                       << pcm_of_.at(other).size() << " closures agree";
-    inlier_sets_.publish(InlierSet{self_, other, ++version_of_[other], std::move(inliers)});
+void PcmNode::publish_changes(double now_s) {
+  for (auto& [other, pair] : pairs_) {
+    std::vector<ClosureId> closures = selected(other, pair, now_s);
+    if (closures.empty()) continue;
+    pair.changed = false;
+    inlier_sets_.publish(InlierSet{self_, other, ++version_of_[other], std::move(closures)});
   }
+}
+
+std::vector<ClosureId> PcmNode::selected(RobotId other, Pair& pair, double now_s) const {
+  if (!pair.changed) return {};
+  if (const auto* pcm = std::get_if<Pcm>(&pair.closures)) {
+    std::vector<ClosureId> inliers = pcm->inliers();
+    pair.changed = false;
+    log::debug(name()) << text_of(self_, other) << inliers.size() << " of " << pcm->size()
+                       << " closures agree";
+    return inliers;
+  }
+  if (!is_joined(other, pair, now_s)) return {};
+  return std::get<WitnessedPair>(pair.closures).closures();
+}
+
+bool PcmNode::is_joined(RobotId other, Pair& pair, double now_s) const {
+  const auto& closures = std::get<WitnessedPair>(pair.closures);
+  if (other == self_ || pair.waited || closures.is_witnessed()) return true;
+  if (!pair.since_s) pair.since_s = now_s;
+  if (!no_more_ && now_s - *pair.since_s < config_.witness_wait_s) return false;
+  pair.waited = true;
+  const std::size_t places = closures.witnesses();
+  log::info(name()) << text_of(self_, other) << "joined by "
+                    << (places == 1 ? std::string("one place") : std::to_string(places) + " places")
+                    << " only, none other has agreed in " << now_s - *pair.since_s
+                    << " s: their closures are assumed to be true where the graph does not "
+                       "contradict them";
+  return true;
 }
 
 }  // namespace km

@@ -1,13 +1,19 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <exception>
 #include <map>
+#include <optional>
 #include <set>
 #include <string_view>
+#include <variant>
+#include <vector>
 
 #include "modules/core/pose_graph.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
+#include "modules/outlier_rejection/witnessed_pair.hpp"
+#include "runtime/dds/peer_table.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
 #include "runtime/topic.hpp"
@@ -15,15 +21,21 @@
 
 namespace km {
 
-/// Decides which closures agree, for every pair in which this robot has the lower id and for the
-/// closures inside it. In: `closures`, the robot's own and received ones, in any order, repeated
-/// or not. Out: `inlier_sets`, versions ascending per pair. Closures of other pairs are left to
-/// their deciders, unusable ones refused with a warning.
+/// Decides which closures are optimised, for every pair in which this robot has the lower id and
+/// for the closures inside it. In: `closures`, the robot's own and received ones, in any order,
+/// repeated or not. Out: `inlier_sets`, versions ascending per pair. Closures of other pairs are
+/// left to their deciders, unusable ones refused with a warning.
+///
+/// Which they are is told by PcmConfig::selection. By default all, since the optimiser weighs them;
+/// but two robots are joined only once independent closures agree (WitnessedPair), or when
+/// PcmConfig::witness_wait_s is over or no witness can come any more, which is logged. Closures inside the robot join nothing and
+/// are published at once.
 class PcmNode final : public Node {
  public:
-  /// Throws ConfigError if `config` is out of bounds. Both topics must outlive the node.
+  /// Throws ConfigError if `config` is out of bounds. All topics must outlive the node. Of a peer
+  /// that `peer_events` says has restarted everything is forgotten: its keyframes are others now.
   PcmNode(const PcmConfig& config, RobotId self, Topic<Closure>& closures,
-          const Topic<InlierSet>& inlier_sets);
+          const Topic<InlierSet>& inlier_sets, Topic<PeerEvent>* peer_events = nullptr);
   ~PcmNode() override { stop(); }
 
   std::string_view name() const override { return PcmConfig::kSection; }
@@ -33,22 +45,43 @@ class PcmNode final : public Node {
   std::exception_ptr error() const override;
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Handles one closure synchronously. The thread calls only this and publish_changes().
+  /// Handles one closure synchronously. The thread calls only this, the other step() and
+  /// publish_changes().
   void step(const Closure& closure);
+  void step(const PeerEvent& event);
 
-  /// Publishes the sets that grew since the last call and have min_inliers.
-  void publish_changes();
+  /// Publishes the sets that have changed since the last call, and those whose wait is over. The
+  /// wait of a pair begins with the first call after its first closure. `now_s`: any origin.
+  void publish_changes(double now_s);
+
+  /// The runs of all robots are over, and all that was found has arrived: whoever waits for a
+  /// witness waits for nothing. Safe to call from any thread, repeatedly.
+  void expect_no_more() { no_more_ = true; }
 
  private:
-  using Input = Topic<Closure>::Message;  // null: time to publish
-  void report(const Closure& closure, PcmVerdict verdict, const Pcm& pcm) const;
+  struct Tick {};
+  using Input = std::variant<Tick, Topic<Closure>::Message, Topic<PeerEvent>::Message>;
+
+  // Of this robot and another one, or inside this one.
+  struct Pair {
+    std::variant<WitnessedPair, Pcm> closures;
+    std::optional<double> since_s = {};  // waiting for a witness
+    bool changed = false;
+    bool waited = false;
+  };
+
+  void handle(const Input& input);
+  Pair& pair_with(RobotId other);
+  [[nodiscard]] std::vector<ClosureId> selected(RobotId other, Pair& pair, double now_s) const;
+  [[nodiscard]] bool is_joined(RobotId other, Pair& pair, double now_s) const;
+  void report(const Closure& closure, PcmVerdict verdict, const Pair& pair) const;
 
   const PcmConfig config_;
   const RobotId self_;
   const Topic<InlierSet>& inlier_sets_;
-  std::map<RobotId, Pcm> pcm_of_;  // by the other robot; `self_` for closures inside this one
+  std::map<RobotId, Pair> pairs_;  // by the other robot; `self_` for closures inside this one
   std::map<RobotId, std::uint32_t> version_of_;
-  std::set<RobotId> changed_;
+  std::atomic<bool> no_more_ = false;
   Worker<Input> worker_;
   Periodic ticks_;  // last member: stops before the worker it posts to
 };

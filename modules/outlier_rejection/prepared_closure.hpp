@@ -9,7 +9,7 @@ namespace km {
 /// A closure turned so that a.id < b.id: the direction it was measured in does not matter to a
 /// cycle. Covariances are scaled to what the test assumes.
 struct OrientedClosure {
-  ClosureId id;  ///< As measured.
+  ClosureId id;
   OdometryPose a;
   OdometryPose b;
   UncertainPose T_a_b;
@@ -23,7 +23,7 @@ struct OrientedClosure {
 struct PreparedClosure {
   explicit PreparedClosure(const OrientedClosure& closure);
 
-  ClosureId id;  ///< As measured.
+  ClosureId id;
   KeyframeId a, b;
   Eigen::Vector3d t_odoma_a;
   SE3 T_odoma_odomb;           ///< Where b's odometry began, as this closure has it.

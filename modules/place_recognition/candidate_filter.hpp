@@ -36,7 +36,7 @@ struct CandidateSearch {
 ///
 /// The score of two images depends on how much texture they have; divided by the score of the query
 /// against the keyframe before it, eta = s(v_t, v_j) / s(v_t, v_(t-1)), one threshold serves all
-/// places (Galvez-Lopez and Tardos, TRO 2012; threshold 0.5 in Tian et al., "Kimera-Multi", Sec.
+/// places (Galvez-Lopez and Tardos, TRO 2012; threshold 0.5 in Chang et al., "Kimera-Multi", Sec.
 /// III-A). Unlike there, candidates need no temporal consistency: geometric verification and
 /// outlier rejection follow. Const members are thread-safe.
 class CandidateFilter {

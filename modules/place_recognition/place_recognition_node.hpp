@@ -30,7 +30,7 @@ struct PlaceRecognitionTopics {
 };
 
 /// Finds places seen before: own keyframes among earlier own ones, and keyframes of peers, as they
-/// arrive, among own ones (Tian et al., "Kimera-Multi", Sec. III-A).
+/// arrive, among own ones (Chang et al., "Kimera-Multi", Sec. III-A).
 ///
 /// A pair of keyframes (a_i, b_j) of two robots is never missed while messages get through in both
 /// directions: either a knew a_i when b_j arrived, and finds the pair; or it did not, then a_i was

@@ -1,6 +1,7 @@
 #include "modules/pose_graph/g2o_io.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -48,12 +49,47 @@ Eigen::Matrix<double, N, N> read_information(TextFields& fields) {
   return information;
 }
 
+// 1 / (mean of the eigenvalues of the inverse): not positive, or NaN, where that makes no weight.
+template <typename Block>
+double mean_precision(const Block& information) {
+  return static_cast<double>(information.rows()) / information.inverse().trace();
+}
+
+bool usable(double weight) {
+  return weight > 0.0 && std::isfinite(weight);
+}
+
+// Covariance of an edge, in the order of the file.
 template <int N>
-Eigen::Matrix<double, N, N> read_inverse(TextFields& fields) {
+struct EdgeCovariance {
+  Eigen::Matrix<double, N, N> Sigma;
+  bool definite = true;  // the information is
+};
+
+// Without cross terms, with the weights that SE-Sync takes from the blocks of `information`.
+template <int N>
+EdgeCovariance<N> covariance_of_blocks(const Eigen::Matrix<double, N, N>& information,
+                                       const TextFields& fields) {
+  constexpr int kAxes = N == 6 ? 3 : 2;
+  constexpr int kTurns = N - kAxes;
+  const double tau = mean_precision(information.template topLeftCorner<kAxes, kAxes>().eval());
+  const double rotation =  // 2 kappa, in the plane kappa
+      mean_precision(information.template bottomRightCorner<kTurns, kTurns>().eval());
+  if (!usable(tau) || !usable(rotation))
+    fields.fail("information matrix is not positive definite, and its blocks weigh rotation by " +
+                std::to_string(rotation) + " and translation by " + std::to_string(tau));
+  Eigen::Matrix<double, N, 1> variances;
+  variances.template head<kAxes>().setConstant(1.0 / tau);
+  variances.template tail<kTurns>().setConstant(1.0 / rotation);
+  return {variances.asDiagonal(), false};
+}
+
+template <int N>
+EdgeCovariance<N> read_covariance(TextFields& fields) {
   const Eigen::Matrix<double, N, N> information = read_information<N>(fields);
   const Eigen::LLT<Eigen::Matrix<double, N, N>> llt(information);
-  if (llt.info() != Eigen::Success) fields.fail("information matrix is not positive definite");
-  return llt.solve(Eigen::Matrix<double, N, N>::Identity());
+  if (llt.info() != Eigen::Success) return covariance_of_blocks<N>(information, fields);
+  return {llt.solve(Eigen::Matrix<double, N, N>::Identity())};
 }
 
 // What the prior of a vertical knows, [translation; rotation], in units of 1 / sigma^2.
@@ -122,8 +158,15 @@ class Reader {
     edge.to = read_id(fields);
     if (edge.from == edge.to) fields.fail("edge from " + to_string(edge.from) + " to itself");
     edge.T_from_to = read_pose(fields, graph.dimension);
-    edge.covariance =
-        graph.dimension == 2 ? lift(read_inverse<3>(fields)) : swap_blocks(read_inverse<6>(fields));
+    if (graph.dimension == 2) {
+      const EdgeCovariance<3> read = read_covariance<3>(fields);
+      edge.covariance = lift(read.Sigma);
+      graph.indefinite_edges += read.definite ? 0 : 1;
+    } else {
+      const EdgeCovariance<6> read = read_covariance<6>(fields);
+      edge.covariance = swap_blocks(read.Sigma);
+      graph.indefinite_edges += read.definite ? 0 : 1;
+    }
   }
 
   void read_offset(TextFields& fields) {

@@ -30,6 +30,7 @@ struct G2oGraph {
   std::vector<G2oVertex> vertices;
   std::vector<RelativePose> edges;
   std::vector<G2oVertical> verticals = {};  ///< At most one of a pose.
+  std::size_t indefinite_edges = 0;  ///< Weighed by the blocks of their information, read_g2o().
 };
 
 /// Keyframe of a vertex key. A gtsam symbol (letter in the top byte, index below) belongs to robot
@@ -47,6 +48,13 @@ struct G2oGraph {
 /// reordered: g2o has [translation; rotation], the tangent here is [rotation; translation]. (g2o's
 /// rotation error is the vector part of the quaternion, whose information SE-Sync and others take
 /// as that of the angle; so do we.) Edges of 2D files have zero variance in z, roll and pitch.
+///
+/// An information matrix that is not positive definite has no covariance, but SE-Sync, which looks
+/// at its diagonal blocks alone, still has weights for it: 3D kappa = 3 / (2 tr(I_R^-1)), tau = 3 /
+/// tr(I_t^-1), 2D kappa = I_33, tau = 2 / tr(I_t^-1) (read_g2o_file() of SE-Sync). If both are
+/// positive the edge gets the covariance with no cross terms that has these weights, variances
+/// 1 / (2 kappa) (2D: 1 / kappa) and 1 / tau, and counts as one of `indefinite_edges`.
+///
 /// FIX lines and comments (#) are skipped.
 ///
 /// Verticals are priors EDGE_SE3_PRIOR on a pose, with an offset PARAMS_SE3OFFSET that stands
@@ -56,7 +64,7 @@ struct G2oGraph {
 ///
 /// Throws std::runtime_error "file:line: what" for any other deviation: unknown tags, missing or
 /// surplus fields, numbers that are not finite, quaternions not of unit length within 1e-3,
-/// information matrices that are not positive definite, vertices given twice, edges from a pose to
+/// information matrices without positive weights, vertices given twice, edges from a pose to
 /// itself, priors of any other kind, two on one pose. Edges and priors may name vertices that the
 /// file does not have (those of another robot).
 [[nodiscard]] G2oGraph read_g2o(std::istream& in, const std::string& file);

@@ -90,6 +90,7 @@ std::size_t chain_length(const std::vector<RelativePose>& edges, RobotId robot,
 RecordedGraph make_recorded_graph(const G2oGraph& g2o, const std::string& file) {
   if (g2o.dimension != 3) throw std::runtime_error(file + ": the graph is not 3D");
   RecordedGraph graph = make_recorded_graph(g2o.edges, file);
+  graph.indefinite_edges = g2o.indefinite_edges;
   for (const G2oVertical& prior : g2o.verticals) {
     if (prior.id.robot != graph.robot || prior.id.index >= graph.poses())
       throw std::runtime_error(file + ": the prior on " + to_string(prior.id) +

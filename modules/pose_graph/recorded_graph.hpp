@@ -19,6 +19,7 @@ struct RecordedGraph {
   std::vector<RelativePose> intra_closures;  ///< Between keyframes of `robot`, as in the file.
   std::vector<RelativePose> inter_closures;  ///< `robot` at one end, either one; as in the file.
   std::map<KeyframeIndex, Vertical> verticals = {};  ///< Of its keyframes, where known.
+  std::size_t indefinite_edges = 0;                  ///< See G2oGraph.
 
   [[nodiscard]] std::size_t poses() const { return odometry.size() + 1; }
   /// Where odometry starts: the identity, turned the least that gives its frame z up if keyframe 0

@@ -13,7 +13,7 @@ namespace km {
 using Matrix9 = Eigen::Matrix<double, 9, 9>;
 
 /// Relative motion measured by the inertial sensor between two instants i and j, in the body frame
-/// at i and without gravity and initial velocity.
+/// at i and without gravity and initial velocity (Forster et al., TRO 2017, Eq. (33)).
 struct PreintegratedMotion {
   Eigen::Matrix3d dR = Eigen::Matrix3d::Identity();  ///< R_i_j.
   Eigen::Vector3d dv = Eigen::Vector3d::Zero();      ///< R_i^T (v_j - v_i - g dt) [m/s].
@@ -22,7 +22,9 @@ struct PreintegratedMotion {
 
 /// On-manifold preintegration of inertial samples with first-order bias correction
 /// (Forster, Carlone, Dellaert, Scaramuzza, "On-Manifold Preintegration for Real-Time
-/// Visual-Inertial Odometry", TRO 2017, Sec. V and VI).
+/// Visual-Inertial Odometry", TRO 2017, Sec. V and VI): motion() by Eq. (35) to (37), covariance()
+/// by Eq. (62) and (63), corrected() by Eq. (44) with the derivatives of its appendix on bias
+/// correction, built up sample by sample.
 ///
 /// Deviation: each step uses the mean of its two samples in the frame half-way through the step,
 /// second order in the sampling period where the paper's zero-order hold is first order.
@@ -73,7 +75,7 @@ class ImuPreintegration {
 };
 
 /// The state dt_s() after `state` by its biases and `imu`; gravity is [0, 0, -gravity_mps2].
-/// The stamp is left as it is.
+/// The stamp is left as it is. Forster et al., TRO 2017, Eq. (38) without noise, for state j.
 [[nodiscard]] OdometryState predict(const OdometryState& state, const ImuPreintegration& imu,
                                     double gravity_mps2);
 

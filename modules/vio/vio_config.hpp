@@ -79,10 +79,12 @@ struct VioConfig {
   double drift_rotation = 7e-4;
   double drift_translation = 4e-3;
 
-  /// Error of the vertical that is handed on with every keyframe, each horizontal axis [rad]; below
-  /// 1e-4: none is. Errors of keyframes near each other are much the same, and a start may be off
-  /// by more.
-  double tilt_sigma = 5e-3;
+  /// Error of the verticals that are handed on with keyframes, each horizontal axis [rad]; below
+  /// 1e-4: none are. It comes from biases that hardly change: over so many keyframes in a row it is
+  /// one error, and all their verticals together know no more than one. What uses them takes errors
+  /// for independent, so each is handed on with sqrt(tilt_keyframes) times this sigma.
+  double tilt_sigma = 1e-2;
+  int tilt_keyframes = 120;
 
   /// Longest time between two inertial samples that is interpolated [s]; longer: a new start.
   double max_imu_gap_s = 0.1;
@@ -121,7 +123,9 @@ struct VioConfig {
     visitor.field("drift_rotation", drift_rotation, {0.0, 0.1}, "[rad/sqrt(s)]");
     visitor.field("drift_translation", drift_translation, {0.0, 1.0}, "[m/sqrt(s)]");
     visitor.field("tilt_sigma", tilt_sigma, {0.0, 1.5},
-                  "[rad] of a keyframe's vertical; below 1e-4: the pose graph does without");
+                  "[rad] of the verticals; below 1e-4: the pose graph does without");
+    visitor.field("tilt_keyframes", tilt_keyframes, {1, 100000},
+                  "in a row have one error of the vertical in common");
     visitor.field("max_imu_gap_s", max_imu_gap_s, {1e-3, 1.0}, "[s]");
     visitor.field("max_speed_mps", max_speed_mps, {0.1, 1e3}, "[m/s]");
     visitor.field("max_gyro_bias_radps", max_gyro_bias_radps, {1e-3, 10.0}, "[rad/s]");

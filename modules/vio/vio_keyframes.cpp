@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "modules/vio/vio.hpp"
 
@@ -47,7 +48,7 @@ bool Vio::due(const OdometryState& state, const StereoFrame& frame) const {
 std::optional<Vertical> Vio::vertical_at(const OdometryState& state) const {
   if (config_.tilt_sigma < kLeastTiltSigma) return std::nullopt;
   return Vertical{state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ(),
-                  config_.tilt_sigma};
+                  config_.tilt_sigma * std::sqrt(config_.tilt_keyframes)};
 }
 
 void Vio::hand_on_first(const OdometryState& state, const Frame& frame, VioResult& result) {

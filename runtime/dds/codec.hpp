@@ -2,7 +2,7 @@
 
 #include <dds/dds.h>
 
-#include "runtime/dds/decoded.hpp"
+#include "modules/core/decoded.hpp"
 
 namespace km {
 

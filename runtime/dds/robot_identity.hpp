@@ -4,8 +4,8 @@
 #include <string>
 #include <string_view>
 
+#include "modules/core/decoded.hpp"
 #include "modules/core/ids.hpp"
-#include "runtime/dds/decoded.hpp"
 
 namespace km {
 

@@ -29,6 +29,7 @@ Codec<RobotStatus>::Encoded Codec<RobotStatus>::encode(const RobotStatus& status
   wire.phase = static_cast<km_wire_Phase>(status.phase);
   wire.dataset_time_s = status.dataset_time_s;
   wire.keyframes = status.keyframes;
+  wire.settled_links = status.settled_links;
   return encoded;
 }
 
@@ -41,8 +42,11 @@ Decoded<RobotStatus> Codec<RobotStatus>::decode(const Wire& wire) {
   if (!std::ranges::all_of(name, printable)) return Result::refuse("name is not printable");
   if (wire.phase > km_wire_PHASE_LEAVING) return Result::refuse("unknown phase");
   if (!std::isfinite(wire.dataset_time_s)) return Result::refuse("time is not finite");
-  return Result::accept(
-      {wire.robot, name, static_cast<RobotPhase>(wire.phase), wire.dataset_time_s, wire.keyframes});
+  const auto phase = static_cast<RobotPhase>(wire.phase);
+  constexpr std::uint16_t kWithLinks = 2;
+  const std::uint8_t told_before = phase >= RobotPhase::kSettled ? kManyLinks : 0;
+  return Result::accept({wire.robot, name, phase, wire.dataset_time_s, wire.keyframes,
+                         wire.header.version < kWithLinks ? told_before : wire.settled_links});
 }
 
 }  // namespace km

@@ -1,6 +1,8 @@
 #include <catch2/catch.hpp>
 
+#include "apps/robot/results.hpp"
 #include "apps/robot/run_record.hpp"
+#include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {
@@ -30,7 +32,7 @@ TEST_CASE("what the optimiser rejects is no inlier, until it takes it back", "[r
   REQUIRE(outcomes.size() == 3);
   CHECK(outcomes[0].stage == ClosureStage::kInlier);
   CHECK(outcomes[1].stage == ClosureStage::kVerified);
-  CHECK(outcomes[1].reason == "rejected by graduated non-convexity");
+  CHECK(outcomes[1].reason == "rejected: the other closures contradict it");
   CHECK(outcomes[2].reason == "inconsistent with the other closures of the robot pair");
   CHECK(record.inlier_closures().size() == 1);
   CHECK(record.stages_per_peer().at(2).inliers == 1);
@@ -40,6 +42,25 @@ TEST_CASE("what the optimiser rejects is no inlier, until it takes it back", "[r
   CHECK(outcomes[1].stage == ClosureStage::kInlier);
   CHECK(outcomes[1].reason.empty());
   CHECK(record.inlier_closures().size() == 2);
+}
+
+TEST_CASE("a closure is the same from whichever end it was found", "[robot]") {
+  const KeyframeId low{1, 4}, high{2, 3};
+  Closure closure = closure_between({high, low});
+  closure.T_from_to = make_pose(Eigen::Matrix3d::Identity(), {1.0, 2.0, 3.0});
+  RunRecord record(2);
+  record.add(closure);
+  record.add(ClosureOutcome{.id = {high, low}, .stage = ClosureStage::kVerified, .reason = {}});
+  record.add(InlierSet{1, 2, 1, {closure_id(high, low)}});
+  REQUIRE(record.outcomes().size() == 1);
+  CHECK(record.outcomes()[0].id == ClosureId{low, high});
+  CHECK(record.outcomes()[0].stage == ClosureStage::kInlier);
+  CHECK(record.stages_per_peer().at(1).inliers == 1);
+
+  const TemporaryFolder folder;
+  write_results(folder.path(), record, {});
+  CHECK_THAT(folder.read("loop_closures.csv"),
+             Catch::Contains("\n1,4,2,3,0,inlier,0,0,-1.000000,-2.000000,-3.000000,"));
 }
 
 }  // namespace km

@@ -53,6 +53,13 @@ void ip(pid_t network_of, const std::string& arguments) {
     throw std::runtime_error("VirtualNetwork: failed: ip " + arguments);
 }
 
+// Drops what comes from an address that no route leads back to, broadcasts included (RFC 3704).
+void drop_what_cannot_be_answered(pid_t network_of) {
+  const std::string setting = "/proc/sys/net/ipv4/conf/eth0/rp_filter";
+  if (Process({"sh", "-c", "echo 1 > " + setting}, network_of).wait() != 0)
+    throw std::runtime_error("VirtualNetwork: cannot write " + setting);
+}
+
 }  // namespace
 
 bool VirtualNetwork::available() {
@@ -76,6 +83,7 @@ VirtualNetwork::VirtualNetwork(int count) : switch_(hold_namespace()) {
     ip(host, "addr add " + address(n) + "/24 dev eth0");
     ip(host, "link set lo up");
     ip(host, "link set eth0 up");
+    drop_what_cannot_be_answered(host);
   }
 }
 
@@ -86,6 +94,12 @@ VirtualNetwork::~VirtualNetwork() {
 
 void VirtualNetwork::set_link(int n, bool up) {
   ip(switch_, "link set port" + std::to_string(n) + (up ? " up" : " down"));
+}
+
+void VirtualNetwork::set_link_between(int a, int b, bool up) {
+  const std::string command = up ? "route del blackhole " : "route add blackhole ";
+  ip(host(a), command + address(b));
+  ip(host(b), command + address(a));
 }
 
 void VirtualNetwork::remove_interface(int n) {

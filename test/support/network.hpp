@@ -28,6 +28,10 @@ class VirtualNetwork {
   /// Pulls the cable of `host`, or plugs it in.
   void set_link(int host, bool up);
 
+  /// Lets `a` and `b` hear each other, as at first, or not, whoever else hears them: robots on one
+  /// radio channel of which some are out of reach.
+  void set_link_between(int a, int b, bool up);
+
   /// Leaves `host` with nothing but loopback.
   void remove_interface(int host);
 

@@ -5,8 +5,8 @@
 #include <map>
 #include <vector>
 
+#include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
-#include "test/support/pgo_team.hpp"
 #include "test/support/pose_graph_problems.hpp"
 
 namespace km {
@@ -65,7 +65,7 @@ inline InlierSet inlier_set(const SplitGraph& graph, RobotId a, RobotId b,
   InlierSet set{a, b, version, {}};
   for (const RelativePose& e : graph.closures)
     if (std::min(e.from.robot, e.to.robot) == a && std::max(e.from.robot, e.to.robot) == b)
-      set.closures.push_back({e.from, e.to});
+      set.closures.push_back(closure_id(e.from, e.to));
   std::sort(set.closures.begin(), set.closures.end());
   return set;
 }
@@ -87,30 +87,6 @@ inline Closure make_closure(const RelativePose& measured) {
   return closure;
 }
 
-/// Gives an agent the odometry of its robot.
-inline void feed_odometry(PgoAgent& agent, RobotId robot, const SplitGraph& graph) {
-  KeyframeOdometry first;
-  first.id = {robot, 0};
-  if (const auto origin = graph.T_odom_first.find(robot); origin != graph.T_odom_first.end())
-    first.T_odom_kf = first.T_previous_kf = origin->second;
-  const auto add = [&](KeyframeOdometry keyframe) {
-    if (const auto up = graph.up.find(robot); up != graph.up.end())
-      keyframe.vertical = up->second(keyframe.id.index);
-    (void)agent.add(keyframe);
-  };
-  add(first);
-  for (const RelativePose& e : graph.odometry)
-    if (e.from.robot == robot) add(keyframe_odometry(e));
-}
-
-/// Gives an agent all its measurements, with every closure an inlier.
-inline void feed(PgoAgent& agent, RobotId robot, const SplitGraph& graph) {
-  feed_odometry(agent, robot, graph);
-  for (const RelativePose& e : graph.closures) (void)agent.add(make_closure(e));
-  for (const auto& [other, count] : graph.keyframes)
-    (void)agent.add(inlier_set(graph, std::min(robot, other), std::max(robot, other)));
-}
-
 /// Cost of the whole graph at the 3x4 or lifted poses that `pose` gives for keyframes.
 template <typename PoseOf>
 double cost_at(const SplitGraph& graph, const PoseOf& pose) {
@@ -121,20 +97,6 @@ double cost_at(const SplitGraph& graph, const PoseOf& pose) {
       cost += edge_cost(pose(e.from), pose(e.to), e.T_from_to, weight.kappa, weight.tau);
     }
   return cost;
-}
-
-/// Cost of the whole graph at the agents' lifted poses. Precondition: all are in one frame.
-inline double team_cost(PgoTeam& team, const SplitGraph& graph) {
-  return cost_at(graph, [&](const KeyframeId& id) {
-    return team.agent(id.robot).lifted_poses()->middleCols<4>(4 * Eigen::Index{id.index});
-  });
-}
-
-/// Cost of the published trajectories, i.e. after rounding. Precondition: all have been published.
-inline double rounded_cost(const PgoTeam& team, const SplitGraph& graph) {
-  return cost_at(graph, [&](const KeyframeId& id) -> Eigen::MatrixXd {
-    return team.trajectory(id.robot)->T_world_kf.at(id.index).matrix().topRows<3>();
-  });
 }
 
 }  // namespace km

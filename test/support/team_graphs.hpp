@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "modules/core/lie.hpp"
-#include "modules/pose_graph/team/team_graph_file.hpp"
+#include "modules/pgo_study/team_graph_file.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {

@@ -25,6 +25,7 @@ namespace fs = std::filesystem;
 const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"loop_closure", {"place_recognition"}},
     {"pose_graph", {"outlier_rejection"}},
+    {"pgo_study", {"pose_graph", "outlier_rejection"}},
     {"evaluation", {"mesh"}},
     {"simulation", {"mesh"}},
     {"semantic_mapping", {"mesh"}},

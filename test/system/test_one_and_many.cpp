@@ -4,6 +4,7 @@
 #include <iostream>
 
 #include "test/support/random_team.hpp"
+#include "test/system/recorded_team.hpp"
 #include "test/system/team_result.hpp"
 #include "test/system/team_run.hpp"
 
@@ -14,39 +15,12 @@ namespace fs = std::filesystem;
 
 constexpr int kRobots = 5;
 
-// What robot k has recorded: its odometry and every closure that touches it.
-void write_part(const SplitGraph& graph, RobotId robot, const fs::path& file) {
-  G2oGraph part;
-  for (const RelativePose& e : graph.odometry)
-    if (e.from.robot == robot) part.edges.push_back(e);
-  for (const RelativePose& e : graph.closures)
-    if (e.from.robot == robot || e.to.robot == robot) part.edges.push_back(e);
-  write_g2o(file, part);
-}
-
 // A team file for the parts in `folder`.
 void write_team(const fs::path& folder) {
   std::ofstream team(folder / "team.yaml");
   team << "robots:\n";
   for (int k = 0; k < kRobots; ++k)
     team << "  - {id: " << k << ", name: robot" << k << ", graph: part" << k << ".g2o}\n";
-}
-
-// The cost that kimera_multi_pgo comes to for the edges that the processes have kept.
-double solved_in_one_process(const fs::path& folder) {
-  const fs::path parts = folder / "kept";
-  fs::create_directory(parts);
-  for (int k = 0; k < kRobots; ++k) {
-    const std::string name = "robot" + std::to_string(k);
-    fs::copy_file(folder / name / "pose_graph.g2o", parts / (name + ".g2o"));
-  }
-  const fs::path json = folder / "pgo.json";
-  const CommandResult result =
-      run_command(std::string(KM_BIN_DIR) + "/kimera_multi_pgo " + parts.string() +
-                  " --method newton --json " + json.string());
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
-  return YAML::LoadFile(json.string())["rounded_cost"].as<double>();
 }
 
 TEST_CASE("Five processes over DDS come to the cost that one process comes to", "[system]") {
@@ -65,7 +39,7 @@ TEST_CASE("Five processes over DDS come to the cost that one process comes to", 
   CHECK(team.poses.size() == 5 * 40);
   CHECK(team.graph.edges.size() >= 5 * 39 + 4 * 3);  // connected by sets of three or more
   const double many = cost_of(team.graph, team.poses);
-  const double one = solved_in_one_process(folder.path());
+  const double one = solved_in_one_process(folder.path(), kRobots);
   const double difference = std::abs(many - one) / one;
   std::cout << "five processes: cost " << many << ", one process " << one << ", apart by "
             << difference << " of it\n";

@@ -24,7 +24,15 @@ RTCIntersectContext context_for(RayKind kind) {
   return context;
 }
 
-void prepare(RTCRay16& rays) {
+// Embree's checks look at lanes that are not active, too: they get a ray of no length.
+void prepare(LaneMask active, RTCRay16& rays) {
+  for (int i = 0; i < kLanes; ++i) {
+    if ((active >> i & 1U) != 0U) continue;
+    rays.org_x[i] = rays.org_y[i] = rays.org_z[i] = 0.0F;
+    rays.dir_x[i] = rays.dir_y[i] = 0.0F;
+    rays.dir_z[i] = 1.0F;
+    rays.tnear[i] = rays.tfar[i] = 0.0F;
+  }
   std::memset(rays.time, 0, sizeof(rays.time));
   std::memset(rays.mask, 0xFF, sizeof(rays.mask));
   std::memset(rays.flags, 0, sizeof(rays.flags));
@@ -34,6 +42,12 @@ void require_no_error(RTCDevice device) {
   const RTCError error = rtcGetDeviceError(device);
   if (error != RTC_ERROR_NONE)
     throw std::runtime_error("Embree failed with error " + std::to_string(error));
+}
+
+// One thread builds: the tree is then the same every time.
+std::string device_config(const std::string& instruction_set) {
+  const std::string config = "threads=1,set_affinity=0";
+  return instruction_set.empty() ? config : config + ",isa=" + instruction_set;
 }
 
 // Copies the mesh: Embree pads its buffers, since it reads 16 bytes at the last vertex.
@@ -56,9 +70,8 @@ void attach_mesh(RTCDevice device, RTCScene scene, const SurfaceMesh& mesh) {
 
 }  // namespace
 
-RayTracer::RayTracer(const SurfaceMesh& mesh)
-    // One thread builds: the tree is then the same every time.
-    : device_(rtcNewDevice("threads=1,set_affinity=0")) {
+RayTracer::RayTracer(const SurfaceMesh& mesh, const std::string& instruction_set)
+    : device_(rtcNewDevice(device_config(instruction_set).c_str())) {
   require_no_error(device_.get());
   scene_.reset(rtcNewScene(device_.get()));
   // Without it, rays slip through between triangles that share an edge.
@@ -69,7 +82,7 @@ RayTracer::RayTracer(const SurfaceMesh& mesh)
 }
 
 void RayTracer::intersect(LaneMask active, RayKind kind, RayPacket& rays) const {
-  prepare(rays.ray);
+  prepare(active, rays.ray);
   std::memset(rays.hit.primID, 0xFF, sizeof(rays.hit.primID));
   std::memset(rays.hit.geomID, 0xFF, sizeof(rays.hit.geomID));
   if (active == 0) return;
@@ -80,7 +93,7 @@ void RayTracer::intersect(LaneMask active, RayKind kind, RayPacket& rays) const 
 
 LaneMask RayTracer::occluded(LaneMask active, RayKind kind, RayPacket& rays) const {
   if (active == 0) return 0;
-  prepare(rays.ray);
+  prepare(active, rays.ray);
   const ValidLanes valid(active);
   RTCIntersectContext context = context_for(kind);
   rtcOccluded16(valid.lanes.data(), scene_.get(), &context, &rays.ray);

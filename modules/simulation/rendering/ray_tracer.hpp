@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 
 #include "modules/simulation/rendering/lanes.hpp"
 #include "modules/simulation/world/surface_mesh.hpp"
@@ -22,14 +23,16 @@ using RayPacket = RTCRayHit16;
 /// Embree's acceleration structure over a mesh. Immutable, safe to use from several threads.
 class RayTracer {
  public:
-  /// Copies `mesh`. Throws std::runtime_error with Embree's error code.
-  explicit RayTracer(const SurfaceMesh& mesh);
+  /// Copies `mesh`. `instruction_set` is one of Embree's ("sse2", "avx2", ...), for tests of its
+  /// kernels; empty: the widest of this processor. Throws std::runtime_error with Embree's error
+  /// code.
+  explicit RayTracer(const SurfaceMesh& mesh, const std::string& instruction_set = {});
 
   /// Nearest hits of the rays in `active` between tnear and tfar: primID, u, v, and tfar shrinks to
-  /// the hit. The other lanes get kNoTriangle.
+  /// the hit. The other lanes get kNoTriangle and a ray of no length: they need not be set.
   void intersect(LaneMask active, RayKind kind, RayPacket& rays) const;
 
-  /// Which of the rays in `active` hit anything.
+  /// Which of the rays in `active` hit anything. The other lanes need not be set.
   [[nodiscard]] LaneMask occluded(LaneMask active, RayKind kind, RayPacket& rays) const;
 
  private:

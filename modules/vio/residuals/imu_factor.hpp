@@ -28,8 +28,9 @@ struct FirstEstimate {
   [[nodiscard]] OdometryState applied_to(const OdometryState& state) const;
 };
 
-/// Preintegrated inertial factor between two states (Forster et al., TRO 2017, Sec. VI-E and
-/// appendix) together with the random walk of both biases.
+/// Preintegrated inertial factor between two states (Forster et al., TRO 2017, Sec. VI-D: residuals
+/// Eq. (45), their derivatives Eq. (71) to (81)) together with the random walk of both biases
+/// (Sec. VI-E, Eq. (47) and (48)).
 class ImuFactor {
  public:
   /// Throws std::invalid_argument if `imu` is empty or has no noise: it cannot be whitened.

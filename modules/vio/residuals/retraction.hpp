@@ -6,7 +6,7 @@ namespace km {
 
 /// Retraction of every estimator here: R' = R exp(rotation), t' = t + R translation, of
 /// delta = [rotation; translation]. It equals T * exp(delta) to first order (Forster et al., TRO
-/// 2017, Sec. III-C).
+/// 2017, Sec. III-C, Eq. (21)).
 [[nodiscard]] SE3 retract(const SE3& T, const Eigen::Ref<const Vector6>& delta);
 
 /// Inverse of retract(): the delta from `from` to `to`.

@@ -67,7 +67,8 @@ TEST_CASE("The report has every table with our values and the paper's", "[experi
       text,
       Contains("`kimera_multi_pgo ") &&
           Contains("All on TestChip, 2 cores, 8 GB; commit abc123.") &&
-          Contains("`kimera_multi_pgo RESULTS/graphs/city --method local --no-vertical --json ") &&
+          Contains(
+              "`kimera_multi_pgo solve RESULTS/graphs/city --method local --no-vertical --json ") &&
           Contains("12.5 s, load 0.5"));
 }
 

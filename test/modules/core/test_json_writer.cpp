@@ -46,6 +46,19 @@ TEST_CASE("Numbers keep their value, what is no number becomes null", "[core]") 
   CHECK(text.str() == "[\n  0.1,\n  1e-300,\n  18446744073709551615,\n  null,\n  null\n]\n");
 }
 
+TEST_CASE("Fields come in a row, and objects in a list", "[core]") {
+  std::ostringstream text;
+  JsonWriter json(text);
+  json.begin_object();
+  json.fields("a", 1, "b", "two");
+  json.objects("list", std::vector<int>{3}, [&](int x) { json.fields("x", x, "odd", x % 2 == 1); });
+  json.objects("none", std::vector<int>{}, [&](int x) { json.field("x", x); });
+  json.end_object();
+  CHECK(text.str() ==
+        "{\n  \"a\": 1,\n  \"b\": \"two\",\n  \"list\": [\n    {\n      \"x\": 3,\n"
+        "      \"odd\": true\n    }\n  ],\n  \"none\": []\n}\n");
+}
+
 TEST_CASE("A list of values is a field of its own", "[core]") {
   std::ostringstream text;
   JsonWriter json(text);

@@ -8,7 +8,7 @@ namespace {
 const InlierSet kSet{.a = 3,
                      .b = 700,
                      .version = 12,
-                     .closures = {{{3, 0}, {700, 9}}, {{3, 5}, {700, 1}}, {{700, 4}, {3, 5}}}};
+                     .closures = {{{3, 0}, {700, 9}}, {{3, 5}, {700, 1}}, {{3, 5}, {700, 4}}}};
 
 // As it arrives: with the writer's header.
 Codec<InlierSet>::Encoded received(const InlierSet& set) {
@@ -30,7 +30,7 @@ TEST_CASE("An inlier set survives the wire", "[codec]") {
 TEST_CASE("An empty set and one inside a robot survive the wire", "[codec]") {
   InlierSet set{.a = 5, .b = 5, .version = 1, .closures = {}};
   CHECK(Codec<InlierSet>::decode(received(set).wire).value);
-  set.closures = {{{5, 9}, {5, 2}}};
+  set.closures = {{{5, 2}, {5, 9}}};
   CHECK(Codec<InlierSet>::decode(received(set).wire).value);
 }
 
@@ -61,6 +61,10 @@ TEST_CASE("An inlier set that cannot be is refused", "[codec]") {
   SECTION("descending closures") {
     std::swap(encoded.closures[0], encoded.closures[2]);
     reason = "closures are not ascending";
+  }
+  SECTION("a second name of a closure") {
+    std::swap(encoded.closures[1].from, encoded.closures[1].to);
+    reason = "a closure is named by its higher end first";
   }
   SECTION("claimed without being there") {
     encoded.wire.closures._buffer = nullptr;

@@ -60,6 +60,7 @@ struct Team {
 
 PcmConfig tolerant() {
   PcmConfig config;
+  config.selection = ClosureSelection::kPcm;
   config.confidence = 0.9999999;
   config.min_inliers = 3;
   return config;
@@ -72,16 +73,16 @@ TEST_CASE("The PCM node publishes sets that grew, with rising versions", "[node]
 
   node.step(closures[0]);
   node.step(closures[1]);
-  node.publish_changes();
+  node.publish_changes(0.0);
   CHECK(team.recorder.sets().empty());  // below min_inliers
   node.step(closures[2]);
-  node.publish_changes();
-  node.publish_changes();  // nothing new
-  node.step(closures[2]);  // repeated
-  node.publish_changes();
+  node.publish_changes(0.0);
+  node.publish_changes(0.0);  // nothing new
+  node.step(closures[2]);     // repeated
+  node.publish_changes(0.0);
   node.step(closures[3]);
   node.step(closures[4]);
-  node.publish_changes();
+  node.publish_changes(0.0);
 
   const auto sets = team.recorder.sets();
   REQUIRE(sets.size() == 2);
@@ -101,7 +102,7 @@ TEST_CASE("The PCM node decides for the pairs in which it is the lower, and for 
   for (const Closure& closure : team.agreeing_inside(4, 4)) node.step(closure);
   for (const auto& [a, b] : {std::pair<RobotId, RobotId>{9, 4}, {3, 4}, {5, 6}})
     for (const Closure& closure : team.agreeing(a, b, 4)) node.step(closure);
-  node.publish_changes();
+  node.publish_changes(0.0);
 
   const auto sets = team.recorder.sets();
   REQUIRE(sets.size() == 2);
@@ -115,7 +116,7 @@ TEST_CASE("The PCM node survives closures that cannot be weighed", "[node]") {
   auto closures = team.agreeing(0, 1, 4);
   closures[1].T_from_to.translation().x() = std::numeric_limits<double>::quiet_NaN();
   for (const Closure& closure : closures) node.step(closure);
-  node.publish_changes();
+  node.publish_changes(0.0);
   REQUIRE(team.recorder.sets().size() == 1);
   CHECK(team.recorder.sets()[0].closures.size() == 3);
 }
@@ -125,6 +126,7 @@ TEST_CASE("The PCM node says that a search was cut short, and how much may be mi
   PcmConfig config = bounds_per_transform(0.5, 3.1);
   config.bounds_per_transform = false;
   config.max_search_nodes = 1;
+  config.selection = ClosureSelection::kPcm;
   PcmNode node(config, 0, team.closures, team.inlier_sets);
   const CapturedLog log;
   const Chain a(0), b(1);  // closures agree where their translations differ by half a metre
@@ -149,6 +151,95 @@ TEST_CASE("The PCM node's thread handles what was published before it stops", "[
   REQUIRE_FALSE(sets.empty());
   CHECK(sets.back().closures.size() == 40);
   CHECK(sets.size() == sets.back().version);
+}
+
+TEST_CASE("All closures of two robots are published once independent ones agree", "[node]") {
+  Team team;
+  PcmNode node(PcmConfig{}, 2, team.closures, team.inlier_sets);
+  auto closures = team.agreeing(2, 5, 20);
+  closures[1].T_from_to = random_pose(team.rng);  // false, and a neighbour of the first
+  node.step(closures[0]);
+  node.step(closures[1]);
+  node.step(reversed(closures[0]));
+  node.publish_changes(0.0);
+  CHECK(team.recorder.sets().empty());
+  node.step(closures[9]);
+  node.publish_changes(1.0);
+  node.publish_changes(100.0);  // nothing new
+  REQUIRE(team.recorder.sets().size() == 1);
+  CHECK(team.recorder.sets()[0].closures.size() == 3);
+  node.step(closures[10]);
+  node.publish_changes(100.0);
+  REQUIRE(team.recorder.sets().size() == 2);
+  CHECK(team.recorder.sets()[1].closures.size() == 4);
+  CHECK(std::ranges::is_sorted(team.recorder.sets()[1].closures));
+  CHECK(team.recorder.sets()[0].version < team.recorder.sets()[1].version);
+}
+
+TEST_CASE("Robots joined by one place wait for a second one, and it is said", "[node]") {
+  Team team;
+  PcmConfig config;
+  config.witness_wait_s = 30.0;
+  PcmNode node(config, 2, team.closures, team.inlier_sets);
+  const CapturedLog log;
+  const auto closures = team.agreeing(2, 5, 3);  // all neighbours
+  node.step(closures[0]);
+  node.publish_changes(1000.0);
+  node.step(closures[1]);
+  node.publish_changes(1029.9);
+  CHECK(team.recorder.sets().empty());
+  CHECK(log.text().empty());
+  node.publish_changes(1030.0);
+  REQUIRE(team.recorder.sets().size() == 1);
+  CHECK(team.recorder.sets()[0].closures.size() == 2);
+  CHECK_THAT(log.text(), Catch::Contains("robots 2 5: joined by one place only"));
+  node.step(closures[2]);
+  node.publish_changes(1031.0);  // the wait is over for good
+  REQUIRE(team.recorder.sets().size() == 2);
+  CHECK(team.recorder.sets()[1].closures.size() == 3);
+}
+
+TEST_CASE("At the end of all runs nobody waits for a witness", "[node]") {
+  Team team;
+  PcmNode node(PcmConfig{}, 2, team.closures, team.inlier_sets);
+  const CapturedLog log;
+  node.step(team.agreeing(2, 5, 1)[0]);
+  node.publish_changes(10.0);
+  CHECK(team.recorder.sets().empty());
+  node.expect_no_more();
+  node.publish_changes(12.0);
+  CHECK(team.recorder.sets().size() == 1);
+  CHECK_THAT(log.text(), Catch::Contains("none other has agreed in 2 s"));
+}
+
+TEST_CASE("Closures inside the robot need no witness", "[node]") {
+  Team team;
+  PcmNode node(PcmConfig{}, 4, team.closures, team.inlier_sets);
+  node.step(team.agreeing_inside(4, 4)[0]);
+  node.publish_changes(0.0);
+  REQUIRE(team.recorder.sets().size() == 1);
+  CHECK(team.recorder.sets()[0].closures.size() == 1);
+}
+
+TEST_CASE("Of a peer that has restarted the closures are forgotten", "[node]") {
+  Team team;
+  Topic<PeerEvent> peer_events;
+  PcmNode node(PcmConfig{}, 2, team.closures, team.inlier_sets, &peer_events);
+  const auto before = team.agreeing(2, 5, 20);
+  const auto after = team.agreeing(2, 5, 20);
+  for (const Closure& closure : before) node.step(closure);
+  node.publish_changes(0.0);
+  RobotIdentity identity;
+  identity.robot = 5;
+  node.step(PeerEvent{PeerEventKind::kRestarted, identity, {}});
+  node.step(after[3]);
+  node.step(after[17]);
+  node.publish_changes(0.5);
+  const auto sets = team.recorder.sets();
+  REQUIRE(sets.size() == 2);
+  CHECK(sets[0].closures.size() == 20);
+  CHECK(sets[1].closures.size() == 2);
+  CHECK(sets[0].version < sets[1].version);
 }
 
 }  // namespace

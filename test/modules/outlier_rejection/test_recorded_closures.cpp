@@ -1,9 +1,12 @@
 #include <yaml-cpp/yaml.h>
 #include <catch2/catch.hpp>
 
+#include <map>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "modules/outlier_rejection/witnessed_pair.hpp"
 #include "runtime/yaml_config.hpp"
 #include "test/modules/outlier_rejection/chain.hpp"
 #include "test/modules/outlier_rejection/recorded_closures.hpp"
@@ -77,6 +80,24 @@ TEST_CASE("PCM keeps as many tunnels closures whichever way round they are given
     turned.push_back(n % 2 == 0 ? reversed(closures[n]) : closures[n]);
   CHECK(reject_outliers(turned, config).at({3, 7}).inliers().size() ==
         reject_outliers(closures, config).at({3, 7}).inliers().size());
+}
+
+TEST_CASE("Every two robots in tunnels are joined by witnesses", "[recorded]") {
+  const auto files = team("multi_robot/tunnels_8robots/robot", 8, ".csv");
+  if (files.empty()) return;
+  const auto config = load_config<PcmConfig>(YAML::LoadFile("config/datasets/tunnels.yaml"));
+  std::map<RobotPair, WitnessedPair> pairs;
+  std::map<RobotPair, std::set<ClosureId>> given;
+  for (const Closure& closure : recorded_closures(files)) {
+    const RobotPair pair = pair_of(closure);
+    (void)pairs.try_emplace(pair, pair.first, pair.second, config).first->second.add(closure);
+    given[pair].insert(closure.id());
+  }
+  for (const auto& [pair, closures] : pairs) {
+    CAPTURE(pair.first, pair.second, closures.closures().size());
+    CHECK((pair.first == pair.second || closures.is_witnessed()));
+    CHECK(closures.closures().size() == given.at(pair).size());
+  }
 }
 
 }  // namespace

@@ -194,11 +194,34 @@ TEST_CASE("A bad g2o file is refused with its line and the reason", "[g2o]") {
       {"EDGE_SE3:QUAT 1 1" + kPose + kUnit, "edge from 0:1 to itself"},
       {"EDGE_SE3:QUAT 0 1" + kPose + " 0 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1",
        "not positive definite"},
+      {"EDGE_SE3:QUAT 0 1" + kPose + " 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 -0.4 0 0 1 0 1",
+       "not positive definite, and its blocks weigh rotation by -6.0"},
+      {"EDGE_SE3:QUAT 0 1" + kPose + " 1 0 0 0 0 0 1 0 0 0 0 -0.4 0 0 0 1 0 0 1 0 1",
+       "weigh rotation by 1.000000 and translation by -6.0"},
       {"EDGE_SE3:QUAT 0 1" + kPose, "line ends before information"},
   }));
   CAPTURE(line);
   CHECK_THROWS_WITH(read(kVertex + "# comment\n\nFIX 0\n" + line + '\n'),
                     Catch::StartsWith("test.g2o:5: ") && Catch::Contains(reason));
+}
+
+TEST_CASE("An edge with indefinite information weighs what its blocks say", "[g2o]") {
+  // As in cubicle.g2o: cross terms that no covariance has, beside definite blocks.
+  const G2oGraph graph =
+      read("EDGE_SE3:QUAT 1 2" + kPose + " 4 2 0 0 0 0 4 0 0 0 0 10 70 100 0 10 0 0 10 0 5\n" +
+           "EDGE_SE3:QUAT 2 3" + kPose + kUnit + '\n');
+  CHECK(graph.indefinite_edges == 1);
+  // tr(I_t^-1) = 8 / 12 + 1 / 10, tr(I_R^-1) = 2 / 10 + 1 / 5.
+  const double tau = 3.0 / (8.0 / 12.0 + 0.1);
+  const double kappa = 1.5 / 0.4;
+  Vector6 variances;
+  variances << Eigen::Vector3d::Constant(0.5 / kappa), Eigen::Vector3d::Constant(1.0 / tau);
+  CHECK(graph.edges[0].covariance.isApprox(Matrix6(variances.asDiagonal()), 1e-14));
+
+  const G2oGraph planar = read("EDGE_SE2 0 1 1 0 0 4 0 9 4 0 16\n");
+  CHECK(planar.indefinite_edges == 1);
+  variances << 0.0, 0.0, 1.0 / 16.0, 0.25, 0.25, 0.0;
+  CHECK(planar.edges[0].covariance.isApprox(Matrix6(variances.asDiagonal()), 1e-14));
 }
 
 TEST_CASE("A g2o file without content or that is not there is refused", "[g2o]") {

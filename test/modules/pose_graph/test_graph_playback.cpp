@@ -138,7 +138,7 @@ TEST_CASE("A closure is played with the keyframe that makes it known, by one rob
 }
 
 TEST_CASE("The playback thread plays to the end at any rate", "[playback]") {
-  const double rate = GENERATE(kMax, 1e4);
+  const double rate = GENERATE(as<double>{}, kMax, 1e4);
   std::mt19937 rng(1);
   const RecordedGraph graph = recording(rng);
   Played played;

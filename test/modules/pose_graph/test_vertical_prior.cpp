@@ -1,13 +1,11 @@
 #include <catch2/catch.hpp>
 
 #include "modules/core/lie.hpp"
-#include "modules/pose_graph/newton/edge_model.hpp"
+#include "modules/pose_graph/edge_model.hpp"
 #include "modules/pose_graph/quadratic_problem.hpp"
 #include "modules/pose_graph/truncated_newton.hpp"
 #include "modules/pose_graph/vertical_prior.hpp"
-#include "test/support/pgo_team.hpp"
 #include "test/support/pose_graph_problems.hpp"
-#include "test/support/split_graph.hpp"
 
 // Which way is up, as part of pose graph optimisation.
 
@@ -18,11 +16,6 @@ constexpr double kWeight = 1.0 / (0.005 * 0.005);
 
 Eigen::Vector3d up_at(const SE3& T_world_kf) {
   return T_world_kf.linear().transpose() * Eigen::Vector3d::UnitZ();
-}
-
-// Angle between the z axes of two rotations.
-double tilt_between(const SE3& a, const SE3& b) {
-  return std::acos(std::min(1.0, up_at(a).dot(up_at(b))));
 }
 
 }  // namespace
@@ -145,110 +138,6 @@ TEST_CASE("levelling turns a frame that lies on its side, and one upside down",
   // About the x axis, which is level.
   const SE3 expected = make_pose(so3_exp({0.0, 0.0, 0.7}), {1.0, 2.0, 3.0});
   CHECK(L.isApprox(expected.matrix().topRows<3>(), 1e-9));
-}
-
-namespace {
-
-// Two robots that drive side by side over level ground, joined at many places. Odometry takes each
-// for pitching ever further, and their first keyframes for tilted otherwise than they are.
-struct Drive {
-  std::map<RobotId, std::vector<SE3>> truth;
-  SplitGraph graph;
-};
-
-Drive level_drive(double tilt_of_first) {
-  constexpr std::uint32_t kLength = 30;
-  Drive drive;
-  const auto measured = [](const KeyframeId& from, const KeyframeId& to, const SE3& T,
-                           double sigma) {
-    Matrix6 covariance = Matrix6::Identity() * sigma * sigma;
-    return RelativePose{from, to, T, covariance};
-  };
-  const SE3 drift = make_pose(so3_exp({0.0, 0.002, 0.0}), Eigen::Vector3d::Zero());
-  for (const RobotId robot : {RobotId{1}, RobotId{2}}) {
-    std::vector<SE3>& truth = drive.truth[robot];
-    for (std::uint32_t k = 0; k < kLength; ++k)
-      truth.push_back(make_pose(Eigen::Matrix3d::Identity(), {1.0 * k, 2.0 * robot, 0.0}));
-    drive.graph.keyframes[robot] = kLength;
-    drive.graph.T_odom_first[robot] =
-        make_pose(so3_exp({0.0, tilt_of_first * robot, 0.0}), Eigen::Vector3d::Zero());
-    for (std::uint32_t k = 1; k < kLength; ++k)
-      drive.graph.odometry.push_back(
-          measured({robot, k - 1}, {robot, k}, truth[k - 1].inverse() * truth[k] * drift, 2e-3));
-    drive.graph.up[robot] = [&truth](std::uint32_t k) { return Vertical{up_at(truth[k]), 5e-3}; };
-  }
-  for (std::uint32_t k = 0; k < kLength; k += 5)
-    drive.graph.closures.push_back(
-        measured({1, k}, {2, k}, drive.truth[1][k].inverse() * drive.truth[2][k], 1e-2));
-  return drive;
-}
-
-}  // namespace
-
-TEST_CASE("a team that knows which way is up ends level", "[pose_graph][agent][vertical]") {
-  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
-  CAPTURE(to_string(method));
-  const Drive drive = level_drive(0.01);
-  PoseGraphConfig config;
-  config.method = method;
-  PgoTeam team;
-  for (const auto& [robot, count] : drive.graph.keyframes)
-    feed(team.add({robot, robot + 1000U}, config), robot, drive.graph);
-  REQUIRE(team.run(3600.0, [&] { return team.all_settled(); }));
-  CHECK(team.notices.empty());
-  double worst = 0.0;
-  for (const auto& [robot, truth] : drive.truth)
-    for (std::size_t k = 0; k < truth.size(); ++k)
-      worst = std::max(worst, tilt_between(team.trajectory(robot)->T_world_kf[k], truth[k]));
-  // Odometry alone would be pitched by 58 mrad at the end.
-  CHECK(worst < 0.012);
-  // Where odometry says that keyframe 0 of the anchor is, there it is; its tilt is the team's.
-  const SE3& first = team.trajectory(1)->T_world_kf[0];
-  CHECK(first.translation().norm() < 1e-6);
-  CHECK(std::abs(so3_log(first.linear()).z()) < 1e-6);
-}
-
-TEST_CASE("the vertical leads block descent and Newton's method to one optimum",
-          "[pose_graph][agent][vertical]") {
-  const Drive drive = level_drive(0.01);
-  std::map<PgoMethod, std::vector<SE3>> result;
-  for (const PgoMethod method : {PgoMethod::kRbcd, PgoMethod::kNewton}) {
-    PoseGraphConfig config;
-    config.method = method;
-    config.max_rounds = 2000;
-    PgoTeam team;
-    for (const auto& [robot, count] : drive.graph.keyframes)
-      feed(team.add({robot, robot + 1000U}, config), robot, drive.graph);
-    REQUIRE(team.run(3600.0, [&] { return team.all_settled(); }));
-    for (const RobotId robot : {RobotId{1}, RobotId{2}})
-      for (const SE3& T : team.trajectory(robot)->T_world_kf) result[method].push_back(T);
-  }
-  const auto& a = result[PgoMethod::kRbcd];
-  const auto& b = result[PgoMethod::kNewton];
-  REQUIRE(a.size() == b.size());
-  for (std::size_t k = 0; k < a.size(); ++k) {
-    CAPTURE(k);
-    CHECK((a[k].translation() - b[k].translation()).norm() < 2e-2);
-    CHECK(tilt_between(a[k], b[k]) < 2e-3);
-  }
-}
-
-TEST_CASE("one robot that does not know which way is up leaves the team as it was",
-          "[pose_graph][agent][vertical]") {
-  Drive drive = level_drive(0.0);
-  drive.graph.up.erase(2);
-  Drive without = level_drive(0.0);
-  without.graph.up.clear();
-  std::vector<std::vector<SE3>> result;
-  for (const Drive* d : {&drive, &without}) {
-    PgoTeam team;
-    for (const auto& [robot, count] : d->graph.keyframes)
-      feed(team.add({robot, robot + 1000U}, PoseGraphConfig()), robot, d->graph);
-    REQUIRE(team.run(3600.0, [&] { return team.all_settled(); }));
-    result.push_back(team.trajectory(1)->T_world_kf);
-  }
-  for (std::size_t k = 0; k < result[0].size(); ++k)
-    CHECK(result[0][k].isApprox(result[1][k], 1e-5));
 }
 
 }  // namespace km

@@ -111,7 +111,8 @@ TEST_CASE("Faulty frames and rows are skipped and counted", "[sensors]") {
     text = "frame-000002.depth.png: 8 bits";
   }
   SECTION("colour of another size") {
-    folder.write_image(RgbdFolder::name(2, ".color.png"), cv::Mat(5, 8, CV_8UC3));
+    folder.write_image(RgbdFolder::name(2, ".color.png"),
+                       cv::Mat(5, 8, CV_8UC3, cv::Scalar::all(0)));
     fault = ReaderFault::kWrongImageSize;
     text = "frame-000002.color.png: 8x5 px, the calibration says 8x6";
   }

@@ -57,7 +57,7 @@ struct Run {
 }  // namespace
 
 TEST_CASE("Every packet is published in order, then the end", "[sensors]") {
-  const double rate = GENERATE(kMax, 1000.0);
+  const double rate = GENERATE(as<double>{}, kMax, 1000.0);
   Run run;
   SensorsConfig config;
   config.max_lag_s = 1e6;

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+
+#include "modules/pgo_study/team_graph.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace km {
+
+/// The pose graph of a team, as the command line names it.
+struct GraphInput {
+  std::filesystem::path file = {};
+  std::size_t robots = 1;
+  std::string partition = "contiguous";
+
+  /// Defines FILE, --robots and --partition, which fill this: it outlives `app`.
+  void define(CLI::App& app);
+
+  /// Throws std::runtime_error if there is no such graph, and if --robots was given to `app` and is
+  /// not their number.
+  [[nodiscard]] TeamGraph read(const CLI::App& app) const;
+};
+
+/// What to say of edges that were weighed by the blocks of their information matrix alone, since it
+/// is not positive definite, as SE-Sync reads them; nothing if there are none.
+[[nodiscard]] std::string indefinite_text(std::size_t edges);
+
+}  // namespace km

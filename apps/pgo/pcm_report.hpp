@@ -1,0 +1,21 @@
+#pragma once
+
+#include <iosfwd>
+#include <span>
+#include <string>
+
+#include "apps/pgo/pcm_run.hpp"
+
+namespace km {
+
+/// A table of the run at about ten sizes of its graph, and its totals, for people.
+[[nodiscard]] std::string pcm_text(const PcmRun& run);
+
+/// One object for one run: {"search", "additions": [{"vertices", "check_s", "search_s", "clique",
+/// "true_members", "false_members"}]}, members null without labels; an array of them for several.
+void write_pcm_json(std::ostream& out, std::span<const PcmRun> runs);
+
+/// SVG: time of search and checks, and size of the clique, against vertices.
+[[nodiscard]] std::string pcm_plot(std::span<const PcmRun> runs);
+
+}  // namespace km

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "modules/core/pose_graph.hpp"
+#include "modules/outlier_rejection/pcm_config.hpp"
+
+namespace km {
+
+/// A closure of whom it is known whether it is true.
+struct LabelledClosure {
+  Closure closure;
+  bool outlier = false;
+};
+
+/// A graph by the earlier neighbours of each vertex.
+using ConsistencyRows = std::vector<std::vector<std::size_t>>;
+
+/// State after one vertex was added. Times are those of the processor, of one thread.
+struct PcmAddition {
+  std::size_t vertices = 0;
+  double check_s = 0.0;   ///< Consistency of the new closure with all others.
+  double search_s = 0.0;  ///< Of the larger clique.
+  std::size_t clique = 0;
+  std::optional<std::size_t> true_members = {};   ///< Of the clique; nullopt without labels.
+  std::optional<std::size_t> true_vertices = {};  ///< Of the graph; likewise.
+  std::size_t bound = 0;                          ///< No clique is larger.
+};
+
+struct PcmRun {
+  std::string search;  ///< "exact", "incremental" or "batch".
+  std::vector<PcmAddition> additions;
+  std::size_t dropped_true = 0, dropped_false = 0;  ///< By the odometry gate, before the graph.
+  std::size_t edges = 0;                            ///< Of the consistency graph.
+  std::uint64_t search_nodes = 0;
+  std::size_t searches_ended = 0;  ///< By PcmConfig::max_search_nodes.
+};
+
+/// Called before every addition with the number of closures handled so far.
+using PcmProgress = std::function<void(std::size_t)>;
+
+/// Adds the closures, all inside one robot, one at a time, as Pcm does. Throws
+/// std::invalid_argument for a closure that is not is_usable().
+[[nodiscard]] PcmRun run_pcm(const std::vector<LabelledClosure>& closures, const PcmConfig& config,
+                             const PcmProgress& progress = {});
+
+/// Adds the vertices of a consistency graph one at a time; nothing is checked.
+[[nodiscard]] PcmRun run_pcm(const ConsistencyRows& rows, const PcmConfig& config,
+                             const PcmProgress& progress = {});
+
+/// "exact", "incremental" or "batch".
+[[nodiscard]] std::string to_string(CliqueMethod method);
+
+}  // namespace km

@@ -1,0 +1,240 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <fstream>
+#include <iostream>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+
+#include "apps/pgo/commands.hpp"
+#include "apps/pgo/graph_input.hpp"
+#include "apps/pgo/report_files.hpp"
+#include "apps/pgo/solve_report.hpp"
+#include "modules/core/precision.hpp"
+#include "modules/pose_graph/g2o_io.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kDetails =
+    "Every robot has only its part of the graph, and what it hears from the others are the\n"
+    "messages that would cross the network.\n\n"
+    "FILE is a g2o file, 2D or 3D, dealt out to --robots robots, or a folder with one *.csv or\n"
+    "*.g2o per robot, or what a team's run has left behind. The cost is the chordal one without\n"
+    "1/2, weights as SE-Sync reads them (of a team's results: as the robots weighed them):\n"
+    "  F = sum kappa |R_j - R_i R_ij|^2 + tau |t_j - t_i - R_i t_ij|^2\n"
+    "Where a g2o file says which way is up at a pose (EDGE_SE3_PRIOR with information on the tilt\n"
+    "alone, as kimera_multi_robot writes it), |R_i up_i - z|^2 / sigma_i^2 is added; dgs and\n"
+    "rbcd-asynchronous do not know of that. Other priors are refused.\n\n"
+    "Methods:\n"
+    "  local             every robot alone; their frames joined by one closure each\n"
+    "  dgs               two-stage distributed Gauss-Seidel (Choudhary et al., IJRR 2017)\n"
+    "  rbcd              Riemannian block-coordinate descent (Tian et al., TRO 2021),\n"
+    "                    over-relaxed; as published with --over-relaxation 1 or --schedule greedy\n"
+    "  rbcd-accelerated  the same with Nesterov's acceleration and restarts\n"
+    "  rbcd-asynchronous all robots at once, on poses up to --max-delay rounds old; descends all\n"
+    "                    the same\n"
+    "  centralized       the whole graph on one computer: Newton, certified; else the staircase\n"
+    "                    of SE-Sync\n"
+    "  newton            what the robots run: Newton steps of the whole team up and down a tree of\n"
+    "                    robots. Finds out how noisy closures are and which are false (graduated\n"
+    "                    non-convexity: weights, and a step, in turn), and ends with the optimum\n"
+    "                    of those that it keeps; with --trust-all it keeps all\n"
+    "newton starts from odometry; the others, and newton --trust-all, from the chordal\n"
+    "initialisation of the whole graph, timed apart (local: from each robot's own).\n\n"
+    "A round is one exchange of messages, of newton one way up the tree and down again. The table\n"
+    "says after how many rounds each gap to the certified optimum was reached (computed centrally\n"
+    "unless given), what had been sent by then by all robots, and the CPU time: of the slowest\n"
+    "robot of each round, summed, and of all. A broadcast counts once; newton's letters have one\n"
+    "reader each. The certificate proves how far any poses can lie below at most. Of newton\n"
+    "without --trust-all it says what was kept.\n\n"
+    "Examples:\n"
+    "  kimera_multi_pgo solve sphere2500.g2o --robots 5 --method newton --trust-all --json "
+    "out.json\n"
+    "  kimera_multi_pgo solve tunnels_8robots --method rbcd --rounds 300 --plot gap.svg\n"
+    "  kimera_multi_pgo solve tunnels_8robots\n"
+    "  kimera_multi_pgo solve tunnels_8robots --barc 20 --links chain\n"
+    "  kimera_multi_pgo solve manhattan.g2o --method centralized --output manhattan.tum";
+
+struct SolveCommand {
+  GraphInput input;
+  bool no_vertical = false;
+  SolverOptions solver;
+  std::string schedule = "coloured";
+  std::optional<double> optimum;
+  ReportFiles files;
+  fs::path output;
+};
+
+// Options that not every method takes, and who does.
+struct Takers {
+  const char* option;
+  std::vector<std::string> methods;
+};
+
+std::vector<Takers> takers() {
+  const std::vector<std::string> lifted{"rbcd", "rbcd-accelerated", "rbcd-asynchronous"};
+  const std::vector<std::string> newton{"newton", "newton --trust-all"};
+  std::vector<std::string> judged = lifted;
+  judged.insert(judged.end(), {"local", "dgs", "centralized", "newton --trust-all"});
+  return {{"--rank", lifted},
+          {"--gradient", judged},
+          {"--optimum", judged},
+          {"--plot", judged},
+          {"--schedule", {"rbcd"}},
+          {"--over-relaxation", {"rbcd", "rbcd-asynchronous"}},
+          {"--verify", {"rbcd", "rbcd-accelerated"}},
+          {"--max-delay", {"rbcd-asynchronous"}},
+          {"--loss", {"rbcd-asynchronous"}},
+          {"--seed", {"rbcd-asynchronous"}},
+          {"--barc", {"newton"}},
+          {"--reject-odometry", {"newton"}},
+          {"--tell-private", newton},
+          {"--links", newton}};
+}
+
+void define_method(CLI::App& app, SolveCommand& command) {
+  SolverOptions& solver = command.solver;
+  app.add_option("--method", solver.method, "See below")
+      ->check(CLI::IsMember(kMethods).description(""));
+  app.add_flag("--no-vertical", command.no_vertical,
+               "Leave out what the files say of which way is up");
+  app.add_option("--rounds", solver.run.max_rounds, "At most so many")
+      ->check(CLI::Range(0, 1000000));
+  app.add_option("--gradient", solver.run.gradient_tolerance,
+                 "Stop once the norm of the Riemannian gradient is at most this")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--rank", solver.rank, "rbcd*, newton --trust-all: of the relaxation")
+      ->check(CLI::Range(3, 10));
+  app.add_option("--optimum", command.optimum, "The optimum, if known: it is not computed then")
+      ->check(CLI::PositiveNumber);
+}
+
+void define_descent(CLI::App& app, SolveCommand& command) {
+  SolverOptions& solver = command.solver;
+  app.option_defaults()->group("Block descent");
+  app.add_option("--schedule", command.schedule,
+                 "rbcd: coloured (robots without common edges together) or greedy (the one with\n"
+                 "the largest gradient)")
+      ->check(CLI::IsMember({"coloured", "greedy"}));
+  app.add_option(
+         "--over-relaxation", solver.over_relaxation,
+         "rbcd, coloured, and rbcd-asynchronous: how far beyond the minimum of its block a\n"
+         "robot may go")
+      ->check(CLI::Range(1.0, 1.99));
+  app.add_flag("--verify", solver.verify,
+               "rbcd, rbcd-accelerated: the team verifies its result itself, and goes on one rank\n"
+               "higher if a direction leads down");
+  app.add_option("--max-delay", solver.max_delay,
+                 "rbcd-asynchronous: messages come up to so many rounds late, at random; a robot\n"
+                 "that knows less of a neighbour waits")
+      ->check(CLI::Range(0, 1000));
+  app.add_option("--loss", solver.loss, "rbcd-asynchronous: this part of the messages is lost")
+      ->check(CLI::Range(0.0, 0.99));
+  app.add_option("--seed", solver.seed, "rbcd-asynchronous: of delays and losses");
+}
+
+void define_newton(CLI::App& app, SolveCommand& command) {
+  SolverOptions& solver = command.solver;
+  app.option_defaults()->group("newton");
+  app.add_flag("--trust-all", solver.trust_all, "No closure is false");
+  app.add_option("--barc", solver.barc,
+                 "Residual [sigma] up to which a closure is kept, sqrt of its cost; 0: where all but\n"
+                 "one in a million Gaussian residuals lie, times the noise scale that the team finds")
+      ->check(CLI::NonNegativeNumber);
+  app.add_flag("--tell-private", solver.tell_private,
+               "Poses that no closure to another robot ends on are told, too, where that saves bytes");
+  app.add_option_function<std::string>(
+         "--links",
+         [&solver](const std::string& shape) {
+           solver.shape = shape == "chain" ? TeamShape::kChain : TeamShape::kAll;
+         },
+         "Who hears whom: all, or chain (robot k only k - 1 and k + 1)")
+      ->check(CLI::IsMember({"all", "chain"}))
+      ->default_str("all");
+  app.add_flag("--reject-odometry", solver.reject_odometry,
+               "Steps of odometry inside a robot can be false, too");
+}
+
+void check(const CLI::App& app, SolveCommand& command) {
+  if (command.solver.trust_all && command.solver.method != "newton")
+    throw std::runtime_error("--trust-all is for --method newton only");
+  const std::string method = command.solver.name();
+  for (const auto& [option, methods] : takers())
+    if (app.count(option) > 0 && std::find(methods.begin(), methods.end(), method) == methods.end())
+      throw std::runtime_error(std::string(option) + " is for --method " +
+                               CLI::detail::join(methods, ", ") + " only, not for " + method);
+  command.solver.greedy = command.schedule == "greedy";
+  if (command.solver.greedy && app.count("--over-relaxation") > 0)
+    throw std::runtime_error("--over-relaxation is for --schedule coloured only");
+  command.files.check();
+  check_output_folder(command.output);
+}
+
+// A row for each pose, its number in place of a time.
+void write_tum(std::ostream& out, const std::vector<SE3>& T_world_kf) {
+  out.precision(std::numeric_limits<double>::max_digits10);
+  for (std::size_t i = 0; i < T_world_kf.size(); ++i) {
+    out << i;
+    for (const double c : T_world_kf[i].translation()) out << ' ' << c;
+    const Eigen::Quaterniond q(T_world_kf[i].linear());
+    for (const double c : q.coeffs()) out << ' ' << c;
+    out << '\n';
+  }
+}
+
+// The graph with these poses and isotropic weights, in 3D also if it is planar.
+void write_solved(std::ostream& out, const TeamGraph& graph, const std::vector<SE3>& T_world_kf) {
+  const auto id = [&](Eigen::Index pose) { return graph.ids[static_cast<std::size_t>(pose)]; };
+  G2oGraph result{.dimension = 3, .vertices = {}, .edges = {}};
+  for (std::size_t i = 0; i < T_world_kf.size(); ++i)
+    result.vertices.push_back({graph.ids[i], T_world_kf[i]});
+  for (const BlockEdge& e : graph.edges)
+    result.edges.push_back({id(e.i), id(e.j), e.T_i_j, covariance_of({e.kappa, e.tau})});
+  for (const VerticalPrior& v : graph.verticals)
+    result.verticals.push_back({id(v.pose), {v.up, 1.0 / std::sqrt(v.weight)}});
+  write_g2o(out, result);
+}
+
+void run(const CLI::App& app, SolveCommand& command) {
+  check(app, command);
+  TeamGraph graph = command.input.read(app);
+  if (command.no_vertical) graph.verticals.clear();
+  const Solution solution =
+      solve(graph, command.solver, command.optimum, cpu_meter());
+  std::cout << solution_text(graph, solution);
+  command.files.write([&](std::ostream& out) { write_solution_json(out, graph, solution); },
+                      [&] { return gap_plot(solution); });
+  write_output(command.output, [&](std::ostream& out) {
+    command.output.extension() == ".tum" ? write_tum(out, solution.T_world_kf)
+                                         : write_solved(out, graph, solution.T_world_kf);
+  });
+}
+
+}  // namespace
+
+void add_solve(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("solve", "Optimises a pose graph by a team of robots");
+  app.footer(kDetails);
+  app.option_defaults()->always_capture_default();
+  const auto command = std::make_shared<SolveCommand>();
+  command->input.define(app);
+  define_method(app, *command);
+  define_descent(app, *command);
+  define_newton(app, *command);
+  app.option_defaults()->group("Output");
+  command->files.define(app, "every round",
+                        "the gap against rounds, bytes and time (not newton without --trust-all)");
+  app.add_option("--output", command->output,
+                 "Also write the rounded poses: *.tum (numbers of the poses as times) or *.g2o")
+      ->check([](const std::string& file) {
+        return file.ends_with(".tum") || file.ends_with(".g2o")
+                   ? std::string()
+                   : file + ": --output writes *.tum or *.g2o";
+      });
+  app.callback([&app, command] { run(app, *command); });
+}
+
+}  // namespace km

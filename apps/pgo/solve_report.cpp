@@ -1,0 +1,199 @@
+#include "apps/pgo/solve_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <ostream>
+#include <sstream>
+
+#include "apps/pgo/graph_input.hpp"
+#include "apps/team/text_table.hpp"
+#include "modules/core/json_writer.hpp"
+#include "modules/evaluation/curve_plot.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kMostMarks = 40;  // rounds beyond which their marks would hide the line
+
+// Relative to the optimum, or to what rounding leaves of it where there is no noise.
+double gap(const Solution& solution, const TeamRound& round) {
+  constexpr double kNoCost = 1e-9;
+  const double optimum = solution.judgement->optimum;
+  return (round.cost - optimum) / std::max(optimum, kNoCost);
+}
+
+// Bottom of a logarithmic axis of gaps: the decade below the least that is above 0. Once there is
+// no gap left, rounding makes it 0 or less.
+double gap_floor(const Solution& solution) {
+  double least = 1.0;
+  for (const TeamRound& round : solution.run.rounds)
+    if (const double g = gap(solution, round); g > 0.0) least = std::min(least, g);
+  return std::pow(10.0, std::floor(std::log10(least)));
+}
+
+std::string work_bytes(const TeamWork& work) {
+  return bytes_text(static_cast<double>(work.bytes));
+}
+
+std::string table(const Solution& solution) {
+  const std::vector<TeamRound>& rounds = solution.run.rounds;
+  std::vector<std::vector<std::string>> rows{
+      {"", "rounds", "cost", "gap", "gradient", "sent", "critical s", "CPU s"}};
+  const auto add = [&](const std::string& name, const TeamRound& round) {
+    rows.push_back({name, std::to_string(&round - rounds.data()), rounded(round.cost, 9),
+                    rounded(gap(solution, round), 2), rounded(round.gradient_norm, 2),
+                    work_bytes(round.work), fixed(round.work.critical_path_s, 3),
+                    fixed(round.work.total_cpu_s, 3)});
+  };
+  add("start", rounds.front());
+  for (const double target : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6}) {
+    const auto reached = std::find_if(rounds.begin(), rounds.end(), [&](const TeamRound& round) {
+      return gap(solution, round) < target;
+    });
+    const std::string name = "gap < " + rounded(target, 1);
+    if (reached == rounds.end()) {
+      rows.push_back({name, "-", "", "", "", "", "", ""});
+      break;
+    }
+    add(name, *reached);
+  }
+  add("end", rounds.back());
+  return align_columns(rows);
+}
+
+std::string verification_text(const TeamVerification& verification) {
+  const std::string verdict = verification.negative    ? "found a direction that leads down"
+                              : verification.converged ? "found no direction that leads down"
+                                                       : "came to no end";
+  return "the team's own verification " + verdict + " (" + std::to_string(verification.rounds) +
+         " rounds, " + work_bytes(verification.work) + ", critical " +
+         fixed(verification.work.critical_path_s, 3) + " s, least curvature beyond the kernel " +
+         rounded(verification.lambda_min, 3) + ")\n";
+}
+
+std::string certificate_text(const Certificate& certificate) {
+  std::string text = certificate.certified ? "certified" : "not certified";
+  text += ": proven that the cost lies above that of any poses by at most " +
+          rounded(std::max(certificate.relative_gap, 1e-12), 2) +
+          " of itself (lambda_min at least " + rounded(certificate.lambda_bound, 3);
+  if (certificate.lambda_min) text += ", estimated " + rounded(*certificate.lambda_min, 3);
+  if (certificate.hidden_by_rounding) text += ", the rest being what rounding could hide";
+  return text + ")\n";
+}
+
+std::string judged_text(const Solution& solution) {
+  const Judgement& judged = *solution.judgement;
+  std::ostringstream text;
+  text << table(solution) << "chordal start in " << fixed(solution.start_s, 3) << " s, "
+       << (judged.optimum_certified ? "optimum " : "least cost known ")
+       << rounded(judged.optimum, 9) << ", rounded cost "
+       << rounded(judged.rounded_cost, 9) << ", rank " << judged.rank << '\n'
+       << certificate_text(judged.certificate);
+  if (solution.run.verification) text << verification_text(*solution.run.verification);
+  return text.str();
+}
+
+struct Count {
+  std::size_t kept = 0, all = 0;
+
+  [[nodiscard]] std::string text() const {
+    return std::to_string(kept) + " of " + std::to_string(all);
+  }
+};
+
+std::string decision_text(const TeamGraph& graph, const Solution& solution) {
+  const Decision& decision = *solution.run.decision;
+  const std::vector<bool> odometry = odometry_edges(graph);
+  Count between, inside, steps;
+  for (std::size_t k = 0; k < decision.kept.size(); ++k) {
+    const BlockEdge& e = graph.edges[k];
+    Count& count = odometry[k]                                  ? steps
+                   : graph.robot_of(e.i) != graph.robot_of(e.j) ? between
+                                                                : inside;
+    ++count.all;
+    if (decision.kept[k]) ++count.kept;
+  }
+  const TeamWork& work = solution.run.rounds.back().work;
+  std::ostringstream text;
+  text << "kept " << between.text() << " closures between robots, " << inside.text()
+       << " inside a robot, " << steps.text() << " steps of odometry\n"
+       << "closures are " << rounded(decision.noise_scale, 3)
+       << " times as noisy as the graph says; kept up to " << rounded(decision.threshold, 3)
+       << " sigma of the graph\n"
+       << solution.run.rounds.size() - 1 << " rounds, " << work_bytes(work)
+       << " sent, by one robot at most "
+       << bytes_text(static_cast<double>(decision.most_sent)) << " and to one "
+       << bytes_text(static_cast<double>(decision.most_received)) << ", critical path "
+       << fixed(work.critical_path_s, 3) << " s, CPU " << fixed(work.total_cpu_s, 3) << " s\n";
+  if (!decision.decided) text << "not decided: --rounds did not suffice\n";
+  return text.str();
+}
+
+}  // namespace
+
+std::string solution_text(const TeamGraph& graph, const Solution& solution) {
+  std::ostringstream text;
+  text << solution.method << ": " << graph.poses() << " poses, " << graph.edges.size()
+       << " edges, ";
+  if (!graph.verticals.empty()) text << graph.verticals.size() << " verticals, ";
+  text << graph.robots() << (graph.robots() == 1 ? " robot\n" : " robots\n")
+       << indefinite_text(graph.indefinite_edges) << (solution.judgement ? judged_text(solution) : decision_text(graph, solution));
+  return text.str();
+}
+
+void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution) {
+  JsonWriter json(out);
+  json.begin_object();
+  json.fields("poses", graph.poses(), "edges", graph.edges.size(), "verticals",
+              graph.verticals.size(), "indefinite_edges", graph.indefinite_edges, "robots", graph.robots(), "method", solution.method);
+  json.objects("rounds", solution.run.rounds, [&](const TeamRound& round) {
+    json.fields("cost", round.cost, "gradient_norm", round.gradient_norm, "bytes", round.work.bytes,
+                "critical_path_s", round.work.critical_path_s, "total_cpu_s",
+                round.work.total_cpu_s);
+  });
+  json.field("start_cpu_s", solution.start_s);
+  if (const auto& judged = solution.judgement) {
+    json.fields("rounded_cost", judged->rounded_cost, "relative_gap",
+                judged->certificate.relative_gap, "lambda_bound", judged->certificate.lambda_bound,
+                "certified", judged->certificate.certified, "rank", judged->rank, "optimum",
+                judged->optimum);
+    if (judged->certificate.lambda_min) json.field("lambda_min", *judged->certificate.lambda_min);
+  }
+  if (const auto& decision = solution.run.decision) {
+    json.fields("noise_scale", decision->noise_scale, "barc", decision->threshold, "most_sent",
+                decision->most_sent, "most_received", decision->most_received, "decided",
+                decision->decided);
+    std::vector<std::size_t> kept;
+    for (std::size_t k = 0; k < decision->kept.size(); ++k)
+      if (decision->kept[k]) kept.push_back(k);
+    json.array("kept", kept);
+  }
+  json.end_object();
+}
+
+std::string gap_plot(const Solution& solution) {
+  const std::vector<TeamRound>& rounds = solution.run.rounds;
+  const double floor = gap_floor(solution);
+  const bool clipped = std::any_of(rounds.begin(), rounds.end(), [&](const TeamRound& round) {
+    return gap(solution, round) < floor;
+  });
+  const auto panel = [&](const char* label, const auto& abscissa) {
+    Curve curve{.name = "", .points = {}, .marks = rounds.size() <= kMostMarks};
+    for (std::size_t k = 0; k < rounds.size(); ++k)
+      curve.points.push_back({abscissa(k), std::max(floor, gap(solution, rounds[k]))});
+    return CurvePanel{.title = solution.method + ": gap to the optimum" +
+                               (clipped ? " (none: at the bottom)" : ""),
+                      .x_label = label,
+                      .y_label = "(F - F*) / F*",
+                      .log_y = true,
+                      .curves = {std::move(curve)}};
+  };
+  return plot_curves(std::vector{
+      panel("rounds", [](std::size_t k) { return static_cast<double>(k); }),
+      panel("sent by all robots [MB]",
+            [&](std::size_t k) { return 1e-6 * static_cast<double>(rounds[k].work.bytes); }),
+      panel("critical path [s of CPU time]",
+            [&](std::size_t k) { return rounds[k].work.critical_path_s; })});
+}
+
+}  // namespace km

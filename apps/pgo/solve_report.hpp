@@ -1,0 +1,27 @@
+#pragma once
+
+#include <iosfwd>
+#include <string>
+
+#include "apps/pgo/solution.hpp"
+
+namespace km {
+
+/// What was reached, and after how many rounds, bytes and seconds each gap to the optimum; of a
+/// method that rejects, what it has kept. If that is less than nine tenths of the closures and the
+/// graph was believed, it hints at what may be the reason.
+[[nodiscard]] std::string solution_text(const TeamGraph& graph, const Solution& solution);
+
+/// {"poses", "edges", "verticals", "robots", "method", "rounds": [{"cost", "gradient_norm",
+/// "bytes", "critical_path_s", "total_cpu_s"}], "start_cpu_s", and "rounded_cost", "lambda_min",
+/// "certified", "rank", "optimum", or of a method that rejects "barc", "scale", "scaled_barc",
+/// "updates", "isolated", "decided", "kept": [indices of edges]}. rounds[0] is the start; bytes and
+/// times are sums up to the round. The threshold is barc sigmas of closures, or scaled_barc = scale
+/// barc sigmas of the graph.
+void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution);
+
+/// SVG: the relative gap to the optimum against rounds, bytes and critical-path time, on a
+/// logarithmic axis; where there is no gap, at the bottom of it. Precondition: a judgement.
+[[nodiscard]] std::string gap_plot(const Solution& solution);
+
+}  // namespace km

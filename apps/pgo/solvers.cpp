@@ -1,0 +1,116 @@
+#include "apps/pgo/solvers.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <stdexcept>
+
+#include "apps/pgo/cpu_time.hpp"
+#include "modules/pgo_study/asynchronous_team.hpp"
+#include "modules/pgo_study/central_team.hpp"
+#include "modules/pgo_study/gauss_seidel_team.hpp"
+#include "modules/pgo_study/local_team.hpp"
+#include "modules/pgo_study/odometry_start.hpp"
+#include "modules/pgo_study/team_staircase.hpp"
+#include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/tree_newton.hpp"
+
+namespace km {
+namespace {
+
+constexpr Eigen::Index kRigidRank = 3;
+constexpr Eigen::Index kLastRank = 10;  // of the staircase
+
+BlockDescentOptions descent_options(const SolverOptions& options) {
+  return {.schedule = options.greedy ? BlockSchedule::kGreedy : BlockSchedule::kColoured,
+          .max_over_relaxation = options.over_relaxation,
+          .accelerated = options.method == "rbcd-accelerated"};
+}
+
+std::unique_ptr<TeamSolver> make_team(const TeamGraph& graph, const std::vector<SE3>& start,
+                                      const SolverOptions& options) {
+  const std::string& method = options.method;
+  const auto lifted = [&] { return lift(start, options.rank); };
+  if (method == "local") return std::make_unique<LocalTeam>(graph);
+  if (method == "dgs") return std::make_unique<GaussSeidelTeam>(graph, start);
+  if (method == "rbcd" || method == "rbcd-accelerated")
+    return std::make_unique<BlockDescentTeam>(graph, lifted(), descent_options(options));
+  if (method == "rbcd-asynchronous")
+    return std::make_unique<AsynchronousTeam>(
+        graph, lifted(),
+        AsynchronousOptions{.max_delay = options.max_delay,
+                            .loss = options.loss,
+                            .seed = options.seed,
+                            .max_over_relaxation = options.over_relaxation});
+  if (method == "centralized") return std::make_unique<CentralTeam>(graph, lift(start, kRigidRank));
+  throw std::invalid_argument("unknown method " + method);
+}
+
+// The team ends by itself: that there is no gradient says nothing of the weights.
+SolverRun run_newton(const TeamGraph& graph, std::vector<SE3> start, const SolverOptions& options,
+                     const TeamMeter& meter) {
+  constexpr double kPatience = 8.0;  // rounds: as many as second derivatives are worth here
+  const TreeNewtonOptions newton{.dimension = graph.dimension,
+                                 .absolute_tolerance = 1e-12,
+                                 .patience_rounds = kPatience,
+                                 .robust = !options.trust_all,
+                                 .barc = options.barc,
+                                 .reject_odometry = options.reject_odometry,
+                                 .tell_private = options.tell_private};
+  if (start.empty()) start = odometry_start(graph);
+  MemberTeam team(
+      graph, kRigidRank, std::move(start),
+      [&](SessionGraph part, TreePlace place) {
+        return std::make_unique<TreeNewton>(std::move(part), std::move(place), newton);
+      },
+      options.shape);
+  SolverRun run;
+  run.rounds = run_team(graph, team,
+                        {.max_rounds = options.run.max_rounds, .gradient_tolerance = -1.0}, meter);
+  run.X = team_poses(graph, team);
+  run.decision = Decision{.kept = team.kept(),
+                          .noise_scale = team.state().noise_scale,
+                          .threshold = team.state().barc,
+                          .decided = team.done() && !team.state().failed};
+  for (std::size_t k = 0; k < graph.robots(); ++k) {
+    run.decision->most_sent = std::max(run.decision->most_sent, team.sent_by(k));
+    run.decision->most_received = std::max(run.decision->most_received, team.received_by(k));
+  }
+  return run;
+}
+
+// What knows of nothing but edges says so.
+void check_verticals(const TeamGraph& graph, const SolverOptions& options) {
+  const std::string who = options.verify ? "the team's own verification (--verify)"
+                          : options.method == "dgs" || options.method == "rbcd-asynchronous"
+                              ? "method " + options.method
+                              : "";
+  if (!graph.verticals.empty() && !who.empty())
+    throw std::invalid_argument(who + " does not know verticals, and the graph has " +
+                                std::to_string(graph.verticals.size()) +
+                                ": leave them out by --no-vertical");
+}
+
+}  // namespace
+
+SolverRun run_solver(const TeamGraph& graph, const std::vector<SE3>& start,
+                     const SolverOptions& options, const TeamMeter& meter) {
+  check_verticals(graph, options);
+  if (options.method == "newton") return run_newton(graph, start, options, meter);
+  if (options.verify) {
+    TeamStaircase staircase = run_team_staircase(
+        graph, lift(start, options.rank), descent_options(options), options.run, kLastRank, meter);
+    return {std::move(staircase.rounds), std::move(staircase.X), std::move(staircase.verification),
+            std::nullopt};
+  }
+  const auto team = make_team(graph, start, options);
+  SolverRun run;
+  run.rounds = run_team(graph, *team, options.run, meter);
+  run.X = team_poses(graph, *team);
+  return run;
+}
+
+TeamMeter cpu_meter() {
+  return {.cpu_s = thread_cpu_s};
+}
+
+}  // namespace km

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "modules/pgo_study/member_team.hpp"
+#include "modules/pgo_study/team_solver.hpp"
+#include "modules/pgo_study/team_verification.hpp"
+
+namespace km {
+
+/// A method by its name, and what it takes. kMethods has the names.
+struct SolverOptions {
+  std::string method = "newton";
+  Eigen::Index rank = 5;
+  TeamRunOptions run = {.max_rounds = 100};
+  bool greedy = false;            ///< rbcd.
+  bool verify = false;            ///< rbcd, rbcd-accelerated: the staircase over the rank.
+  double over_relaxation = 1.95;  ///< rbcd, rbcd-asynchronous: at most; 1: as published.
+  int max_delay = 0;              ///< rbcd-asynchronous, as loss and seed: see AsynchronousOptions.
+  double loss = 0.0;
+  unsigned seed = 1;
+  bool trust_all = false;        ///< newton: no closure is false.
+  double barc = 0.0;             ///< newton: residual of an inlier [sigma]; 0: the team finds it.
+  bool reject_odometry = false;  ///< newton: odometry can be false, too.
+  bool tell_private = false;     ///< newton: see TreeNewtonOptions.
+  TeamShape shape = TeamShape::kAll;  ///< newton: who hears whom.
+
+  [[nodiscard]] bool rejects() const { return method == "newton" && !trust_all; }
+  /// The method in the words of the command line.
+  [[nodiscard]] std::string name() const { return method + (trust_all ? " --trust-all" : ""); }
+};
+
+inline const std::vector<std::string> kMethods = {
+    "local", "dgs", "rbcd", "rbcd-accelerated", "rbcd-asynchronous", "centralized", "newton"};
+
+/// Which edges a method has kept, and how it came to that.
+struct Decision {
+  std::vector<bool> kept;     ///< Of the graph's edges.
+  double noise_scale = 1.0;   ///< Noise of closures, in multiples of what the graph says.
+  double threshold = 0.0;     ///< Residual of an inlier [sigma of the graph].
+  std::size_t most_sent = 0;  ///< By one robot [B], and received.
+  std::size_t most_received = 0;
+  bool decided = false;       ///< Else the rounds did not suffice, or the team could not go on.
+};
+
+struct SolverRun {
+  std::vector<TeamRound> rounds;  ///< [0]: the start. Costs are of all edges, unweighted.
+  LiftedPoses X;
+  std::optional<TeamVerification> verification;  ///< By the team, if asked for.
+  std::optional<Decision> decision;              ///< Of newton.
+};
+
+/// Solves `graph` from `start`; newton without one begins at odometry. Throws
+/// std::invalid_argument if method, options and graph do not go together.
+[[nodiscard]] SolverRun run_solver(const TeamGraph& graph, const std::vector<SE3>& start,
+                                   const SolverOptions& options, const TeamMeter& meter);
+
+/// Measures CPU time of the calling thread.
+[[nodiscard]] TeamMeter cpu_meter();
+
+}  // namespace km

@@ -1,0 +1,57 @@
+#include "modules/outlier_rejection/witnessed_pair.hpp"
+
+#include <algorithm>
+
+namespace km {
+namespace {
+
+bool near(const KeyframeId& x, const KeyframeId& y) {
+  return std::max(x.index, y.index) - std::min(x.index, y.index) <= WitnessedPair::kNeighbourhood;
+}
+
+}  // namespace
+
+bool share_neighbourhood(const ClosureId& x, const ClosureId& y) {
+  return near(x.from, y.from) && near(x.to, y.to);
+}
+
+WitnessedPair::WitnessedPair(RobotId a, RobotId b, const PcmConfig& config)
+    : a_(std::min(a, b)),
+      b_(std::max(a, b)),
+      config_(checked(config)),
+      test_(config),
+      clique_(static_cast<std::uint64_t>(config.max_search_nodes)) {}
+
+PcmVerdict WitnessedPair::add(const Closure& closure) {
+  check_usable(closure, a_, b_);
+  const ClosureId id = closure.id();
+  if (known_.contains(id)) return PcmVerdict::kRepeated;
+  if (known_.size() >= Pcm::kMaxClosures) return PcmVerdict::kFull;
+  known_.insert(id);
+  const OrientedClosure oriented = test_.orient(closure);
+  if (config_.odometry_gate && a_ == b_ && !test_.agrees_with_odometry(oriented))
+    return PcmVerdict::kAgainstOdometry;
+  added_.insert(id);
+  const std::size_t before = witnesses();
+  if (!is_witnessed()) test(oriented);
+  return witnesses() > before ? PcmVerdict::kGrew : PcmVerdict::kAdded;
+}
+
+void WitnessedPair::test(const OrientedClosure& closure) {
+  PreparedClosure added(closure);
+  std::vector<std::size_t> agreeing;
+  for (std::size_t k = 0; k < tested_.size(); ++k)
+    if (!share_neighbourhood(added.id, tested_[k].id) && test_.consistent(added, tested_[k]))
+      agreeing.push_back(k);
+  tested_.push_back(std::move(added));
+  (void)clique_.add(agreeing);  // witnesses() tells
+  if (!is_witnessed()) return;
+  tested_.clear();
+  tested_.shrink_to_fit();
+}
+
+bool WitnessedPair::is_witnessed() const {
+  return witnesses() >= static_cast<std::size_t>(config_.min_witnesses);
+}
+
+}  // namespace km

@@ -1,0 +1,90 @@
+#include "modules/pgo_study/asynchronous_team.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+#include "modules/pgo_study/message_sizes.hpp"
+
+namespace km {
+namespace {
+
+// Of updates whose missed and concurrent changes are made up for; see the class comment.
+double weight_for(int max_delay) {
+  constexpr double kSurplus = 1.01;
+  return kSurplus * (1.0 + 2.0 * max_delay);
+}
+
+const AsynchronousOptions& checked(const AsynchronousOptions& options) {
+  if (options.max_delay < 0)
+    throw std::invalid_argument("AsynchronousTeam: max_delay " + std::to_string(options.max_delay) +
+                                " is negative");
+  if (!(options.loss >= 0.0 && options.loss < 1.0))
+    throw std::invalid_argument("AsynchronousTeam: loss " + std::to_string(options.loss) +
+                                " is not in [0, 1)");
+  return options;
+}
+
+}  // namespace
+
+AsynchronousTeam::AsynchronousTeam(const TeamGraph& graph, const LiftedPoses& start,
+                                   const AsynchronousOptions& options)
+    : options_(checked(options)), rng_(options.seed) {
+  for (std::size_t k = 0; k < graph.robots(); ++k) {
+    const SessionGraph part = part_of(graph, k);
+    const LiftedPoses X = start.middleCols(4 * graph.first[k], 4 * graph.poses_of(k));
+    Robot robot{.block = ProximalBlock(part, X, weight_for(options.max_delay)), .heard = {}};
+    for (const PoseEdge& e : part.between) robot.heard.emplace(e.other(part.self).robot, 0);
+    robots_.push_back(std::move(robot));
+  }
+}
+
+bool AsynchronousTeam::step(RoundMeter& meter) {
+  ++round_;
+  deliver(meter);
+  const double relaxation =
+      growing_relaxation(static_cast<std::uint32_t>(round_) - 1, options_.max_over_relaxation);
+  for (std::size_t k = 0; k < robots_.size(); ++k) {
+    if (!may_move(robots_[k])) continue;
+    meter.run(k, [&] { (void)robots_[k].block.update(options_.block_update, relaxation); });
+    ++updates_;
+  }
+  for (std::size_t k = 0; k < robots_.size(); ++k) send(k, meter);
+  return true;
+}
+
+// Poses that were overtaken by newer ones are dropped.
+void AsynchronousTeam::deliver(RoundMeter& meter) {
+  for (const Letter& letter : letters_) {
+    if (letter.due > round_) continue;
+    Robot& receiver = robots_[letter.receiver];
+    int& heard = receiver.heard.at(letter.sender);
+    if (letter.round <= heard) continue;
+    heard = letter.round;
+    meter.run(letter.receiver,
+              [&] { (void)receiver.block.block().set_neighbour(letter.sender, letter.poses); });
+  }
+  std::erase_if(letters_, [&](const Letter& letter) { return letter.due <= round_; });
+}
+
+// Poses told in the round before lack nothing. In round 1 nobody moves, alone or not.
+bool AsynchronousTeam::may_move(const Robot& robot) const {
+  return round_ > 1 && std::all_of(robot.heard.begin(), robot.heard.end(), [&](const auto& entry) {
+           return entry.second > 0 && round_ - 1 - entry.second <= options_.max_delay;
+         });
+}
+
+// Also by a robot that has not moved: what it told before may be lost.
+void AsynchronousTeam::send(std::size_t k, RoundMeter& meter) {
+  Robot& robot = robots_[k];
+  const ToldBlock poses = meter.run(k, [&] { return robot.block.block().round_public_poses(); });
+  meter.sent(kMessageHeader + bytes_of_poses(poses.keyframes.size(), poses.X.rows()));
+  for (const auto& [peer, heard] : robot.heard) {
+    const bool lost = std::bernoulli_distribution(options_.loss)(rng_);
+    const int delay = std::uniform_int_distribution(0, options_.max_delay)(rng_);
+    if (!lost)
+      letters_.push_back({round_ + 1 + delay, round_, static_cast<RobotId>(k), peer, poses});
+  }
+}
+
+}  // namespace km

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <vector>
+
+#include "modules/pgo_study/team_schedule.hpp"
+#include "modules/pgo_study/team_solver.hpp"
+
+namespace km {
+
+/// What cooperation is measured against: every robot solves its own graph alone (round 1); then the
+/// frames are joined along a tree of robots, each to its parent's by one closure between them, the
+/// first by id (one round for each level of the tree), level if all robots know which way is
+/// up. Rank 3.
+class LocalTeam : public TeamSolver {
+ public:
+  /// Throws std::invalid_argument, naming the robot, if the own edges of one do not connect its
+  /// poses.
+  explicit LocalTeam(const TeamGraph& graph);
+
+  bool step(RoundMeter& meter) override;
+  [[nodiscard]] const LiftedPoses& block(std::size_t robot) const override {
+    return blocks_[robot];
+  }
+
+ private:
+  void solve(std::size_t k);
+  void join(std::size_t k, RoundMeter& meter);
+
+  std::vector<SessionGraph> parts_;
+  bool upright_ = true;
+  TeamTree tree_;
+  std::vector<std::size_t> depth_;
+  std::vector<LiftedPoses> blocks_;
+  std::size_t round_ = 0;
+};
+
+}  // namespace km

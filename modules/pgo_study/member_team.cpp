@@ -1,0 +1,204 @@
+#include "modules/pgo_study/member_team.hpp"
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+
+#include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/team_plan.hpp"
+#include "modules/pose_graph/tree_front.hpp"
+
+namespace km {
+namespace {
+
+using Eigen::Index;
+
+constexpr int kChances = 2;
+
+}  // namespace
+
+MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> start, Factory make,
+                       TeamShape shape)
+    : graph_(graph),
+      rank_(rank),
+      make_(std::move(make)),
+      parts_(graph.robots()),
+      sent_(graph.robots(), 0),
+      received_(graph.robots(), 0) {
+  if (static_cast<Index>(start.size()) != graph.poses())
+    throw std::invalid_argument("MemberTeam: " + std::to_string(start.size()) +
+                                " start poses for " + std::to_string(graph.poses()));
+  for (std::size_t k = 0; k < parts_.size(); ++k) parts_[k] = part_of(graph, k);
+  places_ = places(shape);
+  tell_starts(std::move(start), nullptr);
+  open_session();
+  take_poses();
+}
+
+// As robots plan it for each other.
+std::map<std::size_t, TreePlace> MemberTeam::places(TeamShape shape) const {
+  std::map<RobotId, TeamStatus> statuses;
+  TeamLinks links;
+  for (const SessionGraph& part : parts_) {
+    TeamStatus& status = statuses[part.self];
+    status.sender = {part.self, 1};
+    std::map<RobotId, std::uint32_t> edges;
+    for (const PoseEdge& e : part.between) ++edges[e.other(part.self).robot];
+    for (const auto& [peer, count] : edges) status.offers.push_back({peer, count, {1, count}});
+    std::set<RobotId> heard;
+    for (const SessionGraph& other : parts_) {
+      const bool beside = other.self + 1 == part.self || part.self + 1 == other.self;
+      if (other.self != part.self && (shape == TeamShape::kAll || beside)) heard.insert(other.self);
+    }
+    links.tell(part.self, heard);
+  }
+  const SessionPlan plan = plan_session(statuses, links, 0);
+  if (plan.members.size() != parts_.size())
+    throw std::invalid_argument("MemberTeam: the graph does not join all robots");
+  std::map<std::size_t, TreePlace> places;
+  for (std::size_t k = 0; k < parts_.size(); ++k)
+    places[k] = place_in(plan, static_cast<RobotId>(k)).value();
+  return places;
+}
+
+// Public poses in single precision, each to everyone: what MemberPoses takes.
+void MemberTeam::tell_starts(std::vector<SE3> start, RoundMeter* meter) {
+  std::set<KeyframeId> ends;
+  for (const SessionGraph& part : parts_)
+    for (const PoseEdge& e : part.between) ends.insert({e.from, e.to});
+  std::map<KeyframeId, SE3> told;
+  for (const KeyframeId& id : ends) {
+    SE3& T = start[static_cast<std::size_t>(graph_.first[id.robot] + id.index)];
+    T = SinglePose::of(T).pose();
+    told[id] = T;
+  }
+  constexpr std::size_t kBytes = sizeof(float) * 7 + 2;
+  to_announce_ = kBytes * ends.size();
+  for (const KeyframeId& id : ends)
+    for (std::size_t k = 0; k < parts_.size(); ++k) {
+      if (k == id.robot) continue;
+      sent_[id.robot] += kBytes;
+      received_[k] += kBytes;
+    }
+  if (meter != nullptr) meter->sent(to_announce_);
+  for (std::size_t k = 0; k < parts_.size(); ++k) {
+    parts_[k].start.assign(start.begin() + graph_.first[k], start.begin() + graph_.first[k + 1]);
+    parts_[k].told.clear();
+    for (const PoseEdge& e : parts_[k].between) {
+      const KeyframeId& other = e.other(parts_[k].self);
+      parts_[k].told[other] = told.at(other);
+    }
+  }
+}
+
+void MemberTeam::open_session() {
+  members_.clear();
+  post_.clear();
+  for (std::size_t k = 0; k < parts_.size(); ++k) {
+    parts_[k].decided = decided_;
+    parts_[k].noise_scale = state_.round > 0 ? state_.noise_scale : 0.0;
+    members_.push_back(make_(parts_[k], places_.at(k)));
+  }
+  rounds_before_ = rounds_;
+}
+
+void MemberTeam::take_poses() {
+  blocks_.clear();
+  for (const auto& member : members_) blocks_.push_back(lift(member->poses(), rank_));
+  for (std::size_t k = 0; k < members_.size(); ++k)
+    if (!places_.at(k).parent) state_ = members_[k]->state();
+}
+
+bool MemberTeam::step(RoundMeter& meter) {
+  if (to_announce_ > 0) meter.sent(std::exchange(to_announce_, 0));
+  if (done() && !reconsider(meter)) return false;
+  const std::uint32_t round = rounds_ - rounds_before_ + 1;
+  const auto arrived = [&] {
+    return std::all_of(members_.begin(), members_.end(), [&](const auto& m) {
+      return m->done() || m->state().round >= round;
+    });
+  };
+  while (!arrived())
+    if (!pass_on(round, meter)) throw std::runtime_error("MemberTeam: the members wait for each other");
+  ++rounds_;
+  take_poses();
+  return true;
+}
+
+bool MemberTeam::done() const {
+  return std::all_of(members_.begin(), members_.end(), [](const auto& m) { return m->done(); });
+}
+
+// Every member works that has something to do, but for those that are a round ahead.
+bool MemberTeam::pass_on(std::uint32_t round, RoundMeter& meter) {
+  bool worked = !post_.empty();
+  for (const Delivery& delivery : std::exchange(post_, {})) {
+    received_[delivery.letter.to] += delivery.letter.bytes->size();
+    meter.run(delivery.letter.to, [&] {
+      (void)members_[delivery.letter.to]->receive(delivery.from, *delivery.letter.bytes);
+    });
+  }
+  for (std::size_t k = 0; k < members_.size(); ++k) {
+    if (members_[k]->state().round >= round || !members_[k]->ready()) continue;
+    worked = true;
+    for (SolverLetter& letter : meter.run(k, [&] { return members_[k]->advance(); })) {
+      meter.sent(letter.bytes->size());
+      sent_[k] += letter.bytes->size();
+      post_.push_back({static_cast<RobotId>(k), std::move(letter)});
+    }
+  }
+  return worked;
+}
+
+bool MemberTeam::reconsider(RoundMeter& meter) {
+  for (const auto& member : members_)
+    for (const WeighedClosure& closure : member->verdicts().closures)
+      decided_[closure.id] = closure.kept;
+  std::vector<SE3> poses;
+  for (const auto& member : members_)
+    poses.insert(poses.end(), member->poses().begin(), member->poses().end());
+  const auto pose = [&](const KeyframeId& id) {
+    return poses[static_cast<std::size_t>(graph_.first[id.robot] + id.index)];
+  };
+  bool any = false;
+  const auto look_again = [&](const PoseEdge& e) {
+    const auto decided = decided_.find(e.id());
+    if (decided == decided_.end() || decided->second || chances_[e.id()] >= kChances ||
+        residual_of(e, pose(e.from), pose(e.to)) > state_.barc)
+      return;
+    ++chances_[e.id()];
+    decided_.erase(decided);
+    any = true;
+  };
+  for (const SessionGraph& part : parts_) {
+    for (std::size_t k = part.odometry; k < part.own.size(); ++k) look_again(part.own[k]);
+    for (const PoseEdge& e : part.between)
+      if (part.self < e.other(part.self).robot) look_again(e);
+  }
+  if (!any) return false;
+  tell_starts(std::move(poses), &meter);
+  to_announce_ = 0;
+  open_session();
+  return true;
+}
+
+std::vector<bool> MemberTeam::kept() const {
+  std::map<ClosureId, bool> verdict;
+  for (const auto& member : members_)
+    for (const WeighedClosure& closure : member->verdicts().closures)
+      verdict[closure.id] = closure.kept;
+  std::vector<bool> kept = odometry_edges(graph_);
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    const BlockEdge& e = graph_.edges[k];
+    const auto id = [&](Index pose) {
+      const std::size_t robot = graph_.robot_of(pose);
+      return KeyframeId{static_cast<RobotId>(robot),
+                        static_cast<KeyframeIndex>(pose - graph_.first[robot])};
+    };
+    const auto found = verdict.find(closure_id(id(e.i), id(e.j)));
+    kept[k] = kept[k] || found == verdict.end() || found->second;
+  }
+  return kept;
+}
+
+}  // namespace km

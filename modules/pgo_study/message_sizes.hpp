@@ -1,0 +1,25 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+
+namespace km {
+
+// Bytes that a message of the methods in this module would take inside a letter between robots (see
+// SolverLetter): 4 for its kind and round, and its content,
+//     public poses   2 for the index of each and 4 rank floats, 16 rank: m (2 + 16 rank);
+//     doubles        8 each: rows and sums of a verification, shares of cost and gradient.
+// Nothing is encoded: the methods run in one process.
+
+inline constexpr std::size_t kMessageHeader = 1 + 3;  ///< Kind, and the round as a varint.
+
+[[nodiscard]] constexpr std::size_t bytes_of_doubles(Eigen::Index count) {
+  return sizeof(double) * static_cast<std::size_t>(count);
+}
+
+[[nodiscard]] constexpr std::size_t bytes_of_poses(std::size_t poses, Eigen::Index rank) {
+  constexpr std::size_t kIndex = 2;
+  return poses * (kIndex + 4 * sizeof(float) * static_cast<std::size_t>(rank));
+}
+
+}  // namespace km

@@ -1,0 +1,119 @@
+#include "modules/pose_graph/corroboration.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "modules/core/covariance.hpp"
+#include "modules/core/lie.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::uint32_t kSteps = 10;  // of odometry in a cycle, at most
+constexpr std::uint32_t kBeside = 5;  // keyframes, at both ends
+constexpr std::size_t kEnoughLengths = 300;
+constexpr double kLargestTurn = 0.25 * std::numbers::pi;
+
+std::uint32_t steps_between(const KeyframeId& a, const KeyframeId& b) {
+  return std::max(a.index, b.index) - std::min(a.index, b.index);
+}
+
+}  // namespace
+
+Matrix6 covariance_in(const Precision& precision, int dimension) {
+  Matrix6 Sigma = covariance_of(precision);
+  if (dimension == 3) return Sigma;
+  Sigma(0, 0) = Sigma(1, 1) = Sigma(5, 5) = 0.0;  // roll, pitch, z
+  Sigma(2, 2) = 1.0 / precision.kappa;
+  return Sigma;
+}
+
+Corroboration::Corroboration(std::span<const PoseEdge> closures, const PoseOf& pose,
+                             const std::map<RobotId, Precision>& step, int dimension)
+    : pose_(pose), step_(step), dimension_(dimension) {
+  for (std::size_t k = 0; k < closures.size(); ++k) {
+    const PoseEdge& e = closures[k];
+    const bool up = e.from < e.to;
+    closures_.push_back({k, up ? e.from : e.to, up ? e.to : e.from,
+                         up ? e.T_from_to : e.T_from_to.inverse(), e.precision});
+  }
+  std::stable_sort(closures_.begin(), closures_.end(), [](const Upward& a, const Upward& b) {
+    return std::pair(a.lower, a.upper) < std::pair(b.lower, b.upper);
+  });
+}
+
+double Corroboration::cycle_length(const Upward& one, const Upward& other) const {
+  const auto chain = [&](const KeyframeId& from, const KeyframeId& to) {
+    const auto step = step_.find(from.robot);
+    const Precision precision = step == step_.end() ? Precision{} : step->second;
+    return UncertainPose{pose_(from).inverse() * pose_(to),
+                         steps_between(from, to) * covariance_in(precision, dimension_)};
+  };
+  const auto measured = [&](const Upward& c) {
+    return UncertainPose{c.T_lower_upper, covariance_in(c.precision, dimension_)};
+  };
+  const UncertainPose cycle =
+      compose(compose(compose(measured(one), chain(one.upper, other.upper)), inverse(measured(other))),
+              chain(other.lower, one.lower));
+  if (angle_of(cycle.T.linear()) > kLargestTurn) return std::numeric_limits<double>::infinity();
+  const Vector6 xi = se3_log(cycle.T);
+  if (dimension_ == 3) return std::sqrt(xi.dot(cycle.Sigma.ldlt().solve(xi)));
+  const std::array<int, 3> planar{2, 3, 4};  // angle, x, y
+  const Eigen::Vector3d in_plane = xi(planar);
+  const Eigen::Matrix3d Sigma = cycle.Sigma(planar, planar);
+  return std::sqrt(in_plane.dot(Sigma.ldlt().solve(in_plane)));
+}
+
+void Corroboration::count_lengths(NoiseHistogram& histogram) const {
+  struct Cycle {
+    std::uint32_t steps;
+    std::size_t a;
+    std::size_t b;
+  };
+  std::vector<Cycle> cycles;
+  for (std::size_t a = 0; a < closures_.size(); ++a)
+    for (std::size_t b = a + 1; b < closures_.size(); ++b) {
+      if (steps_between(closures_[a].lower, closures_[b].lower) > kSteps) break;
+      const std::uint32_t steps = steps_between(closures_[a].lower, closures_[b].lower) +
+                                  steps_between(closures_[a].upper, closures_[b].upper);
+      if (steps <= kSteps) cycles.push_back({steps, a, b});
+    }
+  std::stable_sort(cycles.begin(), cycles.end(),
+                   [](const Cycle& x, const Cycle& y) { return x.steps < y.steps; });
+  if (cycles.size() > kEnoughLengths) cycles.resize(kEnoughLengths);
+  for (const Cycle& c : cycles)
+    count_length(histogram, cycle_length(closures_[c.a], closures_[c.b]));
+}
+
+bool Corroboration::agree(const Upward& one, const Upward& other, double barc) const {
+  if (steps_between(one.upper, other.upper) > kBeside) return false;
+  const SE3 T = pose_(one.lower).inverse() * pose_(other.lower) * other.T_lower_upper *
+                pose_(other.upper).inverse() * pose_(one.upper);
+  const SE3& measured = one.T_lower_upper;
+  const auto& [kappa, tau] = one.precision;
+  const double turned = kappa * (T.linear() - measured.linear()).squaredNorm();
+  const double moved = tau * (T.translation() - measured.translation()).squaredNorm();
+  // Both closures' noise and that of every step; a rotation also moves the far end of a closure.
+  const double variances =
+      2.0 + steps_between(one.lower, other.lower) + steps_between(one.upper, other.upper);
+  const double lever = 1.0 + tau / kappa * measured.translation().squaredNorm();
+  return turned <= barc * barc * variances && moved <= barc * barc * variances * lever;
+}
+
+std::vector<bool> Corroboration::isolated(double barc) const {
+  std::vector<bool> isolated(closures_.size(), true);
+  for (std::size_t a = 0; a < closures_.size(); ++a)
+    for (std::size_t b = a + 1; b < closures_.size(); ++b) {
+      if (steps_between(closures_[a].lower, closures_[b].lower) > kBeside) break;
+      // From either side: so close to each other, one lever may be shorter.
+      if (!agree(closures_[a], closures_[b], barc) && !agree(closures_[b], closures_[a], barc))
+        continue;
+      isolated[closures_[a].place] = isolated[closures_[b].place] = false;
+    }
+  return isolated;
+}
+
+}  // namespace km

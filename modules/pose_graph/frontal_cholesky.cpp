@@ -1,0 +1,190 @@
+#include "modules/pose_graph/frontal_cholesky.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+namespace km {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+// Lower triangle of the dense `front`, its first `pivots` scalar columns eliminated in place:
+// those columns become L, the rest the Schur complement. False if a pivot is not positive.
+bool eliminate(MatrixXd& front, Index pivots) {
+  const Index rest = front.rows() - pivots;
+  auto pivot_block = front.topLeftCorner(pivots, pivots);
+  Eigen::LLT<Eigen::Ref<MatrixXd>> llt(pivot_block);
+  if (llt.info() != Eigen::Success) return false;
+  if (rest == 0) return true;
+  auto below = front.bottomLeftCorner(rest, pivots);
+  pivot_block.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(below);
+  front.bottomRightCorner(rest, rest).selfadjointView<Eigen::Lower>().rankUpdate(below, -1.0);
+  return true;
+}
+
+// Adds block (i, j) of a symmetric matrix to the lower triangle of `front`.
+template <typename Block>
+void add_block(MatrixXd& front, Index block, int i, int j, const Block& values) {
+  if (i >= j)
+    front.block(block * i, block * j, block, block) += values;
+  else
+    front.block(block * j, block * i, block, block) += values.transpose();
+}
+
+}  // namespace
+
+bool FrontalCholesky::factorise(const BlockMatrix& A) {
+  block_ = A.block();
+  const std::size_t fronts = plan_->fronts().size();
+  factors_.resize(fronts);
+  rests_.assign(fronts, MatrixXd());
+  local_.assign(static_cast<std::size_t>(plan_->nodes()), -1);
+  schur_ = BlockMatrix::zero(block_, plan_->kept().size(), plan_->kept_pairs().size());
+  for (std::size_t f = 0; f < fronts; ++f)
+    if (!factorise_front(f, A)) return false;
+  add_kept(A);
+  return true;
+}
+
+bool FrontalCholesky::factorise_front(std::size_t f, const BlockMatrix& A) {
+  const EliminationPlan::Front& front = plan_->fronts()[f];
+  const Index pivots = block_ * front.pivots;
+  const Index size = block_ * static_cast<Index>(front.nodes.size());
+  for (std::size_t k = 0; k < front.nodes.size(); ++k)
+    local_[static_cast<std::size_t>(front.nodes[k])] = static_cast<int>(k);
+  const auto local = [&](int node) { return local_[static_cast<std::size_t>(node)]; };
+
+  MatrixXd F = MatrixXd::Zero(size, size);
+  for (int k = 0; k < front.pivots; ++k)
+    F.block(block_ * k, block_ * k, block_, block_) =
+        A.at(front.nodes[static_cast<std::size_t>(k)]);
+  for (const int pair : front.pairs) {
+    const auto& [i, j] = plan_->pairs()[static_cast<std::size_t>(pair)];
+    add_block(F, block_, local(i), local(j), A.between(pair));
+  }
+  for (const int c : front.children) {
+    const EliminationPlan::Front& child = plan_->fronts()[static_cast<std::size_t>(c)];
+    MatrixXd& rest = rests_[static_cast<std::size_t>(c)];
+    const auto first = static_cast<std::size_t>(child.pivots);
+    for (std::size_t j = first; j < child.nodes.size(); ++j)
+      for (std::size_t i = j; i < child.nodes.size(); ++i)
+        add_block(F, block_, local(child.nodes[i]), local(child.nodes[j]),
+                  rest.block(block_ * static_cast<Index>(i - first),
+                             block_ * static_cast<Index>(j - first), block_, block_));
+    rest.resize(0, 0);
+  }
+  if (!eliminate(F, pivots)) return false;
+  factors_[f] = F.leftCols(pivots);
+  MatrixXd rest = F.bottomRightCorner(size - pivots, size - pivots);
+  if (front.parent >= 0)
+    rests_[f] = std::move(rest);
+  else
+    add_to_schur(front, rest);
+  return true;
+}
+
+int FrontalCholesky::kept_pair(int a, int b) const {
+  const auto& pairs = plan_->kept_pairs();
+  const NodePair pair{std::min(a, b), std::max(a, b)};
+  return static_cast<int>(std::lower_bound(pairs.begin(), pairs.end(), pair) - pairs.begin());
+}
+
+void FrontalCholesky::add_to_schur(const EliminationPlan::Front& front, const MatrixXd& rest) {
+  const auto first = static_cast<std::size_t>(front.pivots);
+  const auto kept = [&](std::size_t k) {
+    return plan_->place_of_kept()[static_cast<std::size_t>(front.nodes[k])];
+  };
+  for (std::size_t j = first; j < front.nodes.size(); ++j) {
+    const Index col = block_ * static_cast<Index>(j - first);
+    const MatrixXd lower = rest.block(col, col, block_, block_);
+    schur_.at(kept(j)) += lower.selfadjointView<Eigen::Lower>();
+    for (std::size_t i = j + 1; i < front.nodes.size(); ++i) {
+      const auto values = rest.block(block_ * static_cast<Index>(i - first), col, block_, block_);
+      auto sum = schur_.between(kept_pair(kept(i), kept(j)));
+      if (kept(i) < kept(j))
+        sum += values;
+      else
+        sum += values.transpose();
+    }
+  }
+}
+
+void FrontalCholesky::add_kept(const BlockMatrix& A) {
+  for (std::size_t k = 0; k < plan_->kept().size(); ++k)
+    schur_.at(static_cast<int>(k)) += A.at(plan_->kept()[k]);
+  for (std::size_t p = 0; p < plan_->pairs().size(); ++p) {
+    const auto& [i, j] = plan_->pairs()[p];
+    const int a = plan_->place_of_kept()[static_cast<std::size_t>(i)];
+    const int b = plan_->place_of_kept()[static_cast<std::size_t>(j)];
+    if (a < 0 || b < 0) continue;
+    auto sum = schur_.between(kept_pair(a, b));
+    if (a < b)
+      sum += A.between(static_cast<int>(p));
+    else
+      sum += A.between(static_cast<int>(p)).transpose();
+  }
+}
+
+void FrontalCholesky::forward(MatrixXd& C) const {
+  MatrixXd rows;
+  for (std::size_t f = 0; f < factors_.size(); ++f) {
+    const EliminationPlan::Front& front = plan_->fronts()[f];
+    const Index pivots = block_ * front.pivots;
+    const Index rest = factors_[f].rows() - pivots;
+    rows.resize(pivots, C.cols());
+    for (int k = 0; k < front.pivots; ++k)
+      rows.middleRows(block_ * k, block_) =
+          C.middleRows(block_ * front.nodes[static_cast<std::size_t>(k)], block_);
+    factors_[f].topRows(pivots).triangularView<Eigen::Lower>().solveInPlace(rows);
+    for (int k = 0; k < front.pivots; ++k)
+      C.middleRows(block_ * front.nodes[static_cast<std::size_t>(k)], block_) =
+          rows.middleRows(block_ * k, block_);
+    if (rest == 0) continue;
+    const MatrixXd change = factors_[f].bottomRows(rest) * rows;
+    for (std::size_t k = static_cast<std::size_t>(front.pivots); k < front.nodes.size(); ++k)
+      C.middleRows(block_ * front.nodes[k], block_) -=
+          change.middleRows(block_ * (static_cast<Index>(k) - front.pivots), block_);
+  }
+}
+
+void FrontalCholesky::backward(MatrixXd& X) const {
+  MatrixXd rows;
+  for (std::size_t f = factors_.size(); f-- > 0;) {
+    const EliminationPlan::Front& front = plan_->fronts()[f];
+    const Index pivots = block_ * front.pivots;
+    const Index rest = factors_[f].rows() - pivots;
+    rows.resize(factors_[f].rows(), X.cols());
+    for (std::size_t k = 0; k < front.nodes.size(); ++k)
+      rows.middleRows(block_ * static_cast<Index>(k), block_) =
+          X.middleRows(block_ * front.nodes[k], block_);
+    auto solved = rows.topRows(pivots);
+    if (rest > 0)
+      solved.noalias() -= factors_[f].bottomRows(rest).transpose() * rows.bottomRows(rest);
+    factors_[f].topRows(pivots).triangularView<Eigen::Lower>().transpose().solveInPlace(solved);
+    for (int k = 0; k < front.pivots; ++k)
+      X.middleRows(block_ * front.nodes[static_cast<std::size_t>(k)], block_) =
+          rows.middleRows(block_ * k, block_);
+  }
+}
+
+double FrontalCholesky::magnitude(const Eigen::VectorXd& b) const {
+  double sum = 0.0;
+  Eigen::VectorXd rows;
+  for (std::size_t f = 0; f < factors_.size(); ++f) {
+    const EliminationPlan::Front& front = plan_->fronts()[f];
+    rows.resize(factors_[f].rows());
+    for (std::size_t k = 0; k < front.nodes.size(); ++k)
+      rows.segment(block_ * static_cast<Index>(k), block_) =
+          b.segment(block_ * front.nodes[k], block_);
+    // The upper triangle of the pivots' block is not part of the factor.
+    for (Index c = 0; c < factors_[f].cols(); ++c) {
+      const Index below = factors_[f].rows() - c;
+      const double column = factors_[f].col(c).tail(below).cwiseAbs().dot(rows.tail(below));
+      sum += column * column;
+    }
+  }
+  return sum;
+}
+
+}  // namespace km

@@ -1,0 +1,101 @@
+#include "modules/pose_graph/letter_book.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace km {
+namespace {
+
+// A letter is sent again after so many times the mean time of an answer, and then ever more rarely.
+constexpr double kPatience = 2.0;
+constexpr double kMeanOver = 8.0;  // letters
+// In periods.
+constexpr double kLeastPatience = 0.2;
+constexpr double kMostPatience = 3.0;
+
+// A letter that is so far ahead of those that were taken is not one of a solver's.
+constexpr std::uint32_t kFarAhead = 10000;
+
+}  // namespace
+
+SessionLetter LetterBook::write(SolverLetter letter, double now_s) {
+  Correspondent& to = correspondents_[letter.to];
+  const SessionLetter written{.sender = self_,
+                              .session = session_,
+                              .number = to.written++,
+                              .to = letter.to,
+                              .bytes = std::move(letter.bytes),
+                              .received = to.taken};
+  to.owes_word = false;
+  to.waiting.push_back({written, now_s});
+  return written;
+}
+
+LetterNews LetterBook::read(const SessionLetter& letter, double now_s) {
+  Correspondent& from = correspondents_[letter.sender.robot];
+  if (letter.received > from.written) return LetterNews::kFalse;
+  while (!from.waiting.empty() && from.waiting.front().letter.number < letter.received) {
+    const Waiting& arrived = from.waiting.front();
+    if (arrived.repetitions == 0) {
+      const double took_s = now_s - arrived.sent_s;
+      from.answer_s =
+          from.answer_s ? *from.answer_s + (took_s - *from.answer_s) / kMeanOver : took_s;
+    }
+    from.waiting.pop_front();
+  }
+  if (!letter.bytes || letter.bytes->empty()) return LetterNews::kNone;
+  const bool repeated = letter.number < from.taken || from.taken_early.contains(letter.number);
+  if (repeated) {
+    from.owes_word = true;
+    return LetterNews::kNone;
+  }
+  return letter.number - from.taken > kFarAhead ? LetterNews::kFalse : LetterNews::kNew;
+}
+
+void LetterBook::take(const SessionLetter& letter) {
+  Correspondent& from = correspondents_[letter.sender.robot];
+  from.taken_early.insert(letter.number);
+  while (!from.taken_early.empty() && *from.taken_early.begin() == from.taken) {
+    from.taken_early.erase(from.taken_early.begin());
+    ++from.taken;
+  }
+}
+
+double LetterBook::patience_s(const Correspondent& of, const Waiting& waiting) const {
+  const double first_s = of.answer_s ? kPatience * *of.answer_s : period_s_;
+  const double least_s = kLeastPatience * period_s_;
+  const double most_s = kMostPatience * period_s_;
+  return std::min(std::max(first_s, least_s) * std::ldexp(1.0, waiting.repetitions), most_s);
+}
+
+std::vector<SessionLetter> LetterBook::due(double now_s) {
+  std::vector<SessionLetter> due;
+  for (auto& [robot, of] : correspondents_) {
+    for (Waiting& waiting : of.waiting) {
+      if (now_s - waiting.sent_s < patience_s(of, waiting)) continue;
+      waiting.sent_s = now_s;
+      waiting.repetitions = std::min(waiting.repetitions + 1, 16);
+      waiting.letter.received = of.taken;
+      of.owes_word = false;
+      due.push_back(waiting.letter);
+    }
+    if (!std::exchange(of.owes_word, false)) continue;
+    due.push_back({.sender = self_,
+                   .session = session_,
+                   .number = of.written,
+                   .to = robot,
+                   .bytes = nullptr,
+                   .received = of.taken});
+  }
+  return due;
+}
+
+void LetterBook::reachable_again(RobotId robot) {
+  const auto of = correspondents_.find(robot);
+  if (of == correspondents_.end()) return;
+  for (Waiting& waiting : of->second.waiting)
+    waiting.sent_s = -std::numeric_limits<double>::infinity();
+}
+
+}  // namespace km

@@ -1,0 +1,183 @@
+#include "modules/pose_graph/own_graph.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include "modules/core/config.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kKeptSets = 4;  // per peer
+
+void mix(std::uint64_t& hash, std::uint64_t value) {  // FNV-1a, bytewise
+  for (int byte = 0; byte < 8; ++byte) {
+    hash ^= (value >> (8 * byte)) & 0xffU;
+    hash *= 0x100000001b3ULL;
+  }
+}
+
+// Of the measurements used: direction, translation and weights, which cross the network as they
+// are. A rotation does not: as a quaternion it loses its last bit.
+EdgeSetId identify(std::uint32_t version, const std::vector<PoseEdge>& edges) {
+  EdgeSetId id{version, 0xcbf29ce484222325ULL};
+  mix(id.hash, version);
+  for (const PoseEdge& e : edges) {
+    for (const KeyframeId& end : {e.from, e.to})
+      mix(id.hash, (std::uint64_t{end.robot} << 32U) | end.index);
+    const Eigen::Vector3d& t = e.T_from_to.translation();
+    for (const double x : {t.x(), t.y(), t.z(), e.precision.kappa, e.precision.tau})
+      mix(id.hash, std::bit_cast<std::uint64_t>(x + 0.0));  // -0.0 equals 0.0
+  }
+  return id;
+}
+
+VerticalPrior vertical_prior(const KeyframeId& keyframe, const Vertical& vertical) {
+  constexpr Bounds<double> kSigma{1e-4, 1.6};
+  constexpr double kUnit = 1e-3;
+  const double norm = vertical.up_body.norm();
+  if (!(std::abs(norm - 1.0) < kUnit) || !kSigma.contains(vertical.sigma_rad))
+    throw std::invalid_argument("OwnGraph: the vertical of keyframe " + to_string(keyframe) +
+                                " is not a direction with a usable sigma");
+  return {Eigen::Index{keyframe.index}, vertical.up_body / norm,
+          1.0 / (vertical.sigma_rad * vertical.sigma_rad)};
+}
+
+}  // namespace
+
+bool OwnGraph::add(const KeyframeOdometry& keyframe) {
+  if (keyframe.id.robot != self_ || keyframe.id.index != keyframes_) return false;
+  std::optional<VerticalPrior> vertical;
+  if (keyframe.vertical) vertical = vertical_prior(keyframe.id, *keyframe.vertical);
+  if (keyframes_ > 0) {
+    const auto step = pose_edge(
+        {{self_, keyframes_ - 1}, keyframe.id, keyframe.T_previous_kf, keyframe.covariance});
+    if (!step)
+      throw std::invalid_argument("OwnGraph: odometry to keyframe " + to_string(keyframe.id) +
+                                  " is not finite with a usable covariance");
+    odometry_.push_back(*step);
+  } else {
+    if (!keyframe.T_odom_kf.matrix().allFinite())
+      throw std::invalid_argument("OwnGraph: the first keyframe's pose is not finite");
+    T_odom_first_ = keyframe.T_odom_kf;
+  }
+  if (vertical) verticals_.push_back(*vertical);
+  ++keyframes_;
+  ++revision_;
+  complete_sets();
+  return true;
+}
+
+bool OwnGraph::add(const Closure& closure) {
+  const ClosureId id = closure.id();
+  const bool touches = id.from.robot == self_ || id.to.robot == self_;
+  if (!touches || id.from == id.to) return false;
+  const auto edge = pose_edge(closure.relative_pose());
+  if (!edge) return false;
+  const auto [known, is_new] = closures_.try_emplace(id, *edge);
+  if (!is_new) {
+    if (!is_better(*edge, known->second)) return false;
+    known->second = *edge;
+    const auto sets = sets_.find(id.from.robot == self_ ? id.to.robot : id.from.robot);
+    if (sets != sets_.end())
+      sets->second.changed |= std::ranges::binary_search(sets->second.newest.closures, id);
+  }
+  complete_sets();
+  return true;
+}
+
+bool OwnGraph::add(const InlierSet& set) {
+  if (set.a > set.b || (set.a != self_ && set.b != self_)) return false;
+  for (const ClosureId& id : set.closures)
+    if (std::min(id.from.robot, id.to.robot) != set.a ||
+        std::max(id.from.robot, id.to.robot) != set.b)
+      return false;
+  const auto [sets, is_first] = sets_.try_emplace(set.a == self_ ? set.b : set.a);
+  InlierSet& newest = sets->second.newest;
+  if (!is_first && set.version <= newest.version) return false;
+  newest = set;
+  for (ClosureId& id : newest.closures) id = closure_id(id.from, id.to);
+  std::ranges::sort(newest.closures);
+  const auto repeated = std::ranges::unique(newest.closures);
+  newest.closures.erase(repeated.begin(), repeated.end());
+  sets->second.changed = true;
+  complete_sets();
+  return true;
+}
+
+void OwnGraph::forget(RobotId peer) {
+  sets_.erase(peer);
+  std::erase_if(closures_, [&](const auto& closure) {
+    return closure.first.from.robot == peer || closure.first.to.robot == peer;
+  });
+}
+
+void OwnGraph::complete_sets() {
+  for (auto& [peer, sets] : sets_)
+    if (sets.changed && complete(sets)) {
+      sets.changed = false;
+      if (peer == self_) ++revision_;
+    }
+}
+
+bool OwnGraph::complete(Sets& sets) const {
+  const auto known = [&](const KeyframeId& end) {
+    return end.robot != self_ || end.index < keyframes_;
+  };
+  EdgeSet result;
+  for (const ClosureId& id : sets.newest.closures) {
+    const auto found = closures_.find(id);
+    if (found == closures_.end() || !known(id.from) || !known(id.to)) return false;
+    result.edges.push_back(found->second);
+  }
+  result.id = identify(sets.newest.version, result.edges);
+  sets.complete.insert(sets.complete.begin(), std::move(result));
+  if (sets.complete.size() > kKeptSets) sets.complete.pop_back();
+  return true;
+}
+
+std::vector<EdgeSetOffer> OwnGraph::offers() const {
+  std::vector<EdgeSetOffer> offers;
+  for (const auto& [peer, sets] : sets_)
+    for (const EdgeSet& set : sets.complete)
+      if (peer != self_ && !set.edges.empty())
+        offers.push_back({peer, static_cast<std::uint32_t>(set.edges.size()), set.id});
+  return offers;
+}
+
+const std::vector<PoseEdge>* OwnGraph::edges(RobotId peer, const EdgeSetId& id) const {
+  const auto sets = sets_.find(peer);
+  if (sets == sets_.end()) return nullptr;
+  for (const EdgeSet& set : sets->second.complete)
+    if (set.id == id) return &set.edges;
+  return nullptr;
+}
+
+const std::vector<PoseEdge>* OwnGraph::newest_edges(RobotId peer) const {
+  const auto sets = sets_.find(peer);
+  return sets == sets_.end() || sets->second.complete.empty() ? nullptr
+                                                              : &sets->second.complete[0].edges;
+}
+
+std::vector<PoseEdge> OwnGraph::own_edges() const {
+  std::vector<PoseEdge> edges = odometry_;
+  if (const std::vector<PoseEdge>* inside = newest_edges(self_))
+    edges.insert(edges.end(), inside->begin(), inside->end());
+  return edges;
+}
+
+Precision OwnGraph::mean_step_precision() const {
+  if (odometry_.empty()) return {};
+  Precision sum{0.0, 0.0};
+  for (const PoseEdge& step : odometry_) {
+    sum.kappa += step.precision.kappa;
+    sum.tau += step.precision.tau;
+  }
+  const auto steps = static_cast<double>(odometry_.size());
+  return {sum.kappa / steps, sum.tau / steps};
+}
+
+}  // namespace km

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <team.h>
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "modules/pose_graph/team_messages.hpp"
+#include "runtime/dds/codec.hpp"
+
+namespace km {
+
+/// A message as it comes across a link: a Parcel that says who hands it over.
+struct TeamParcel {
+  RobotId from = 0;
+  std::shared_ptr<const TeamMessage> message;
+};
+
+/// Sent as TopicKind::kRequest: what a link that is down shortly holds up arrives later, the newest
+/// of each key, and what it holds up for dds.lease_s is forgotten: who is heard again is told
+/// afresh.
+template <>
+struct Codec<TeamParcel> {
+  using Wire = km_wire_TeamParcel;
+  static constexpr const char* kTopic = "team_parcels";
+  static constexpr std::uint16_t kVersion = 1;
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_TeamParcel_desc; }
+
+  struct Encoded {
+    Wire wire{};
+    std::vector<std::uint8_t> content;
+  };
+  static Encoded encode(const TeamParcel& parcel);
+  static Decoded<TeamParcel> decode(const Wire& wire);
+};
+
+}  // namespace km

@@ -1,0 +1,33 @@
+#include "modules/pose_graph/pose_edge.hpp"
+
+#include <tuple>
+
+#include "modules/core/config.hpp"
+
+namespace km {
+namespace {
+
+auto rank_of(const PoseEdge& e) {
+  const double trace = 1.5 / e.precision.kappa + 3.0 / e.precision.tau;  // see precision_of()
+  const Eigen::Vector3d& t = e.T_from_to.translation();
+  return std::tuple(trace, e.precision.kappa, e.from, t.x(), t.y(), t.z());
+}
+
+}  // namespace
+
+std::optional<PoseEdge> pose_edge(const RelativePose& measured) {
+  const double rotation = measured.covariance.topLeftCorner<3, 3>().trace();
+  const double translation = measured.covariance.bottomRightCorner<3, 3>().trace();
+  constexpr Bounds<double> kVariance{1e-12, 1e12};
+  if (!measured.T_from_to.matrix().allFinite() || !kVariance.contains(rotation) ||
+      !kVariance.contains(translation))
+    return std::nullopt;
+  return PoseEdge{measured.from, measured.to, measured.T_from_to,
+                  precision_of(measured.covariance)};
+}
+
+bool is_better(const PoseEdge& a, const PoseEdge& b) {
+  return rank_of(a) < rank_of(b);
+}
+
+}  // namespace km

@@ -1,0 +1,87 @@
+#include "modules/pose_graph/robust_schedule.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "modules/outlier_rejection/chi_squared.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kInlierProbability = 0.999999;
+constexpr double kMuStep = 1.4;
+// While the surrogate is nearly convex it may come closer faster.
+constexpr double kFastMuStep = 2.5;
+constexpr double kNearlyConvex = 0.05;
+constexpr int kMaxUpdates = 100;  // then they are decided as they are
+// A few more updates let the borderline cases come to rest.
+constexpr int kHardUpdates = 3;
+constexpr int kMaxReopened = 3;
+
+double chi_squared_3(double x) {
+  return std::erf(std::sqrt(0.5 * x)) - std::sqrt(2.0 * x / std::numbers::pi) * std::exp(-0.5 * x);
+}
+
+double chi_squared_3_quantile(double probability) {
+  double below = 0.0, above = 1000.0;
+  for (int i = 0; i < 64; ++i) {
+    const double middle = 0.5 * (below + above);
+    (chi_squared_3(middle) < probability ? below : above) = middle;
+  }
+  return 0.5 * (below + above);
+}
+
+}  // namespace
+
+double robust_weight(double squared_residual, double squared_barc, double mu) {
+  if (mu >= kHardMu) return squared_residual <= squared_barc ? 1.0 : 0.0;
+  if (squared_residual * (mu + 1.0) <= mu * squared_barc) return 1.0;
+  if (squared_residual * mu >= (mu + 1.0) * squared_barc) return 0.0;
+  return std::clamp(std::sqrt(mu * (mu + 1.0) * squared_barc / squared_residual) - mu, 0.0, 1.0);
+}
+
+double first_mu(double largest_squared_residual, double squared_barc) {
+  const double beyond = 2.0 * largest_squared_residual - squared_barc;
+  return beyond > 0.0 ? std::min(kLargestMu, squared_barc / beyond) : kLargestMu;
+}
+
+double default_threshold(int dimension) {
+  return std::sqrt(dimension == 2 ? chi_squared_3_quantile(kInlierProbability)
+                                  : chi_squared_6_quantile(kInlierProbability));
+}
+
+void RobustSchedule::start(float largest, std::uint32_t open, double barc, int all_in) {
+  decided_ = open == 0;
+  all_in_ = decided_ ? 0 : all_in;
+  mu_ = first_mu(static_cast<double>(largest) * largest, barc * barc);
+  updates_ = 1;
+  hard_updates_ = mu_ >= kHardMu ? 1 : 0;
+}
+
+void RobustSchedule::next(const Tally& tally) {
+  if (decided_) return;
+  if (all_in_ > 0) {
+    --all_in_;
+    return;
+  }
+  const bool same = tally.changed == 0;
+  const bool hard = mu_ >= kHardMu;
+  decided_ = (same && (tally.fractional == 0 || hard)) ||
+             (hard && hard_updates_ >= kHardUpdates) || updates_ >= kMaxUpdates;
+  if (decided_) return;
+  ++updates_;
+  mu_ = std::min(kLargestMu, mu_ * (mu_ < kNearlyConvex ? kFastMuStep : kMuStep));
+  if (mu_ >= kHardMu) ++hard_updates_;
+}
+
+bool RobustSchedule::reopen() {
+  if (reopened_ >= kMaxReopened || updates_ == 0) return false;
+  ++reopened_;
+  decided_ = false;
+  mu_ = kLargestMu;
+  hard_updates_ = 1;
+  return true;
+}
+
+}  // namespace km

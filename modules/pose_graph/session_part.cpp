@@ -1,0 +1,262 @@
+#include "modules/pose_graph/session_part.hpp"
+
+#include <algorithm>
+#include <exception>
+#include <stdexcept>
+
+#include "modules/pose_graph/frame_entry.hpp"
+
+namespace km {
+namespace {
+
+// Rounds whose poses are kept until it is known that all members have completed them.
+constexpr std::size_t kRememberedRounds = 16;
+
+// Of letters before there is a solver. What there is no room for comes again.
+constexpr std::size_t kMaxEarlyLetters = 1000;
+constexpr std::size_t kMaxEarlyBytes = 1U << 26U;
+
+void add_told(const MemberPoses& poses, std::map<KeyframeId, SE3>& told) {
+  for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
+    told[{poses.sender.robot, poses.keyframes[k]}] = poses.T_frame_kf[k].pose();
+}
+
+}  // namespace
+
+SessionPart::SessionPart(Session session, TeamPeer self, FrozenPart part,
+                         MemberSolverFactory factory, const AlignmentTolerance& tolerance,
+                         double period_s, double now_s)
+    : session_(std::move(session)),
+      self_(self),
+      graph_(std::move(part.graph)),
+      place_(std::move(part.place)),
+      in_frame_(part.in_frame),
+      suspicious_(part.suspicious),
+      public_(std::move(part.public_keyframes)),
+      factory_(std::move(factory)),
+      tolerance_(tolerance),
+      letters_(self, session_.id, period_s),
+      moved_s_(now_s) {
+  for (const SessionMember& member : session_.plan.members)
+    boot_of_[member.peer.robot] = member.peer.boot;
+  for (const PoseEdge& e : graph_.between) between_.push_back(e.id());
+}
+
+const MemberPoses* SessionPart::told_by(const ToldPoses& told, RobotId robot,
+                                        std::uint32_t stage) const {
+  const auto member = boot_of_.find(robot);
+  const auto poses = told.find(robot);
+  const bool has = member != boot_of_.end() && poses != told.end() &&
+                   poses->second.sender.boot == member->second &&
+                   poses->second.session == session_.id && poses->second.stage >= stage;
+  return has ? &poses->second : nullptr;
+}
+
+bool SessionPart::all_solved(const ToldPoses& told) const {
+  return stage_ == 1U && std::all_of(boot_of_.begin(), boot_of_.end(), [&](const auto& member) {
+           if (member.first == self_.robot) return true;
+           const MemberPoses* poses = told_by(told, member.first, 1);
+           return poses != nullptr && poses->stage == 1;
+         });
+}
+
+bool SessionPart::joins_members(const ClosureId& closure) const {
+  return std::binary_search(between_.begin(), between_.end(), closure);
+}
+
+std::vector<SessionLetter> SessionPart::advance(const ToldPoses& told, double now_s) {
+  worked_ = false;
+  if (!stage_) {
+    worked_ = enter(told);
+  } else if (*stage_ == 0 && !solver_) {
+    worked_ = gather(told);
+    if (worked_) start_solver(now_s);
+  } else if (*stage_ == 0 && (solver_->ready() || solver_->done())) {
+    worked_ = true;
+    solve(now_s);
+  }
+  if (worked_) moved_s_ = now_s;
+  for (SessionLetter& letter : letters_.due(now_s)) to_send_.push_back(std::move(letter));
+  return std::exchange(to_send_, {});
+}
+
+bool SessionPart::enter(const ToldPoses& told) {
+  if (!in_frame_ && !align(told)) return false;
+  for (const KeyframeIndex keyframe : public_) {
+    SE3& T = graph_.start[keyframe];
+    T = SinglePose::of(T).pose();
+  }
+  committed_ = graph_.start;
+  stage_ = 0;
+  return true;
+}
+
+bool SessionPart::align(const ToldPoses& told) {
+  std::map<KeyframeId, SE3> poses = graph_.told;  // of absent robots
+  for (const SessionMember& member : session_.plan.members) {
+    if (member.peer == self_) break;
+    const bool neighbour = std::any_of(
+        graph_.between.begin(), graph_.between.end(),
+        [&](const PoseEdge& e) { return e.other(self_.robot).robot == member.peer.robot; });
+    if (!neighbour) continue;
+    const MemberPoses* of_member = told_by(told, member.peer.robot, 0);
+    if (of_member == nullptr) return false;
+    add_told(*of_member, poses);
+  }
+  std::vector<PoseEdge> closures = graph_.between;
+  closures.insert(closures.end(), graph_.to_absent.begin(), graph_.to_absent.end());
+  std::vector<PoseEdge> kept;
+  for (const PoseEdge& e : closures) {
+    const auto decided = graph_.decided.find(e.id());
+    if (decided == graph_.decided.end() || decided->second) kept.push_back(e);
+  }
+  auto moved = moved_into_frame(graph_.start, self_.robot, kept, poses, tolerance_);
+  if (!moved) moved = moved_into_frame(graph_.start, self_.robot, closures, poses, tolerance_);
+  if (!moved) return false;
+  graph_.start = suspicious_ ? std::move(*moved)
+                             : bent_to_told(*moved, self_.robot, graph_.own, closures, poses);
+  return true;
+}
+
+bool SessionPart::gather(const ToldPoses& told) {
+  for (const auto& [robot, boot] : boot_of_)
+    if (robot != self_.robot && told_by(told, robot, 0) == nullptr) return false;
+  for (const auto& [robot, boot] : boot_of_) {
+    if (robot == self_.robot) continue;
+    const MemberPoses& poses = *told_by(told, robot, 0);
+    add_told(poses, graph_.told);
+    graph_.step_precision[robot] = poses.step_precision;
+    combine_decisions(poses);
+  }
+  return true;
+}
+
+// Both ends of a closure come to the same: rejected if either says so, kept if both do.
+void SessionPart::combine_decisions(const MemberPoses& told) {
+  std::map<ClosureId, bool> theirs;
+  for (const WeighedClosure& closure : told.verdicts) theirs[closure.id] = closure.kept;
+  for (const PoseEdge& e : graph_.between) {
+    if (e.other(self_.robot).robot != told.sender.robot) continue;
+    const auto here = graph_.decided.find(e.id());
+    const auto there = theirs.find(e.id());
+    const bool here_rejected = here != graph_.decided.end() && !here->second;
+    const bool there_rejected = there != theirs.end() && !there->second;
+    if (here_rejected || there_rejected)
+      graph_.decided[e.id()] = false;
+    else if (here != graph_.decided.end() && there == theirs.end())
+      graph_.decided.erase(here);
+  }
+}
+
+void SessionPart::start_solver(double now_s) {
+  try {
+    for (const PoseEdge& e : graph_.between)
+      if (!graph_.told.contains(e.other(self_.robot)))
+        throw std::runtime_error("a closure ends on " + to_string(e.other(self_.robot)) +
+                                 ", which its robot has not told");
+    solver_ = factory_(session_, std::move(graph_), place_);
+  } catch (const std::exception& e) {
+    return fail(e.what());
+  }
+  moved_s_ = now_s;
+  for (const auto& [from, letter] : std::exchange(early_, {}))
+    if (!hand_over(letter, now_s)) refused_.push_back(from.first);
+}
+
+void SessionPart::solve(double now_s) {
+  std::vector<SolverLetter> letters;
+  try {
+    letters = solver_->advance();
+  } catch (const std::exception& e) {
+    return fail(e.what());
+  }
+  for (SolverLetter& letter : letters)
+    if (boot_of_.contains(letter.to) && letter.to != self_.robot)
+      to_send_.push_back(letters_.write(std::move(letter), now_s));
+  remember_round();
+  if (!solver_->done()) return;
+  if (solver_->state().failed) return fail("the team's equations cannot be solved");
+  stage_ = 1;
+}
+
+void SessionPart::fail(const std::string& why) {
+  failure_ = why;
+  stage_ = 2;
+}
+
+void SessionPart::remember_round() {
+  const std::uint32_t round = solver_->state().round;
+  if (!rounds_.empty() && rounds_.back().first == round)
+    rounds_.back().second = solver_->poses();
+  else
+    rounds_.emplace_back(round, solver_->poses());
+  if (rounds_.size() > kRememberedRounds) rounds_.pop_front();
+}
+
+void SessionPart::commit(std::uint32_t round) {
+  while (!rounds_.empty() && rounds_.front().first <= round) {
+    committed_ = std::move(rounds_.front().second);
+    rounds_.pop_front();
+  }
+}
+
+bool SessionPart::receive(const SessionLetter& letter, double now_s) {
+  const auto member = boot_of_.find(letter.sender.robot);
+  if (letter.sender.robot == self_.robot || member == boot_of_.end() ||
+      member->second != letter.sender.boot)
+    return false;
+  switch (letters_.read(letter, now_s)) {
+    case LetterNews::kNone:
+      return true;
+    case LetterNews::kFalse:
+      return false;
+    case LetterNews::kNew:
+      break;
+  }
+  if (solver_) return hand_over(letter, now_s);
+  keep(letter);
+  return true;
+}
+
+bool SessionPart::hand_over(const SessionLetter& letter, double now_s) {
+  if (!solver_->receive(letter.sender.robot, *letter.bytes)) return false;
+  letters_.take(letter);
+  moved_s_ = now_s;
+  remember_round();
+  return true;
+}
+
+void SessionPart::keep(const SessionLetter& letter) {
+  const std::size_t bytes = early_bytes_ + letter.bytes->size();
+  if (early_.size() >= kMaxEarlyLetters || bytes > kMaxEarlyBytes) return;
+  if (early_.try_emplace({letter.sender.robot, letter.number}, letter).second) early_bytes_ = bytes;
+}
+
+bool SessionPart::follow(const Session& session) {
+  if (session.number <= session_.number && session_.number > 0) return false;
+  session_.number = session.number;
+  session_.round = session.round;
+  session_.cost = session.cost;
+  session_.gradient = session.gradient;
+  if (session.T_frame_world) session_.T_frame_world = session.T_frame_world;
+  commit(session.round);
+  const bool ends = session.finished && !session_.finished;
+  session_.finished |= session.finished;
+  return ends;
+}
+
+ClosureVerdicts SessionPart::verdicts() const {
+  if (solver_) return solver_->verdicts();
+  ClosureVerdicts known;
+  for (const PoseEdge& e : graph_.between)
+    if (const auto decided = graph_.decided.find(e.id()); decided != graph_.decided.end())
+      known.closures.push_back({e.id(), decided->second});
+  return known;
+}
+
+const std::vector<SE3>& SessionPart::poses() const {
+  if (stage_ == 2U) return committed_;
+  return solver_ ? solver_->poses() : graph_.start;
+}
+
+}  // namespace km

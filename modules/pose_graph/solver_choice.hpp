@@ -1,0 +1,11 @@
+#pragma once
+
+#include "modules/pose_graph/session_part.hpp"
+#include "modules/pose_graph/pose_graph_config.hpp"
+
+namespace km {
+
+/// Makes the solver that a session's method asks for, with the parameters of `config`.
+[[nodiscard]] MemberSolverFactory solver_choice(const PoseGraphConfig& config);
+
+}  // namespace km

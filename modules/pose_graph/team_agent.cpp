@@ -1,0 +1,340 @@
+#include "modules/pose_graph/team_agent.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <tuple>
+#include <utility>
+
+#include "modules/pose_graph/stiefel.hpp"
+#include "modules/pose_graph/team_message_bytes.hpp"
+#include "modules/pose_graph/team_plan.hpp"
+
+// Who is there, what they tell, and what this robot tells; its sessions are in
+// team_agent_session.cpp.
+
+namespace km {
+namespace {
+
+// A status that has changed is sent after this part of the period at the earliest; one that hears
+// others than before, sooner.
+constexpr double kEarlyStatus = 0.5;
+constexpr double kEarlyLinks = 0.05;
+
+// So many reasons of refusals are told apart: they name robots, which may be made up.
+constexpr std::size_t kReasons = 1000;
+
+bool same_content(const TeamStatus& a, const TeamStatus& b) {
+  const auto rest = [](const TeamStatus& s) {
+    return std::tie(s.sender, s.hears, s.frame, s.frame_version, s.keyframes, s.revision, s.offers,
+                    s.method, s.upright);
+  };
+  return rest(a) == rest(b) && a.T_odom_first.matrix() == b.T_odom_first.matrix();
+}
+
+bool touches(const ClosureId& id, RobotId robot) {
+  return id.from.robot == robot || id.to.robot == robot;
+}
+
+// What the codec checks, too, and everything else that is relied on: nobody else is trusted.
+bool in_order(const MemberPoses& poses) {
+  const auto& keyframes = poses.keyframes;
+  const auto finite = [](const SinglePose& T) {
+    constexpr float kUnit = 1e-3F;
+    return std::abs(T.q.norm() - 1.0F) < kUnit && T.t.allFinite();
+  };
+  const Precision& step = poses.step_precision;
+  return !keyframes.empty() && keyframes.front() == 0 &&
+         std::adjacent_find(keyframes.begin(), keyframes.end(), std::greater_equal<>()) ==
+             keyframes.end() &&
+         poses.T_frame_kf.size() == keyframes.size() && poses.stage <= 2 &&
+         std::all_of(poses.T_frame_kf.begin(), poses.T_frame_kf.end(), finite) &&
+         step.kappa > 0.0 && step.tau > 0.0 && std::isfinite(step.kappa + step.tau);
+}
+
+bool in_order(const TeamStatus& status) {
+  const auto by_peer = [](const EdgeSetOffer& a, const EdgeSetOffer& b) { return a.peer < b.peer; };
+  return std::is_sorted(status.offers.begin(), status.offers.end(), by_peer) &&
+         status.T_odom_first.matrix().allFinite();
+}
+
+}  // namespace
+
+TeamAgent::TeamAgent(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory factory)
+    : config_(checked(config)),
+      self_(self),
+      factory_(std::move(factory)),
+      graph_(self.robot),
+      relay_(self, config_.status_period_s),
+      component_{self.robot},
+      frame_(self) {}
+
+bool TeamAgent::refuse(const std::string& what) {
+  const bool told_apart = refused_.size() < kReasons || refused_.contains(what);
+  const std::string& reason = told_apart ? what : "for reasons of which there are too many";
+  const std::size_t times = ++refused_[reason];
+  const bool power_of_two = (times & (times - 1)) == 0;
+  if (power_of_two) notices_.push_back("refused (" + std::to_string(times) + " times): " + reason);
+  return false;
+}
+
+bool TeamAgent::add(const KeyframeOdometry& keyframe) {
+  const bool taken = graph_.add(keyframe);
+  plan_outdated_ |= taken;
+  return taken || refuse("a keyframe that is not the next one of this robot");
+}
+
+bool TeamAgent::add(const Closure& closure) {
+  const ClosureId id = closure.id();
+  const bool taken = graph_.add(closure);
+  plan_outdated_ |= taken;
+  if (!taken && touches(id, self_.robot) &&
+      (id.from == id.to || !pose_edge(closure.relative_pose())))
+    return refuse("a closure that has no usable pose or covariance");
+  return taken;
+}
+
+bool TeamAgent::add(const InlierSet& set) {
+  const bool taken = graph_.add(set);
+  plan_outdated_ |= taken;
+  const auto between = [&](const ClosureId& id) {
+    return std::minmax(id.from.robot, id.to.robot) == std::minmax(set.a, set.b);
+  };
+  const bool concerns = set.a == self_.robot || set.b == self_.robot;
+  if (!taken && concerns &&
+      (set.a > set.b || !std::all_of(set.closures.begin(), set.closures.end(), between)))
+    return refuse("an inlier set with closures of other robots than it is about");
+  return taken;
+}
+
+void TeamAgent::peer_alive(TeamPeer peer) {
+  if (peer.robot == self_.robot) return;
+  meet(peer);
+  relay_.link_up(peer, now_s_);
+  if (!in_session()) return;
+  for (const RobotId member : part_->members())
+    if (relay_.next_hop(member) == peer.robot) part_->reachable_again(member);
+}
+
+void TeamAgent::peer_lost(RobotId robot) {
+  relay_.link_down(robot, now_s_);
+}
+
+TeamAgent::Peer& TeamAgent::meet(const TeamPeer& peer) {
+  Peer& entry = peers_.try_emplace(peer.robot, Peer{.boot = peer.boot}).first->second;
+  if (entry.boot != peer.boot) {
+    forget(peer.robot);
+    entry = Peer{.boot = peer.boot};
+  }
+  return entry;
+}
+
+// It has been restarted: its keyframes are others now.
+void TeamAgent::forget(RobotId robot) {
+  graph_.forget(robot);
+  told_.erase(robot);
+  std::erase_if(decided_, [&](const auto& decision) { return touches(decision.first, robot); });
+  std::erase_if(chances_, [&](const auto& chance) { return touches(chance.first, robot); });
+  std::erase_if(verdicts_, [&](const auto& verdict) { return touches(verdict.first, robot); });
+  plan_outdated_ = true;
+}
+
+void TeamAgent::watch_links() {
+  relay_.step(now_s_);
+  if (links_seen_ == relay_.links_version()) return;
+  links_seen_ = relay_.links_version();
+  component_ = relay_.links().component(self_.robot);
+  plan_outdated_ = true;
+}
+
+bool TeamAgent::in_reach(const TeamPeer& peer) const {
+  if (peer == self_) return true;
+  const auto known = peers_.find(peer.robot);
+  return known != peers_.end() && known->second.boot == peer.boot &&
+         component_.contains(peer.robot);
+}
+
+bool TeamAgent::receive(RobotId from, const TeamMessagePtr& message) {
+  const TeamPeer sender = origin_of(*message);
+  switch (relay_.receive(from, message, now_s_)) {
+    case Arrival::kNew:
+      return std::visit([&](const auto& m) { return take(sender, m); }, *message);
+    case Arrival::kRefused:
+      return refuse("a message of robot " + std::to_string(sender.robot) +
+                    " by another process than the one that is known");
+    case Arrival::kRepeated:
+    case Arrival::kPassedOn:
+    case Arrival::kLost:
+      break;
+  }
+  return true;
+}
+
+bool TeamAgent::take(const TeamPeer& sender, const TeamStatus& status) {
+  Peer& peer = meet(sender);
+  if (!in_order(status))
+    return refuse("a status of robot " + std::to_string(sender.robot) + " that is not in order");
+  plan_outdated_ = true;
+  peer.other_method = status.method != config_.method;
+  peer.status = status;
+  return !peer.other_method ||
+         refuse("robot " + std::to_string(sender.robot) + " is configured for another method");
+}
+
+bool TeamAgent::take(const TeamPeer& sender, const Session& session) {
+  Peer& peer = meet(sender);
+  if (!well_formed(session))
+    return refuse("a session of robot " + std::to_string(sender.robot) + " that is not in order");
+  peer.session = session;
+  consider(session);
+  return true;
+}
+
+bool TeamAgent::take(const TeamPeer& sender, const MemberPoses& poses) {
+  meet(sender);
+  if (!in_order(poses))
+    return refuse("poses of robot " + std::to_string(sender.robot) + " that are not in order");
+  plan_outdated_ = true;
+  told_[sender.robot] = poses;
+  if (!part_ || part_->told_by(told_, sender.robot, 0) == nullptr) return true;
+  if (in_session()) part_->moved(now_s_);
+  if (solved_) decide_with(poses);
+  return true;
+}
+
+bool TeamAgent::take(const TeamPeer& sender, const SessionLetter& letter) {
+  if (!part_ || over_ || letter.session != part_->session().id) return true;  // too early or late
+  return part_->receive(letter, now_s_) ||
+         refuse("a letter of robot " + std::to_string(sender.robot) + " that is of no use");
+}
+
+TeamOutput TeamAgent::step(double now_s) {
+  now_s_ = now_s;
+  TeamOutput output;
+  watch_links();
+  if (graph_.keyframes() > 0) {
+    coordinate();
+    advance(output);
+    reconsider();
+  }
+  send_status(output);
+  if (graph_.keyframes() > 0) publish(output);
+  hand_out(output);
+  output.verdicts = std::exchange(verdicts_due_, std::nullopt);
+  output.notices = std::exchange(notices_, {});
+  return output;
+}
+
+TeamStatus TeamAgent::make_status() const {
+  return {.sender = self_,
+          .hears = relay_.hears(),
+          .frame = frame_,
+          .frame_version = frame_version_,
+          .keyframes = graph_.keyframes(),
+          .revision = revision(),
+          .offers = graph_.offers(),
+          .method = config_.method,
+          .T_odom_first = graph_.T_odom_first(),
+          .upright = graph_.upright()};
+}
+
+void TeamAgent::send_status(TeamOutput& output) {
+  const double age_s = now_s_ - status_sent_s_;
+  if (age_s < kEarlyLinks * config_.status_period_s) return;
+  const bool links_changed = !sent_status_ || sent_status_->hears != relay_.hears();
+  if (!links_changed && age_s < kEarlyStatus * config_.status_period_s) return;
+  TeamStatus status = make_status();
+  const bool changed = !sent_status_ || !same_content(status, *sent_status_);
+  if (!changed && age_s < config_.status_period_s) return;
+  status_sent_s_ = now_s_;
+  output.progress = make_progress();
+  if (!changed) return relay_.repeat_status(now_s_);
+  sent_status_ = status;
+  relay_.say(std::move(status), now_s_);
+}
+
+// What is of the session of this robot is charged to it, what is passed on for others, too.
+void TeamAgent::hand_out(TeamOutput& output) {
+  std::map<const TeamMessage*, std::size_t> sizes;
+  for (Parcel& parcel : relay_.take_parcels()) {
+    if (part_ && session_of(*parcel.message) == part_->session().id) {
+      const auto [size, is_new] = sizes.try_emplace(parcel.message.get(), 0);
+      if (is_new) size->second = encode(*parcel.message).size();
+      sent_bytes_ += size->second;
+    }
+    output.parcels.push_back(std::move(parcel));
+  }
+}
+
+std::optional<SE3> TeamAgent::world_of(RobotId anchor) const {
+  const bool upright = part_ && part_->session().upright;
+  // Upright, the optimum knows better than keyframe 0 did how that was tilted.
+  const auto world = [&](const SE3& T_frame_first, const SE3& T_odom_first) {
+    const SE3 T_frame_world = T_frame_first * T_odom_first.inverse();
+    if (!upright) return T_frame_world;
+    const Eigen::MatrixXd turned =
+        level(T_frame_world.matrix().topRows<3>(), T_odom_first.translation());
+    return make_pose(turned.leftCols<3>(), turned.col(3));
+  };
+  // What the others know it as: then all are in one frame to the last digit.
+  const auto told = told_.find(anchor);
+  if (told == told_.end() || told->second.frame != frame_) return std::nullopt;
+  const SE3 T_frame_first = told->second.T_frame_kf.front().pose();
+  if (anchor == self_.robot) return world(T_frame_first, graph_.T_odom_first());
+  const auto peer = peers_.find(anchor);
+  if (peer == peers_.end() || !peer->second.status) return std::nullopt;
+  return world(T_frame_first, peer->second.status->T_odom_first);
+}
+
+const std::vector<SE3>& TeamAgent::poses() const {
+  return part_ && !over_ && part_->stage() ? part_->poses() : poses_;
+}
+
+void TeamAgent::publish(TeamOutput& output) {
+  const bool early = now_s_ - published_s_ < config_.publish_period_s;
+  if (!publish_due_ || !world_ || (in_session() && early)) return;
+  publish_due_ = false;
+  published_s_ = now_s_;
+  Trajectory trajectory{self_.robot, world_->anchor, {}};
+  const SE3 T_world_frame = world_->T_frame_world.inverse();
+  for (const SE3& T_frame_kf : poses()) trajectory.T_world_kf.push_back(T_world_frame * T_frame_kf);
+  output.trajectory = std::move(trajectory);
+  output.progress = make_progress();
+}
+
+OptimizerProgress TeamAgent::make_progress() const {
+  OptimizerProgress progress{.anchor = world_ ? world_->anchor : self_.robot,
+                             .members = {self_.robot}};
+  progress.round = rounds_before_;
+  progress.seconds = optimising_s_;
+  if (!part_) return progress;
+  const Session& session = part_->session();
+  if (!over_ || solved_) progress.members = part_->members();
+  progress.round += part_->state().round;
+  progress.cost = session.finished ? session.cost : part_->state().cost;
+  progress.gradient_norm = session.finished ? session.gradient : part_->state().gradient;
+  progress.seconds += part_->moved_s() - started_s_;
+  progress.settled = over_ && session.finished && !publish_due_ && holds_all(session.plan);
+  return progress;
+}
+
+bool TeamAgent::holds_all(const SessionPlan& plan) const {
+  const auto self = std::find_if(plan.members.begin(), plan.members.end(),
+                                 [&](const SessionMember& member) { return member.peer == self_; });
+  if (self->revision != revision()) return false;
+  std::optional<RobotId> last;
+  for (const EdgeSetOffer& offer : graph_.offers()) {
+    const bool newest = offer.peer != last;
+    last = offer.peer;
+    const auto peer = peers_.find(offer.peer);
+    if (!newest || peer == peers_.end() || peer->second.other_method ||
+        !in_reach({offer.peer, peer->second.boot}))
+      continue;
+    const SessionPair pair{std::min(self_.robot, offer.peer), std::max(self_.robot, offer.peer),
+                           offer.id};
+    if (std::find(plan.pairs.begin(), plan.pairs.end(), pair) == plan.pairs.end()) return false;
+  }
+  return true;
+}
+
+}  // namespace km

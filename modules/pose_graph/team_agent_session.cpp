@@ -1,0 +1,438 @@
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include "modules/pose_graph/frame_entry.hpp"
+#include "modules/pose_graph/team_agent.hpp"
+#include "modules/pose_graph/team_plan.hpp"
+#include "modules/pose_graph/tree_front.hpp"
+
+// Sessions: who opens them, how this robot gets in and out.
+
+namespace km {
+namespace {
+
+// A session in which nothing has happened for so many status periods is replaced.
+constexpr double kHopelessPeriods = 15.0;
+
+// After so long without anything new [s] the team has come to rest.
+constexpr double kAtRest_s = 2.0;
+
+// A closure that was set aside unheard is weighed again at most so many times.
+constexpr int kChances = 2;
+
+bool same_members(const SessionPlan& x, const SessionPlan& y) {
+  return x.members.size() == y.members.size() && !has_lost_member(x, y);
+}
+
+}  // namespace
+
+// Who optimises what, and who says so.
+
+void TeamAgent::make_plan() {
+  std::map<RobotId, TeamStatus> statuses{{self_.robot, make_status()}};
+  for (const auto& [robot, peer] : peers_) {
+    if (!peer.status || peer.other_method || !in_reach(peer.status->sender)) continue;
+    TeamStatus& status = statuses.emplace(robot, *peer.status).first->second;
+    // Poses are sent at once, status now and then.
+    const auto told = told_.find(robot);
+    if (told != told_.end() && told->second.frame_version > status.frame_version)
+      status.frame = told->second.frame;
+  }
+  SessionPlan plan = plan_session(statuses, relay_.links(), self_.robot);
+  if (!same_graph(plan, plan_)) plan_changed_s_ = now_s_;
+  closures_known_ = closures_known(plan, statuses);
+  plan_ = std::move(plan);
+}
+
+void TeamAgent::coordinate() {
+  if (std::exchange(plan_outdated_, false)) {
+    make_plan();
+    for (const auto& [robot, peer] : peers_)
+      if (peer.session && in_reach(peer.session->id.coordinator)) consider(*peer.session);
+  }
+  if (coordinator_of(plan_) != self_.robot) return;
+  if (should_open()) open_session();
+  const bool due = now_s_ - session_sent_s_ >= config_.status_period_s;
+  if (in_session() && part_->session().id.coordinator == self_ && due) announce();
+}
+
+void TeamAgent::announce() {
+  Session& session = part_->session();
+  session_sent_s_ = now_s_;
+  if (!session.finished) {
+    const SolverState state = part_->state();
+    session.round = std::max(session.round, state.round - std::min(state.round, state.lag));
+    session.cost = state.cost;
+    session.gradient = state.gradient;
+    part_->commit(session.round);
+  }
+  if (part_->members().size() > 1) relay_.say(session, now_s_);
+}
+
+bool TeamAgent::all_upright(const SessionPlan& plan) const {
+  return std::all_of(plan.members.begin(), plan.members.end(), [&](const SessionMember& member) {
+    return member.peer == self_ ? graph_.upright() : peers_.at(member.peer.robot).status->upright;
+  });
+}
+
+// What the member that has sent most has sent for the last session: the budget is every robot's.
+std::uint64_t TeamAgent::price_bytes() const {
+  std::uint64_t most = sent_bytes_;
+  for (const RobotId member : part_->members())
+    if (const MemberPoses* told = part_->told_by(told_, member, 1))
+      most = std::max(most, told->sent_bytes);
+  return most;
+}
+
+bool TeamAgent::paid_for() const {
+  const double price_s = static_cast<double>(price_bytes()) / (1e3 * config_.exchange_budget_kb_s);
+  return now_s_ - part_->moved_s() >= std::min(price_s, config_.session_wait_s);
+}
+
+bool TeamAgent::worthwhile() const {
+  const bool alone = plan_.members.size() == 1;
+  if (alone || !same_members(part_->session().plan, plan_)) return true;
+  // The first closures join the maps; each further one changes them less. Odometry alone changes
+  // nothing: what it adds can wait until the team is at rest.
+  const auto used = static_cast<double>(closures_used_);
+  const bool grown = closures_known_ != closures_used_ &&
+                     static_cast<double>(closures_known_) >= (1.0 + config_.session_growth) * used;
+  return grown || now_s_ - plan_changed_s_ >= kAtRest_s ||
+         now_s_ - part_->moved_s() >= config_.session_wait_s;
+}
+
+// True if a member has been in another session since the last one.
+bool TeamAgent::has_moved_on() const {
+  const auto elsewhere = [&](RobotId robot) {
+    return robot != self_.robot && part_->told_by(told_, robot, 0) == nullptr;
+  };
+  return std::any_of(part_->members().begin(), part_->members().end(), elsewhere);
+}
+
+bool TeamAgent::should_open() const {
+  if (!part_) return true;
+  const Session& session = part_->session();
+  const bool stalled =
+      !over_ && now_s_ - part_->moved_s() > kHopelessPeriods * config_.status_period_s;
+  if (same_graph(session.plan, plan_)) return session.finished ? has_moved_on() : over_ || stalled;
+  if (session.id.coordinator != self_ || has_lost_member(session.plan, plan_)) return true;
+  return over_ ? !session.finished || (paid_for() && worthwhile()) : stalled;
+}
+
+void TeamAgent::open_session() {
+  Session session{.id = {self_, ++sessions_opened_}, .plan = plan_};
+  session.method = config_.method;
+  session.upright = all_upright(plan_);
+  session.max_rounds = static_cast<std::uint32_t>(config_.max_rounds);
+  session.anchor = coordinator_of(plan_);
+  // `world` stays where it is when its robot has gone.
+  if (world_ && world_->anchor < session.anchor && frame_ == plan_.frame) {
+    session.anchor = world_->anchor;
+    session.T_frame_world = world_->T_frame_world;
+  }
+  if (!join(session)) return;
+  closures_used_ = closures_known_;
+  announce();
+}
+
+// Also of hostile origin: nothing that joining relies on is taken for granted.
+bool TeamAgent::well_formed(const Session& session) const {
+  const SessionPlan& plan = session.plan;
+  const auto known_pair = [&](const SessionPair& pair) {
+    return pair.a < pair.b && plan.has_member(pair.a) && plan.has_member(pair.b);
+  };
+  return !plan.members.empty() && session.method == config_.method &&
+         place_in(plan, plan.members.front().peer.robot) &&
+         coordinator_of(plan) == session.id.coordinator.robot &&
+         std::all_of(plan.pairs.begin(), plan.pairs.end(), known_pair) &&
+         (!session.T_frame_world || session.T_frame_world->matrix().allFinite());
+}
+
+bool TeamAgent::accepts(const Session& session) const {
+  if (!part_) return true;
+  const SessionId& running = part_->session().id;
+  if (session.id.coordinator == running.coordinator) return running.number < session.id.number;
+  return session.id.coordinator.robot <= running.coordinator.robot ||
+         !plan_.has_member(running.coordinator.robot);
+}
+
+void TeamAgent::consider(const Session& session) {
+  if (part_ && session.id == part_->session().id) {
+    // If it has been left because a member seemed to be lost, all came to the end nevertheless.
+    if (part_->follow(session) && !solved_) leave(part_->stage() == 1U && !has_failed());
+    return;
+  }
+  const auto& members = session.plan.members;
+  const bool member = std::any_of(members.begin(), members.end(),
+                                  [&](const SessionMember& m) { return m.peer == self_; });
+  const bool from_own_coordinator = part_ && !over_ &&
+                                    session.id.coordinator == part_->session().id.coordinator &&
+                                    part_->session().id.number < session.id.number;
+  // The others go on without this robot.
+  if (from_own_coordinator && !member) return leave(part_->all_solved(told_));
+  // Its coordinator must be known to be connected to this robot, and all members to be there.
+  if (member && !session.finished && accepts(session) && !misses_member(session.plan) &&
+      plan_.has_member(session.id.coordinator.robot) && !join(session))
+    refuse("a session of robot " + std::to_string(session.id.coordinator.robot) +
+           " over closures that are not at hand");
+}
+
+// The session that this robot is in.
+
+void TeamAgent::extend_poses() {
+  if (poses_.empty()) poses_.push_back(graph_.T_odom_first());
+  while (poses_.size() < graph_.keyframes())
+    poses_.push_back(poses_.back() * graph_.step_to(static_cast<std::uint32_t>(poses_.size())));
+}
+
+std::optional<FrozenPart> TeamAgent::freeze(const Session& session) const {
+  const SessionPlan& plan = session.plan;
+  FrozenPart part;
+  SessionGraph& graph = part.graph;
+  graph.self = self_.robot;
+  for (const SessionPair& pair : plan.pairs) {
+    if (pair.a != self_.robot && pair.b != self_.robot) continue;
+    const auto* edges = graph_.edges(pair.a == self_.robot ? pair.b : pair.a, pair.edges);
+    if (edges == nullptr) return std::nullopt;
+    graph.between.insert(graph.between.end(), edges->begin(), edges->end());
+  }
+  std::set<KeyframeIndex> ends{0};
+  for (const auto& [robot, peer] : peers_) {
+    const auto* edges = graph_.newest_edges(robot);
+    if (edges == nullptr) continue;
+    for (const PoseEdge& e : *edges) ends.insert(e.end_on(self_.robot).index);
+    const auto told = told_.find(robot);
+    if (plan.has_member(robot) || told == told_.end() || told->second.frame != plan.frame) continue;
+    const MemberPoses& poses = told->second;
+    for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
+      graph.told[{robot, poses.keyframes[k]}] = poses.T_frame_kf[k].pose();
+    for (const PoseEdge& e : *edges)
+      if (graph.told.contains(e.other(self_.robot))) graph.to_absent.push_back(e);
+  }
+  for (const PoseEdge& e : graph.between) ends.insert(e.end_on(self_.robot).index);
+  part.public_keyframes.assign(ends.begin(), ends.end());
+  std::sort(graph.between.begin(), graph.between.end(),
+            [](const PoseEdge& a, const PoseEdge& b) { return a.id() < b.id(); });
+  graph.own = graph_.own_edges();
+  graph.odometry = graph_.keyframes() - 1;
+  graph.step_precision[self_.robot] = graph_.mean_step_precision();
+  graph.upright = session.upright;
+  if (session.upright) graph.verticals = graph_.verticals();
+  part.place = *place_in(plan, self_.robot);
+  part.in_frame = frame_ == plan.frame || plan.members.front().peer == self_;
+  part.suspicious = config_.robust && config_.method == PgoMethod::kNewton;
+  return part;
+}
+
+// Alone, nothing ties the poses to their present place: closures may call for a better start.
+void TeamAgent::try_chordal(const Session& session) {
+  const std::vector<PoseEdge> own = graph_.own_edges();
+  const std::size_t closures = own.size() + 1 - graph_.keyframes();
+  const bool trusted = !config_.robust || config_.method != PgoMethod::kNewton;
+  if (!trusted || session.plan.members.size() > 1 || closures == chordal_tried_) return;
+  chordal_tried_ = closures;
+  poses_ = better_of_chordal(std::move(poses_), own);
+}
+
+bool TeamAgent::join(const Session& session) {
+  if (graph_.keyframes() == 0) return false;
+  auto part = freeze(session);
+  if (!part) return false;
+  if (in_session()) leave(part_->all_solved(told_));
+  if (session.plan.members.size() > 1) decide_anew();
+  if (part_) {
+    rounds_before_ += part_->state().round;
+    optimising_s_ += part_->moved_s() - started_s_;
+  }
+  extend_poses();
+  if (part->graph.to_absent.empty()) try_chordal(session);
+  part->graph.start = poses_;
+  part->graph.decided = decided_;
+  part->graph.lengths = lengths_;
+  part_.emplace(session, self_, std::move(*part), factory_,
+                AlignmentTolerance{config_.alignment_rotation_rad, config_.alignment_translation_m},
+                config_.status_period_s, now_s_);
+  over_ = solved_ = false;
+  started_s_ = now_s_;
+  sent_bytes_ = 0;
+  verdicts_.clear();
+  reconsider_due_ = false;
+  return true;
+}
+
+bool TeamAgent::misses_member(const SessionPlan& plan) const {
+  return std::any_of(plan.members.begin(), plan.members.end(),
+                     [&](const SessionMember& member) { return !in_reach(member.peer); });
+}
+
+bool TeamAgent::has_failed() const {
+  const auto failed = [&](RobotId robot) {
+    return robot == self_.robot ? part_->stage() == 2U : part_->told_by(told_, robot, 2) != nullptr;
+  };
+  return std::any_of(part_->members().begin(), part_->members().end(), failed);
+}
+
+void TeamAgent::advance(TeamOutput& output) {
+  if (!in_session()) return;
+  const auto stage = part_->stage();
+  for (SessionLetter& letter : part_->advance(told_, now_s_)) relay_.say(std::move(letter), now_s_);
+  for (const RobotId sender : part_->take_refused())
+    refuse("a letter of robot " + std::to_string(sender) + " that is of no use");
+  output.more |= part_->worked();
+  publish_due_ |= part_->worked() && part_->stage() == 0U;
+  if (part_->stage() != stage) enter_stage(output);
+  if (in_session()) conclude();
+}
+
+void TeamAgent::enter_stage(TeamOutput& output) {
+  const Session& session = part_->session();
+  output.more = true;
+  if (part_->stage() == 0U) {
+    if (frame_ != session.plan.frame) {
+      ++frame_version_;
+      world_.reset();
+    }
+    frame_ = session.plan.frame;
+    plan_outdated_ = true;
+  }
+  if (part_->stage() == 2U)
+    notices_.push_back("session " + std::to_string(session.id.number) + " of robot " +
+                       std::to_string(session.id.coordinator.robot) +
+                       " cannot be solved: " + part_->failure());
+  hand_out(output);  // what is told of them includes these
+  tell_poses();
+}
+
+void TeamAgent::tell_poses() {
+  MemberPoses message{.sender = self_, .session = part_->session().id};
+  message.stage = *part_->stage();
+  message.frame = frame_;
+  message.frame_version = frame_version_;
+  message.step_precision = graph_.mean_step_precision();
+  message.keyframes = part_->public_keyframes();
+  const std::vector<SE3>& poses = part_->poses();
+  for (const KeyframeIndex keyframe : message.keyframes)
+    message.T_frame_kf.push_back(SinglePose::of(poses[keyframe]));
+  for (const WeighedClosure& verdict : part_->verdicts().closures)
+    if (verdict.id.from.robot != verdict.id.to.robot) message.verdicts.push_back(verdict);
+  message.sent_bytes = sent_bytes_;
+  told_[self_.robot] = message;
+  const bool concerns_others = part_->members().size() > 1 || message.keyframes.size() > 1;
+  if (concerns_others) relay_.say(std::move(message), now_s_);
+}
+
+void TeamAgent::decide(const std::vector<WeighedClosure>& verdicts) {
+  if (verdicts.empty()) return;
+  for (const WeighedClosure& verdict : verdicts)
+    decided_[verdict.id] = verdicts_[verdict.id] = verdict.kept;
+  verdicts_due_.emplace();
+  for (const auto& [id, kept] : verdicts_) verdicts_due_->closures.push_back({id, kept});
+}
+
+void TeamAgent::decide_anew() {
+  for (const ClosureId& id : std::exchange(provisional_, {})) decided_.erase(id);
+  lengths_ = team_lengths_;
+}
+
+// A member's verdicts on a closure hold for both of its ends.
+void TeamAgent::decide_with(const MemberPoses& poses) {
+  if (poses.session != part_->session().id || poses.stage != 1) return;
+  std::vector<WeighedClosure> of_both;
+  for (const WeighedClosure& verdict : poses.verdicts)
+    if (std::minmax(verdict.id.from.robot, verdict.id.to.robot) ==
+            std::minmax(self_.robot, poses.sender.robot) &&
+        part_->joins_members(verdict.id))
+      of_both.push_back(verdict);
+  decide(of_both);
+}
+
+// Closures that were set aside have not been heard, and some were decided on from worse poses: those
+// that fit the solution may be true. Between robots both ends look at the poses that both have told.
+void TeamAgent::reconsider() {
+  if (!reconsider_due_ || !part_->all_solved(told_)) return;
+  reconsider_due_ = false;
+  std::vector<PoseEdge> closures;
+  for (const RobotId member : part_->members())
+    if (const auto* edges = graph_.newest_edges(member))
+      closures.insert(closures.end(), edges->begin(), edges->end());
+  bool any = false;
+  for (const PoseEdge& e : closures) {
+    const auto decided = decided_.find(e.id());
+    if (decided == decided_.end() || decided->second || !fits(e)) continue;
+    if (++chances_[e.id()] > kChances) continue;
+    decided_.erase(decided);
+    any = true;
+  }
+  if (!any) return;
+  ++reconsidered_;
+  plan_outdated_ = true;
+}
+
+bool TeamAgent::fits(const PoseEdge& closure) const {
+  const bool inside = closure.from.robot == closure.to.robot;
+  const auto pose = [&](const KeyframeId& id) -> std::optional<SE3> {
+    if (inside) return id.index < poses_.size() ? std::optional(poses_[id.index]) : std::nullopt;
+    const MemberPoses& told = told_.at(id.robot);
+    const auto at = std::lower_bound(told.keyframes.begin(), told.keyframes.end(), id.index);
+    if (at == told.keyframes.end() || *at != id.index) return std::nullopt;
+    return told.T_frame_kf[static_cast<std::size_t>(at - told.keyframes.begin())].pose();
+  };
+  const auto from = pose(closure.from), to = pose(closure.to);
+  return from && to && residual_of(closure, *from, *to) <= part_->state().barc;
+}
+
+// What follows from what the members have told.
+void TeamAgent::conclude() {
+  Session& session = part_->session();
+  const RobotId anchor = session.anchor;
+  if (part_->stage() == 0U && (!world_ || world_->anchor != anchor)) {
+    const bool told = anchor == self_.robot || part_->told_by(told_, anchor, 0) != nullptr;
+    const auto world = session.T_frame_world ? session.T_frame_world
+                       : told                ? world_of(anchor)
+                                             : std::nullopt;
+    if (world) world_ = World{anchor, *world};
+  }
+  const bool coordinates = session.id.coordinator == self_;
+  if (part_->all_solved(told_) && coordinates) {
+    const SolverState state = part_->state();
+    session.round = state.round;
+    session.cost = state.cost;
+    session.gradient = state.gradient;
+    session.finished = true;
+    if (const auto world = world_of(session.anchor)) session.T_frame_world = world;
+    announce();
+    leave(true);
+  } else if (has_failed()) {
+    session.finished = coordinates;
+    if (coordinates) announce();
+    leave(false);
+  } else if (misses_member(session.plan)) {
+    leave(part_->all_solved(told_));
+  }
+}
+
+void TeamAgent::leave(bool with_solution) {
+  if (part_->stage()) poses_ = with_solution ? part_->poses() : part_->committed_poses();
+  over_ = true;
+  solved_ = with_solution;
+  const Session& session = part_->session();
+  if (with_solution && session.finished && session.T_frame_world)
+    world_ = World{session.anchor, *session.T_frame_world};
+  publish_due_ = true;
+  plan_outdated_ = true;
+  if (!with_solution) return;
+  const std::vector<WeighedClosure> own = part_->verdicts().closures;
+  const bool alone = part_->members().size() == 1;
+  for (const WeighedClosure& verdict : own)
+    if (alone && !decided_.contains(verdict.id)) provisional_.insert(verdict.id);
+  decide(own);
+  for (const RobotId member : part_->members())
+    if (const MemberPoses* told = part_->told_by(told_, member, 1); told && member != self_.robot)
+      decide_with(*told);
+  lengths_ = part_->lengths();
+  if (!alone) team_lengths_ = lengths_;
+  reconsider_due_ = true;
+}
+
+}  // namespace km

@@ -1,0 +1,109 @@
+#include "modules/pose_graph/team_node.hpp"
+
+#include <chrono>
+#include <utility>
+
+#include "modules/pose_graph/solver_choice.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/log.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kQueue = 1024;
+constexpr std::chrono::milliseconds kTick{50};
+
+template <typename... Handlers>
+struct Overloaded : Handlers... {
+  using Handlers::operator()...;
+};
+template <typename... Handlers>
+Overloaded(Handlers...) -> Overloaded<Handlers...>;  // Clang before 17 does not deduce aggregates
+
+}  // namespace
+
+TeamNode::TeamNode(const PoseGraphConfig& config, TeamPeer self, const TeamTopics& topics)
+    : self_(self),
+      topics_(topics),
+      agent_(config, self, solver_choice(config)),
+      worker_(
+          kQueue, Overflow::kBlock, [this](const Input& input) { step(input, steady_now_s()); },
+          PoseGraphConfig::kSection),
+      ticks_(
+          kTick, [this] { worker_.post(Tick()); }, "pose_graph tick") {
+  const auto post = [this](const auto& message) { worker_.post(message); };
+  topics.odometry.subscribe(post);
+  topics.closures.subscribe(post);
+  topics.inlier_sets.subscribe(post);
+  topics.peer_inlier_sets.subscribe(post);
+  topics.peer_events.subscribe(post);
+  topics.peer_parcels.subscribe(post);
+}
+
+void TeamNode::start() {
+  worker_.start();
+  ticks_.start();
+}
+
+void TeamNode::stop() noexcept {
+  worker_.stop();  // refuses further ticks, so that none waits for room
+  ticks_.stop();
+}
+
+std::exception_ptr TeamNode::error() const {
+  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
+}
+
+void TeamNode::step(const Input& input, double now_s) {
+  take(input);
+  const bool is_tick = std::holds_alternative<Tick>(input);
+  for (bool more = is_tick || worker_.load().size == 0; more;) {
+    TeamOutput output = agent_.step(now_s);
+    more = output.more && worker_.load().size == 0;
+    publish(std::move(output));
+  }
+}
+
+// What is not taken is either known already, or the agent gives notice of it.
+void TeamNode::take(const Input& input) {
+  const auto take_in = Overloaded{
+      [](const Tick&) {},
+      [&](const Topic<PeerEvent>::Message& m) { take_peer_event(*m); },
+      [&](const Topic<TeamParcel>::Message& m) { agent_.receive(m->from, m->message); },
+      [&](const auto& measured) { agent_.add(*measured); },
+  };
+  std::visit(take_in, input);
+}
+
+void TeamNode::take_peer_event(const PeerEvent& event) {
+  switch (event.kind) {
+    case PeerEventKind::kJoined:
+    case PeerEventKind::kReturned:
+    case PeerEventKind::kRestarted:
+      return agent_.peer_alive({event.identity.robot, event.identity.boot});
+    case PeerEventKind::kLost:
+    case PeerEventKind::kLeft:
+      return agent_.peer_lost(event.identity.robot);
+    case PeerEventKind::kRefused:
+    case PeerEventKind::kConflict:
+      return;
+  }
+}
+
+void TeamNode::publish(TeamOutput output) const {
+  for (Parcel& parcel : output.parcels)
+    topics_.parcels.publish({parcel.next, std::make_shared<const TeamParcel>(
+                                              TeamParcel{self_.robot, std::move(parcel.message)})});
+  for (const std::string& notice : output.notices)
+    log::limited(log::Level::kWarn, name(), notice) << notice;
+  if (output.trajectory) topics_.trajectory.publish(std::move(*output.trajectory));
+  if (output.progress) topics_.progress.publish(std::move(*output.progress));
+  if (!output.verdicts) return;
+  if (const std::size_t rejected = output.verdicts->rejected(); rejected > 0)
+    log::limited(log::Level::kInfo, name(), "verdicts")
+        << rejected << " of this robot's " << output.verdicts->closures.size()
+        << " closures rejected: the others contradict them";
+  topics_.verdicts.publish(std::move(*output.verdicts));
+}
+
+}  // namespace km

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <exception>
+#include <memory>
+#include <string_view>
+#include <variant>
+
+#include "modules/pose_graph/parcel_codec.hpp"
+#include "modules/pose_graph/team_agent.hpp"
+#include "runtime/dds/bridge.hpp"
+#include "runtime/node.hpp"
+#include "runtime/periodic.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+
+/// Channels of the team node; they must outlive it.
+struct TeamTopics {
+  Topic<KeyframeOdometry>& odometry;            ///< In: own keyframes, ascending.
+  Topic<Closure>& closures;                     ///< In: own and received ones.
+  Topic<InlierSet>& inlier_sets;                ///< In: decided here.
+  Topic<InlierSet>& peer_inlier_sets;           ///< In: decided by other robots.
+  Topic<PeerEvent>& peer_events;                ///< In: who is heard directly.
+  Topic<TeamParcel>& peer_parcels;              ///< In: from robots that are heard directly.
+  const Topic<Addressed<TeamParcel>>& parcels;  ///< Out: to robots that are heard directly.
+  const Topic<Trajectory>& trajectory;          ///< Out.
+  const Topic<OptimizerProgress>& progress;     ///< Out.
+  const Topic<ClosureVerdicts>& verdicts;       ///< Out, after sessions that weigh closures.
+};
+
+/// One robot's part of the team's pose graph optimisation: a TeamAgent on its thread.
+///
+/// Inputs are taken in as they come; optimisation goes on piece by piece while none is waiting, so
+/// that a heavy graph delays a message by one piece at most. What the agent has to say to people is
+/// logged at a limited rate.
+class TeamNode final : public Node {
+ public:
+  /// `self` as the participant announces it. Throws ConfigError if `config` is out of bounds.
+  TeamNode(const PoseGraphConfig& config, TeamPeer self, const TeamTopics& topics);
+  ~TeamNode() override { stop(); }
+
+  std::string_view name() const override { return PoseGraphConfig::kSection; }
+  void start() override;
+  void stop() noexcept override;
+  std::exception_ptr error() const override;
+  DurationHistogram timing() const override { return worker_.timing(); }
+
+  /// Time passes. Always null: as a plain struct among pointers it sets off a false alarm of
+  /// GCC 12.
+  using Tick = std::shared_ptr<const struct TickTag>;
+  using Input = std::variant<Tick, Topic<KeyframeOdometry>::Message, Topic<Closure>::Message,
+                             Topic<InlierSet>::Message, Topic<PeerEvent>::Message,
+                             Topic<TeamParcel>::Message>;
+
+  /// Handles one input synchronously at time `now_s`. The thread calls only this; so can tests.
+  void step(const Input& input, double now_s);
+
+ private:
+  void take(const Input& input);
+  void take_peer_event(const PeerEvent& event);
+  void publish(TeamOutput output) const;
+
+  const TeamPeer self_;
+  const TeamTopics topics_;
+  TeamAgent agent_;
+  Worker<Input> worker_;
+  Periodic ticks_;  // last member: stops before the worker it posts to
+};
+
+}  // namespace km

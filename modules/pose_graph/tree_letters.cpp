@@ -1,0 +1,356 @@
+#include "modules/pose_graph/tree_letters.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "modules/core/bytes.hpp"
+
+namespace km {
+namespace {
+
+using Eigen::Index;
+
+constexpr std::uint8_t kUp = 1;
+constexpr std::uint8_t kDown = 2;
+constexpr std::size_t kMaxElements = 1U << 24U;
+
+class Writer : public ByteWriter {
+ public:
+  void id(const KeyframeId& k) {
+    varint(k.robot);
+    varint(k.index);
+  }
+  void single(const SinglePose& T) {
+    for (const float x : T.q.coeffs()) f32(x);
+    for (const float x : T.t) f32(x);
+  }
+  void doubles(const auto& values) {
+    for (Index k = 0; k < values.size(); ++k) f64(values.reshaped()(k));
+  }
+};
+
+class Reader : public ByteReader {
+ public:
+  using ByteReader::ByteReader;
+  KeyframeId id() {
+    const auto robot = varint_as<RobotId>();
+    return {robot, varint_as<KeyframeIndex>()};
+  }
+  double number() {
+    const double x = f64();
+    if (!std::isfinite(x)) fail();
+    return x;
+  }
+  float small_number() {
+    const float x = f32();
+    if (!std::isfinite(x)) fail();
+    return x;
+  }
+  float weight() {
+    const float w = small_number();
+    if (!(w >= 0.0F && w <= 1.0F)) fail();
+    return w;
+  }
+  bool flag() {
+    const std::uint8_t x = u8();
+    if (x > 1) fail();
+    return x == 1;
+  }
+  SinglePose single() {
+    SinglePose T;
+    for (float& x : T.q.coeffs()) x = small_number();
+    for (float& x : T.t) x = small_number();
+    if (std::abs(T.q.norm() - 1.0F) > 1e-3F) fail();
+    return T;
+  }
+  Eigen::VectorXd doubles() {
+    Eigen::VectorXd values(static_cast<Index>(count(kMaxElements, sizeof(double))));
+    for (double& x : values) x = number();
+    return values;
+  }
+};
+
+bool below(const PairVote& x, const PairVote& y) {
+  return std::pair(x.a, x.b) < std::pair(y.a, y.b);
+}
+
+void write(Writer& w, const TreeSums& s) {
+  for (const double x : {s.base_cost, s.cost, s.decrement}) w.f64(x);
+  w.f32(s.largest);
+  for (const std::uint32_t n : {s.open, s.changed, s.fractional, s.isolated, s.fixed, s.poses})
+    w.varint(n);
+  w.f32(s.noise_scale);
+  w.varint(s.lengths.size());
+  for (const auto& [bin, n] : s.lengths) {
+    w.varint(bin);
+    w.varint(n);
+  }
+  w.varint(s.votes.size());
+  for (const PairVote& v : s.votes) {
+    w.varint(v.a);
+    w.varint(v.b);
+    w.varint(v.used);
+  }
+}
+
+TreeSums read_sums(Reader& r) {
+  TreeSums s;
+  for (double* x : {&s.base_cost, &s.cost, &s.decrement}) *x = r.number();
+  s.largest = r.small_number();
+  for (std::uint32_t* n : {&s.open, &s.changed, &s.fractional, &s.isolated, &s.fixed, &s.poses})
+    *n = r.varint_as<std::uint32_t>();
+  s.noise_scale = r.small_number();
+  for (std::size_t n = r.count(kMaxElements, 2); n > 0; --n) {
+    const auto bin = r.varint_as<std::uint16_t>();
+    if (!s.lengths.empty() && bin <= s.lengths.rbegin()->first) r.fail();
+    s.lengths[bin] = r.varint_as<std::uint32_t>();
+  }
+  for (std::size_t n = r.count(kMaxElements, 3); n > 0; --n) {
+    PairVote v{.a = r.varint_as<RobotId>()};
+    v.b = r.varint_as<RobotId>();
+    if (!s.votes.empty() && !below(s.votes.back(), v)) r.fail();
+    v.used = r.varint_as<std::uint32_t>();
+    s.votes.push_back(v);
+  }
+  return s;
+}
+
+// Blocks that are zero, as those of poses that only told edges reach, are left out.
+std::vector<bool> present_blocks(const TreeSystem& system) {
+  std::vector<bool> present;
+  const BlockMatrix& S = system.schur;
+  for (std::size_t k = 0; k < system.variables.size(); ++k)
+    present.push_back(!S.at(static_cast<int>(k)).isZero(0.0));
+  for (std::size_t p = 0; p < system.pairs.size(); ++p)
+    present.push_back(!S.between(static_cast<int>(p)).isZero(0.0));
+  return present;
+}
+
+void write(Writer& w, const TreeSystem& system) {
+  const Index B = system.schur.block();
+  w.u8(static_cast<std::uint8_t>(B));
+  w.varint(system.variables.size());
+  for (const TreeVariable& v : system.variables) {
+    w.id(v.id);
+    w.varint(v.touched);
+    w.varint(v.of);
+  }
+  w.varint(system.pairs.size());
+  for (const auto& [i, j] : system.pairs) {
+    w.varint(static_cast<std::uint64_t>(i));
+    w.varint(static_cast<std::uint64_t>(j));
+  }
+  const std::vector<bool> present = present_blocks(system);
+  for (std::size_t k = 0; k < present.size(); k += 8) {
+    unsigned byte = 0;
+    for (std::size_t b = k; b < std::min(k + 8, present.size()); ++b)
+      if (present[b]) byte |= 1U << (b - k);
+    w.u8(static_cast<std::uint8_t>(byte));
+  }
+  const std::size_t n = system.variables.size();
+  for (std::size_t k = 0; k < n; ++k)
+    if (present[k])
+      for (Index c = 0; c < B; ++c)
+        for (Index row = c; row < B; ++row) w.f64(system.schur.at(static_cast<int>(k))(row, c));
+  for (std::size_t p = 0; p < system.pairs.size(); ++p)
+    if (present[n + p]) w.doubles(system.schur.between(static_cast<int>(p)));
+  w.varint(system.edges.size());
+  for (const ToldEdge& e : system.edges) {
+    const bool full = e.curvature == Curvature::kFull;
+    w.varint(4 * static_cast<std::uint64_t>(e.pair) + (e.transposed ? 2U : 0U) + (full ? 1U : 0U));
+    w.f32(e.kappa);
+    w.f32(e.tau);
+    w.f32(e.weight);
+    w.single(e.present);
+    if (full) w.single(e.measured);
+  }
+}
+
+void read_blocks(Reader& r, TreeSystem& system, Index B) {
+  const std::size_t n = system.variables.size();
+  const std::size_t blocks = n + system.pairs.size();
+  const auto bits = r.bytes((blocks + 7) / 8);
+  if (r.failed()) return;
+  const auto present = [&](std::size_t k) { return ((bits[k / 8] >> (k % 8)) & 1U) != 0; };
+  std::size_t doubles = 0;
+  for (std::size_t k = 0; k < blocks; ++k)
+    if (present(k)) doubles += static_cast<std::size_t>(k < n ? B * (B + 1) / 2 : B * B);
+  if (doubles * sizeof(double) > r.left()) {
+    r.fail();
+    return;
+  }
+  system.schur = BlockMatrix::zero(B, n, system.pairs.size());
+  for (std::size_t k = 0; k < n; ++k) {
+    if (!present(k)) continue;
+    auto block = system.schur.at(static_cast<int>(k));
+    for (Index c = 0; c < B; ++c)
+      for (Index row = c; row < B; ++row) block(row, c) = block(c, row) = r.number();
+  }
+  for (std::size_t p = 0; p < system.pairs.size(); ++p)
+    if (present(n + p))
+      for (double& x : system.schur.between(static_cast<int>(p)).reshaped()) x = r.number();
+  const std::vector<bool> nonzero = present_blocks(system);  // equal systems have equal bytes
+  for (std::size_t k = 0; k < 8 * bits.size(); ++k)
+    if (present(k) != (k < blocks && nonzero[k])) r.fail();
+}
+
+void read_edges(Reader& r, TreeSystem& system) {
+  for (std::size_t n = r.count(kMaxElements, 41); n > 0; --n) {
+    ToldEdge e;
+    const std::uint64_t code = r.varint();
+    if (code / 4 >= system.pairs.size()) {
+      r.fail();
+      return;
+    }
+    e.pair = static_cast<int>(code / 4);
+    e.transposed = (code & 2U) != 0;
+    e.curvature = (code & 1U) != 0 ? Curvature::kFull : Curvature::kGaussNewton;
+    e.kappa = r.small_number();
+    e.tau = r.small_number();
+    if (!(e.kappa > 0.0F && e.tau > 0.0F)) r.fail();
+    e.weight = r.weight();
+    e.present = r.single();
+    if (e.curvature == Curvature::kFull) e.measured = r.single();
+    system.edges.push_back(e);
+  }
+}
+
+std::optional<TreeSystem> read_system(Reader& r) {
+  TreeSystem system;
+  const Index B = r.u8();
+  if (B != 3 && B != 6) r.fail();
+  for (std::size_t n = r.count(kMaxElements, 4); n > 0; --n) {
+    TreeVariable v{.id = r.id()};
+    v.touched = r.varint_as<std::uint32_t>();
+    v.of = r.varint_as<std::uint32_t>();
+    system.variables.push_back(v);
+  }
+  const auto is_place = [&](std::uint64_t k) { return k < system.variables.size(); };
+  for (std::size_t n = r.count(kMaxElements, 2); n > 0; --n) {
+    const std::uint64_t i = r.varint(), j = r.varint();
+    if (!is_place(i) || !is_place(j) || i == j) {
+      r.fail();
+      break;
+    }
+    system.pairs.push_back({static_cast<int>(i), static_cast<int>(j)});
+  }
+  read_blocks(r, system, B);
+  if (!r.failed()) read_edges(r, system);
+  return r.failed() ? std::nullopt : std::optional(std::move(system));
+}
+
+}  // namespace
+
+EdgeModel ToldEdge::model() const {
+  const BlockEdge edge{0, 1, curvature == Curvature::kFull ? measured.pose() : present.pose(),
+                       static_cast<double>(weight) * static_cast<double>(kappa),
+                       static_cast<double>(weight) * static_cast<double>(tau)};
+  return model_edge(edge, SE3::Identity(), present.pose(), curvature);
+}
+
+void TreeSums::add(const TreeSums& other) {
+  base_cost += other.base_cost;
+  cost += other.cost;
+  decrement += other.decrement;
+  largest = std::max(largest, other.largest);
+  open += other.open;
+  changed += other.changed;
+  fractional += other.fractional;
+  isolated += other.isolated;
+  fixed += other.fixed;
+  poses += other.poses;
+  noise_scale = std::max(noise_scale, other.noise_scale);
+  for (const auto& [bin, n] : other.lengths) lengths[bin] += n;
+  std::vector<PairVote> all;
+  std::merge(votes.begin(), votes.end(), other.votes.begin(), other.votes.end(),
+             std::back_inserter(all), below);
+  votes.clear();
+  for (const PairVote& v : all) {
+    if (votes.empty() || below(votes.back(), v))
+      votes.push_back(v);
+    else
+      votes.back().used += v.used;
+  }
+}
+
+std::vector<std::uint8_t> encode(const UpLetter& letter) {
+  Writer w;
+  w.u8(kUp);
+  w.varint(letter.round);
+  w.u8(letter.failed ? 1 : 0);
+  write(w, letter.sums);
+  w.varint(static_cast<std::uint64_t>(letter.reduced.size()));
+  w.doubles(letter.reduced);
+  w.u8(letter.system ? 1 : 0);
+  if (letter.system) write(w, *letter.system);
+  w.varint(letter.weights.size());
+  for (const auto& [edge, weight] : letter.weights) {
+    w.varint(edge);
+    w.f32(weight);
+  }
+  return w.release();
+}
+
+std::optional<UpLetter> decode_up(std::span<const std::uint8_t> bytes) {
+  Reader r(bytes);
+  if (r.u8() != kUp) return std::nullopt;
+  UpLetter letter{.round = r.varint_as<std::uint32_t>(), .sums = {}};
+  letter.failed = r.flag();
+  letter.sums = read_sums(r);
+  letter.reduced = r.doubles();
+  if (r.flag()) letter.system = read_system(r);
+  for (std::size_t n = r.count(kMaxElements, 5); n > 0; --n) {
+    const auto edge = r.varint_as<std::uint32_t>();
+    letter.weights.push_back({edge, r.weight()});
+  }
+  return r.done() ? std::optional(std::move(letter)) : std::nullopt;
+}
+
+std::vector<std::uint8_t> encode(const DownLetter& letter) {
+  const TreeVerdict& v = letter.verdict;
+  Writer w;
+  w.u8(kDown);
+  w.varint(v.round);
+  w.u8(static_cast<std::uint8_t>(v.next));
+  w.u8(static_cast<std::uint8_t>(v.weighing));
+  w.u8(static_cast<std::uint8_t>((v.accept ? 1 : 0) + (v.full ? 2 : 0) + (v.set_aside ? 4 : 0) +
+                                 (v.free ? 8 : 0)));
+  for (const double x : {v.scale, v.mu, v.barc, v.noise_scale, v.cost, v.gradient}) w.f64(x);
+  for (const double x : v.drift) w.f64(x);
+  w.varint(static_cast<std::uint64_t>(letter.step.size()));
+  w.doubles(letter.step);
+  return w.release();
+}
+
+std::optional<DownLetter> decode_down(std::span<const std::uint8_t> bytes) {
+  Reader r(bytes);
+  if (r.u8() != kDown) return std::nullopt;
+  DownLetter letter;
+  TreeVerdict& v = letter.verdict;
+  v.round = r.varint_as<std::uint32_t>();
+  const std::uint8_t next = r.u8(), weighing = r.u8(), flags = r.u8();
+  if (next > static_cast<std::uint8_t>(TreeVerdict::Next::kStop) ||
+      weighing > static_cast<std::uint8_t>(TreeVerdict::Weighing::kDecided) || flags > 15)
+    return std::nullopt;
+  v.next = static_cast<TreeVerdict::Next>(next);
+  v.weighing = static_cast<TreeVerdict::Weighing>(weighing);
+  v.accept = (flags & 1U) != 0;
+  v.full = (flags & 2U) != 0;
+  v.set_aside = (flags & 4U) != 0;
+  v.free = (flags & 8U) != 0;
+  for (double* x : {&v.scale, &v.mu, &v.barc, &v.noise_scale, &v.cost, &v.gradient})
+    *x = r.number();
+  const bool in_range = v.scale > 0.0 && v.scale <= 1.0 && v.mu >= 0.0 && v.barc >= 0.0 &&
+                        v.noise_scale > 0.0 && v.gradient >= 0.0;
+  if (!in_range) r.fail();
+  for (double& x : v.drift) x = r.number();
+  letter.step = r.doubles();
+  return r.done() ? std::optional(std::move(letter)) : std::nullopt;
+}
+
+bool is_up_letter(std::span<const std::uint8_t> bytes) {
+  return !bytes.empty() && bytes.front() == kUp;
+}
+
+}  // namespace km

@@ -1,0 +1,450 @@
+#include "modules/pose_graph/tree_newton.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "modules/pose_graph/closure_cover.hpp"
+#include "modules/pose_graph/corroboration.hpp"
+
+namespace km {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using Next = TreeVerdict::Next;
+using Weighing = TreeVerdict::Weighing;
+
+// A closure that is rejected keeps so much: no robot floats, and nothing bends.
+constexpr double kFloor = 1e-10;
+// A step of odometry that is rejected holds the trajectory together.
+constexpr double kJoint = 1e-6;
+// Where numbers are not what they should be, for single precision overflows beyond.
+constexpr double kOutOfTheWorld_m = 1e15;
+
+SolverLetter letter_to(RobotId to, std::vector<std::uint8_t> bytes) {
+  return {to, std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes))};
+}
+
+}  // namespace
+
+TreeNewton::TreeNewton(SessionGraph graph, TreePlace place, const TreeNewtonOptions& options)
+    : graph_(std::move(graph)),
+      place_(std::move(place)),
+      options_(options),
+      accepted_(graph_.start) {
+  for (std::size_t k = 0; k < graph_.own.size(); ++k)
+    known_.push_back({.edge = graph_.own[k], .odometry = k < graph_.odometry});
+  for (const PoseEdge& e : graph_.between) {
+    (void)start_of(e.from);
+    (void)start_of(e.to);
+    known_.push_back({.edge = e});
+  }
+  classify();
+  if (!place_.parent) root_.emplace(place_.members, options_, graph_.upright);
+}
+
+const SE3& TreeNewton::start_of(const KeyframeId& id) const {
+  if (id.robot == graph_.self && id.index < graph_.start.size()) return graph_.start[id.index];
+  const auto told = graph_.told.find(id);
+  if (told == graph_.told.end())
+    throw std::invalid_argument("TreeNewton: nobody told pose " + to_string(id));
+  return told->second;
+}
+
+// Of the closures of each pair of robots, both ends decide alike.
+void TreeNewton::classify() {
+  if (!options_.robust) return;
+  for (const auto& [peer, closures] : by_peer()) {
+    const bool any_new = std::any_of(closures.begin(), closures.end(), [&](std::size_t k) {
+      const ClosureId id = known_[k].edge.id();
+      return !graph_.decided.contains(id) && !graph_.trusted.contains(id);
+    });
+    for (const std::size_t k : closures) {
+      if (graph_.trusted.contains(known_[k].edge.id())) continue;
+      const auto decided = graph_.decided.find(known_[k].edge.id());
+      if (decided != graph_.decided.end() && !decided->second)
+        known_[k].trust = Trust::kOut;
+      else if (any_new)
+        known_[k].trust = Trust::kOpen;
+    }
+  }
+  if (options_.reject_odometry)
+    for (Known& k : known_)
+      if (k.odometry) k.trust = Trust::kOpen;
+}
+
+// Places of closures, by the other robot of the pair; own ones by this one.
+std::map<RobotId, std::vector<std::size_t>> TreeNewton::by_peer() const {
+  std::map<RobotId, std::vector<std::size_t>> closures;
+  for (std::size_t k = graph_.odometry; k < known_.size(); ++k) {
+    const PoseEdge& e = known_[k].edge;
+    closures[e.from.robot == graph_.self ? e.to.robot : e.from.robot].push_back(k);
+  }
+  return closures;
+}
+
+// Of what both robots of a pair know, one speaks.
+bool TreeNewton::speaks_for(const Known& k) const {
+  return graph_.self <= std::min(k.edge.from.robot, k.edge.to.robot);
+}
+
+void TreeNewton::find_isolated(double barc) {
+  const Corroboration::PoseOf pose = [this](const KeyframeId& id) { return start_of(id); };
+  for (const auto& [peer, places] : by_peer()) {
+    std::vector<PoseEdge> closures;
+    std::vector<std::size_t> open;
+    for (const std::size_t k : places)
+      if (known_[k].trust != Trust::kOut) {
+        closures.push_back(known_[k].edge);
+        open.push_back(k);
+      }
+    const auto isolated =
+        Corroboration(closures, pose, graph_.step_precision, options_.dimension).isolated(barc);
+    for (std::size_t k = 0; k < open.size(); ++k) {
+      Known& known = known_[open[k]];
+      const bool fits =
+          residual_of(known.edge, pose(known.edge.from), pose(known.edge.to)) <= told_.barc;
+      known.aside = isolated[k] && known.trust == Trust::kOpen && !fits;
+    }
+  }
+}
+
+void TreeNewton::share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_by) {
+  for (const auto& [peer, places] : by_peer()) {
+    if (peer == graph_.self) continue;
+    std::vector<ClosureId> ids;
+    for (const std::size_t k : places)
+      if (takes_part(known_[k])) ids.push_back(known_[k].edge.id());
+    const std::vector<KeyframeId> cover = cover_closures(ids);
+    const auto covered = [&](const KeyframeId& id) {
+      return std::binary_search(cover.begin(), cover.end(), id);
+    };
+    std::set<KeyframeIndex> theirs;
+    for (const std::size_t k : places) {
+      Known& known = known_[k];
+      const KeyframeId& here = known.edge.end_on(graph_.self);
+      if (!takes_part(known)) continue;
+      const bool both = covered(here) && covered(known.edge.other(graph_.self));
+      known.own = both ? graph_.self < peer : !covered(here);
+      if (!known.own) theirs.insert(here.index);
+    }
+    for (const KeyframeIndex index : theirs) {
+      auto& robots = touched_by.try_emplace(index, 1).first->second;
+      ++robots;
+    }
+  }
+}
+
+void TreeNewton::build_front() {
+  FrontGraph front{.self = graph_.self,
+                   .poses = static_cast<Index>(graph_.start.size()),
+                   .dimension = options_.dimension,
+                   .verticals = graph_.verticals,
+                   .root = !place_.parent.has_value(),
+                   .free = told_.free};
+  share_closures(front.touched_by);
+  front_edge_.clear();
+  for (std::size_t k = 0; k < known_.size(); ++k) {
+    if (!takes_part(known_[k]) || !known_[k].own) continue;
+    front.edges.push_back(known_[k].edge);
+    front_edge_.push_back(k);
+  }
+  for (const PoseEdge& e : graph_.to_absent) {
+    const auto decided = graph_.decided.find(e.id());
+    const bool rejected = decided != graph_.decided.end() && !decided->second;
+    if (!rejected || !options_.robust)
+      front.held.push_back({e, start_of(e.other(graph_.self))});
+  }
+  for (const PoseEdge& e : graph_.between) front.open.insert(e.end_on(graph_.self).index);
+  if (options_.tell_private)
+    for (KeyframeIndex k = 0; k < graph_.start.size(); ++k) front.open.insert(k);
+  front_.emplace(std::move(front));
+  base_.clear();
+  for (std::size_t v = 0; v < front_->followed(); ++v) base_.push_back(start_of(front_->id(v)));
+  at_hand_ = base_;
+  refresh_ = true;
+}
+
+std::vector<double> TreeNewton::front_weights(bool candidate) const {
+  std::vector<double> weights;
+  for (const std::size_t k : front_edge_) {
+    const Known& known = known_[k];
+    const double weight = candidate ? known.candidate : known.weight;
+    weights.push_back(known.trust == Trust::kOpen ? std::max(weight, kFloor) : weight);
+  }
+  weights.resize(weights.size() + front_->graph().held.size(), 1.0);
+  return weights;
+}
+
+void TreeNewton::count_closures(TreeSums& sums) const {
+  std::map<RobotId, PairVote> votes;
+  for (const Known& k : known_) {
+    if (!speaks_for(k)) continue;
+    if (k.aside) ++sums.isolated;
+    if (!takes_part(k)) continue;
+    if (k.trust == Trust::kOpen) {
+      ++sums.open;
+      sums.largest = std::max(
+          sums.largest,
+          static_cast<float>(residual_of(k.edge, start_of(k.edge.from), start_of(k.edge.to))));
+    }
+    const RobotId peer = std::max(k.edge.from.robot, k.edge.to.robot);
+    if (peer != graph_.self) ++votes.try_emplace(peer, PairVote{graph_.self, peer}).first->second.used;
+  }
+  for (const auto& [peer, vote] : votes) sums.votes.push_back(vote);
+}
+
+UpLetter TreeNewton::first_letter() {
+  UpLetter letter{.round = round_, .sums = {}};
+  TreeSums& sums = letter.sums;
+  sums.poses = static_cast<std::uint32_t>(graph_.start.size());
+  sums.fixed = static_cast<std::uint32_t>(graph_.to_absent.size());
+  count_closures(sums);
+  if (!options_.robust || round_ > 0) return letter;
+  sums.noise_scale = static_cast<float>(graph_.noise_scale);
+  const Corroboration::PoseOf pose = [this](const KeyframeId& id) { return start_of(id); };
+  for (const auto& [peer, places] : by_peer()) {
+    std::vector<PoseEdge> closures;
+    for (const std::size_t k : places)
+      if (known_[k].trust == Trust::kOpen && speaks_for(known_[k]) &&
+          !graph_.decided.contains(known_[k].edge.id()))
+        closures.push_back(known_[k].edge);
+    // Once only: poses that were optimised agree with closures better than odometry does.
+    Corroboration(closures, pose, graph_.step_precision, options_.dimension)
+        .count_lengths(graph_.lengths);
+  }
+  sums.lengths = graph_.lengths;
+  return letter;
+}
+
+const SE3& TreeNewton::pose_at(const KeyframeId& id, const std::vector<SE3>& poses) const {
+  return poses[front_->node_of(id)];
+}
+
+// Their weights at the poses at hand. Whether these are accepted is not known yet. Once all is
+// decided weights stay, and those count as changed that would be decided otherwise here.
+void TreeNewton::weigh_candidates(TreeSums& sums) {
+  const double c2 = told_.barc * told_.barc;
+  const bool decided = told_.weighing == Weighing::kDecided;
+  for (const std::size_t k : front_edge_) {
+    Known& known = known_[k];
+    known.candidate = known.weight;
+    if (known.trust != Trust::kOpen) continue;
+    const double r = residual_of(known.edge, pose_at(known.edge.from, at_hand_),
+                                 pose_at(known.edge.to, at_hand_));
+    const double least = known.odometry ? kJoint : 0.0;
+    const double weight =
+        std::max(least, robust_weight(r * r, c2, decided ? kLargestMu : told_.mu));
+    if (told_.weighing == Weighing::kWeigh) known.candidate = weight;
+    ++sums.open;
+    sums.largest = std::max(sums.largest, static_cast<float>(r));
+    if ((decided ? weight : known.candidate) != known.weight) ++sums.changed;
+    if (known.candidate != least && known.candidate != 1.0) ++sums.fractional;
+  }
+}
+
+UpLetter TreeNewton::equations() {
+  UpLetter letter{.round = round_, .sums = {}};
+  front_->weigh(front_weights(false));
+  letter.sums.base_cost = front_->cost(base_);
+  letter.sums.cost = front_->cost(at_hand_);
+  weigh_candidates(letter.sums);
+  front_->weigh(front_weights(true));
+  if (refresh_ || front_->stale())
+    front_->linearise(at_hand_, told_.full ? Curvature::kFull : Curvature::kGaussNewton);
+  refresh_ = false;
+  std::map<RobotId, VectorXd> reduced;
+  for (auto& [child, up] : ups_) reduced[child] = std::move(up.reduced);
+  if (front_->changed()) {
+    bool positive = front_->factorise();
+    if (!positive && told_.full && place_.parent) {
+      front_->linearise(at_hand_, Curvature::kGaussNewton);
+      positive = front_->factorise();
+    }
+    factorised_ = positive;
+    letter.failed = !positive && place_.parent.has_value();
+    if (positive && place_.parent) letter.system = front_->told_system(at_hand_);
+  } else {
+    letter.weights = front_->told_weights();
+  }
+  if (!factorised_) return letter;
+  front_->reduce(at_hand_, reduced);
+  letter.reduced = front_->reduced();
+  letter.sums.decrement = front_->decrement();
+  return letter;
+}
+
+bool TreeNewton::receive(RobotId from, std::span<const std::uint8_t> bytes) {
+  if (done()) return true;
+  if (is_up_letter(bytes)) {
+    const bool child = std::binary_search(place_.children.begin(), place_.children.end(), from);
+    auto letter = child ? decode_up(bytes) : std::nullopt;
+    if (!letter) return false;
+    if (letter->round > round_) return false;  // it waits for the letter down of this round
+    if (letter->round == round_ && phase_ == Phase::kUp) ups_.try_emplace(from, std::move(*letter));
+    return true;
+  }
+  if (place_.parent != from) return false;
+  auto letter = decode_down(bytes);
+  if (!letter) return false;
+  if (letter->verdict.round < round_) return true;
+  if (letter->verdict.round > round_ || phase_ != Phase::kDown || !can_follow(*letter))
+    return false;
+  if (!down_) down_ = std::move(*letter);
+  return true;
+}
+
+// Of what the root may say, what it can say to the letter that went up.
+bool TreeNewton::can_follow(const DownLetter& letter) const {
+  switch (letter.verdict.next) {
+    case Next::kCount:
+    case Next::kStart:
+      return !front_;
+    case Next::kStep:
+      return front_ && letter.step.size() == told_rows_;
+    case Next::kShorten:
+      return front_ && step_.size() > 0;
+    case Next::kRefresh:
+    case Next::kDone:
+      return front_.has_value();
+    case Next::kStop:
+      break;
+  }
+  return true;
+}
+
+bool TreeNewton::ready() const {
+  if (done()) return false;
+  if (phase_ == Phase::kDown) return down_.has_value();
+  return ups_.size() == place_.children.size();
+}
+
+std::vector<SolverLetter> TreeNewton::advance() {
+  if (!ready()) return {};
+  if (phase_ == Phase::kUp) return go_up();
+  const DownLetter letter = std::move(*down_);
+  down_.reset();
+  return go_down(letter);
+}
+
+std::vector<SolverLetter> TreeNewton::go_up() {
+  UpLetter letter;
+  bool failed =
+      std::any_of(ups_.begin(), ups_.end(), [](const auto& up) { return up.second.failed; });
+  if (!failed) {
+    try {
+      for (auto& [child, up] : ups_) {
+        if (up.system) front_->set_child(child, std::move(*up.system));
+        if (front_) front_->reweigh_child(child, up.weights);
+      }
+      letter = front_ ? equations() : first_letter();
+    } catch (const std::exception&) {
+      failed = true;  // a child's letter does not fit
+    }
+  }
+  for (const auto& [child, up] : ups_) letter.sums.add(up.sums);
+  letter.round = round_;
+  letter.failed = letter.failed || failed;
+  ups_.clear();
+  told_rows_ = letter.failed ? -1 : letter.reduced.size();
+  if (place_.parent) {
+    phase_ = Phase::kDown;
+    return {letter_to(*place_.parent, encode(letter))};
+  }
+  // Full second derivatives may be indefinite once those of several robots have met.
+  if (letter.failed && told_.full) return go_down(root_->retreat(round_));
+  state_.failed = letter.failed;
+  if (letter.failed) return go_down(root_->stop(round_));
+  if (!front_) return go_down(root_->decide_start(letter.sums, round_));
+  return go_down(root_->decide(letter.sums, round_, *front_, at_hand_, factorised_));
+}
+
+void TreeNewton::accept() {
+  base_ = at_hand_;
+  accepted_.assign(base_.begin(), base_.begin() + static_cast<Index>(accepted_.size()));
+  for (Known& k : known_) k.weight = k.candidate;
+}
+
+void TreeNewton::take_step(const VectorXd& step, const TreeVerdict& verdict,
+                           std::map<RobotId, VectorXd>& children) {
+  const MatrixXd steps = front_->substitute_back(step);
+  for (const RobotId child : place_.children) children[child] = front_->step_of_child(child, steps);
+  step_ = steps.leftCols(static_cast<Index>(front_->followed()));
+  const Eigen::Map<const Eigen::Vector3d> w(verdict.drift.data());
+  const Eigen::Map<const Eigen::Vector3d> u(verdict.drift.data() + 3);
+  const Index first = step_.rows() == 3 ? 2 : 0;
+  for (std::size_t v = 0; v < base_.size(); ++v) {
+    const Eigen::Matrix3d R_t = base_[v].linear().transpose();
+    Vector6 xi;
+    xi << R_t * w, R_t * (w.cross(base_[v].translation()) + u);
+    step_.col(static_cast<Index>(v)) += xi.segment(first, step_.rows());
+  }
+}
+
+std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
+  const TreeVerdict& v = letter.verdict;
+  std::map<RobotId, VectorXd> step_of_child;
+  const auto move = [&](double scale) {
+    for (std::size_t k = 0; k < base_.size(); ++k) {
+      at_hand_[k] = move_along(base_[k], scale * tangent_of_step(step_.col(static_cast<Index>(k))));
+      if (!at_hand_[k].matrix().allFinite() || at_hand_[k].translation().norm() > kOutOfTheWorld_m)
+        throw std::runtime_error("TreeNewton: a step that leads out of the world");
+    }
+  };
+  told_ = v;
+  switch (v.next) {
+    case Next::kCount:
+      find_isolated(default_threshold(options_.dimension) * v.noise_scale);
+      break;
+    case Next::kStart:
+      if (!v.set_aside)
+        for (Known& k : known_) k.aside = false;
+      build_front();
+      break;
+    case Next::kStep:
+      accept();
+      take_step(letter.step, v, step_of_child);
+      move(1.0);
+      break;
+    case Next::kShorten:
+      move(v.scale);
+      break;
+    case Next::kRefresh:
+      if (v.accept) accept();
+      at_hand_ = base_;
+      refresh_ = true;
+      break;
+    case Next::kDone:
+      accept();
+      phase_ = Phase::kDone;
+      break;
+    case Next::kStop:
+      phase_ = Phase::kDone;
+      break;
+  }
+  state_ = {.round = round_ + 1, .cost = v.cost, .gradient = v.gradient,
+            .noise_scale = v.noise_scale, .barc = options_.robust ? v.barc : 0.0,
+            .failed = state_.failed};
+  if (!done()) phase_ = Phase::kUp;
+  ++round_;
+  std::vector<SolverLetter> letters;
+  for (const RobotId child : place_.children)
+    letters.push_back(letter_to(child, encode(DownLetter{v, step_of_child[child]})));
+  return letters;
+}
+
+ClosureVerdicts TreeNewton::verdicts() const {
+  ClosureVerdicts verdicts;
+  if (!options_.robust || told_.weighing != Weighing::kDecided) return verdicts;
+  for (const Known& k : known_) {
+    if (k.odometry || graph_.trusted.contains(k.edge.id())) continue;
+    const bool tells = takes_part(k) ? k.own : speaks_for(k);
+    if (tells) verdicts.closures.push_back({k.edge.id(), takes_part(k) && k.weight > 0.5});
+  }
+  return verdicts;
+}
+
+}  // namespace km

@@ -1,0 +1,212 @@
+#include "modules/pose_graph/tree_root.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "modules/pose_graph/noise_histogram.hpp"
+
+namespace km {
+namespace {
+
+using Eigen::Index;
+using Next = TreeVerdict::Next;
+using Weighing = TreeVerdict::Weighing;
+
+constexpr double kShorten = 0.25;
+constexpr double kRounding = 1e-13;  // of the cost: a smaller increase is none
+constexpr int kMaxBacktracks = 12;
+constexpr int kMaxBacktracksUndecided = 8;
+// At a start by odometry nothing speaks against odometry. If that may be false, all edges are first
+// heard alike.
+constexpr int kAllInSteps = 8;
+// Noise that is smaller than told has longer tails, too: of parking-garage's residuals the largest
+// is 31 times what the scale is.
+constexpr double kMargin = 8.0;
+// Where so many closures agree with those beside them, one that stands alone has cause to be false.
+constexpr double kMostlyConsistent = 0.75;
+constexpr std::uint32_t kFewIsolated = 32;  // do no harm
+// With fewer closures left per pose, the others are needed from the start.
+constexpr double kClosuresPerPose = 0.25;
+
+// Robots hang together by pairs with closures in use.
+bool joined(const std::vector<RobotId>& robots, const std::vector<PairVote>& votes) {
+  std::map<RobotId, RobotId> part;
+  for (const RobotId robot : robots) part[robot] = robot;
+  for (const PairVote& v : votes) {
+    if (v.used == 0 || !part.contains(v.a) || !part.contains(v.b)) continue;
+    const RobotId gone = part[v.b];
+    for (auto& [robot, name] : part)
+      if (name == gone) name = part[v.a];
+  }
+  return std::all_of(part.begin(), part.end(),
+                     [&](const auto& entry) { return entry.second == part.begin()->second; });
+}
+
+// The rigid motion that leaves `poses` no mean rotation or translation by `steps`. To first order
+// it costs nothing; the step is as short as can be, and which pose was held to find it no longer
+// shows. `upright`: only turns about z cost nothing.
+std::array<double, 6> drift_against(std::span<const SE3> poses, const Eigen::MatrixXd& steps,
+                                    bool upright) {
+  const double share = 1.0 / static_cast<double>(poses.size());
+  const auto xi = [&](std::size_t v) { return tangent_of_step(steps.col(static_cast<Index>(v))); };
+  Eigen::Vector3d w = Eigen::Vector3d::Zero(), u = Eigen::Vector3d::Zero();
+  for (std::size_t v = 0; v < poses.size(); ++v) w -= share * (poses[v].linear() * xi(v).head<3>());
+  if (upright) w.head<2>().setZero();
+  for (std::size_t v = 0; v < poses.size(); ++v)
+    u -= share * (poses[v].linear() * xi(v).tail<3>() + w.cross(poses[v].translation()));
+  return {w.x(), w.y(), w.z(), u.x(), u.y(), u.z()};
+}
+
+}  // namespace
+
+DownLetter TreeRoot::say(Next next) const {
+  DownLetter letter;
+  letter.verdict = {.round = round_,
+                    .next = next,
+                    .full = full_,
+                    .free = free_,
+                    .weighing = weighing_,
+                    .mu = schedule_.mu(),
+                    .barc = barc_,
+                    .noise_scale = noise_scale_,
+                    .cost = cost_,
+                    .gradient = std::sqrt(std::max(0.0, decrement_))};
+  return letter;
+}
+
+DownLetter TreeRoot::stop(std::uint32_t round) {
+  round_ = round;
+  return say(Next::kStop);
+}
+
+DownLetter TreeRoot::retreat(std::uint32_t round) {
+  round_ = round;
+  convex_ = true;
+  return refresh(false, weighing_);
+}
+
+DownLetter TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
+  round_ = round;
+  if (first_) {  // what stands alone is aside
+    const std::uint32_t left = sums.open;
+    const bool enough = static_cast<double>(left) >= kClosuresPerPose * sums.poses;
+    const bool aside = sums.isolated > kFewIsolated && enough && joined(members_, sums.votes);
+    return start(aside, aside ? sums : *first_);
+  }
+  first_ = sums;
+  free_ = sums.fixed == 0;
+  const std::optional<NoiseScale> noise = fit_noise(sums.lengths, options_.dimension);
+  if (noise) noise_scale_ = noise->scale;
+  // Poses that were optimised since agree with the closures better than odometry does.
+  if (sums.noise_scale > 0.0F) noise_scale_ = sums.noise_scale;
+  const double margin = noise_scale_ < 1.0 ? std::min(1.0, kMargin * noise_scale_) : noise_scale_;
+  barc_ = options_.barc > 0.0 ? options_.barc : margin * default_threshold(options_.dimension);
+  if (noise && noise->consistent >= kMostlyConsistent && sums.open > kFewIsolated)
+    return say(Next::kCount);
+  return start(false, sums);
+}
+
+DownLetter TreeRoot::start(bool set_aside, const TreeSums& sums) {
+  schedule_.start(sums.largest, options_.robust ? sums.open : 0, barc_,
+                  options_.reject_odometry ? kAllInSteps : 0);
+  weighing_ = schedule_.decided()  ? Weighing::kDecided
+              : schedule_.all_in() ? Weighing::kAllIn
+                                   : Weighing::kWeigh;
+  DownLetter letter = say(Next::kStart);
+  letter.verdict.set_aside = set_aside;
+  return letter;
+}
+
+DownLetter TreeRoot::decide(const TreeSums& sums, std::uint32_t round, const TreeFront& front,
+                            std::span<const SE3> poses, bool factorised) {
+  round_ = round;
+  const double limit = sums.base_cost * (1.0 + kRounding) + options_.absolute_tolerance;
+  if (!at_base_ && !(sums.cost <= limit)) return go_back();
+  if (!at_base_) {
+    retried_ = false;
+    stale_ = true;
+    backtracks_ = 0;
+  }
+  cost_ = sums.cost;
+  if (!factorised) {
+    if (!full_) return say(Next::kStop);
+    convex_ = true;
+    return refresh(true, weighing_);
+  }
+  if (weighing_ != Weighing::kHold) schedule_.next({sums.changed, sums.fractional});
+  return step(sums, front, poses);
+}
+
+DownLetter TreeRoot::step(const TreeSums& sums, const TreeFront& front,
+                          std::span<const SE3> poses) {
+  const TreeFront::RootStep root = front.solve_root(upright_);
+  decrement_ = sums.decrement + root.decrement;
+  const bool small = 0.5 * decrement_ <= options_.tolerance * cost_ + options_.absolute_tolerance;
+  // Decisions fall before the poses have come to rest: what these contradict is weighed again.
+  if (schedule_.decided() && small && sums.changed > 0 && schedule_.reopen())
+    last_decrement_.reset();
+  // Weights that were decided on before this way up: its equations are those of the end.
+  const bool decided = schedule_.decided();
+  weighing_ = decided              ? Weighing::kDecided
+              : schedule_.all_in() ? Weighing::kAllIn
+                                   : Weighing::kWeigh;
+  if ((decided && small) || round_ + 1 >= options_.max_rounds) return say(Next::kDone);
+  if (decided && worth_refreshing(decrement_)) {
+    full_ = true;
+    convex_ = false;
+    return refresh(true, weighing_);
+  }
+  at_base_ = false;
+  DownLetter letter = say(Next::kStep);
+  letter.step = root.kept;
+  if (free_)
+    letter.verdict.drift =
+        drift_against(poses, front.substitute_back(root.kept).leftCols(static_cast<Index>(poses.size())),
+                      upright_);
+  return letter;
+}
+
+DownLetter TreeRoot::go_back() {
+  ++backtracks_;
+  const bool decided = weighing_ == Weighing::kDecided;
+  if (backtracks_ > (decided ? kMaxBacktracks : kMaxBacktracksUndecided)) {
+    if (decided) return say(Next::kStop);
+    retried_ = false;
+    return refresh(false, weighing_);  // with the next weights, the next step may succeed
+  }
+  if (decided && stale_) {
+    full_ = !convex_;
+    return refresh(false, weighing_);
+  }
+  if (!decided && backtracks_ == 2 && !retried_) {
+    retried_ = true;
+    return refresh(false, Weighing::kHold);
+  }
+  DownLetter letter = say(Next::kShorten);
+  letter.verdict.scale = std::pow(kShorten, backtracks_);
+  return letter;
+}
+
+DownLetter TreeRoot::refresh(bool accept, Weighing weighing) {
+  if (convex_) full_ = false;
+  weighing_ = weighing;
+  at_base_ = true;
+  stale_ = false;
+  last_decrement_.reset();
+  DownLetter letter = say(Next::kRefresh);
+  letter.verdict.accept = accept;
+  return letter;
+}
+
+bool TreeRoot::worth_refreshing(double decrement) {
+  const std::optional<double> before = std::exchange(last_decrement_, decrement);
+  if (!before) return false;
+  const double rate = decrement / *before;
+  if (!(rate < 1.0)) return true;
+  const double enough = 2.0 * (options_.tolerance * cost_ + options_.absolute_tolerance);
+  return std::log(decrement / enough) / -std::log(rate) > options_.patience_rounds;
+}
+
+}  // namespace km

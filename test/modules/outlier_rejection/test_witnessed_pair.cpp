@@ -1,0 +1,102 @@
+#include <catch2/catch.hpp>
+
+#include <random>
+#include <vector>
+
+#include "modules/outlier_rejection/witnessed_pair.hpp"
+#include "test/modules/outlier_rejection/chain.hpp"
+
+namespace km {
+namespace {
+
+// Two robots that drive along x; closures say where b is in the frame of a.
+struct Aisles {
+  Chain a{0}, b{1};
+
+  explicit Aisles(std::size_t keyframes) {
+    for (std::size_t i = 1; i < keyframes; ++i) {
+      a.step(rotz(0.0, 1.0));
+      b.step(rotz(0.0, 1.0));
+    }
+  }
+
+  // As if robot b had begun `offset_m` beside robot a.
+  [[nodiscard]] Closure at(std::size_t i, std::size_t j, double offset_m = 0.0) const {
+    const double ahead_m = static_cast<double>(j) - static_cast<double>(i);
+    return closure(a.at(i), b.at(j), rotz(0.0, ahead_m, offset_m));
+  }
+};
+
+TEST_CASE("Aliased neighbours seen from both sides are one witness", "[witness]") {
+  const Aisles aisles(40);
+  WitnessedPair pair(0, 1, PcmConfig{});
+  for (const std::size_t i : {10U, 11U}) {
+    const Closure seen = aisles.at(i, i + 20, 7.0);
+    CHECK(pair.add(seen) != PcmVerdict::kRepeated);
+    CHECK(pair.add(reversed(seen)) == PcmVerdict::kRepeated);
+  }
+  CHECK(pair.closures().size() == 2);
+  CHECK(pair.witnesses() == 1);
+  CHECK_FALSE(pair.is_witnessed());
+}
+
+TEST_CASE("A cluster of aliased keyframes does not join two robots, a second place does",
+          "[witness]") {
+  const Aisles aisles(60);
+  WitnessedPair pair(0, 1, PcmConfig{});
+  for (std::size_t i = 10; i <= 13; ++i)
+    for (std::size_t j = 30; j <= 33; ++j) (void)pair.add(aisles.at(i, j));
+  CHECK(pair.closures().size() == 16);
+  CHECK_FALSE(pair.is_witnessed());
+  CHECK(pair.add(aisles.at(50, 5, 7.0)) == PcmVerdict::kAdded);  // another place, contradicts
+  CHECK_FALSE(pair.is_witnessed());
+  CHECK(pair.add(aisles.at(14, 40)) == PcmVerdict::kGrew);  // near on robot a alone
+  CHECK(pair.is_witnessed());
+  CHECK(pair.closures().size() == 18);  // the optimiser weighs the one that contradicts
+}
+
+TEST_CASE("Along a common stretch there is a witness every fourth keyframe", "[witness]") {
+  const Aisles aisles(40);
+  PcmConfig config;
+  config.min_witnesses = 1000;
+  WitnessedPair pair(0, 1, config);
+  for (std::size_t i = 0; i < 12; ++i) (void)pair.add(aisles.at(i, i));
+  CHECK(pair.witnesses() == 3);
+}
+
+TEST_CASE("All true and false closures of a witnessed pair are handed on", "[witness]") {
+  const unsigned seed = GENERATE(range(0U, 5U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const TwoRobots robots(3, 12, 40, 0.01, rng);
+  WitnessedPair pair(12, 3, PcmConfig{});
+  std::uniform_int_distribution<std::size_t> any(0, 39);
+  std::size_t added = 0;
+  for (int n = 0; n < 40; ++n) {
+    const std::size_t i = any(rng);
+    const std::size_t j = any(rng);
+    Closure closure = robots.measure(i, j, 0.02, rng);
+    if (n % 2 == 1) closure.T_from_to = random_pose(rng);
+    added += pair.add(closure) == PcmVerdict::kRepeated ? 0 : 1;
+  }
+  CHECK(pair.is_witnessed());
+  CHECK(pair.closures().size() == added);
+}
+
+TEST_CASE("A witnessed pair refuses closures it cannot weigh and keeps its state", "[witness]") {
+  const Aisles aisles(5);
+  WitnessedPair pair(0, 1, PcmConfig{});
+  Closure bad = aisles.at(1, 2);
+  SECTION("another pair") {
+    bad.to.id.robot = 2;
+  }
+  SECTION("not a covariance") {
+    bad.covariance(2, 2) = -1.0;
+  }
+  CHECK_THROWS_AS(pair.add(bad), std::invalid_argument);
+  CHECK(pair.closures().empty());
+  CHECK(pair.add(aisles.at(1, 2)) == PcmVerdict::kGrew);
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,235 @@
+#include <catch2/catch.hpp>
+
+#include "modules/pgo_study/block_descent_team.hpp"
+#include "modules/pgo_study/central_team.hpp"
+#include "modules/pgo_study/gauss_seidel_team.hpp"
+#include "modules/pgo_study/local_team.hpp"
+#include "modules/pgo_study/message_sizes.hpp"
+#include "modules/pgo_study/team_staircase.hpp"
+#include "modules/pose_graph/rounding.hpp"
+#include "test/support/pose_graph_problems.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/team_graphs.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kSmallGridOptimum = 1025.398056;  // SE-Sync, unit quaternions
+// A rounded pose is off by 6e-8 of itself, squared residuals by twice that and their weights.
+constexpr double kSinglePrecision = 1e-6;
+
+std::vector<SE3> chordal(const TeamGraph& graph) {
+  return chordal_initialisation(graph.poses(), graph.edges);
+}
+
+double optimum_of(const TeamGraph& graph) {
+  Staircase staircase(graph.edges, lift(chordal(graph), 3));
+  while (staircase.step()) {
+  }
+  REQUIRE(staircase.certificate()->certified);
+  return staircase.cost();
+}
+
+// A unit of time for every use of the clock.
+TeamMeter counting_meter(double& clock) {
+  return {.cpu_s = [&clock] { return clock += 1.0; }};
+}
+
+double rounded_cost(const TeamGraph& graph, const LiftedPoses& X) {
+  const QuadraticProblem problem(3, graph.poses(), graph.edges, {});
+  return problem.cost(lift(round_to_poses(X, X.leftCols<4>()), 3));
+}
+
+}  // namespace
+
+TEST_CASE("Work of a round is that of its slowest robot and of all", "[pgo_study]") {
+  double clock = 0.0;
+  RoundMeter meter(3, counting_meter(clock));
+  meter.run(0, [] {});
+  meter.run(0, [] {});
+  CHECK(meter.run(2, [] { return 7; }) == 7);
+  meter.sent(3);
+  meter.sent(4);
+  const TeamWork work = meter.finish_round();
+  CHECK(work.critical_path_s == 2.0);
+  CHECK(work.total_cpu_s == 3.0);
+  CHECK(work.bytes == 7);
+  CHECK(meter.finish_round().total_cpu_s == 0.0);
+}
+
+TEST_CASE("A round of block descent tells every public pose once", "[pgo_study]") {
+  const TeamGraph graph = WoundRing(24, 3).graph;  // each robot's first and last pose are public
+  const Eigen::Index rank = GENERATE(3, 5);
+  BlockDescentTeam team(graph, lift(std::vector<SE3>(24, SE3::Identity()), rank), {});
+  const auto rounds = run_team(graph, team, {.max_rounds = 1, .gradient_tolerance = -1.0}, {});
+  REQUIRE(rounds.size() == 2);
+  const auto pose = static_cast<std::size_t>(2 + 4 * 4 * rank);
+  CHECK(rounds[1].work.bytes == 3 * (4 + 2 * pose + 2 * 8));
+}
+
+TEST_CASE("Robots of one colour share no edges, and all have a colour", "[pgo_study]") {
+  const TeamGraph graph = WoundRing(24, 12).graph;
+  const TeamNeighbours neighbours = neighbours_in(graph);
+  std::size_t coloured = 0;
+  for (const auto& members : colours_of(neighbours)) {
+    coloured += members.size();
+    for (const std::size_t a : members)
+      for (const std::size_t b : members)
+        CHECK_FALSE(std::binary_search(neighbours[a].begin(), neighbours[a].end(), b));
+  }
+  CHECK(coloured == 12);
+  CHECK(colours_of(neighbours).size() == 2);  // a ring of robots, of even length
+  const TeamTree tree = breadth_first_tree(neighbours);
+  CHECK(tree.order.size() == 12);
+}
+
+TEST_CASE("Block descent ends at the optimum of the small grid however it is dealt out",
+          "[pgo_study]") {
+  const auto file = shared_data("pose_graphs/3d/smallGrid3D.g2o");
+  if (!file) return;
+  const std::size_t robots = GENERATE(1U, 2U, 3U, 5U);
+  const double over_relaxation = GENERATE(1.0, 1.95);
+  CAPTURE(robots, over_relaxation);
+  const TeamGraph graph = deal_contiguously(read_g2o(*file), robots, "smallGrid3D");
+  BlockDescentTeam team(graph, lift(chordal(graph), 5), {.max_over_relaxation = over_relaxation});
+  const auto rounds = run_team(graph, team, {.max_rounds = 150}, {});
+  for (std::size_t k = 1; k < rounds.size(); ++k)
+    REQUIRE(rounds[k].cost <= rounds[k - 1].cost * (1.0 + kSinglePrecision));
+  CHECK(rounds.back().cost == Approx(kSmallGridOptimum).epsilon(1e-5));
+  CHECK(rounded_cost(graph, team_poses(graph, team)) == Approx(kSmallGridOptimum).epsilon(1e-5));
+}
+
+TEST_CASE("The published schedule descends with every update", "[pgo_study]") {
+  const unsigned seed = GENERATE(1U, 2U);
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const TeamGraph graph = noisy_chain(40, 4, 0.1, rng);
+  BlockDescentTeam team(graph, lift(chordal(graph), 5), {.schedule = BlockSchedule::kGreedy});
+  const auto rounds = run_team(graph, team, {.max_rounds = 200}, {});
+  for (std::size_t k = 1; k < rounds.size(); ++k)
+    REQUIRE(rounds[k].cost <= rounds[k - 1].cost * (1.0 + kSinglePrecision));
+  CHECK(rounds.back().cost == Approx(optimum_of(graph)).epsilon(1e-4));
+  CHECK(rounds.back().gradient_norm < rounds.front().gradient_norm);
+}
+
+TEST_CASE("Acceleration ends at the optimum in fewer rounds than plain descent", "[pgo_study]") {
+  std::mt19937 rng(5);
+  const TeamGraph graph = noisy_chain(100, 5, 0.1, rng);
+  const double optimum = optimum_of(graph);
+  const auto rounds_to = [&](bool accelerated) {
+    BlockDescentTeam team(graph, lift(chordal(graph), 5),
+                          {.max_over_relaxation = 1.0, .accelerated = accelerated});
+    const auto rounds = run_team(graph, team, {.max_rounds = 300}, {});
+    const auto reached = std::find_if(rounds.begin(), rounds.end(), [&](const TeamRound& round) {
+      return round.cost < optimum * (1.0 + 1e-5);
+    });
+    CHECK(reached != rounds.end());
+    return reached - rounds.begin();
+  };
+  CHECK(rounds_to(true) < rounds_to(false));
+}
+
+TEST_CASE("Acceleration is refused with the greedy schedule", "[pgo_study]") {
+  std::mt19937 rng(1);
+  const TeamGraph graph = noisy_chain(10, 2, 0.1, rng);
+  CHECK_THROWS_AS(BlockDescentTeam(graph, lift(chordal(graph), 5),
+                                   {.schedule = BlockSchedule::kGreedy, .accelerated = true}),
+                  std::invalid_argument);
+}
+
+TEST_CASE("Gauss-Seidel sweeps of a team come to the answer of one robot", "[pgo_study]") {
+  const std::size_t robots = GENERATE(2U, 4U);
+  CAPTURE(robots);
+  std::mt19937 rng(2);
+  const TeamGraph graph = noisy_chain(40, robots, 0.05, rng);
+  TeamGraph alone = graph;
+  alone.first = {0, 40};
+  const GaussSeidelOptions exact{.max_sweeps = 2000, .tolerance = 1e-7};
+  const auto cost_of = [&](const TeamGraph& dealt) {
+    GaussSeidelTeam team(dealt, chordal(graph), exact);
+    return run_team(dealt, team, {.max_rounds = 20000}, {}).back().cost;
+  };
+  const double team_cost = cost_of(graph);
+  // Positions of some 100 m are told in single precision, and slow modes add up what is lost.
+  CHECK(team_cost == Approx(cost_of(alone)).epsilon(1e-2));
+  // One Gauss-Newton step from the chordal rotations: better than those, no better than the best.
+  const QuadraticProblem problem(3, 40, graph.edges, {});
+  CHECK(team_cost < problem.cost(lift(chordal(graph), 3)));
+  CHECK(team_cost >= optimum_of(graph) * (1.0 - 1e-9));
+}
+
+TEST_CASE("Alone, robots meet if nothing is noisy", "[pgo_study]") {
+  std::mt19937 rng(4);
+  const TeamGraph graph = noisy_chain(30, 3, 0.0, rng);
+  LocalTeam team(graph);
+  const auto rounds = run_team(graph, team, {}, {});
+  CHECK(rounds.size() == 3);  // the start, solving alone, joining robot 0
+  CHECK(rounds.back().cost < 1e-9);
+}
+
+TEST_CASE("A robot whose own edges do not connect its poses cannot be alone", "[pgo_study]") {
+  std::mt19937 rng(4);
+  TeamGraph graph = noisy_chain(30, 3, 0.0, rng);
+  std::erase_if(graph.edges, [&](const BlockEdge& e) {
+    return (e.i == 15 || e.j == 15) && graph.robot_of(e.i) == graph.robot_of(e.j);
+  });
+  CHECK_THROWS_WITH(LocalTeam(graph), Catch::Contains("robot 1 cannot solve alone"));
+}
+
+TEST_CASE("A distributed verification finds that a wound ring is no minimum", "[pgo_study]") {
+  const std::size_t robots = GENERATE(1U, 3U);
+  const Eigen::Index rank = GENERATE(3, 5);
+  CAPTURE(robots, rank);
+  const WoundRing ring(24, robots);
+  const LiftedPoses X = lift(ring.wound, rank);
+  const TeamVerification found = verify_team(ring.graph, X, {}, {});
+  CHECK(found.negative);
+  CHECK(found.lambda_min < 0.0);
+  // The direction has that curvature: the way up from the saddle lowers the cost.
+  const QuadraticProblem higher(rank + 1, 24, ring.graph.edges, {});
+  const LiftedPoses beyond = escape(higher, X, found.direction.row(0).transpose());
+  CHECK(higher.cost(beyond) < 0.999 * QuadraticProblem(rank, 24, ring.graph.edges, {}).cost(X));
+}
+
+TEST_CASE("A distributed verification finds nothing at an optimum", "[pgo_study]") {
+  const std::size_t robots = GENERATE(1U, 3U);
+  const Eigen::Index rank = GENERATE(3, 5);
+  CAPTURE(robots, rank);
+  const WoundRing ring(24, robots);
+  const LiftedPoses X = lift(std::vector<SE3>(24, SE3::Identity()), rank);
+  const TeamVerification found =
+      verify_team(ring.graph, X, {.max_iterations = 500, .tolerance = 1e-6}, {});
+  CHECK_FALSE(found.negative);
+  CHECK(found.converged);
+  // Beyond the kernel: the Laplacian of the ring.
+  CHECK(found.lambda_min ==
+        Approx(2.0 - 2.0 * std::cos(2.0 * std::numbers::pi / 24)).epsilon(1e-3));
+  CHECK(found.work.bytes > robots * static_cast<std::size_t>(found.rounds) * kMessageHeader);
+}
+
+TEST_CASE("Distributed and central verification agree on a recorded graph", "[pgo_study]") {
+  const auto file = shared_data("pose_graphs/3d/smallGrid3D.g2o");
+  if (!file) return;
+  const TeamGraph graph = deal_contiguously(read_g2o(*file), 5, "smallGrid3D");
+  CentralTeam central(graph, lift(chordal(graph), 3));
+  (void)run_team(graph, central, {}, {});
+  const TeamVerification found = verify_team(graph, team_poses(graph, central), {}, {});
+  CHECK_FALSE(found.negative);
+  CHECK(found.converged);
+  CHECK(found.lambda_min > 0.0);
+}
+
+TEST_CASE("A team climbs from the wound ring to the optimum", "[pgo_study]") {
+  const WoundRing ring(24, 3);
+  const QuadraticProblem problem(3, 24, ring.graph.edges, {});
+  const LiftedPoses start = lift(ring.wound, 3);
+  const TeamStaircase result =
+      run_team_staircase(ring.graph, start, {}, {.max_rounds = 300}, 10, {});
+  CHECK(result.rounds.front().cost > 1.0);
+  CHECK(result.rounds.back().cost < 1e-6);
+  CHECK(result.X.rows() > 3);
+  CHECK_FALSE(result.verification.negative);
+  CHECK(rounded_cost(ring.graph, result.X) < 1e-5);
+}
+
+}  // namespace km

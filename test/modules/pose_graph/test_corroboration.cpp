@@ -1,0 +1,202 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <random>
+#include <set>
+#include <vector>
+
+#include "modules/core/lie.hpp"
+#include "modules/pose_graph/corroboration.hpp"
+#include "modules/pose_graph/robust_schedule.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+constexpr int kKeyframes = 300;
+constexpr double kSigma = 0.01;  // [rad], [m]
+
+// Two robots drive side by side, and each keyframe of the one sees that of the other.
+class Lanes {
+ public:
+  // Noise of odometry and of closures is `times` what they claim.
+  Lanes(int dimension, double times, unsigned seed) : dimension_(dimension), rng_(seed) {
+    precision_ = {(dimension == 2 ? 1.0 : 0.5) / (kSigma * kSigma), 1.0 / (kSigma * kSigma)};
+    step_ = {{kOne, precision_}, {kOther, precision_}};
+    for (int lane = 0; lane < 2; ++lane) {
+      SE3 odometry = truth(lane, 0);
+      for (int k = 0; k < kKeyframes; ++k) {
+        if (k > 0)
+          odometry = odometry * truth(lane, k - 1).inverse() * truth(lane, k) * noise(times);
+        poses_[id(lane, k)] = odometry;
+      }
+    }
+  }
+
+  void add_true(int k, int l, double times = 1.0) {
+    closures_.push_back(
+        {id(0, k), id(1, l), truth(0, k).inverse() * truth(1, l) * noise(times), precision_});
+  }
+  // As false as can be, or little turned.
+  void add_false(int k, int l, bool turned = true) {
+    SE3 T = truth(0, k).inverse() * truth(1, l);
+    T = T * se3_exp(flat((turned ? 20.0 : 0.2) * random_vector<6>(rng_)));
+    T.translation() += flat(20.0 * random_vector<6>(rng_)).tail<3>();
+    closures_.push_back({id(0, k), id(1, l), T, precision_});
+  }
+  void add_random_false(int count, bool turned = true) {
+    std::uniform_int_distribution<int> keyframe(0, kKeyframes - 1);
+    for (int n = 0; n < count; ++n) {
+      const int k = keyframe(rng_);
+      const int l = keyframe(rng_);
+      if (k != l) add_false(k, l, turned);
+    }
+  }
+  [[nodiscard]] std::vector<PoseEdge>& closures() { return closures_; }
+
+  [[nodiscard]] std::optional<NoiseScale> noise_scale() const {
+    NoiseHistogram lengths;
+    const Corroboration::PoseOf pose = [this](const KeyframeId& k) { return poses_.at(k); };
+    Corroboration(closures_, pose, step_, dimension_).count_lengths(lengths);
+    return fit_noise(lengths, dimension_);
+  }
+  [[nodiscard]] std::set<ClosureId> isolated(const std::vector<PoseEdge>& closures) const {
+    const Corroboration::PoseOf pose = [this](const KeyframeId& k) { return poses_.at(k); };
+    const std::vector<bool> alone =
+        Corroboration(closures, pose, step_, dimension_).isolated(default_threshold(dimension_));
+    REQUIRE(alone.size() == closures.size());
+    std::set<ClosureId> ids;
+    for (std::size_t k = 0; k < alone.size(); ++k)
+      if (alone[k]) ids.insert(closures[k].id());
+    return ids;
+  }
+  [[nodiscard]] std::set<ClosureId> isolated() const { return isolated(closures_); }
+  [[nodiscard]] std::set<ClosureId> ids() const {
+    std::set<ClosureId> ids;
+    for (const PoseEdge& e : closures_) ids.insert(e.id());
+    return ids;
+  }
+  [[nodiscard]] std::mt19937& rng() { return rng_; }
+
+ private:
+  static constexpr RobotId kOne = 3;
+  static constexpr RobotId kOther = 8;
+
+  static KeyframeId id(int lane, int k) {
+    return {lane == 0 ? kOne : kOther, static_cast<KeyframeIndex>(k)};
+  }
+  // The other robot looks across.
+  [[nodiscard]] static SE3 truth(int lane, int k) {
+    const Eigen::AngleAxisd turn(0.02 * k + lane, Eigen::Vector3d::UnitZ());
+    return make_pose(turn.toRotationMatrix(), Eigen::Vector3d(k, 2.0 * lane, 0.0));
+  }
+  [[nodiscard]] Vector6 flat(Vector6 xi) const {
+    if (dimension_ == 2) xi(0) = xi(1) = xi(5) = 0.0;
+    return xi;
+  }
+  [[nodiscard]] SE3 noise(double times) {
+    return se3_exp(flat(times * kSigma * random_vector<6>(rng_)));
+  }
+
+  int dimension_;
+  std::mt19937 rng_;
+  Precision precision_;
+  std::map<RobotId, Precision> step_;
+  std::map<KeyframeId, SE3> poses_;
+  std::vector<PoseEdge> closures_;
+};
+
+TEST_CASE("The noise of closures is found from pairs of them", "[pose_graph]") {
+  const int dimension = GENERATE(2, 3);
+  const double times = GENERATE(0.1, 1.0, 4.0);
+  const int false_closures = GENERATE(0, 600);
+  const bool turned = GENERATE(true, false);
+  const unsigned seed = GENERATE(1U, 2U);
+  CAPTURE(dimension, times, false_closures, turned, seed);
+  Lanes lanes(dimension, times, seed);
+  for (int k = 0; k < kKeyframes; ++k) lanes.add_true(k, k, times);
+  lanes.add_random_false(false_closures, turned);
+  const auto found = lanes.noise_scale();
+  REQUIRE(found);
+  CHECK(found->lengths >= 240);  // of those that are compared, some turn too far
+  CHECK(found->lengths <= 300);
+  // Scales are told apart to 5 %; of some 300 lengths the error of a scale is below that.
+  CHECK(found->scale == Approx(times).epsilon(0.1));
+  if (false_closures == 0)
+    CHECK(found->consistent > 0.95);
+  else
+    CHECK(found->consistent < 0.99);
+}
+
+TEST_CASE("Few closures do not tell their noise", "[pose_graph]") {
+  Lanes lanes(GENERATE(2, 3), 1.0, 3);
+  CHECK_FALSE(lanes.noise_scale());
+  lanes.add_true(0, 0);
+  CHECK_FALSE(lanes.noise_scale());
+  for (int k = 1; k < 12; ++k) lanes.add_true(25 * k, 25 * k);  // too far apart to be compared
+  CHECK_FALSE(lanes.noise_scale());
+}
+
+TEST_CASE("Lengths that are not finite are not counted", "[pose_graph]") {
+  NoiseHistogram histogram;
+  count_length(histogram, std::numeric_limits<double>::infinity());
+  count_length(histogram, std::nan(""));
+  CHECK(histogram.empty());
+  count_length(histogram, 0.0);
+  count_length(histogram, 1e300);
+  CHECK(histogram.size() == 2);
+}
+
+TEST_CASE("Closures beside each other that agree do not stand alone", "[pose_graph]") {
+  Lanes lanes(GENERATE(2, 3), 1.0, GENERATE(range(1U, 6U)));
+  for (const int k : {10, 12, 15, 100, 101, 200, 205}) lanes.add_true(k, k);
+  CHECK(lanes.isolated().empty());
+}
+
+TEST_CASE("A closure far from all others stands alone", "[pose_graph]") {
+  Lanes lanes(GENERATE(2, 3), 1.0, 4);
+  for (const int k : {10, 40, 70}) lanes.add_true(k, k);
+  CHECK(lanes.isolated() == lanes.ids());
+}
+
+TEST_CASE("False closures stand alone, also beside true ones", "[pose_graph]") {
+  const unsigned seed = GENERATE(range(1U, 6U));
+  const int dimension = GENERATE(2, 3);
+  CAPTURE(seed, dimension);
+  Lanes lanes(dimension, 1.0, seed);
+  lanes.add_false(50, 150);
+  lanes.add_false(101, 103);
+  lanes.add_false(152, 149);
+  lanes.add_false(153, 150);
+  const std::set<ClosureId> all_false = lanes.ids();
+  CHECK(lanes.isolated() == all_false);
+  for (int k = 98; k < 106; ++k) lanes.add_true(k, k);
+  for (int k = 148; k < 156; ++k) lanes.add_true(k, k);
+  CHECK(lanes.isolated() == all_false);
+}
+
+TEST_CASE("Both robots of a pair find that the same closures stand alone", "[pose_graph]") {
+  const unsigned seed = GENERATE(range(1U, 6U));
+  const int dimension = GENERATE(2, 3);
+  CAPTURE(seed, dimension);
+  Lanes lanes(dimension, 1.0, seed);
+  for (int k = 0; k < kKeyframes; k += 3) lanes.add_true(k, k, k % 2 == 0 ? 1.0 : 4.0);
+  lanes.add_random_false(100);
+  lanes.add_random_false(100, false);
+  std::vector<PoseEdge> seen_from_there = lanes.closures();
+  std::shuffle(seen_from_there.begin(), seen_from_there.end(), lanes.rng());
+  for (PoseEdge& e : seen_from_there) {
+    std::swap(e.from, e.to);
+    e.T_from_to = e.T_from_to.inverse();
+  }
+  const std::set<ClosureId> alone = lanes.isolated();
+  CHECK(alone.size() > 50);
+  CHECK(alone.size() < lanes.closures().size());
+  CHECK(lanes.isolated(seen_from_there) == alone);
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,100 @@
+#include <Eigen/Eigenvalues>
+#include <catch2/catch.hpp>
+
+#include "modules/core/lie.hpp"
+#include "modules/pose_graph/edge_model.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+using Vector12 = Eigen::Matrix<double, 12, 1>;
+using Matrix12 = Eigen::Matrix<double, 12, 12>;
+
+struct Moved {
+  BlockEdge edge;
+  SE3 T_i;
+  SE3 T_j;
+
+  [[nodiscard]] double cost(const Vector12& xi) const {
+    const SE3 i = move_along(T_i, xi.head<6>());
+    const SE3 j = move_along(T_j, xi.tail<6>());
+    return edge.kappa * (j.linear() - i.linear() * edge.T_i_j.linear()).squaredNorm() +
+           edge.tau * (j.translation() - i.translation() - i.linear() * edge.T_i_j.translation())
+                          .squaredNorm();
+  }
+};
+
+Moved random_edge(std::mt19937& rng) {
+  const SE3 T_i = random_pose(rng, 2.0);
+  const SE3 T_j = random_pose(rng, 2.0);
+  SE3 T_i_j = random_pose(rng, 2.0);
+  return {{0, 1, T_i_j, 1.3, 0.7}, T_i, T_j};
+}
+
+Matrix12 hessian_of(const EdgeModel& model) {
+  Matrix12 H;
+  H << model.H_ii, model.H_ij, model.H_ij.transpose(), model.H_jj;
+  return H;
+}
+
+}  // namespace
+
+TEST_CASE("an edge's slope and curvature are those of differences", "[newton]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U, 4U, 5U);
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const Moved moved = random_edge(rng);
+  const EdgeModel model = model_edge(moved.edge, moved.T_i, moved.T_j, Curvature::kFull);
+  const Matrix12 H = hessian_of(model);
+  Vector12 g;
+  g << model.g_i, model.g_j;
+  CHECK(model.cost == Approx(moved.cost(Vector12::Zero())).epsilon(1e-12));
+  // Central differences along h: errors of order h^2 and, for the second, rounding over h^2.
+  constexpr double h = 1e-4;
+  for (int k = 0; k < 20; ++k) {
+    Vector12 d;
+    d << random_vector<6>(rng), random_vector<6>(rng);
+    const double up = moved.cost(h * d);
+    const double down = moved.cost(-h * d);
+    CHECK((up - down) / (2.0 * h) == Approx(g.dot(d)).margin(1e-4));
+    CHECK((up - 2.0 * model.cost + down) / (h * h) == Approx(d.dot(H * d)).margin(1e-3));
+  }
+}
+
+TEST_CASE("without its second derivatives an edge has the same slope", "[newton]") {
+  std::mt19937 rng(7);
+  const Moved moved = random_edge(rng);
+  const EdgeModel model = model_edge(moved.edge, moved.T_i, moved.T_j, Curvature::kFull);
+  EdgeModel slope;
+  slope_edge(moved.edge, moved.T_i, moved.T_j, slope);
+  CHECK(slope.cost == model.cost);
+  CHECK(slope.g_i == model.g_i);
+  CHECK(slope.g_j == model.g_j);
+}
+
+TEST_CASE("Gauss-Newton's curvature is never negative, and the full one at a fit", "[newton]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  Moved moved = random_edge(rng);
+  const Matrix12 gauss_newton =
+      hessian_of(model_edge(moved.edge, moved.T_i, moved.T_j, Curvature::kGaussNewton));
+  CHECK(Eigen::SelfAdjointEigenSolver<Matrix12>(gauss_newton).eigenvalues().minCoeff() > -1e-12);
+  // Both poses turned about the world's origin and shifted, to first order.
+  const Eigen::Vector3d w = random_vector<3>(rng);
+  const Eigen::Vector3d u = random_vector<3>(rng);
+  Vector12 rigid;
+  rigid << moved.T_i.linear().transpose() * w,
+      moved.T_i.linear().transpose() * (w.cross(moved.T_i.translation()) + u),
+      moved.T_j.linear().transpose() * w,
+      moved.T_j.linear().transpose() * (w.cross(moved.T_j.translation()) + u);
+  CHECK((gauss_newton * rigid).norm() < 1e-12 * gauss_newton.norm() * rigid.norm());
+  moved.T_j = moved.T_i * moved.edge.T_i_j;
+  const Matrix12 full = hessian_of(model_edge(moved.edge, moved.T_i, moved.T_j, Curvature::kFull));
+  const Matrix12 same =
+      hessian_of(model_edge(moved.edge, moved.T_i, moved.T_j, Curvature::kGaussNewton));
+  CHECK((full - same).norm() < 1e-12 * full.norm());
+}
+
+}  // namespace km

@@ -1,0 +1,183 @@
+#include <catch2/catch.hpp>
+
+#include <limits>
+
+#include "modules/pose_graph/own_graph.hpp"
+
+namespace km {
+namespace {
+
+Closure measured(KeyframeId from, KeyframeId to, double variance = 1.0) {
+  Closure closure;
+  closure.from.id = from;
+  closure.to.id = to;
+  closure.covariance = variance * Matrix6::Identity();
+  return closure;
+}
+
+Closure measured(const ClosureId& id, double variance = 1.0) {
+  return measured(id.from, id.to, variance);
+}
+
+KeyframeOdometry keyframe(RobotId robot, std::uint32_t index) {
+  KeyframeOdometry keyframe;
+  keyframe.id = {robot, index};
+  keyframe.covariance = Matrix6::Identity();
+  return keyframe;
+}
+
+OwnGraph graph_of(RobotId robot, std::uint32_t keyframes) {
+  OwnGraph graph(robot);
+  for (std::uint32_t i = 0; i < keyframes; ++i) REQUIRE(graph.add(keyframe(robot, i)));
+  return graph;
+}
+
+// Between robots 5 and 9.
+constexpr ClosureId kFirst{{5, 1}, {9, 4}};
+constexpr ClosureId kSecond{{5, 2}, {9, 2}};
+
+}  // namespace
+
+TEST_CASE("an edge set is offered once all of it is known", "[own_graph]") {
+  OwnGraph graph = graph_of(5, 2);
+  REQUIRE(graph.add(InlierSet{5, 9, 3, {kFirst, kSecond}}));
+  CHECK(graph.offers().empty());
+  CHECK(graph.newest_edges(9) == nullptr);
+  REQUIRE(graph.add(measured(kSecond.to, kSecond.from)));
+  REQUIRE(graph.add(measured(kFirst)));
+  CHECK(graph.offers().empty());  // its own keyframe 2 is missing
+  REQUIRE(graph.add(keyframe(5, 2)));
+  REQUIRE(graph.offers().size() == 1);
+  const EdgeSetOffer offer = graph.offers().front();
+  CHECK(offer.peer == 9);
+  CHECK(offer.edges == 2);
+  const auto* edges = graph.edges(9, offer.id);
+  REQUIRE(edges != nullptr);
+  CHECK(edges == graph.newest_edges(9));
+  CHECK(edges->at(0).id() == kFirst);
+  CHECK(edges->at(1).id() == kSecond);
+  CHECK(edges->at(1).from == kSecond.to);  // as measured
+  CHECK(edges->at(1).end_on(5) == kSecond.from);
+  CHECK(graph.edges(9, {3, offer.id.hash + 1}) == nullptr);
+}
+
+TEST_CASE("both ends name an edge set alike, in whatever order it came", "[own_graph]") {
+  OwnGraph graph = graph_of(5, 3);
+  OwnGraph other = graph_of(9, 5);
+  for (OwnGraph* end : {&graph, &other})
+    for (const ClosureId& id : {kFirst, kSecond}) REQUIRE(end->add(measured(id)));
+  REQUIRE(graph.add(InlierSet{5, 9, 1, {kFirst, kSecond}}));
+  REQUIRE(other.add(InlierSet{5, 9, 1, {kSecond, kFirst, kSecond}}));
+  CHECK(graph.offers().front().id == other.offers().front().id);
+  REQUIRE(graph.add(InlierSet{5, 9, 2, {kFirst}}));
+  CHECK_FALSE(graph.add(InlierSet{5, 9, 1, {kSecond}}));  // an old version
+  REQUIRE(graph.offers().size() == 2);  // the newest first, the old one still held
+  CHECK(graph.offers()[0].id.version == 2);
+  CHECK(graph.offers()[1].id == other.offers().front().id);
+}
+
+TEST_CASE("a closure measured from both ends counts once, the better one", "[own_graph]") {
+  OwnGraph graph = graph_of(5, 3);
+  OwnGraph other = graph_of(9, 5);
+  const Closure coarse = measured(kFirst, 2.0);
+  const Closure fine = measured(kFirst.to, kFirst.from, 1.0);
+  const InlierSet set{5, 9, 1, {kFirst}};
+  REQUIRE(graph.add(set));
+  REQUIRE(other.add(set));
+  REQUIRE(graph.add(coarse));
+  REQUIRE(other.add(fine));
+  // Each holds the measurement of its own: they must not take their sets for the same.
+  CHECK(graph.offers().front().edges == other.offers().front().edges);
+  CHECK(graph.offers().front().id != other.offers().front().id);
+  CHECK(graph.add(fine));
+  CHECK_FALSE(other.add(coarse));
+  CHECK_FALSE(graph.add(fine));
+  CHECK(graph.offers().front().id == other.offers().front().id);
+  CHECK(graph.offers().size() == 2);
+  for (const OwnGraph* end : {&graph, &other}) {
+    const PoseEdge& edge = end->newest_edges(end == &graph ? 9 : 5)->at(0);
+    CHECK(edge.from == kFirst.to);
+    CHECK(edge.precision.tau == 1.0);
+  }
+}
+
+TEST_CASE("both ends take the same of two equally good measurements", "[own_graph]") {
+  Closure x = measured(kFirst), y = measured(kFirst);
+  SECTION("from either side") {
+    std::swap(y.from, y.to);
+  }
+  SECTION("from one side, after a restart") {
+    y.T_from_to.translation().z() = 0.1;
+  }
+  OwnGraph graph = graph_of(5, 3);
+  OwnGraph other = graph_of(9, 5);
+  REQUIRE(graph.add(InlierSet{5, 9, 1, {kFirst}}));
+  REQUIRE(other.add(InlierSet{5, 9, 1, {kFirst}}));
+  CHECK(graph.add(x) + graph.add(y) + other.add(y) + other.add(x) == 3);
+  CHECK(graph.offers().front().id == other.offers().front().id);
+}
+
+TEST_CASE("a restarted peer is forgotten", "[own_graph]") {
+  OwnGraph graph = graph_of(5, 3);
+  REQUIRE(graph.add(measured(kFirst)));
+  REQUIRE(graph.add(InlierSet{5, 9, 8, {kFirst}}));
+  CHECK(graph.offers().size() == 1);
+  graph.forget(9);
+  CHECK(graph.offers().empty());
+  REQUIRE(graph.add(InlierSet{5, 9, 1, {kFirst}}));  // versions start anew as well
+  CHECK(graph.offers().empty());
+  REQUIRE(graph.add(measured(kFirst)));
+  CHECK(graph.offers().size() == 1);
+}
+
+TEST_CASE("what does not concern a robot, or cannot be weighed, is ignored", "[own_graph]") {
+  OwnGraph graph = graph_of(5, 3);
+  CHECK_FALSE(graph.add(measured({1, 0}, {2, 0})));
+  CHECK_FALSE(graph.add(measured({5, 0}, {5, 0})));
+  CHECK_FALSE(graph.add(measured(kFirst, 0.0)));
+  CHECK_FALSE(graph.add(measured(kFirst, std::numeric_limits<double>::quiet_NaN())));
+  CHECK_FALSE(graph.add(InlierSet{1, 2, 1, {}}));
+  CHECK_FALSE(graph.add(InlierSet{9, 5, 1, {}}));
+  CHECK_FALSE(graph.add(InlierSet{5, 9, 1, {{{5, 0}, {8, 0}}}}));
+  CHECK_FALSE(graph.add(keyframe(5, 7)));
+  KeyframeOdometry next = keyframe(5, 3);
+  next.covariance.setZero();
+  CHECK_THROWS_AS(graph.add(next), std::invalid_argument);
+  next.covariance.setIdentity();
+  for (const Vertical& vertical :
+       {Vertical{Eigen::Vector3d::Zero(), 0.01}, Vertical{Eigen::Vector3d::UnitZ(), 0.0},
+        Vertical{Eigen::Vector3d::Constant(NAN), 0.01}, Vertical{{0.0, 0.0, 2.0}, 0.01}}) {
+    next.vertical = vertical;
+    CHECK_THROWS_AS(graph.add(next), std::invalid_argument);
+  }
+  CHECK(graph.keyframes() == 3);
+  CHECK(graph.own_edges().size() == 2);
+}
+
+TEST_CASE("closures inside the robot join its own edges", "[own_graph]") {
+  OwnGraph graph = graph_of(5, 4);
+  const std::uint32_t before = graph.revision();
+  REQUIRE(graph.add(InlierSet{5, 5, 1, {{{5, 3}, {5, 0}}}}));
+  CHECK(graph.own_edges().size() == 3);
+  REQUIRE(graph.add(measured({5, 3}, {5, 0})));
+  REQUIRE(graph.own_edges().size() == 4);
+  CHECK(graph.own_edges().back().from.index == 3);
+  CHECK(graph.own_edges().back().to.index == 0);
+  CHECK(graph.revision() == before + 1);
+  REQUIRE(graph.add(measured({5, 0}, {5, 3}, 0.5)));  // a better one
+  REQUIRE(graph.own_edges().size() == 4);
+  CHECK(graph.own_edges().back().from.index == 0);
+  CHECK(graph.revision() == before + 2);
+  CHECK(graph.offers().empty());
+}
+
+TEST_CASE("the mean precision of a step is that of odometry alone", "[own_graph]") {
+  OwnGraph graph = graph_of(5, 2);
+  KeyframeOdometry next = keyframe(5, 2);
+  next.covariance *= 0.5;
+  REQUIRE(graph.add(next));
+  CHECK(graph.mean_step_precision().tau == Approx(1.5));
+  CHECK(graph.mean_step_precision().kappa == Approx(0.75));
+}
+
+}  // namespace km

@@ -1,0 +1,139 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <random>
+
+#include "modules/core/bytes.hpp"
+#include "modules/pose_graph/session_part.hpp"
+
+namespace km {
+namespace {
+
+constexpr TeamPeer kSelf{1, 1};
+constexpr TeamPeer kOther{2, 1};
+
+// Takes letters with one number each, in order. It refuses what comes too early or is no number.
+class OrderlySolver final : public MemberSolver {
+ public:
+  explicit OrderlySolver(std::uint32_t& taken) : taken_(taken) {}
+
+  bool receive(RobotId, std::span<const std::uint8_t> bytes) override {
+    ByteReader in(bytes);
+    const std::uint32_t number = in.u32();
+    if (!in.done() || number > taken_) return false;
+    if (number == taken_) ++taken_;
+    return true;
+  }
+  [[nodiscard]] bool ready() const override { return false; }
+  [[nodiscard]] std::vector<SolverLetter> advance() override { return {}; }
+  [[nodiscard]] bool done() const override { return false; }
+  [[nodiscard]] const std::vector<SE3>& poses() const override { return poses_; }
+  [[nodiscard]] SolverState state() const override { return {}; }
+  [[nodiscard]] ClosureVerdicts verdicts() const override { return {}; }
+
+ private:
+  std::uint32_t& taken_;
+  std::vector<SE3> poses_{SE3::Identity()};
+};
+
+// A robot's part in a session with another robot, whose letters it is handed.
+struct Correspondence {
+  std::uint32_t taken = 0;  // by the solver
+  Session session{.id = {kSelf, 1},
+                  .plan = {.frame = kSelf,
+                           .members = {{.peer = kSelf}, {.peer = kOther, .parent = kSelf.robot}},
+                           .pairs = {}}};
+  SessionPart part{session,
+                   kSelf,
+                   {.graph = {.self = kSelf.robot, .start = {SE3::Identity()}},
+                    .place = {.children = {2}, .members = {1, 2}, .root = 1},
+                    .in_frame = true,
+                    .public_keyframes = {0}},
+                   [this](const Session&, SessionGraph, const TreePlace&) {
+                     return std::make_unique<OrderlySolver>(taken);
+                   },
+                   {},
+                   1.0,
+                   0.0};
+  LetterBook others{kOther, session.id, 1.0};
+  ToldPoses told = {};
+
+  Correspondence() {
+    (void)part.advance(told, 0.0);
+    REQUIRE(part.stage() == 0U);
+  }
+  // The solver does.
+  void begin(double now_s) {
+    told[kOther.robot] = {.sender = kOther, .session = session.id, .keyframes = {0}};
+    told[kOther.robot].T_frame_kf.resize(1);
+    (void)part.advance(told, now_s);
+    REQUIRE(part.worked());
+  }
+  SessionLetter write(const std::vector<std::uint8_t>& bytes, double now_s = 0.0) {
+    return others.write({kSelf.robot, std::make_shared<const std::vector<std::uint8_t>>(bytes)},
+                        now_s);
+  }
+  SessionLetter write_number(std::uint32_t number) {
+    ByteWriter out;
+    out.u32(number);
+    return write(out.release());
+  }
+  void exchange(double from_s, double to_s) {
+    for (double now_s = from_s; now_s < to_s; now_s += 0.1) {
+      for (const SessionLetter& letter : others.due(now_s)) (void)part.receive(letter, now_s);
+      for (const SessionLetter& letter : part.advance(told, now_s))
+        (void)others.read(letter, now_s);
+    }
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a letter that the solver cannot take yet comes again", "[pose_graph][session]") {
+  Correspondence c;
+  c.begin(0.0);
+  const SessionLetter first = c.write_number(0), second = c.write_number(1);
+  CHECK_FALSE(c.part.receive(second, 0.0));
+  CHECK(c.part.receive(first, 0.0));
+  CHECK(c.taken == 1);
+  c.exchange(0.1, 20.0);
+  CHECK(c.taken == 2);
+  CHECK(c.others.due(1000.0).empty());
+}
+
+TEST_CASE("letters before the solver begins are not lost, however many and in any order",
+          "[pose_graph][session]") {
+  constexpr std::uint32_t kLetters = 1500;
+  Correspondence c;
+  std::vector<SessionLetter> letters;
+  for (std::uint32_t k = 0; k < kLetters; ++k) letters.push_back(c.write_number(k));
+  std::shuffle(letters.begin(), letters.end(), std::mt19937(1));
+  for (const SessionLetter& letter : letters) CHECK(c.part.receive(letter, 0.0));
+  c.begin(0.1);
+  c.exchange(0.2, 60.0);
+  CHECK(c.taken == kLetters);
+  CHECK(c.others.due(1000.0).empty());
+}
+
+TEST_CASE("letters that are refused do not keep a session going", "[pose_graph][session]") {
+  Correspondence c;
+  CHECK(c.part.receive(c.write({1, 2, 3}), 0.0));  // nobody can tell yet
+  CHECK(c.part.take_refused().empty());
+  c.begin(0.0);
+  CHECK(c.part.take_refused() == std::vector<RobotId>{2});
+  CHECK_FALSE(c.part.receive(c.write({1, 2, 3}), 5.0));
+  SessionLetter stranger = c.write_number(0);
+  stranger.sender = {3, 1};
+  CHECK_FALSE(c.part.receive(stranger, 5.0));
+  stranger.sender = {kOther.robot, 2};
+  CHECK_FALSE(c.part.receive(stranger, 5.0));
+  SessionLetter impossible = c.write_number(0);
+  impossible.number = 1'000'000;
+  CHECK_FALSE(c.part.receive(impossible, 5.0));
+  impossible = c.write_number(0);
+  impossible.received = 7;  // of this robot, which has not written any
+  CHECK_FALSE(c.part.receive(impossible, 5.0));
+  CHECK(c.part.moved_s() == 0.0);
+}
+
+}  // namespace km

@@ -1,0 +1,601 @@
+#include <catch2/catch.hpp>
+
+#include "modules/pose_graph/letter_book.hpp"
+#include "modules/pose_graph/solver_choice.hpp"
+#include "test/support/gather_solver.hpp"
+#include "test/support/team_network.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kTolerance = 1e-6;  // of the cost, relative
+
+const std::vector<RobotId> kIds{7, 33, 50, 1200};
+const std::vector<std::pair<RobotId, RobotId>> kRing{{7, 33}, {33, 50}, {50, 1200}, {7, 1200}};
+
+MemberSolverFactory gather(GatherSolver::Options options = {}) {
+  return [options](const Session& session, SessionGraph graph, TreePlace place) {
+    GatherSolver::Options of_session = options;
+    of_session.max_rounds = session.max_rounds;
+    return std::make_unique<GatherSolver>(std::move(graph), std::move(place), of_session);
+  };
+}
+
+TeamProblem ring(unsigned seed) {
+  return random_team_problem({.robots = kIds, .pairs = kRing, .keyframes = 12}, seed);
+}
+
+// Everything but what joins 33 to 50: the rest holds all four together.
+TeamProblem without_33_50(TeamProblem problem) {
+  std::erase_if(problem.edges,
+                [](const PoseEdge& e) { return e.id().from.robot == 33 && e.id().to.robot == 50; });
+  return problem;
+}
+
+bool settle(TeamNetwork& network, double within_s = 600.0) {
+  const bool settled = network.run(within_s, [&] { return network.all_settled(); });
+  if (!settled) UNSCOPED_INFO(network.describe());
+  return settled;
+}
+
+void check_optimal(const TeamNetwork& network, const TeamProblem& problem) {
+  for (const auto& [id, robot] : network.robots) {
+    CAPTURE(id);
+    REQUIRE(robot.trajectory);
+    CHECK(robot.trajectory->anchor == problem.start.begin()->first);
+  }
+  const CentralProblem whole(problem);
+  CHECK(whole.cost(network.trajectories()) ==
+        Approx(whole.optimum(problem.start)).epsilon(kTolerance));
+}
+
+SolverLetter solver_letter(RobotId to, std::uint8_t content) {
+  return {to, std::make_shared<const std::vector<std::uint8_t>>(1, content)};
+}
+
+}  // namespace
+
+TEST_CASE("letters are repeated until they are known to have arrived", "[pose_graph][agent]") {
+  LetterBook a({1, 1}, {}, 1.0), b({2, 1}, {}, 1.0);
+  const auto arrives = [](LetterBook& at, const SessionLetter& letter, double now_s) {
+    const bool is_new = at.read(letter, now_s) == LetterNews::kNew;
+    if (is_new) at.take(letter);
+    return is_new;
+  };
+  const SessionLetter first = a.write(solver_letter(2, 10), 0.0);
+  const SessionLetter second = a.write(solver_letter(2, 11), 0.0);
+  CHECK(a.due(0.9).empty());
+  CHECK(a.due(1.0).size() == 2);
+  CHECK(a.due(2.5).empty());  // ever more rarely
+  CHECK(arrives(b, second, 1.0));
+  CHECK_FALSE(arrives(b, second, 1.0));
+  CHECK(arrives(b, first, 1.0));
+  const auto word = b.due(1.0);  // the second came twice
+  REQUIRE(word.size() == 1);
+  CHECK(word[0].received == 2);
+  CHECK_FALSE(arrives(a, word[0], 1.0));
+  CHECK(a.due(100.0).empty());
+  const SessionLetter answer = b.write(solver_letter(1, 12), 2.0);
+  CHECK(arrives(a, answer, 2.0));
+  (void)a.write(solver_letter(2, 13), 2.0);
+  a.reachable_again(2);
+  CHECK(a.due(2.0).size() == 1);
+}
+
+TEST_CASE("one robot alone solves its own graph", "[pose_graph][agent]") {
+  const TeamProblem problem = random_team_problem({.robots = {4}, .keyframes = 12}, 1);
+  PoseGraphConfig config;
+  config.robust = GENERATE(true, false);  // without: from chordal initialisation
+  TeamNetwork network;
+  feed(network.add({4, 1}, config, gather()), 4, problem);
+  REQUIRE(settle(network, 5.0));
+  check_optimal(network, problem);
+  CHECK(network.robots.at(4).bytes == 0);
+}
+
+TEST_CASE("robots end in the odometry frame of the lowest one", "[pose_graph][agent]") {
+  const TeamProblem problem = ring(2);
+  PoseGraphConfig config;
+  config.robust = GENERATE(true, false);
+  TeamNetwork network;
+  std::mt19937 rng(2);
+  const SE3 T_odom_first = random_pose(rng, 3.0);
+  for (const RobotId id : kIds) {
+    TeamAgent& agent = network.add({id, 1}, config, gather());
+    if (id == 7) {
+      KeyframeOdometry first;
+      first.id = {7, 0};
+      first.T_odom_kf = first.T_previous_kf = T_odom_first;
+      CHECK(agent.add(first));
+    }
+    feed(agent, id, problem);
+  }
+  REQUIRE(settle(network));
+  check_optimal(network, problem);
+  CHECK(network.robots.at(7).trajectory->T_world_kf[0].isApprox(T_odom_first, 1e-6));
+}
+
+TEST_CASE("inputs may come in any order and at any time", "[pose_graph][agent]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  const TeamProblem problem = ring(seed);
+  TeamNetwork network(seed);
+  network.usual.max_delay_s = 0.05;
+  for (const RobotId id : kIds) {
+    TeamAgent& agent = network.add({id, 1}, {}, gather());
+    feed_closures(agent, id, problem);
+    (void)network.run(0.3);
+    feed_odometry(agent, id, problem);
+    (void)network.run(0.7);
+  }
+  REQUIRE(settle(network));
+  check_optimal(network, problem);
+}
+
+TEST_CASE("a restarted robot is forgotten and taken in anew", "[pose_graph][agent]") {
+  const RobotId restarted = GENERATE(RobotId{7}, RobotId{50});
+  const bool chain = GENERATE(true, false);
+  CAPTURE(restarted, chain);
+  const TeamProblem problem = ring(9);
+  TeamNetwork network;
+  for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
+  if (chain) network.wire({{7, 33}, {33, 50}, {50, 1200}});
+  REQUIRE(settle(network));
+  network.kill(restarted);
+  (void)network.run(1.0);
+  feed(network.add({restarted, 2}, {}, gather()), restarted, problem);
+  (void)network.run(0.5);
+  for (const RobotId id : kIds)  // closures with the new process are found again
+    if (id != restarted) feed_closures(network.agent(id), id, problem, 3);
+  feed_closures(network.agent(restarted), restarted, problem, 3);
+  (void)network.run(1.0);
+  REQUIRE(settle(network));
+  check_optimal(network, problem);
+}
+
+TEST_CASE("decisions on closures hold for both ends and carry over", "[pose_graph][agent]") {
+  TeamProblem problem = ring(4);
+  PoseEdge wrong = problem.edges.back();
+  wrong.from = {7, 3};
+  wrong.to = {33, 8};
+  wrong.T_from_to = make_pose(Eigen::Matrix3d::Identity(), {0.0, 30.0, 0.0});
+  problem.edges.push_back(wrong);
+  PoseGraphConfig config;
+  config.exchange_budget_kb_s = 1e6;
+  TeamNetwork network;
+  for (const RobotId id : kIds)
+    feed(network.add({id, 1}, config, gather({.largest_residual = 100.0})), id, problem);
+  REQUIRE(settle(network));
+  for (const RobotId id : {RobotId{7}, RobotId{33}}) {
+    CAPTURE(id);
+    REQUIRE(network.agent(id).decided().contains(wrong.id()));
+    CHECK_FALSE(network.agent(id).decided().at(wrong.id()));
+    CHECK(network.robots.at(id).verdicts.rejected() > 0);
+    for (const auto& [closure, kept] : network.agent(id).decided()) problem.decided[closure] = kept;
+  }
+  CHECK_FALSE(network.agent(50).decided().contains(wrong.id()));
+  // The next session begins with what this one has decided.
+  for (const RobotId id : {RobotId{7}, RobotId{33}})
+    (void)network.agent(id).add(inlier_set(problem, 7, 33, 2));
+  (void)network.run(1.0);
+  REQUIRE(settle(network));
+  check_optimal(network, problem);
+}
+
+TEST_CASE("a graph that cannot be solved ends the session for all, and they say so",
+          "[pose_graph][agent]") {
+  const bool throws = GENERATE(true, false);
+  CAPTURE(throws);
+  const GatherSolver::Options options = throws ? GatherSolver::Options{.fails_in_round = 2}
+                                               : GatherSolver::Options{.gives_up_in_round = 2};
+  const TeamProblem problem = ring(5);
+  TeamNetwork network;
+  for (const RobotId id : kIds)
+    feed(network.add({id, 1}, {}, id == 50 ? gather(options) : gather()), id, problem);
+  (void)network.run(60.0);
+  CHECK_THAT(network.robots.at(50).notices.front(), Catch::Contains("cannot be solved"));
+  for (const RobotId id : kIds) {
+    CAPTURE(id);
+    CHECK_FALSE(network.agent(id).in_session());
+    CHECK(network.agent(id).frame() == network.agent(7).frame());
+    CHECK(network.robots.at(id).trajectory);
+  }
+  CHECK(network.agent(7).part()->session().id.number < 5);  // not again and again
+}
+
+TEST_CASE("sessions wait until their bytes are paid for", "[pose_graph][agent]") {
+  const double budget_kb_s = GENERATE(1e6, 1.0);
+  CAPTURE(budget_kb_s);
+  const TeamProblem problem = ring(15);
+  PoseGraphConfig config;
+  config.exchange_budget_kb_s = budget_kb_s;
+  config.session_wait_s = 30.0;
+  TeamNetwork network;
+  for (const RobotId id : kIds)
+    feed(network.add({id, 1}, config, gather()), id, without_33_50(problem));
+  REQUIRE(settle(network));
+  const double first_s = network.now_s();
+  for (const RobotId id : {RobotId{33}, RobotId{50}}) {
+    for (const PoseEdge& e : problem.edges)
+      if (!is_step(e)) (void)network.agent(id).add(closure_of(e));
+    (void)network.agent(id).add(inlier_set(problem, 33, 50));
+  }
+  (void)network.run(1.0);
+  REQUIRE(settle(network));
+  const double waited_s = network.now_s() - first_s;
+  CAPTURE(waited_s);
+  if (budget_kb_s > 1.0) CHECK(waited_s < 5.0);  // two at rest, and the session
+  if (budget_kb_s <= 1.0) CHECK(waited_s > 5.0);
+  CHECK(waited_s < 35.0);
+  check_optimal(network, problem);
+}
+
+TEST_CASE("a session is paid for by the member that has sent most", "[pose_graph][agent]") {
+  const std::vector<RobotId> ids{7, 33, 50};
+  constexpr double kBudget_kb_s = 5.0;
+  TeamProblem problem =
+      random_team_problem({.robots = ids, .pairs = {{7, 33}, {33, 50}}, .keyframes = 40}, 15);
+  PoseGraphConfig config;
+  config.exchange_budget_kb_s = kBudget_kb_s;
+  config.session_wait_s = 600.0;
+  TeamNetwork network;
+  std::map<std::optional<SessionId>, std::map<RobotId, double>> sent_in;
+  network.on_parcel = [&](RobotId from, const Parcel& parcel) {
+    sent_in[session_of(*parcel.message)][from] +=
+        static_cast<double>(encode(*parcel.message).size());
+  };
+  for (const RobotId id : ids) feed(network.add({id, 1}, config, gather()), id, problem);
+  network.wire({{7, 33}, {33, 50}});
+  REQUIRE(settle(network));
+  const double first_s = network.now_s();
+  const SessionId first = network.agent(7).part()->session().id;
+  std::map<RobotId, double>& sent = sent_in.at(first);
+  // The one in the middle is the root; the coordinator is a leaf.
+  REQUIRE(sent.at(33) > 3.0 * sent.at(7));
+  const double price_s = sent.at(33) / (1e3 * kBudget_kb_s);
+  for (const RobotId id : {RobotId{7}, RobotId{33}})
+    (void)network.agent(id).add(inlier_set(problem, 7, 33, 2));
+  REQUIRE(network.run(600.0, [&] { return network.agent(7).part()->session().id != first; }));
+  const double waited_s = network.now_s() - first_s;
+  CAPTURE(sent.at(7), sent.at(33), waited_s);
+  CHECK(waited_s > 0.9 * price_s);
+  CHECK(waited_s < 1.1 * price_s + 2.0);
+}
+
+TEST_CASE("early stopping ends a session after its rounds", "[pose_graph][agent]") {
+  const TeamProblem problem = ring(10);
+  PoseGraphConfig config;
+  config.max_rounds = 2;
+  TeamNetwork network;
+  for (const RobotId id : kIds) feed(network.add({id, 1}, config, gather()), id, problem);
+  REQUIRE(settle(network));
+  for (const RobotId id : kIds) CHECK(network.agent(id).part()->state().round == 2);
+}
+
+TEST_CASE("robots of different methods go their own ways, and say so", "[pose_graph][agent]") {
+  const TeamProblem problem = ring(13);
+  TeamNetwork network;
+  for (const RobotId id : kIds) {
+    PoseGraphConfig config;
+    if (id == 33) config.method = PgoMethod::kRbcd;
+    feed(network.add({id, 1}, config, gather()), id, problem);
+  }
+  REQUIRE(network.run(60.0, [&] {
+    return network.robots.at(33).progress.settled && network.robots.at(7).progress.settled &&
+           network.robots.at(7).progress.members.size() == 3;
+  }));
+  CHECK(network.robots.at(33).progress.members == std::vector<RobotId>{33});
+  REQUIRE_FALSE(network.robots.at(7).notices.empty());
+  CHECK_THAT(network.robots.at(7).notices.front(), Catch::Contains("another method"));
+}
+
+TEST_CASE("what is refused is counted and told", "[pose_graph][agent]") {
+  TeamAgent agent({}, {7, 1}, gather());
+  KeyframeOdometry keyframe;
+  keyframe.id = {7, 5};
+  CHECK_FALSE(agent.add(keyframe));
+  Closure closure;
+  closure.from.id = {7, 0};
+  closure.to.id = {33, 0};
+  closure.covariance.setZero();
+  CHECK_FALSE(agent.add(closure));
+  closure.from.id = {50, 0};
+  CHECK_FALSE(agent.add(closure));  // of others: no reason to speak of it
+  InlierSet set{7, 33, 1, {closure_id({7, 0}, {50, 0})}};
+  CHECK_FALSE(agent.add(set));
+  CHECK(agent.refused().size() == 3);
+  const TeamOutput output = agent.step(0.0);
+  CHECK(output.notices.size() == 3);
+  CHECK_FALSE(agent.add(keyframe));
+  CHECK(agent.step(0.1).notices.size() == 1);
+  CHECK_FALSE(agent.add(keyframe));
+  CHECK(agent.step(0.2).notices.empty());  // the third time
+}
+
+TEST_CASE("messages that lie are refused or do no lasting harm", "[pose_graph][agent]") {
+  const unsigned seed = GENERATE(range(1U, 7U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const TeamProblem problem = ring(11);
+  TeamNetwork network(seed);
+  network.usual.max_delay_s = 0.01;
+  for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
+  std::uniform_int_distribution<std::uint32_t> any(0, 20);
+  const auto robot = [&] {
+    const std::vector<RobotId> robots{7, 33, 50, 1200, 666, 667};
+    return robots[any(rng) % robots.size()];
+  };
+  const auto peer = [&] { return TeamPeer{robot(), 1 + any(rng) / 12}; };
+  TeamAgent& victim = network.agent(33);
+  victim.peer_alive({666, 1});
+  for (int k = 0; k < 400; ++k) {
+    TeamStatus status{.sender = {666, 1}, .number = any(rng), .frame = peer()};
+    for (std::uint32_t n = any(rng) % 6; n > 0; --n) status.hears.push_back(peer());
+    status.offers = {{robot(), any(rng) + 1, {any(rng), any(rng)}}};
+    status.holds = any(rng);
+    (void)network.inject(666, 33, status);
+
+    Session session{.id = {peer(), any(rng)},
+                    .plan = {.frame = peer(), .members = {}, .pairs = {}}};
+    if (session.id.coordinator.robot != 666 && session.id.coordinator.robot != 667)
+      session.id.coordinator = {666, 1};  // else nothing could tell it from the true one
+    for (std::uint32_t n = any(rng) % 5; n > 0; --n)
+      session.plan.members.push_back({.peer = peer(), .parent = robot()});
+    session.plan.members.push_back({.peer = {33, 1}});
+    session.plan.pairs = {{33, 666, {1, any(rng)}}};
+    session.finished = any(rng) > 15;
+    session.round = any(rng);
+    (void)network.inject(666, 33, session);
+
+    MemberPoses poses{.sender = {666, 1}, .number = any(rng), .session = session.id};
+    poses.stage = any(rng) % 4;
+    poses.keyframes = {any(rng) % 2, any(rng)};
+    poses.T_frame_kf.resize(any(rng) % 3);
+    poses.verdicts = {{closure_id({7, 1}, {33, 2}), false}};
+    (void)network.inject(666, 33, poses);
+
+    SessionLetter letter{.sender = {}, .session = session.id, .number = any(rng), .bytes = {}};
+    if (victim.part() != nullptr && any(rng) > 10) letter.session = victim.part()->session().id;
+    letter.sender = {any(rng) > 10 ? RobotId{666} : RobotId{667}, 1};
+    letter.to = any(rng) > 5 ? RobotId{33} : robot();
+    letter.copy = any(rng);
+    letter.received = any(rng);
+    letter.bytes = std::make_shared<const std::vector<std::uint8_t>>(any(rng), std::uint8_t{7});
+    (void)network.inject(666, 33, letter);
+    (void)network.run(0.003);
+  }
+  victim.peer_lost(666);
+  (void)network.run(5.0);
+  REQUIRE(settle(network, 120.0));
+  check_optimal(network, problem);
+}
+
+TEST_CASE("what is told of closures that nobody has, and by strangers, decides nothing",
+          "[pose_graph][agent]") {
+  const TeamProblem problem = ring(11);
+  TeamNetwork network;
+  for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
+  REQUIRE(settle(network));
+  (void)network.run(1.0);
+  const TeamAgent& victim = network.agent(7);
+  const std::map<ClosureId, bool> decided = victim.decided();
+  const std::size_t verdicts = network.robots.at(7).verdicts.closures.size();
+  const double moved_s = victim.part()->moved_s();
+  const auto known = std::find_if(decided.begin(), decided.end(), [](const auto& closure) {
+    return closure.first.from.robot == 7 && closure.first.to.robot == 33;
+  });
+  REQUIRE(known != decided.end());
+  for (std::uint32_t k = 1; k < 10; ++k) {
+    MemberPoses poses{.sender = {666, 1},
+                      .number = 1000 + k,
+                      .session = victim.part()->session().id,
+                      .stage = 1,
+                      .keyframes = {0}};
+    poses.T_frame_kf.resize(1);
+    poses.verdicts = {{closure_id({7, k}, {666, k}), false}};
+    (void)network.inject(33, 7, poses);
+    poses.sender = {33, 1};
+    poses.verdicts = {{known->first, known->second}, {closure_id({7, 1000 + k}, {33, k}), false}};
+    (void)network.inject(33, 7, poses);
+    (void)network.run(0.1);
+  }
+  CHECK(victim.decided() == decided);
+  CHECK(network.robots.at(7).verdicts.closures.size() == verdicts);
+  CHECK(victim.part()->moved_s() == moved_s);  // it is over
+}
+
+TEST_CASE("a session over closures that are not at hand is refused", "[pose_graph][agent]") {
+  const TeamProblem problem = ring(11);
+  TeamNetwork network;
+  for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
+  REQUIRE(settle(network));
+  const TeamAgent& agent = network.agent(33);
+  const Session running = agent.part()->session();
+  Session made_up = running;
+  ++made_up.id.number;
+  made_up.number = 1000;
+  made_up.finished = false;
+  for (SessionPair& pair : made_up.plan.pairs) pair.edges.hash ^= 1U;
+  CHECK(agent.refused().empty());
+  (void)network.inject(7, 33, made_up);
+  CHECK(agent.refused().size() == 1);
+  CHECK(agent.part()->session().id == running.id);
+}
+
+TEST_CASE("what a session has decided holds in the next one, also for who did not hear its end",
+          "[pose_graph][agent]") {
+  const TeamProblem problem = ring(11);
+  PoseGraphConfig config;
+  config.exchange_budget_kb_s = 1e6;
+  TeamNetwork network;
+  network.loses = [](RobotId, const Parcel& parcel) {
+    const auto* session = std::get_if<Session>(parcel.message.get());
+    return session != nullptr && session->finished && parcel.next == 33;
+  };
+  std::size_t known = 0;  // to 33, when its last session of all four began
+  const MemberSolverFactory factory = [&](const Session& session, SessionGraph graph,
+                                          TreePlace place) {
+    if (graph.self == 33 && place.members.size() == 4) known = graph.decided.size();
+    return gather()(session, std::move(graph), std::move(place));
+  };
+  for (const RobotId id : kIds) feed(network.add({id, 1}, config, factory), id, problem);
+  const TeamAgent& agent = network.agent(33);
+  const auto solved = [&] {
+    return agent.part() != nullptr && agent.part()->members().size() == 4 &&
+           agent.part()->stage() == 1U && !network.agent(7).in_session();
+  };
+  REQUIRE(network.run(60.0, solved));
+  CHECK(agent.in_session());
+  CHECK(known == 0);
+  for (const RobotId id : {RobotId{7}, RobotId{33}})
+    (void)network.agent(id).add(inlier_set(problem, 7, 33, 2));
+  REQUIRE(network.run(60.0, [&] { return agent.part()->stage() != 1U; }));
+  REQUIRE(network.run(60.0, solved));
+  CHECK(known > 0);
+}
+
+TEST_CASE("every message may come late, twice and in any order", "[pose_graph][agent]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  const TeamProblem problem = ring(seed);
+  TeamNetwork network(seed);
+  network.usual = {.max_delay_s = 0.3, .lost = 0.05, .duplicated = 0.5};
+  std::vector<std::pair<RobotId, Parcel>> seen;
+  network.on_parcel = [&](RobotId from, const Parcel& parcel) { seen.emplace_back(from, parcel); };
+  for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
+  std::mt19937 rng(seed);
+  for (int k = 0; k < 200; ++k) {
+    (void)network.run(0.01);
+    if (seen.empty()) continue;
+    const auto& [from, parcel] = seen[rng() % seen.size()];  // long ago
+    (void)network.inject(from, parcel.next, *parcel.message);
+  }
+  REQUIRE(settle(network));
+  for (int k = 0; k < 100; ++k) {
+    const auto& [from, parcel] = seen[rng() % seen.size()];
+    (void)network.inject(from, parcel.next, *parcel.message);
+  }
+  (void)network.run(5.0);
+  REQUIRE(settle(network));
+  check_optimal(network, problem);
+}
+
+namespace {
+
+// Two robots that drive side by side over level ground, joined at many places. Odometry takes each
+// for pitching ever further, and their first keyframes for tilted otherwise than they are.
+struct Drive {
+  TeamPoses truth = {};
+  std::map<RobotId, std::vector<KeyframeOdometry>> odometry = {};
+  std::vector<Closure> closures = {};
+};
+
+Eigen::Vector3d up_at(const SE3& T) {
+  return T.linear().transpose() * Eigen::Vector3d::UnitZ();
+}
+
+double tilt_between(const SE3& a, const SE3& b) {
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  return std::acos(std::clamp((a.linear() * up_at(b)).dot(z), -1.0, 1.0));
+}
+
+Drive level_drive(double tilt_of_first) {
+  constexpr std::uint32_t kLength = 30;
+  Drive drive;
+  const SE3 drift = make_pose(so3_exp({0.0, 0.002, 0.0}), Eigen::Vector3d::Zero());
+  for (const RobotId robot : {RobotId{1}, RobotId{2}}) {
+    std::vector<SE3>& truth = drive.truth[robot];
+    for (std::uint32_t k = 0; k < kLength; ++k) {
+      truth.push_back(make_pose(Eigen::Matrix3d::Identity(), {1.0 * k, 2.0 * robot, 0.0}));
+      KeyframeOdometry keyframe;
+      keyframe.id = {robot, k};
+      if (k == 0) {
+        const Eigen::Matrix3d tilted = so3_exp({0.0, tilt_of_first * robot, 0.0});
+        keyframe.T_odom_kf = make_pose(tilted, Eigen::Vector3d::Zero());
+      } else {
+        keyframe.T_previous_kf = truth[k - 1].inverse() * truth[k] * drift;
+      }
+      keyframe.covariance = Matrix6::Identity() * 4e-6;
+      keyframe.vertical = Vertical{up_at(truth[k]), 5e-3};
+      drive.odometry[robot].push_back(keyframe);
+    }
+  }
+  for (std::uint32_t k = 0; k < kLength; k += 5) {
+    Closure closure;
+    closure.from.id = {1, k};
+    closure.to.id = {2, k};
+    closure.T_from_to = drive.truth[1][k].inverse() * drive.truth[2][k];
+    closure.covariance = Matrix6::Identity() * 1e-4;
+    drive.closures.push_back(closure);
+  }
+  return drive;
+}
+
+TeamPoses drive_to_the_end(const Drive& drive, const PoseGraphConfig& config) {
+  TeamNetwork network;
+  for (const auto& [robot, keyframes] : drive.odometry) {
+    TeamAgent& agent = network.add({robot, 1}, config, solver_choice(config));
+    for (const KeyframeOdometry& keyframe : keyframes) (void)agent.add(keyframe);
+    InlierSet set{1, 2, 1, {}};
+    for (const Closure& closure : drive.closures) {
+      (void)agent.add(closure);
+      set.closures.push_back(closure.id());
+    }
+    (void)agent.add(set);
+  }
+  REQUIRE(settle(network));
+  for (const auto& [id, robot] : network.robots) CHECK(robot.notices.empty());
+  return network.trajectories();
+}
+
+}  // namespace
+
+TEST_CASE("a team that knows which way is up ends level", "[pose_graph][agent][vertical]") {
+  PoseGraphConfig config;
+  config.method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
+  config.robust = GENERATE(true, false);
+  CAPTURE(to_string(config.method), config.robust);
+  const Drive drive = level_drive(0.01);
+  const TeamPoses poses = drive_to_the_end(drive, config);
+  double worst = 0.0;
+  for (const auto& [robot, truth] : drive.truth)
+    for (std::size_t k = 0; k < truth.size(); ++k)
+      worst = std::max(worst, tilt_between(poses.at(robot)[k], truth[k]));
+  // Odometry alone would be pitched by 58 mrad at the end.
+  CHECK(worst < 0.012);
+  // Where odometry says that keyframe 0 of the anchor is, there it is; its tilt is the team's.
+  const SE3& first = poses.at(1)[0];
+  CHECK(first.translation().norm() < 1e-6);
+  CHECK(std::abs(so3_log(first.linear()).z()) < 1e-6);
+}
+
+TEST_CASE("the vertical leads block descent and Newton's method to one optimum",
+          "[pose_graph][agent][vertical]") {
+  const Drive drive = level_drive(0.01);
+  PoseGraphConfig config;
+  config.max_rounds = 2000;
+  const TeamPoses newton = drive_to_the_end(drive, config);
+  config.method = PgoMethod::kRbcd;
+  const TeamPoses rbcd = drive_to_the_end(drive, config);
+  for (const auto& [robot, poses] : newton)
+    for (std::size_t k = 0; k < poses.size(); ++k) {
+      CAPTURE(robot, k);
+      const SE3& other = rbcd.at(robot)[k];
+      CHECK((poses[k].translation() - other.translation()).norm() < 2e-2);
+      CHECK(tilt_between(poses[k], other) < 2e-3);
+    }
+}
+
+TEST_CASE("one robot that does not know which way is up leaves the team as it was",
+          "[pose_graph][agent][vertical]") {
+  Drive one = level_drive(0.0), none = level_drive(0.0);
+  for (KeyframeOdometry& keyframe : one.odometry.at(2)) keyframe.vertical.reset();
+  for (auto& [robot, keyframes] : none.odometry)
+    for (KeyframeOdometry& keyframe : keyframes) keyframe.vertical.reset();
+  const TeamPoses with = drive_to_the_end(one, {}), without = drive_to_the_end(none, {});
+  for (const auto& [robot, poses] : with)
+    for (std::size_t k = 0; k < poses.size(); ++k)
+      CHECK(poses[k].isApprox(without.at(robot)[k], 1e-5));
+}
+
+}  // namespace km

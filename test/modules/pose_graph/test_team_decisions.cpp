@@ -1,0 +1,353 @@
+#include <catch2/catch.hpp>
+
+#include "modules/pose_graph/recorded_graph.hpp"
+#include "modules/pose_graph/solver_choice.hpp"
+#include "modules/pose_graph/tree_newton.hpp"
+#include "test/support/gather_solver.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/team_network.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kTolerance = 1e-6;  // of the cost, relative
+
+using Pairs = std::vector<std::pair<RobotId, RobotId>>;
+
+const std::vector<RobotId> kFour{2, 3, 5, 9};
+const Pairs kRing{{2, 3}, {3, 5}, {5, 9}, {2, 9}};
+constexpr std::uint32_t kKeyframes = 20;
+
+TeamProblem problem_of(unsigned seed) {
+  return random_team_problem({.robots = kFour,
+                              .pairs = kRing,
+                              .keyframes = kKeyframes,
+                              .closures = 10,
+                              .start_sigma = 0.0},
+                             seed);
+}
+
+void add_all(TeamNetwork& network, const TeamProblem& problem,
+             const MemberSolverFactory& factory = solver_choice({})) {
+  for (const auto& [robot, start] : problem.start)
+    feed(network.add({robot, 100U + robot}, {}, factory), robot, problem);
+}
+
+bool settle(TeamNetwork& network, double within_s = 300.0) {
+  const bool settled = network.run(within_s, [&] { return network.all_settled(); });
+  if (!settled) UNSCOPED_INFO(network.describe());
+  return settled;
+}
+
+std::size_t closures_of(const TeamProblem& problem) {
+  return static_cast<std::size_t>(std::count_if(problem.edges.begin(), problem.edges.end(),
+                                                [](const PoseEdge& e) { return !is_step(e); }));
+}
+
+// So that this part of all closures is false, between the robots of each pair and inside each.
+std::set<ClosureId> add_random_false(TeamProblem& problem, double part, unsigned seed) {
+  std::mt19937 rng(seed);
+  std::set<ClosureId> known, added;
+  for (const PoseEdge& e : problem.edges) known.insert(e.id());
+  Pairs pairs = kRing;
+  for (const RobotId robot : kFour) pairs.emplace_back(robot, robot);
+  const auto count =
+      static_cast<std::size_t>(part / (1.0 - part) * static_cast<double>(closures_of(problem)));
+  std::uniform_int_distribution<std::uint32_t> any(0, kKeyframes - 1);
+  while (added.size() < count) {
+    const auto& [a, b] = pairs[added.size() % pairs.size()];
+    const KeyframeId from{a, any(rng)};
+    const KeyframeId to{b, any(rng)};
+    if (from == to || !known.insert(closure_id(from, to)).second) continue;
+    added.insert(closure_id(from, to));
+    problem.edges.push_back({from, to, random_pose(rng, 5.0), problem.edges.back().precision});
+  }
+  return added;
+}
+
+TeamProblem without(TeamProblem problem, const std::set<ClosureId>& closures) {
+  std::erase_if(problem.edges, [&](const PoseEdge& e) { return closures.contains(e.id()); });
+  return problem;
+}
+
+// In a row, all off by the same motion: places that look alike.
+std::set<ClosureId> add_cluster(TeamProblem& problem, std::uint32_t count, unsigned seed) {
+  std::mt19937 rng(seed);
+  const SE3 off = random_pose(rng, 8.0);
+  std::set<ClosureId> known, added;
+  for (const PoseEdge& e : problem.edges) known.insert(e.id());
+  for (std::uint32_t k = 0; k < count; ++k) {
+    const KeyframeId from{2, 4 + k}, to{3, 9 + k};
+    if (!known.insert(closure_id(from, to)).second) continue;
+    const SE3 T = problem.start.at(2)[from.index].inverse() * off * problem.start.at(3)[to.index];
+    const Vector6 noise = 0.02 * random_vector<6>(rng);
+    problem.edges.push_back({from, to, T * se3_exp(noise), problem.edges.back().precision});
+    added.insert(closure_id(from, to));
+  }
+  return added;
+}
+
+std::set<ClosureId> rejected(const TeamNetwork& network) {
+  std::set<ClosureId> closures;
+  for (const auto& [id, robot] : network.robots)
+    for (const auto& [closure, kept] : robot.agent->decided())
+      if (!kept) closures.insert(closure);
+  return closures;
+}
+
+void check_ends_agree(const TeamNetwork& network) {
+  std::map<ClosureId, bool> decided;
+  for (const auto& [id, robot] : network.robots)
+    for (const auto& [closure, kept] : robot.agent->decided())
+      CHECK(decided.try_emplace(closure, kept).first->second == kept);
+}
+
+void check_cost(const TeamNetwork& network, const TeamProblem& problem) {
+  const CentralProblem whole(problem);
+  CHECK(whole.cost(network.trajectories()) ==
+        Approx(whole.optimum(problem.start)).epsilon(kTolerance));
+}
+
+}  // namespace
+
+TEST_CASE("random false closures are rejected and leave the optimum of the true ones",
+          "[pose_graph][decisions]") {
+  const unsigned seed = GENERATE(range(1U, 13U));
+  CAPTURE(seed);
+  TeamProblem problem = problem_of(seed);
+  const std::set<ClosureId> wrong = add_random_false(problem, 0.3, seed);
+  TeamNetwork network(seed);
+  network.usual = {.max_delay_s = 0.05, .lost = 0.05, .duplicated = 0.05};
+  add_all(network, problem);
+  network.wire({{2, 3}, {3, 5}, {5, 9}});
+  REQUIRE(settle(network));
+  CHECK(rejected(network) == wrong);
+  check_ends_agree(network);
+  check_cost(network, without(problem, wrong));
+}
+
+TEST_CASE("false closures that agree with each other are rejected where others contradict them",
+          "[pose_graph][decisions]") {
+  const unsigned seed = GENERATE(range(1U, 5U));
+  const std::uint32_t count = GENERATE(2U, 4U, 6U);
+  CAPTURE(seed, count);
+  TeamProblem problem = problem_of(seed);
+  const std::set<ClosureId> wrong = add_cluster(problem, count, seed);
+  TeamNetwork network(seed);
+  network.usual = {.max_delay_s = 0.05, .lost = 0.05};
+  add_all(network, problem);
+  REQUIRE(settle(network));
+  CHECK(rejected(network) == wrong);
+  check_ends_agree(network);
+  check_cost(network, without(problem, wrong));
+}
+
+TEST_CASE("a session after new closures takes few rounds and keeps what was decided",
+          "[pose_graph][decisions]") {
+  const unsigned seed = GENERATE(range(1U, 6U));
+  CAPTURE(seed);
+  TeamProblem all = problem_of(seed);
+  const std::set<ClosureId> wrong = add_random_false(all, 0.2, seed);
+  std::set<ClosureId> later;  // true ones of one pair
+  for (const PoseEdge& e : all.edges)
+    if (e.id().from.robot == 3 && e.id().to.robot == 5 && later.size() < 3 &&
+        !wrong.contains(e.id()))
+      later.insert(e.id());
+  REQUIRE(later.size() == 3);
+  TeamNetwork network(seed);
+  add_all(network, without(all, later));
+  REQUIRE(settle(network));
+  REQUIRE(rejected(network) == wrong);
+  const std::uint32_t first = network.agent(2).part()->state().round;
+  for (const RobotId robot : {RobotId{3}, RobotId{5}}) {
+    for (const PoseEdge& e : all.edges)
+      if (later.contains(e.id())) (void)network.agent(robot).add(closure_of(e));
+    (void)network.agent(robot).add(inlier_set(all, 3, 5, 2));
+  }
+  (void)network.run(1.0);
+  REQUIRE(settle(network));
+  const std::uint32_t second = network.agent(2).part()->state().round;
+  CAPTURE(first, second);
+  // One pair is weighed again; the rest is convergence to 1e-13 of the cost.
+  CHECK(second < first);
+  CHECK(second <= 20);
+  CHECK(rejected(network) == wrong);
+  check_ends_agree(network);
+  check_cost(network, without(all, wrong));
+}
+
+TEST_CASE("a closure that both robots have verified counts once", "[pose_graph][decisions]") {
+  const bool robust = GENERATE(true, false);
+  const TeamProblem problem = problem_of(1);
+  PoseGraphConfig config;
+  config.robust = robust;
+  TeamNetwork network;
+  for (const RobotId robot : kFour) {
+    TeamAgent& agent = network.add({robot, 1}, config, solver_choice(config));
+    feed_odometry(agent, robot, problem);
+    // Each hears its own verification first; the other one starts at the other end, and is worse.
+    const auto verify = [&](const PoseEdge& e) {
+      PoseEdge back{e.to, e.from,
+                    e.T_from_to.inverse() * make_pose(so3_exp({0.0, 0.0, 0.1}), {0.3, 0.0, 0.0}),
+                    e.precision};
+      back.precision.kappa *= 0.25;
+      back.precision.tau *= 0.25;
+      if (e.to.robot == robot) (void)agent.add(closure_of(back));
+      (void)agent.add(closure_of(e));
+      if (e.to.robot != robot) (void)agent.add(closure_of(back));
+    };
+    for (const PoseEdge& e : problem.edges)
+      if (!is_step(e) && (e.from.robot == robot || e.to.robot == robot)) verify(e);
+    for (const RobotId other : kFour) {
+      InlierSet set = inlier_set(problem, robot, other);
+      const std::vector<ClosureId> once = set.closures;
+      for (const ClosureId& id : once) set.closures.push_back({id.to, id.from});
+      if (!once.empty()) (void)agent.add(set);
+    }
+  }
+  REQUIRE(settle(network));
+  CHECK(rejected(network).empty());
+  check_cost(network, problem);
+}
+
+TEST_CASE("both ends of a closure enter every session with the same decisions",
+          "[pose_graph][decisions]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  TeamProblem problem = problem_of(seed);
+  (void)add_random_false(problem, 0.2, seed);
+  TeamNetwork network(seed);
+  network.usual = {.max_delay_s = 0.1, .lost = 0.1};
+  struct Entered {
+    std::optional<bool> decided;
+    std::size_t ends = 0;
+  };
+  std::map<std::pair<SessionId, ClosureId>, Entered> entered;
+  std::size_t differ = 0, known = 0;
+  const MemberSolverFactory newton = solver_choice({});
+  add_all(network, problem, [&](const Session& session, SessionGraph graph, TreePlace place) {
+    for (const PoseEdge& e : graph.between) {
+      const auto decided = graph.decided.find(e.id());
+      std::optional<bool> here;
+      if (decided != graph.decided.end()) here = decided->second;
+      known += here ? 1 : 0;
+      Entered& closure = entered[{session.id, e.id()}];
+      if (closure.ends++ == 0) closure.decided = here;
+      differ += closure.decided != here ? 1 : 0;
+    }
+    return newton(session, std::move(graph), std::move(place));
+  });
+  // Links that break sessions off, and a pair that learns of its closures late.
+  std::mt19937 rng(seed);
+  for (double at_s = 2.0; at_s < 60.0; at_s += 4.0) {
+    const auto [a, b] = kRing[rng() % kRing.size()];
+    network.at(at_s, [&network, a = a, b = b] { network.cut(a, b); });
+    network.at(at_s + 3.5, [&network, a = a, b = b] { network.restore(a, b); });
+    network.at(at_s, [&, version = static_cast<std::uint32_t>(2.0 + at_s)] {
+      for (const RobotId robot : {RobotId{5}, RobotId{9}})
+        (void)network.agent(robot).add(inlier_set(problem, 5, 9, version));
+    });
+  }
+  (void)network.run(70.0);
+  REQUIRE(settle(network));
+  CHECK(known > 0);
+  CHECK(differ == 0);
+}
+
+TEST_CASE("closures that were set aside and fit get two more chances", "[pose_graph][decisions]") {
+  const bool at_last = GENERATE(true, false);
+  CAPTURE(at_last);
+  const TeamProblem problem = problem_of(3);
+  const auto closure = std::find_if(problem.edges.begin(), problem.edges.end(), [](const auto& e) {
+    return e.id().from.robot == 5 && e.id().to.robot == 9;
+  });
+  REQUIRE(closure != problem.edges.end());
+  std::map<SessionId, std::set<std::optional<bool>>> sessions;  // what was decided before each
+  const MemberSolverFactory factory = [&](const Session& session, SessionGraph graph,
+                                          TreePlace place) {
+    GatherSolver::Options options{.barc = 100.0};
+    if (place.members.size() == kFour.size()) {
+      const auto decided = graph.decided.find(closure->id());
+      if (graph.self == 5 || graph.self == 9)
+        sessions[session.id].insert(
+            decided == graph.decided.end() ? std::nullopt : std::optional(decided->second));
+      if (!at_last || sessions.size() <= 1) options.rejects = {closure->id()};
+    }
+    return std::make_unique<GatherSolver>(std::move(graph), std::move(place), options);
+  };
+  TeamNetwork network;
+  add_all(network, problem, factory);
+  REQUIRE(settle(network));
+  (void)network.run(30.0);
+  REQUIRE(settle(network));
+  CHECK(sessions.size() == (at_last ? 2 : 3));
+  for (const auto& [id, before] : sessions) CHECK(before == std::set<std::optional<bool>>{{}});
+  for (const RobotId robot : {RobotId{5}, RobotId{9}})
+    CHECK(network.agent(robot).decided().at(closure->id()) == at_last);
+}
+
+namespace {
+
+// Everything that was recorded, each robot in its own frame by odometry.
+TeamProblem recorded_team(const std::filesystem::path& folder, int robots) {
+  TeamProblem problem;
+  for (int k = 0; k < robots; ++k) {
+    const auto part = read_recorded_graph(folder / ("robot" + std::to_string(k) + ".csv"));
+    std::vector<SE3>& poses = problem.start[part.robot];
+    poses.push_back(SE3::Identity());
+    for (const RelativePose& e : part.odometry) poses.push_back(poses.back() * e.T_from_to);
+    for (const auto* edges : {&part.odometry, &part.intra_closures, &part.inter_closures})
+      for (const RelativePose& e : *edges) problem.edges.push_back(*pose_edge(e));
+  }
+  problem.edges = in_order(problem.edges);
+  return problem;
+}
+
+// What one session rejects that knows nothing before, with the robots where `frames` has them.
+std::set<ClosureId> rejected_at_once(TeamProblem problem, const TeamPoses& frames) {
+  for (auto& [robot, poses] : problem.start) {
+    const SE3 T_frame_own = frames.at(robot).front() * poses.front().inverse();
+    for (SE3& T : poses) T = T_frame_own * T;
+  }
+  problem.start = with_public_poses_rounded(problem.start, problem.edges);
+  SolverTeam team =
+      solver_team(problem, star(problem.members()), {}, [](SessionGraph graph, TreePlace place) {
+        return std::make_unique<TreeNewton>(std::move(graph), std::move(place),
+                                            TreeNewtonOptions{});
+      });
+  REQUIRE(team.run());
+  std::set<ClosureId> closures;
+  for (const RobotId robot : problem.members())
+    for (const WeighedClosure& closure : team.member(robot).verdicts().closures)
+      if (!closure.kept) closures.insert(closure.id);
+  return closures;
+}
+
+}  // namespace
+
+// Every robot has had a session of its own before, and knows the noise badly from that.
+TEST_CASE("eight robots in tunnels decide as one session would that knows nothing before",
+          "[pose_graph][decisions]") {
+  const auto folder = shared_data("multi_robot/tunnels_8robots");
+  if (!folder) return;
+  const TeamProblem problem = recorded_team(*folder, 8);
+  TeamNetwork network;
+  network.usual = {.min_delay_s = 0.002, .max_delay_s = 0.01};
+  add_all(network, problem);
+  REQUIRE(settle(network));
+  check_ends_agree(network);
+  const std::set<ClosureId> out = rejected(network);
+  const std::set<ClosureId> at_once = rejected_at_once(problem, network.trajectories());
+  std::vector<ClosureId> differ;
+  std::set_symmetric_difference(out.begin(), out.end(), at_once.begin(), at_once.end(),
+                                std::back_inserter(differ));
+  const SolverState state = network.agent(0).part()->state();
+  CAPTURE(out.size(), at_once.size(), state.noise_scale, state.round);
+  const auto kept = static_cast<double>(closures_of(problem) - at_once.size());
+  CHECK(static_cast<double>(differ.size()) < 0.01 * kept);  // Jaccard's index
+  TeamProblem rest = without(problem, out);
+  rest.start = network.trajectories();
+  check_cost(network, rest);
+}
+
+}  // namespace km

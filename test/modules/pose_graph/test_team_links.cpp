@@ -1,0 +1,45 @@
+#include <catch2/catch.hpp>
+
+#include "modules/core/team_links.hpp"
+
+namespace km {
+namespace {
+
+void link(TeamLinks& links, const std::vector<std::pair<RobotId, RobotId>>& pairs) {
+  std::map<RobotId, std::set<RobotId>> heard;
+  for (const auto& [a, b] : pairs) {
+    heard[a].insert(b);
+    heard[b].insert(a);
+  }
+  for (const auto& [robot, others] : heard) (void)links.tell(robot, others);
+}
+
+}  // namespace
+
+TEST_CASE("a link counts if both of its ends say so", "[core]") {
+  TeamLinks links;
+  CHECK(links.tell(1, {2}));
+  CHECK_FALSE(links.tell(1, {2}));
+  CHECK(links.hears(1, 2));
+  CHECK_FALSE(links.linked(1, 2));
+  CHECK(links.component(1) == std::set<RobotId>{1});
+  CHECK(links.tell(2, {1, 7}));
+  CHECK(links.linked(2, 1));
+  CHECK(links.neighbours(2) == std::vector<RobotId>{1});
+  links.forget(1);
+  CHECK_FALSE(links.linked(1, 2));
+}
+
+TEST_CASE("a team is who links lead to, and paths are the shortest", "[core]") {
+  TeamLinks links;
+  // A ring of five, a tail at 3, and two apart.
+  link(links, {{1, 2}, {2, 3}, {3, 4}, {4, 5}, {1, 5}, {3, 9}, {20, 21}});
+  CHECK(links.component(9) == std::set<RobotId>{1, 2, 3, 4, 5, 9});
+  CHECK(links.component(21) == std::set<RobotId>{20, 21});
+  CHECK(links.distances(9).at(5) == 3);
+  CHECK(links.distances(1).at(9) == 3);
+  CHECK(links.distances(4).at(1) == 2);
+  CHECK_FALSE(links.distances(1).contains(20));
+}
+
+}  // namespace km

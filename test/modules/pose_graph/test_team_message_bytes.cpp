@@ -1,0 +1,397 @@
+#include <catch2/catch.hpp>
+
+#include <limits>
+#include <random>
+
+#include "modules/core/bytes.hpp"
+#include "modules/pose_graph/team_message_bytes.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr TeamPeer kPeer2{2, 0x1122334455667788};
+constexpr TeamPeer kPeer7{7, 0x8877665544332211};
+constexpr TeamPeer kPeer60000{60000, 1};
+
+TeamStatus some_status() {
+  std::mt19937 random(1);
+  return {.sender = kPeer7,
+          .number = 300,
+          .hears = {kPeer2, kPeer60000},
+          .frame = kPeer2,
+          .frame_version = 5,
+          .keyframes = 1000,
+          .revision = 1007,
+          .offers = {{2, 12, {3, 0xABCDEF0123456789}}, {2, 9, {2, 5}}, {60000, 1, {1, 77}}},
+          .method = PgoMethod::kRbcd,
+          .T_odom_first = random_pose(random, 2.0),
+          .upright = true,
+          .holds = 0xFEDCBA9876543210};
+}
+
+Session some_session() {
+  std::mt19937 random(2);
+  return {.id = {kPeer2, 9},
+          .number = 41,
+          .plan = {.frame = kPeer7,
+                   .members = {{kPeer7, 1007, RobotId{2}},
+                               {kPeer2, 4, {}},
+                               {kPeer60000, 9, RobotId{7}}},
+                   .pairs = {{2, 7, {3, 5}}, {2, 60000, {1, 6}}, {7, 60000, {2, 7}}}},
+          .method = PgoMethod::kNewton,
+          .upright = true,
+          .max_rounds = 50,
+          .anchor = 7,
+          .T_frame_world = random_pose(random, 2.0),
+          .round = 3,
+          .cost = 1.0 / 3.0,
+          .gradient = 1e-9,
+          .finished = true};
+}
+
+MemberPoses some_poses() {
+  std::mt19937 random(3);
+  MemberPoses poses{.sender = kPeer7,
+                    .number = 12,
+                    .session = {kPeer2, 9},
+                    .stage = 1,
+                    .frame = kPeer2,
+                    .frame_version = 8,
+                    .step_precision = {123.456, 7.0},
+                    .keyframes = {0, 1, 5, 200, 4'000'000'000U}};
+  for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
+    poses.T_frame_kf.push_back(SinglePose::of(random_pose(random, 100.0)));
+  poses.verdicts = {{closure_id({7, 200}, {2, 3}), true}, {closure_id({7, 5}, {60000, 9}), false}};
+  poses.sent_bytes = 5'000'000'000;
+  return poses;
+}
+
+SessionLetter some_letter() {
+  return {.sender = kPeer60000,
+          .session = {kPeer2, 9},
+          .number = 130,
+          .to = 7,
+          .bytes = std::make_shared<const Bytes>(Bytes{0, 1, 2, 255}),
+          .copy = 131,
+          .received = 129};
+}
+
+std::vector<TeamMessage> one_of_each() {
+  return {some_status(), some_session(), some_poses(), some_letter()};
+}
+
+template <typename T>
+T decoded(const Bytes& bytes) {
+  auto result = decode_team_message(bytes);
+  CAPTURE(result.refusal == nullptr ? "" : result.refusal);
+  REQUIRE(result.value);
+  return std::get<T>(std::move(*result.value));
+}
+
+template <typename T>
+T round_trip(const T& message) {
+  return decoded<T>(encode(message));
+}
+
+const char* refusal_of(const TeamMessage& message) {
+  const auto result = decode_team_message(encode(message));
+  return result.value ? "" : result.refusal;
+}
+
+constexpr double kRounding = 1e-14;  // of a rotation told as a quaternion
+
+TEST_CASE("A team's status comes back as it was told", "[pose_graph]") {
+  const TeamStatus told = some_status();
+  const TeamStatus heard = round_trip(told);
+  CHECK(heard.sender == told.sender);
+  CHECK(heard.number == told.number);
+  CHECK(heard.hears == told.hears);
+  CHECK(heard.frame == told.frame);
+  CHECK(heard.frame_version == told.frame_version);
+  CHECK(heard.keyframes == told.keyframes);
+  CHECK(heard.revision == told.revision);
+  CHECK(heard.offers == told.offers);
+  CHECK(heard.method == told.method);
+  CHECK(heard.T_odom_first.isApprox(told.T_odom_first, kRounding));
+  CHECK(heard.upright == told.upright);
+  CHECK(heard.holds == told.holds);
+}
+
+TEST_CASE("A session comes back as it was told", "[pose_graph]") {
+  Session told = some_session();
+  const Session heard = round_trip(told);
+  CHECK(heard.id == told.id);
+  CHECK(heard.number == told.number);
+  CHECK(heard.plan == told.plan);
+  CHECK(heard.method == told.method);
+  CHECK(heard.upright == told.upright);
+  CHECK(heard.max_rounds == told.max_rounds);
+  CHECK(heard.anchor == told.anchor);
+  REQUIRE(heard.T_frame_world);
+  CHECK(heard.T_frame_world->isApprox(*told.T_frame_world, kRounding));
+  CHECK(heard.round == told.round);
+  CHECK(heard.cost == told.cost);
+  CHECK(heard.gradient == told.gradient);
+  CHECK(heard.finished == told.finished);
+  told.T_frame_world.reset();
+  CHECK_FALSE(round_trip(told).T_frame_world);
+}
+
+TEST_CASE("Poses of a member come back to the last bit, in 29 bytes each", "[pose_graph]") {
+  const MemberPoses told = some_poses();
+  const MemberPoses heard = round_trip(told);
+  CHECK(heard.sender == told.sender);
+  CHECK(heard.number == told.number);
+  CHECK(heard.session == told.session);
+  CHECK(heard.stage == told.stage);
+  CHECK(heard.frame == told.frame);
+  CHECK(heard.frame_version == told.frame_version);
+  CHECK(heard.step_precision.kappa == told.step_precision.kappa);
+  CHECK(heard.step_precision.tau == told.step_precision.tau);
+  CHECK(heard.keyframes == told.keyframes);
+  REQUIRE(heard.T_frame_kf.size() == told.T_frame_kf.size());
+  for (std::size_t k = 0; k < told.T_frame_kf.size(); ++k) {
+    CHECK(heard.T_frame_kf[k].q.coeffs() == told.T_frame_kf[k].q.coeffs());
+    CHECK(heard.T_frame_kf[k].t == told.T_frame_kf[k].t);
+  }
+  REQUIRE(heard.verdicts.size() == told.verdicts.size());
+  for (std::size_t k = 0; k < told.verdicts.size(); ++k) {
+    CHECK(heard.verdicts[k].id == told.verdicts[k].id);
+    CHECK(heard.verdicts[k].kept == told.verdicts[k].kept);
+  }
+  CHECK(heard.sent_bytes == told.sent_bytes);
+
+  MemberPoses many = told;
+  many.keyframes.clear();
+  many.verdicts.clear();
+  for (KeyframeIndex k = 0; k < 1000; ++k) many.keyframes.push_back(3 * k);
+  many.T_frame_kf.assign(1000, told.T_frame_kf[0]);
+  CHECK(encode(many).size() < 29 * 1000 + 80);
+}
+
+TEST_CASE("A letter comes back as it was told", "[pose_graph]") {
+  SessionLetter told = some_letter();
+  const SessionLetter heard = round_trip(told);
+  CHECK(heard.sender == told.sender);
+  CHECK(heard.session == told.session);
+  CHECK(heard.number == told.number);
+  CHECK(heard.to == told.to);
+  CHECK(heard.copy == told.copy);
+  CHECK(heard.received == told.received);
+  REQUIRE(heard.bytes);
+  CHECK(*heard.bytes == *told.bytes);
+  told.bytes = nullptr;
+  CHECK(round_trip(told).bytes->empty());
+}
+
+TEST_CASE("Messages with nothing in them are messages", "[pose_graph]") {
+  CHECK(round_trip(TeamStatus{.sender = kPeer2, .frame = kPeer2}).hears.empty());
+  CHECK(round_trip(MemberPoses{.sender = kPeer2}).keyframes.empty());
+}
+
+TEST_CASE("What encoding gives is what decoding takes, to the last byte", "[pose_graph]") {
+  for (const TeamMessage& message : one_of_each()) {
+    CAPTURE(message.index());
+    const Bytes bytes = encode(message);
+    const auto again = decode_team_message(bytes);
+    REQUIRE(again.value);
+    CHECK(again.value->index() == message.index());
+    // A rotation may be rounded again: its double comes back to itself from then on.
+    CHECK(encode(*again.value).size() == bytes.size());
+  }
+}
+
+TEST_CASE("No message that is cut short is taken", "[pose_graph]") {
+  for (const TeamMessage& message : one_of_each()) {
+    const bool is_letter = std::holds_alternative<SessionLetter>(message);
+    const Bytes bytes = encode(message);
+    // What a letter says may have any length.
+    const std::size_t end = is_letter ? bytes.size() - some_letter().bytes->size() : bytes.size();
+    for (std::size_t size = 0; size < end; ++size) {
+      CAPTURE(message.index(), size);
+      const auto result = decode_team_message(std::span(bytes).first(size));
+      CHECK_FALSE(result.value);
+      CHECK(result.refusal != nullptr);
+    }
+    if (is_letter) continue;
+    Bytes longer = bytes;
+    longer.push_back(0);
+    CHECK_FALSE(decode_team_message(longer).value);
+  }
+}
+
+TEST_CASE("Counts that are not there are refused before memory is asked for", "[pose_graph]") {
+  ByteWriter out;
+  out.u8(2);  // poses
+  for (int k = 0; k < 2; ++k) {
+    out.varint(7);
+    out.u64(1);
+    out.varint(3);
+  }
+  out.varint(1);
+  out.varint(7);
+  out.u64(1);
+  out.varint(0);
+  out.f64(1.0);
+  out.f64(1.0);
+  out.varint(GENERATE(std::uint64_t{kMaxPublicPoses}, std::uint64_t{kMaxPublicPoses} + 1,
+                      std::numeric_limits<std::uint64_t>::max()));
+  out.bytes(Bytes(1000, 0));
+  CHECK_FALSE(decode_team_message(out.release()).value);
+}
+
+TEST_CASE("A status is refused where it contradicts itself", "[pose_graph]") {
+  TeamStatus m = some_status();
+  SECTION("heard robots out of order") {
+    std::swap(m.hears[0], m.hears[1]);
+  }
+  SECTION("a robot heard twice") {
+    m.hears[1] = {m.hears[0].robot, 99};
+  }
+  SECTION("a robot that hears itself") {
+    m.hears[1] = m.sender;
+  }
+  SECTION("offers out of order") {
+    std::swap(m.offers[0], m.offers[2]);
+  }
+  SECTION("an offer to itself") {
+    m.offers[0].peer = m.sender.robot;
+  }
+  SECTION("an offer without edges") {
+    m.offers[0].edges = 0;
+  }
+  SECTION("a method that is not known") {
+    m.method = static_cast<PgoMethod>(2);
+  }
+  SECTION("an origin that is not finite") {
+    m.T_odom_first.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  }
+  SECTION("an origin out of this world") {
+    m.T_odom_first.translation().x() = 1e9;
+  }
+  SECTION("too large a team") {
+    m.hears.clear();
+    for (std::size_t k = 0; k <= kMaxTeam; ++k)
+      m.hears.push_back({static_cast<RobotId>(k + 10), 1});
+  }
+  CHECK(refusal_of(m) != std::string());
+}
+
+TEST_CASE("A session is refused where it contradicts itself", "[pose_graph]") {
+  Session m = some_session();
+  SECTION("no members") {
+    m.plan.members.clear();
+    m.plan.pairs.clear();
+  }
+  SECTION("a member twice") {
+    m.plan.members[2].peer.robot = 2;
+  }
+  SECTION("a parent that is no member") {
+    m.plan.members[0].parent = RobotId{8};
+  }
+  SECTION("its own parent") {
+    m.plan.members[1].parent = RobotId{2};
+  }
+  SECTION("parents in a circle") {
+    m.plan.members[1].parent = RobotId{60000};
+  }
+  SECTION("a pair with a stranger") {
+    m.plan.pairs[2].b = 60001;
+  }
+  SECTION("a pair the wrong way round") {
+    std::swap(m.plan.pairs[0].a, m.plan.pairs[0].b);
+  }
+  SECTION("pairs out of order") {
+    std::swap(m.plan.pairs[0], m.plan.pairs[1]);
+  }
+  SECTION("a method that is not known") {
+    m.method = static_cast<PgoMethod>(2);
+  }
+  SECTION("no cost") {
+    m.cost = std::numeric_limits<double>::infinity();
+  }
+  SECTION("no gradient") {
+    m.gradient = std::numeric_limits<double>::quiet_NaN();
+  }
+  CHECK(refusal_of(m) != std::string());
+}
+
+TEST_CASE("Poses are refused where they are none", "[pose_graph]") {
+  MemberPoses m = some_poses();
+  SECTION("keyframes out of order") {
+    std::swap(m.keyframes[1], m.keyframes[2]);
+  }
+  SECTION("keyframe 0 is missing") {
+    m.keyframes[0] = 1, m.keyframes[1] = 2;
+  }
+  SECTION("fewer poses than keyframes") {
+    m.T_frame_kf.pop_back();
+  }
+  SECTION("more poses than keyframes") {
+    m.T_frame_kf.push_back(m.T_frame_kf[0]);
+  }
+  SECTION("not finite") {
+    m.T_frame_kf[3].t.z() = std::numeric_limits<float>::infinity();
+  }
+  SECTION("no rotation") {
+    m.T_frame_kf[3].q.coeffs() *= 1.01F;
+  }
+  SECTION("no weight") {
+    m.step_precision.tau = 0.0;
+  }
+  SECTION("too much weight") {
+    m.step_precision.kappa = 1e300;
+  }
+  SECTION("a closure of a keyframe with itself") {
+    m.verdicts[0].id.from = m.verdicts[0].id.to;
+  }
+  SECTION("a closure the wrong way round") {
+    std::swap(m.verdicts[0].id.from, m.verdicts[0].id.to);
+  }
+  CHECK(refusal_of(m) != std::string());
+}
+
+TEST_CASE("A letter to its own robot is refused", "[pose_graph]") {
+  SessionLetter m = some_letter();
+  m.to = m.sender.robot;
+  CHECK(refusal_of(m) != std::string());
+}
+
+TEST_CASE("Changed bytes give a message or a reason", "[pose_graph]") {
+  const auto seed = GENERATE(1U, 2U, 3U, 4U);
+  CAPTURE(seed);
+  std::mt19937 random(seed);
+  std::vector<Bytes> originals;
+  for (const TeamMessage& message : one_of_each()) originals.push_back(encode(message));
+  std::size_t taken = 0;
+  for (int run = 0; run < 30000; ++run) {
+    Bytes bytes = originals[random() % originals.size()];
+    const std::size_t changes = 1 + random() % 3;
+    for (std::size_t k = 0; k < changes; ++k) {
+      const std::size_t place = random() % bytes.size();
+      const auto value = static_cast<std::uint8_t>(random());
+      switch (random() % 3) {
+        case 0:
+          bytes[place] = value;
+          break;
+        case 1:
+          bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(place), value);
+          break;
+        default:
+          bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(place));
+      }
+    }
+    const auto result = decode_team_message(bytes);
+    if (result.value.has_value() == (result.refusal != nullptr)) FAIL("neither or both");
+    // What is taken can be told on.
+    if (result.value && !decode_team_message(encode(*result.value)).value) FAIL("not stable");
+    taken += result.value ? 1 : 0;
+  }
+  CHECK(taken > 1000);  // most of what varies may have any value
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,374 @@
+#include <catch2/catch.hpp>
+
+#include "modules/pose_graph/solver_choice.hpp"
+#include "modules/pose_graph/tree_letters.hpp"
+#include "test/support/team_network.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kHour_s = 3600.0;
+constexpr double kTolerance = 1e-6;  // of the cost, relative
+
+using Pairs = std::vector<std::pair<RobotId, RobotId>>;
+
+std::vector<RobotId> numbered(std::size_t robots) {
+  std::vector<RobotId> ids;
+  for (std::size_t k = 1; k <= robots; ++k) ids.push_back(static_cast<RobotId>(k));
+  return ids;
+}
+
+Pairs line(const std::vector<RobotId>& ids) {
+  Pairs pairs;
+  for (std::size_t k = 0; k + 1 < ids.size(); ++k) pairs.emplace_back(ids[k], ids[k + 1]);
+  return pairs;
+}
+
+TeamProblem problem_of(const std::vector<RobotId>& ids, const Pairs& closures, unsigned seed,
+                       std::uint32_t keyframes = 12) {
+  return random_team_problem(
+      {.robots = ids, .pairs = closures, .keyframes = keyframes, .closures = 6}, seed);
+}
+
+// No closure is false here. The threshold that is found would reject one of 10000 all the same.
+PoseGraphConfig robust(bool on) {
+  PoseGraphConfig config;
+  config.robust = on;
+  config.barc = 8.0;
+  return config;
+}
+
+void add_all(TeamNetwork& network, const TeamProblem& problem,
+             const PoseGraphConfig& config = robust(true)) {
+  for (const auto& [robot, start] : problem.start)
+    feed(network.add({robot, 100U + robot}, config, solver_choice(config)), robot, problem);
+}
+
+PoseGraphConfig rbcd() {
+  PoseGraphConfig config;
+  config.method = PgoMethod::kRbcd;
+  config.min_relative_decrease = 1e-9;
+  return config;
+}
+
+// Of the cost, relative: block descent ends where it gets slow.
+constexpr double kRbcdTolerance = 1e-4;
+
+// One session of all that live, in the frame of the lowest, at the least cost there is.
+void check_optimal(const TeamNetwork& network, const TeamProblem& problem,
+                   double tolerance = kTolerance) {
+  const RobotId anchor = problem.start.begin()->first;
+  for (const auto& [id, robot] : network.robots) {
+    CAPTURE(id);
+    REQUIRE(robot.trajectory);
+    CHECK(robot.trajectory->anchor == anchor);
+    CHECK(robot.progress.members == problem.members());
+  }
+  const CentralProblem whole(problem);
+  const double optimum = whole.optimum(problem.start);
+  CHECK(whole.cost(network.trajectories()) == Approx(optimum).epsilon(tolerance));
+  CHECK(network.undecodable == 0);
+}
+
+bool settle(TeamNetwork& network, double within_s = kHour_s) {
+  const bool settled = network.run(within_s, [&] { return network.all_settled(); });
+  if (!settled) UNSCOPED_INFO(network.describe());
+  return settled;
+}
+
+}  // namespace
+
+TEST_CASE("a robot that only one other hears is taken in at the cost of all links",
+          "[pose_graph][network]") {
+  const bool all_links = GENERATE(true, false);
+  const bool weighed = GENERATE(true, false);
+  CAPTURE(all_links, weighed);
+  const TeamProblem problem = problem_of({1, 2, 3}, {{1, 2}, {2, 3}}, 1);
+  TeamNetwork network;
+  add_all(network, problem, robust(weighed));
+  if (!all_links) network.cut(1, 3);
+  REQUIRE(settle(network, 10.0));
+  CAPTURE(network.now_s());
+  CHECK(network.now_s() < 5.0);
+  check_optimal(network, problem);
+}
+
+TEST_CASE("any links that connect the team do", "[pose_graph][network]") {
+  struct Wiring {
+    const char* name;
+    std::size_t robots;
+    Pairs links;
+    Pairs closures;
+  };
+  const Wiring wiring =
+      GENERATE(Wiring{"chain of 3", 3, {{1, 2}, {2, 3}}, {{1, 2}, {2, 3}}},
+               Wiring{"chain of 8", 8, line(numbered(8)), line(numbered(8))},
+               Wiring{"chain of 8 with a ring of closures",
+                      8,
+                      line(numbered(8)),
+                      {{1, 4}, {4, 7}, {7, 2}, {2, 5}, {5, 8}, {8, 3}, {3, 6}, {6, 1}}},
+               Wiring{"star around the highest",
+                      5,
+                      {{1, 5}, {2, 5}, {3, 5}, {4, 5}},
+                      {{1, 2}, {2, 3}, {3, 4}, {4, 5}}},
+               Wiring{"ring",
+                      6,
+                      {{1, 2}, {2, 3}, {3, 4}, {4, 5}, {5, 6}, {1, 6}},
+                      {{1, 4}, {2, 5}, {3, 6}, {1, 2}, {2, 3}}});
+  const auto [config, tolerance] = GENERATE(table<PoseGraphConfig, double>(
+      {{robust(true), kTolerance}, {robust(false), kTolerance}, {rbcd(), kRbcdTolerance}}));
+  CAPTURE(wiring.name, to_string(config.method), config.robust);
+  const TeamProblem problem = problem_of(numbered(wiring.robots), wiring.closures, 2);
+  TeamNetwork network;
+  add_all(network, problem, config);
+  network.wire(wiring.links);
+  REQUIRE(settle(network, 30.0));
+  CAPTURE(network.now_s());
+  // Block descent takes many letters, which have to be paid for before the next session.
+  CHECK(network.now_s() < (config.method == PgoMethod::kRbcd ? 15.0 : 10.0));
+  check_optimal(network, problem, tolerance);
+}
+
+TEST_CASE("robots without closures pass on what the others say", "[pose_graph][network]") {
+  TeamProblem problem = problem_of({1, 2, 3, 4}, {{1, 4}}, 3);
+  TeamNetwork network;
+  add_all(network, problem);
+  network.wire(line({1, 2, 3, 4}));
+  const auto both = [&] {
+    return network.robots.at(1).progress.settled && network.robots.at(4).progress.settled &&
+           network.robots.at(4).progress.members.size() == 2;
+  };
+  REQUIRE(network.run(30.0, both));
+  CHECK(network.robots.at(4).trajectory->anchor == 1);
+  CHECK(network.robots.at(2).progress.members == std::vector<RobotId>{2});
+}
+
+TEST_CASE("links that come and go every two seconds do not keep a team from its optimum",
+          "[pose_graph][network]") {
+  const unsigned seed = GENERATE(range(1U, 9U));
+  CAPTURE(seed);
+  const auto ids = numbered(5);
+  const TeamProblem problem = problem_of(ids, {{1, 2}, {2, 3}, {3, 4}, {4, 5}, {1, 5}}, seed);
+  TeamNetwork network(seed);
+  network.usual.max_delay_s = 0.02;
+  add_all(network, problem);
+  network.wire({{1, 2}, {2, 3}, {3, 4}, {4, 5}, {2, 4}});
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<double> phase_s(0.0, 4.0);
+  for (const auto& [a, b] : Pairs{{1, 2}, {2, 3}, {3, 4}, {4, 5}, {2, 4}}) {
+    bool up = false;
+    for (double at_s = phase_s(rng); at_s < 600.0; at_s += 2.0, up = !up)
+      network.at(at_s, [&network, a = a, b = b, up] { network.switch_link(a, b, up); });
+  }
+  REQUIRE(settle(network, 600.0));
+  CAPTURE(network.now_s());
+  CHECK(network.now_s() < 120.0);
+  check_optimal(network, problem);
+}
+
+TEST_CASE("a fifth of all messages may be lost", "[pose_graph][network]") {
+  const unsigned seed = GENERATE(range(1U, 5U));
+  const bool chain = GENERATE(true, false);
+  const bool descends = GENERATE(false, true);
+  CAPTURE(seed, chain, descends);
+  const auto ids = numbered(6);
+  const TeamProblem problem = problem_of(ids, line(ids), seed);
+  TeamNetwork network(seed);
+  network.usual = {.max_delay_s = 0.02, .lost = 0.2, .duplicated = 0.1};
+  add_all(network, problem, descends ? rbcd() : robust(true));
+  if (chain) network.wire(line(ids));
+  REQUIRE(settle(network, 600.0));
+  CAPTURE(network.now_s());
+  CHECK(network.now_s() < (descends ? 300.0 : 120.0));
+  check_optimal(network, problem, descends ? kRbcdTolerance : kTolerance);
+}
+
+TEST_CASE("delays up to a second cost time alone", "[pose_graph][network]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  const auto ids = numbered(5);
+  const TeamProblem problem = problem_of(ids, line(ids), seed);
+  TeamNetwork network(seed);
+  network.usual = {.min_delay_s = 0.0, .max_delay_s = 1.0, .duplicated = 0.2};
+  add_all(network, problem);
+  network.wire(line(ids));
+  REQUIRE(settle(network, 600.0));
+  CAPTURE(network.now_s());
+  CHECK(network.now_s() < 300.0);
+  check_optimal(network, problem);
+}
+
+TEST_CASE("the others come to an end when a member dies, and it catches up when it is back",
+          "[pose_graph][network]") {
+  const RobotId gone = GENERATE(RobotId{1}, RobotId{2}, RobotId{4});
+  const std::size_t after_parcels = GENERATE(range<std::size_t>(0, 320, 20));
+  const bool weighed = GENERATE(true, false);
+  CAPTURE(gone, after_parcels, weighed);
+  const auto ids = numbered(4);
+  const TeamProblem problem = problem_of(ids, {{1, 2}, {2, 3}, {3, 4}, {1, 4}}, 5);
+  TeamNetwork network;
+  add_all(network, problem, robust(weighed));
+  REQUIRE(settle(network, 30.0));
+  const CentralProblem whole(problem);
+  // More becomes known, and with it a session begins that does not come to its end.
+  TeamProblem more = problem;
+  const TeamProblem other = problem_of(ids, {{1, 3}, {2, 4}}, 5);
+  for (const PoseEdge& e : other.edges)
+    if (e.from.robot != e.to.robot && e.id().from.robot + 2 == e.id().to.robot)
+      more.edges.push_back(e);
+  for (const RobotId robot : ids) feed_closures(network.agent(robot), robot, more, 2);
+  std::size_t parcels = 0;
+  network.on_parcel = [&](RobotId, const Parcel& parcel) {
+    parcels += std::holds_alternative<TeamStatus>(*parcel.message) ? 0 : 1;
+  };
+  (void)network.run(60.0, [&] { return parcels >= after_parcels && parcels > 0; });
+  network.kill(gone);
+  const double gone_s = network.now_s();
+  const double before = CentralProblem(more).cost(network.trajectories());
+  (void)network.run(1.0);
+  REQUIRE(network.run(60.0, [&] {
+    return network.all_settled() && network.robots.at(3).progress.members.size() == 3;
+  }));
+  CHECK(network.now_s() - gone_s < 20.0);
+  for (const auto& [id, robot] : network.robots)
+    if (id != gone) CHECK(robot.trajectory->anchor == 1);  // `world` stays
+  CHECK(CentralProblem(more).cost(network.trajectories()) <= before * (1.0 + 1e-3));
+  network.revive(gone);
+  (void)network.run(1.0);
+  REQUIRE(settle(network, 60.0));
+  check_optimal(network, more);
+}
+
+TEST_CASE("a team that falls apart goes on in two, in one frame, and becomes one again",
+          "[pose_graph][network]") {
+  const double apart_at_s = GENERATE(0.1, 0.3, 1.0, 5.0, 20.0);
+  CAPTURE(apart_at_s);
+  const auto ids = numbered(6);
+  const TeamProblem problem = problem_of(ids, line(ids), 6);
+  TeamNetwork network;
+  network.usual = {.min_delay_s = 0.005, .max_delay_s = 0.02};
+  add_all(network, problem);
+  network.wire(line(ids));
+  (void)network.run(apart_at_s);
+  network.cut(3, 4);
+  const auto settled_in_two = [&] {
+    return std::all_of(ids.begin(), ids.end(), [&](RobotId id) {
+      const OptimizerProgress& progress = network.robots.at(id).progress;
+      return progress.settled && progress.members.size() == 3;
+    });
+  };
+  REQUIRE(network.run(60.0, settled_in_two));
+  if (apart_at_s >= 20.0)
+    for (const RobotId id : ids) CHECK(network.robots.at(id).trajectory->anchor == 1);
+  network.restore(3, 4);
+  (void)network.run(1.0);
+  REQUIRE(settle(network, 60.0));
+  check_optimal(network, problem);
+}
+
+TEST_CASE("a session that is cut short leaves an improvement or the start",
+          "[pose_graph][network]") {
+  const int cut_after = GENERATE(range(20, 320, 20));
+  const PgoMethod method = GENERATE(PgoMethod::kNewton, PgoMethod::kRbcd);
+  CAPTURE(cut_after, to_string(method));
+  const auto ids = numbered(5);
+  const TeamProblem problem = problem_of(ids, {{1, 2}, {2, 3}, {3, 4}, {4, 5}, {1, 5}}, 7, 20);
+  TeamNetwork network;
+  network.usual = {.min_delay_s = 0.05, .max_delay_s = 0.2};
+  PoseGraphConfig config;
+  config.method = method;
+  config.robust = false;
+  config.status_period_s = 0.3;
+  add_all(network, problem, config);
+  network.wire(line(ids));
+  int steps = 0;
+  std::map<RobotId, std::vector<SE3>> start;
+  network.on_step = [&](const TeamNetwork::Robot& robot) {
+    const SessionPart* part = robot.agent->part();
+    if (part == nullptr || part->members().size() < 5 || !part->stage()) return;
+    if (part->worked()) ++steps;
+    if (part->state().round == 0) start[robot.peer.robot] = robot.agent->poses();
+  };
+  (void)network.run(600.0, [&] { return steps >= cut_after || network.all_settled(); });
+  network.wire({});
+  // Before anybody's own session: that is what is left.
+  (void)network.run(Relay::kPatience_s + network.lease_s - 0.1);
+  TeamPoses left;
+  for (const auto& [id, robot] : network.robots)
+    left[id] =
+        robot.agent->in_session() ? robot.agent->part()->committed_poses() : robot.agent->poses();
+  const CentralProblem whole(problem);
+  CAPTURE(steps, whole.cost(start), whole.cost(left));
+  REQUIRE(start.size() == 5);
+  CHECK(whole.cost(left) <= whole.cost(start) * (1.0 + 1e-9));
+}
+
+TEST_CASE("fifty robots come to the optimum, in a line and all to all", "[pose_graph][network]") {
+  const bool in_line = GENERATE(true, false);
+  CAPTURE(in_line);
+  const auto ids = numbered(50);
+  const TeamProblem problem = problem_of(ids, line(ids), 8, 6);
+  TeamNetwork network;
+  add_all(network, problem);
+  if (in_line) network.wire(line(ids));
+  REQUIRE(settle(network, 120.0));
+  CAPTURE(network.now_s());
+  check_optimal(network, problem);
+}
+
+TEST_CASE("what crosses links names no keyframe that no closure to another robot ends on",
+          "[pose_graph][network]") {
+  const bool chain = GENERATE(true, false);
+  const bool weighed = GENERATE(true, false);
+  CAPTURE(chain, weighed);
+  const auto ids = numbered(4);
+  TeamProblem problem = problem_of(ids, {{1, 2}, {2, 3}, {3, 4}, {1, 4}}, 9, 40);
+  for (std::uint32_t k = 10; k < 25; k += 3) {  // false ones inside a robot, too
+    PoseEdge wrong = problem.edges.back();
+    wrong.from = {2, k};
+    wrong.to = {2, k + 9};
+    wrong.T_from_to.translation().y() += 7.0;
+    problem.edges.push_back(wrong);
+  }
+  problem.edges = in_order(problem.edges);
+  std::set<KeyframeId> open;
+  for (const RobotId robot : ids) open.insert({robot, 0});
+  for (const PoseEdge& e : problem.edges)
+    if (e.from.robot != e.to.robot) open.insert({e.from, e.to});
+  std::size_t named = 0, letters = 0;
+  std::set<KeyframeId> secret;
+  const auto see = [&](const KeyframeId& id) {
+    ++named;
+    if (!open.contains(id)) secret.insert(id);
+  };
+  TeamNetwork network;
+  network.on_parcel = [&](RobotId, const Parcel& parcel) {
+    if (const auto* poses = std::get_if<MemberPoses>(parcel.message.get())) {
+      for (const KeyframeIndex keyframe : poses->keyframes) see({poses->sender.robot, keyframe});
+      for (const WeighedClosure& closure : poses->verdicts) {
+        see(closure.id.from);
+        see(closure.id.to);
+      }
+    }
+    const auto* letter = std::get_if<SessionLetter>(parcel.message.get());
+    if (letter == nullptr || !letter->bytes || letter->bytes->empty()) return;
+    ++letters;
+    if (!is_up_letter(*letter->bytes)) {
+      REQUIRE(decode_down(*letter->bytes));
+      return;
+    }
+    const auto up = decode_up(*letter->bytes);
+    REQUIRE(up);
+    if (up->system)
+      for (const TreeVariable& variable : up->system->variables) see(variable.id);
+  };
+  add_all(network, problem, robust(weighed));
+  if (chain) network.wire(line(ids));
+  REQUIRE(settle(network, 120.0));
+  CHECK(letters > 20);
+  CHECK(named > 100);
+  CHECK(open.size() < 100);
+  CHECK(secret.empty());
+}
+
+}  // namespace km

@@ -1,0 +1,181 @@
+#include <catch2/catch.hpp>
+
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+
+#include "modules/pose_graph/team_node.hpp"
+#include "test/support/captured_log.hpp"
+#include "test/support/patience.hpp"
+#include "test/support/split_graph.hpp"
+
+namespace km {
+namespace {
+
+// One robot's node with its topics.
+struct Robot {
+  explicit Robot(TeamPeer peer, PgoMethod method = PgoMethod::kNewton)
+      : self(peer), node({.method = method}, peer, topics()) {
+    trajectory.subscribe([this](const auto& message) {
+      const std::lock_guard lock(mutex);
+      latest = *message;
+      changed.notify_all();
+    });
+  }
+
+  TeamTopics topics() {
+    return {odometry,     closures, inlier_sets, peer_inlier_sets, peer_events,
+            peer_parcels, parcels,  trajectory,  progress,         verdicts};
+  }
+
+  // What `other` sends to this one arrives.
+  void hears(Robot& other) {
+    other.parcels.subscribe([this](const auto& parcel) {
+      if (parcel->to == self.robot) peer_parcels.publish(parcel->message);
+    });
+  }
+
+  void meet(const Robot& other) {
+    PeerEvent event{.kind = PeerEventKind::kJoined, .identity = {}, .text = {}};
+    event.identity.robot = other.self.robot;
+    event.identity.boot = other.self.boot;
+    peer_events.publish(event);
+  }
+
+  // Odometry, closures, then the decision, which robot 2 makes for the pair.
+  void publish_measurements(const SplitGraph& graph) {
+    KeyframeOdometry first;
+    first.id = {self.robot, 0};
+    odometry.publish(first);
+    for (const RelativePose& e : graph.odometry)
+      if (e.from.robot == self.robot) odometry.publish(keyframe_odometry(e));
+    for (const RelativePose& e : graph.closures) closures.publish(make_closure(e));
+    auto& decided = self.robot == 2 ? inlier_sets : peer_inlier_sets;
+    decided.publish(inlier_set(graph, 2, 9));
+  }
+
+  // Waits for a trajectory in the frame of `anchor`.
+  std::optional<Trajectory> await_trajectory(RobotId anchor, std::size_t size) {
+    std::unique_lock lock(mutex);
+    const bool came = changed.wait_for(lock, kPatience, [&] {
+      return latest && latest->anchor == anchor && latest->T_world_kf.size() == size;
+    });
+    return came ? latest : std::nullopt;
+  }
+
+  TeamPeer self;
+  Topic<KeyframeOdometry> odometry;
+  Topic<Closure> closures;
+  Topic<InlierSet> inlier_sets, peer_inlier_sets;
+  Topic<PeerEvent> peer_events;
+  Topic<TeamParcel> peer_parcels;
+  Topic<Addressed<TeamParcel>> parcels;
+  Topic<Trajectory> trajectory;
+  Topic<OptimizerProgress> progress;
+  Topic<ClosureVerdicts> verdicts;
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::optional<Trajectory> latest;
+  TeamNode node;  // last member: stops first
+};
+
+// Two robots on parallel lines one metre apart, exact.
+SplitGraph parallel_lines() {
+  SplitGraph graph{.keyframes = {{2, 5}, {9, 5}}, .odometry = {}, .closures = {}};
+  const Matrix6 covariance = covariance_of({.kappa = 100.0, .tau = 10.0});
+  const SE3 forward = make_pose(Eigen::Matrix3d::Identity(), {1.0, 0.0, 0.0});
+  const SE3 beside = make_pose(Eigen::Matrix3d::Identity(), {0.0, 1.0, 0.0});
+  for (const RobotId robot : {RobotId{2}, RobotId{9}})
+    for (std::uint32_t i = 0; i < 4; ++i)
+      graph.odometry.push_back({{robot, i}, {robot, i + 1}, forward, covariance});
+  graph.closures = {{{2, 1}, {9, 1}, beside, covariance},
+                    {{9, 3}, {2, 3}, beside.inverse(), covariance}};
+  return graph;
+}
+
+constexpr double kSinglePrecision_m = 1e-5;
+
+TEST_CASE("Two nodes on their threads end in one frame", "[pose_graph][node]") {
+  const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
+  CAPTURE(to_string(method));
+  const SplitGraph graph = parallel_lines();
+  Robot two({2, 11}, method);
+  Robot nine({9, 12}, method);
+  two.hears(nine);
+  nine.hears(two);
+  two.node.start();
+  nine.node.start();
+  two.meet(nine);
+  nine.meet(two);
+  two.publish_measurements(graph);
+  nine.publish_measurements(graph);
+  const auto of_two = two.await_trajectory(2, 5);
+  const auto of_nine = nine.await_trajectory(2, 5);
+  // What one publishes may fill the queue of the other: sources are stopped together.
+  two.node.stop();
+  nine.node.stop();
+  CHECK(two.node.error() == nullptr);
+  CHECK(nine.node.error() == nullptr);
+  REQUIRE(of_two);
+  REQUIRE(of_nine);
+  for (std::size_t i = 0; i < 5; ++i) {
+    const Eigen::Vector3d expected(static_cast<double>(i), 1.0, 0.0);
+    CHECK((of_nine->T_world_kf[i].translation() - expected).norm() < kSinglePrecision_m);
+  }
+}
+
+TEST_CASE("A node alone publishes its own trajectory and sends nothing", "[pose_graph][node]") {
+  const SplitGraph graph = parallel_lines();
+  Robot nine({9, 12});
+  int parcels = 0;
+  nine.parcels.subscribe([&](const auto&) { ++parcels; });
+  KeyframeOdometry first;
+  first.id = {9, 0};
+  double now_s = 100.0;
+  nine.node.step(std::make_shared<const KeyframeOdometry>(first), now_s);
+  for (const RelativePose& e : graph.odometry)
+    if (e.from.robot == 9)
+      nine.node.step(std::make_shared<const KeyframeOdometry>(keyframe_odometry(e)), now_s += 2.0);
+  REQUIRE(nine.latest);
+  CHECK(nine.latest->anchor == 9);
+  CHECK(nine.latest->T_world_kf.size() == 5);
+  CHECK(parcels == 0);
+}
+
+TEST_CASE("Who is heard gets the status, and who is lost gets no more", "[pose_graph][node]") {
+  Robot two({2, 11});
+  std::vector<RobotId> to;
+  two.parcels.subscribe([&](const auto& parcel) {
+    CHECK(parcel->message->from == 2);
+    to.push_back(parcel->to);
+  });
+  const auto event = [](PeerEventKind kind) {
+    PeerEvent e{.kind = kind, .identity = {}, .text = {}};
+    e.identity.robot = 9;
+    e.identity.boot = 12;
+    return std::make_shared<const PeerEvent>(e);
+  };
+  two.node.step(event(PeerEventKind::kJoined), 100.0);
+  two.node.step(TeamNode::Tick(), 102.0);
+  REQUIRE_FALSE(to.empty());
+  CHECK(std::all_of(to.begin(), to.end(), [](RobotId robot) { return robot == 9; }));
+  two.node.step(event(PeerEventKind::kLost), 103.0);
+  to.clear();
+  two.node.step(TeamNode::Tick(), 110.0);
+  CHECK(to.empty());
+}
+
+TEST_CASE("What the agent refuses is logged, once in a while", "[pose_graph][node]") {
+  const CapturedLog log;
+  Robot two({2, 11});
+  KeyframeOdometry third;
+  third.id = {2, 3};
+  for (int k = 0; k < 100; ++k)
+    two.node.step(std::make_shared<const KeyframeOdometry>(third), 100.0 + k);
+  const std::string text = log.text();
+  CHECK(text.find("not the next one") != std::string::npos);
+  CHECK(std::count(text.begin(), text.end(), '\n') < 20);
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,187 @@
+#include <catch2/catch.hpp>
+
+#include "modules/pose_graph/team_plan.hpp"
+
+namespace km {
+namespace {
+
+TeamStatus status_of(RobotId robot, std::vector<EdgeSetOffer> offers) {
+  return {.sender = {robot, 9},
+          .frame = {robot, 9},
+          .keyframes = 5,
+          .revision = 5,
+          .offers = std::move(offers)};
+}
+
+std::map<RobotId, TeamStatus> by_robot(const std::vector<TeamStatus>& statuses) {
+  std::map<RobotId, TeamStatus> map;
+  for (const TeamStatus& status : statuses) map[status.sender.robot] = status;
+  return map;
+}
+
+std::vector<RobotId> order_of(const SessionPlan& plan) {
+  std::vector<RobotId> order;
+  for (const SessionMember& member : plan.members) order.push_back(member.peer.robot);
+  return order;
+}
+
+TeamLinks links_of(const std::vector<std::pair<RobotId, RobotId>>& pairs) {
+  std::map<RobotId, std::set<RobotId>> heard;
+  for (const auto& [a, b] : pairs) {
+    heard[a].insert(b);
+    heard[b].insert(a);
+  }
+  TeamLinks links;
+  for (const auto& [robot, others] : heard) (void)links.tell(robot, others);
+  return links;
+}
+
+std::map<RobotId, RobotId> parents_of(const SessionPlan& plan) {
+  std::map<RobotId, RobotId> parents;
+  for (const SessionMember& member : plan.members)
+    if (member.parent) parents[member.peer.robot] = *member.parent;
+  return parents;
+}
+
+// Robots of a chain of agreed edges, so many in each pair.
+std::map<RobotId, TeamStatus> chain_of(const std::vector<RobotId>& robots,
+                                       const std::vector<std::uint32_t>& edges) {
+  std::vector<TeamStatus> statuses;
+  for (const RobotId robot : robots) statuses.push_back(status_of(robot, {}));
+  for (std::size_t k = 0; k + 1 < robots.size(); ++k) {
+    statuses[k].offers.push_back({robots[k + 1], edges[k], {1, k}});
+    statuses[k + 1].offers.push_back({robots[k], edges[k], {1, k}});
+  }
+  return by_robot(statuses);
+}
+
+}  // namespace
+
+TEST_CASE("two robots agree on the newest edges that both hold", "[pose_graph][session]") {
+  const TeamStatus a = status_of(1, {{2, 9, {4, 40}}, {2, 8, {3, 30}}, {2, 7, {2, 20}}});
+  TeamStatus b = status_of(2, {{1, 8, {3, 30}}, {1, 7, {2, 20}}});
+  REQUIRE(agreed_edges(a, b));
+  CHECK(agreed_edges(a, b)->id == EdgeSetId{3, 30});
+  b.offers.front().id.hash = 31;  // the same version of other closures
+  CHECK(agreed_edges(a, b)->id == EdgeSetId{2, 20});
+  b.offers.pop_back();
+  CHECK_FALSE(agreed_edges(a, b));
+}
+
+TEST_CASE("what a session knows are the closures of its pairs and changes inside its robots",
+          "[pose_graph][session]") {
+  TeamStatus a = status_of(1, {{2, 9, {4, 40}}, {2, 7, {3, 30}}, {3, 5, {1, 10}}});
+  TeamStatus b = status_of(2, {{1, 7, {3, 30}}});
+  const TeamStatus c = status_of(3, {});
+  CHECK(closures_known(plan_session(by_robot({a, b, c}), {}, 1), by_robot({a, b, c})) == 7);
+  b.revision = b.keyframes + 4;
+  CHECK(closures_known(plan_session(by_robot({a, b, c}), {}, 1), by_robot({a, b, c})) == 11);
+  CHECK(closures_known(plan_session(by_robot({a, b, c}), {}, 3), by_robot({a, b, c})) == 0);
+  b.revision = 0;  // no robot says so, but a message can
+  CHECK(closures_known(plan_session(by_robot({a, b, c}), {}, 1), by_robot({a, b, c})) == 7);
+}
+
+TEST_CASE("the plan holds the component, best connected first", "[pose_graph][session]") {
+  // 3 -10- 8 -2- 5 -7- 3, and 20 -4- 21 apart; 30 claims edges to 3 that 3 does not know.
+  const auto statuses =
+      by_robot({status_of(3, {{8, 10, {1, 1}}, {5, 7, {1, 2}}}),
+                status_of(8, {{3, 10, {1, 1}}, {5, 2, {1, 3}}}),
+                status_of(5, {{3, 7, {1, 2}}, {8, 2, {1, 3}}}), status_of(20, {{21, 4, {1, 4}}}),
+                status_of(21, {{20, 4, {1, 4}}}), status_of(30, {{3, 99, {1, 5}}})});
+  const SessionPlan plan = plan_session(statuses, {}, 5);
+  CHECK(order_of(plan) == std::vector<RobotId>{3, 8, 5});
+  CHECK(plan.frame == TeamFrame{3, 9});
+  CHECK(coordinator_of(plan) == 3);
+  CHECK(plan.pairs == std::vector<SessionPair>{{3, 5, {1, 2}}, {3, 8, {1, 1}}, {5, 8, {1, 3}}});
+  for (const RobotId member : {RobotId{3}, RobotId{8}})
+    CHECK(plan_session(statuses, {}, member) == plan);
+  CHECK(order_of(plan_session(statuses, {}, 21)) == std::vector<RobotId>{20, 21});
+  CHECK(order_of(plan_session(statuses, {}, 30)) == std::vector<RobotId>{30});
+  CHECK_THROWS_AS(plan_session(statuses, {}, 4), std::invalid_argument);
+}
+
+TEST_CASE("the frame of most members stays", "[pose_graph][session]") {
+  auto statuses =
+      by_robot({status_of(1, {{2, 3, {1, 1}}}), status_of(2, {{1, 3, {1, 1}}, {3, 3, {1, 2}}}),
+                status_of(3, {{2, 3, {1, 2}}})});
+  statuses[3].frame = statuses[2].frame;
+  const SessionPlan plan = plan_session(statuses, {}, 1);
+  CHECK(plan.frame == TeamFrame{2, 9});
+  CHECK(order_of(plan) == std::vector<RobotId>{2, 3, 1});
+  CHECK(coordinator_of(plan) == 1);
+}
+
+TEST_CASE("the tree follows links with the most agreed edges, its root in the middle",
+          "[pose_graph][session]") {
+  const auto statuses = chain_of({1, 2, 3, 4, 5}, {5, 5, 5, 5});
+  SECTION("a line") {
+    const auto plan = plan_session(statuses, links_of({{1, 2}, {2, 3}, {3, 4}, {4, 5}}), 1);
+    CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 2}, {2, 3}, {4, 3}, {5, 4}});
+  }
+  SECTION("a line of other links than closures") {
+    const auto plan = plan_session(statuses, links_of({{1, 3}, {3, 5}, {5, 2}, {2, 4}}), 1);
+    CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 3}, {3, 5}, {2, 5}, {4, 2}});
+  }
+  SECTION("a star") {
+    const auto plan = plan_session(statuses, links_of({{1, 5}, {2, 5}, {3, 5}, {4, 5}}), 1);
+    CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 5}, {2, 5}, {3, 5}, {4, 5}});
+  }
+  SECTION("a robot in between that is no member") {
+    const auto plan = plan_session(statuses, links_of({{1, 2}, {2, 9}, {9, 3}, {3, 4}, {4, 5}}), 1);
+    CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 2}, {2, 3}, {4, 3}, {5, 4}});
+  }
+  SECTION("no links are told") {
+    const auto plan = plan_session(statuses, {}, 1);
+    CHECK(parents_of(plan).size() == 4);
+  }
+}
+
+TEST_CASE("of a circle of links the one with the fewest edges is not in the tree",
+          "[pose_graph][session]") {
+  auto statuses = chain_of({1, 2, 3}, {4, 9});
+  statuses[1].offers.push_back({3, 6, {2, 2}});
+  statuses[3].offers.push_back({1, 6, {2, 2}});
+  const auto plan = plan_session(statuses, links_of({{1, 2}, {2, 3}, {1, 3}}), 2);
+  CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 3}, {2, 3}});
+  const auto place = place_in(plan, 3);
+  REQUIRE(place);
+  CHECK_FALSE(place->parent);
+  CHECK(place->children == std::vector<RobotId>{1, 2});
+  CHECK(place->members == std::vector<RobotId>{1, 2, 3});
+  CHECK(place_in(plan, 1)->parent == RobotId{3});
+  CHECK(place_in(plan, 1)->root == 3);
+}
+
+TEST_CASE("parents that make no tree give no place", "[pose_graph][session]") {
+  SessionPlan plan = plan_session(chain_of({1, 2, 3}, {1, 1}), links_of({{1, 2}, {2, 3}}), 1);
+  REQUIRE(place_in(plan, 1));
+  CHECK_FALSE(place_in(plan, 7));
+  const SessionPlan good = plan;
+  for (SessionMember& member : plan.members)
+    if (!member.parent) member.parent = 1;
+  CHECK_FALSE(place_in(plan, 1));  // a circle
+  plan = good;
+  for (SessionMember& member : plan.members) member.parent.reset();
+  CHECK_FALSE(place_in(plan, 1));  // three roots
+  plan = good;
+  plan.members[0].parent = 77;
+  CHECK_FALSE(place_in(plan, 1));
+  plan = good;
+  plan.members.push_back(plan.members.back());
+  CHECK_FALSE(place_in(plan, 1));
+}
+
+TEST_CASE("plans are of the same graph whatever their tree and frame", "[pose_graph][session]") {
+  const auto statuses = chain_of({1, 2, 3}, {1, 1});
+  const SessionPlan x = plan_session(statuses, links_of({{1, 2}, {2, 3}}), 1);
+  SessionPlan y = plan_session(statuses, links_of({{1, 3}, {2, 3}}), 1);
+  y.frame = {3, 9};
+  CHECK_FALSE(x == y);
+  CHECK(same_graph(x, y));
+  CHECK_FALSE(has_lost_member(x, y));
+  y.members.front().peer.boot = 10;
+  CHECK_FALSE(same_graph(x, y));
+  CHECK(has_lost_member(x, y));
+}
+
+}  // namespace km

@@ -1,0 +1,437 @@
+#include <catch2/catch.hpp>
+
+#include <sys/resource.h>
+
+#include <random>
+#include <string>
+#include <vector>
+
+#include "modules/core/bytes.hpp"
+#include "modules/pose_graph/tree_letters.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+using Eigen::Index;
+using Bytes = std::vector<std::uint8_t>;
+
+TreeSums some_sums() {
+  TreeSums sums{.base_cost = 1.0 / 3.0,
+                .cost = 17.25,
+                .decrement = 1e-300,
+                .largest = 4.5F,
+                .open = 300,
+                .changed = 7,
+                .fractional = 1,
+                .isolated = 2,
+                .fixed = 0,
+                .poses = 4'000'000'000U,
+                .noise_scale = 3.9F,
+                .lengths = {{0, 1}, {90, 1'000'000}, {65535, 3}}};
+  sums.votes = {{.a = 1, .b = 2, .used = 12},
+                {.a = 1, .b = 60000, .used = 0},
+                {.a = 3, .b = 9, .used = 70000}};
+  return sums;
+}
+
+Eigen::VectorXd some_numbers(std::mt19937& rng, Index count) {
+  std::normal_distribution<double> normal;
+  Eigen::VectorXd values(count);
+  for (double& x : values) x = normal(rng);
+  return values;
+}
+
+// Four poses of three robots. The last one and one of the couplings are reached by told edges
+// alone, so that their blocks are zero.
+TreeSystem some_system(std::mt19937& rng, Index block) {
+  TreeSystem system;
+  system.variables = {{{2, 0}, 1, 1}, {{2, 300}, 1, 2}, {{7, 5}, 2, 0}, {{60000, 1}, 1, 0}};
+  system.pairs = {{0, 1}, {0, 2}, {2, 3}};
+  system.schur = BlockMatrix::zero(block, 4, 3);
+  for (int v = 0; v < 3; ++v) {
+    const Eigen::VectorXd x = some_numbers(rng, block);
+    system.schur.at(v) = x * x.transpose();
+  }
+  for (int p = 0; p < 2; ++p) system.schur.between(p).reshaped() = some_numbers(rng, block * block);
+  for (const Curvature curvature : {Curvature::kGaussNewton, Curvature::kFull})
+    for (const bool transposed : {false, true}) {
+      ToldEdge edge{.pair = 2,
+                    .transposed = transposed,
+                    .curvature = curvature,
+                    .kappa = 123.5F,
+                    .tau = 1e-3F,
+                    .weight = transposed ? 0.25F : 1.0F,
+                    .present = SinglePose::of(random_pose(rng)),
+                    .measured = {}};
+      if (curvature == Curvature::kFull) edge.measured = SinglePose::of(random_pose(rng));
+      system.edges.push_back(edge);
+    }
+  return system;
+}
+
+UpLetter some_up_letter(Index block, bool with_system) {
+  std::mt19937 rng(5);
+  UpLetter letter{.round = 70000, .sums = some_sums(), .failed = false};
+  letter.reduced = some_numbers(rng, 4 * block);
+  if (with_system)
+    letter.system = some_system(rng, block);
+  else
+    letter.weights = {{0, 1.0F}, {300, 0.0F}, {4'000'000'000U, 0.125F}};
+  return letter;
+}
+
+DownLetter some_down_letter(TreeVerdict::Next next, TreeVerdict::Weighing weighing) {
+  std::mt19937 rng(6);
+  DownLetter letter;
+  letter.verdict = {.round = 70000,
+                    .next = next,
+                    .accept = true,
+                    .full = false,
+                    .set_aside = true,
+                    .free = false,
+                    .weighing = weighing,
+                    .scale = 0.25,
+                    .mu = 1e30,
+                    .barc = 5.28,
+                    .noise_scale = 1.0 / 3.0,
+                    .cost = 1687.0,
+                    .gradient = 1e-9,
+                    .drift = {1.0, -2.0, 3.0, 0.0, 1e-200, 6.0}};
+  letter.step = some_numbers(rng, 12);
+  return letter;
+}
+
+UpLetter up_again(const UpLetter& letter) {
+  auto heard = decode_up(encode(letter));
+  REQUIRE(heard);
+  return std::move(*heard);
+}
+
+void check_same(const TreeSums& a, const TreeSums& b) {
+  CHECK(a.base_cost == b.base_cost);
+  CHECK(a.cost == b.cost);
+  CHECK(a.decrement == b.decrement);
+  CHECK(a.largest == b.largest);
+  CHECK(a.open == b.open);
+  CHECK(a.changed == b.changed);
+  CHECK(a.fractional == b.fractional);
+  CHECK(a.isolated == b.isolated);
+  CHECK(a.fixed == b.fixed);
+  CHECK(a.poses == b.poses);
+  CHECK(a.noise_scale == b.noise_scale);
+  CHECK(a.lengths == b.lengths);
+  REQUIRE(a.votes.size() == b.votes.size());
+  for (std::size_t k = 0; k < a.votes.size(); ++k) {
+    CHECK(a.votes[k].a == b.votes[k].a);
+    CHECK(a.votes[k].b == b.votes[k].b);
+    CHECK(a.votes[k].used == b.votes[k].used);
+  }
+}
+
+void check_same(const SinglePose& a, const SinglePose& b) {
+  CHECK(a.q.coeffs() == b.q.coeffs());
+  CHECK(a.t == b.t);
+}
+
+void check_same(const TreeSystem& a, const TreeSystem& b) {
+  REQUIRE(a.variables.size() == b.variables.size());
+  for (std::size_t k = 0; k < a.variables.size(); ++k) {
+    CHECK(a.variables[k].id == b.variables[k].id);
+    CHECK(a.variables[k].touched == b.variables[k].touched);
+    CHECK(a.variables[k].of == b.variables[k].of);
+  }
+  CHECK(a.pairs == b.pairs);
+  CHECK(a.schur.diagonal == b.schur.diagonal);
+  CHECK(a.schur.coupling == b.schur.coupling);
+  REQUIRE(a.edges.size() == b.edges.size());
+  for (std::size_t k = 0; k < a.edges.size(); ++k) {
+    CHECK(a.edges[k].pair == b.edges[k].pair);
+    CHECK(a.edges[k].transposed == b.edges[k].transposed);
+    CHECK(a.edges[k].curvature == b.edges[k].curvature);
+    CHECK(a.edges[k].kappa == b.edges[k].kappa);
+    CHECK(a.edges[k].tau == b.edges[k].tau);
+    CHECK(a.edges[k].weight == b.edges[k].weight);
+    check_same(a.edges[k].present, b.edges[k].present);
+    if (a.edges[k].curvature == Curvature::kFull)
+      check_same(a.edges[k].measured, b.edges[k].measured);
+  }
+}
+
+TEST_CASE("A letter up the tree comes back as it was told", "[pose_graph]") {
+  const Index block = GENERATE(3, 6);
+  const bool with_system = GENERATE(true, false);
+  const UpLetter told = some_up_letter(block, with_system);
+  const UpLetter heard = up_again(told);
+  CHECK(heard.round == told.round);
+  CHECK(heard.failed == told.failed);
+  check_same(heard.sums, told.sums);
+  CHECK(heard.reduced == told.reduced);
+  REQUIRE(heard.system.has_value() == with_system);
+  if (with_system) check_same(*heard.system, *told.system);
+  REQUIRE(heard.weights.size() == told.weights.size());
+  for (std::size_t k = 0; k < told.weights.size(); ++k) {
+    CHECK(heard.weights[k].edge == told.weights[k].edge);
+    CHECK(heard.weights[k].weight == told.weights[k].weight);
+  }
+  CHECK(encode(heard) == encode(told));
+  CHECK(is_up_letter(encode(told)));
+  CHECK_FALSE(decode_down(encode(told)));
+}
+
+TEST_CASE("A letter of a robot that cannot go on comes back", "[pose_graph]") {
+  const UpLetter heard = up_again({.round = 3, .sums = {}, .failed = true});
+  CHECK(heard.failed);
+  CHECK_FALSE(heard.system);
+  CHECK(heard.reduced.size() == 0);
+}
+
+TEST_CASE("A subtree that leaves no pose to others tells an empty system", "[pose_graph]") {
+  UpLetter told{.round = 1, .sums = {}};
+  told.system.emplace().schur = BlockMatrix::zero(6, 0, 0);
+  const UpLetter heard = up_again(told);
+  REQUIRE(heard.system);
+  CHECK(heard.system->variables.empty());
+}
+
+TEST_CASE("Blocks that are zero cost a bit", "[pose_graph]") {
+  UpLetter dense = some_up_letter(6, true), sparse = dense;
+  sparse.system->schur = BlockMatrix::zero(6, 4, 3);
+  CHECK(encode(dense).size() - encode(sparse).size() == 8 * (3 * 21 + 2 * 36));
+}
+
+TEST_CASE("A letter down the tree comes back as it was told", "[pose_graph]") {
+  using Next = TreeVerdict::Next;
+  using Weighing = TreeVerdict::Weighing;
+  const Next next = GENERATE(Next::kStep, Next::kShorten, Next::kRefresh, Next::kStart,
+                             Next::kCount, Next::kDone, Next::kStop);
+  const Weighing weighing =
+      GENERATE(Weighing::kAllIn, Weighing::kWeigh, Weighing::kHold, Weighing::kDecided);
+  const DownLetter told = some_down_letter(next, weighing);
+  const auto heard = decode_down(encode(told));
+  REQUIRE(heard);
+  const TreeVerdict& v = heard->verdict;
+  CHECK(v.round == told.verdict.round);
+  CHECK(v.next == next);
+  CHECK(v.weighing == weighing);
+  CHECK(v.accept == told.verdict.accept);
+  CHECK(v.full == told.verdict.full);
+  CHECK(v.set_aside == told.verdict.set_aside);
+  CHECK(v.free == told.verdict.free);
+  CHECK(v.scale == told.verdict.scale);
+  CHECK(v.mu == told.verdict.mu);
+  CHECK(v.barc == told.verdict.barc);
+  CHECK(v.noise_scale == told.verdict.noise_scale);
+  CHECK(v.cost == told.verdict.cost);
+  CHECK(v.gradient == told.verdict.gradient);
+  CHECK(v.drift == told.verdict.drift);
+  CHECK(heard->step == told.step);
+  CHECK(encode(*heard) == encode(told));
+  CHECK_FALSE(is_up_letter(encode(told)));
+  CHECK_FALSE(decode_up(encode(told)));
+}
+
+std::vector<Bytes> one_of_each() {
+  return {encode(some_up_letter(6, true)), encode(some_up_letter(3, true)),
+          encode(some_up_letter(6, false)),
+          encode(some_down_letter(TreeVerdict::Next::kStep, TreeVerdict::Weighing::kWeigh))};
+}
+
+// Bytes that what was read takes in memory.
+std::size_t held_by(const UpLetter& letter) {
+  std::size_t bytes = sizeof(letter) + 64 * letter.sums.lengths.size() +
+                      sizeof(PairVote) * letter.sums.votes.capacity() +
+                      sizeof(UpLetter::NewWeight) * letter.weights.capacity() +
+                      sizeof(double) * static_cast<std::size_t>(letter.reduced.size());
+  if (!letter.system) return bytes;
+  const TreeSystem& s = *letter.system;
+  return bytes + sizeof(TreeVariable) * s.variables.capacity() +
+         sizeof(NodePair) * s.pairs.capacity() + sizeof(ToldEdge) * s.edges.capacity() +
+         sizeof(double) *
+             static_cast<std::size_t>(s.schur.diagonal.size() + s.schur.coupling.size());
+}
+
+std::size_t held_by(const DownLetter& letter) {
+  return sizeof(letter) + sizeof(double) * static_cast<std::size_t>(letter.step.size());
+}
+
+// A coupling of two bytes may stand for a block of 36 numbers.
+constexpr std::size_t kMostPerByte = 160;
+
+// Nothing is read of it, or what encode() would have written; and no more than there is.
+void check_harmless(const Bytes& bytes) {
+  std::size_t held = 0;
+  bool same = true;
+  if (const auto up = decode_up(bytes)) {
+    same = encode(*up) == bytes;
+    held = held_by(*up);
+  }
+  if (const auto down = decode_down(bytes)) {
+    same = same && encode(*down) == bytes;
+    held = held_by(*down);
+  }
+  if (!same || held > 10000 + kMostPerByte * bytes.size()) {
+    CAPTURE(held, bytes.size());
+    CHECK(same);
+    CHECK(held <= 10000 + kMostPerByte * bytes.size());
+  }
+}
+
+TEST_CASE("A letter that was cut off anywhere is refused", "[pose_graph]") {
+  for (const Bytes& bytes : one_of_each()) {
+    for (std::size_t size = 0; size < bytes.size(); ++size) {
+      const std::span<const std::uint8_t> cut(bytes.data(), size);
+      if (!decode_up(cut) && !decode_down(cut)) continue;
+      CAPTURE(size, bytes.size());
+      FAIL_CHECK("was read");
+    }
+    Bytes longer = bytes;
+    longer.push_back(0);
+    CHECK_FALSE(decode_up(longer));
+    CHECK_FALSE(decode_down(longer));
+  }
+}
+
+std::size_t largest_resident_kb() {
+  rusage usage{};
+  REQUIRE(getrusage(RUSAGE_SELF, &usage) == 0);
+  return static_cast<std::size_t>(usage.ru_maxrss);
+}
+
+TEST_CASE("A letter with a wrong byte is refused, or is another letter", "[pose_graph]") {
+  std::mt19937 rng(7);
+  const std::vector<Bytes> letters = one_of_each();
+  constexpr int kChanges = 100000;
+  const std::size_t before_kb = largest_resident_kb();
+  for (int n = 0; n < kChanges; ++n) {
+    Bytes bytes = letters[static_cast<std::size_t>(n) % letters.size()];
+    const std::size_t at = std::uniform_int_distribution<std::size_t>(0, bytes.size() - 1)(rng);
+    bytes[at] = static_cast<std::uint8_t>(std::uniform_int_distribution<int>(0, 255)(rng));
+    CAPTURE(n, at);
+    check_harmless(bytes);
+  }
+  // What a sanitizer keeps back is in it, too.
+  CHECK(largest_resident_kb() - before_kb < 512 * 1024);
+}
+
+TEST_CASE("Random bytes are not a letter", "[pose_graph]") {
+  std::mt19937 rng(8);
+  for (int n = 0; n < 20000; ++n) {
+    Bytes bytes(std::uniform_int_distribution<std::size_t>(1, 200)(rng));
+    for (std::uint8_t& b : bytes)
+      b = static_cast<std::uint8_t>(std::uniform_int_distribution<int>(0, 255)(rng));
+    bytes[0] = static_cast<std::uint8_t>(1 + n % 2);
+    check_harmless(bytes);
+  }
+}
+
+// What a letter up begins with, up to the number of lengths.
+ByteWriter up_to_lengths() {
+  ByteWriter w;
+  w.u8(1);
+  w.varint(1);
+  w.u8(0);
+  for (int k = 0; k < 3; ++k) w.f64(0.0);
+  w.f32(0.0F);
+  for (int k = 0; k < 6; ++k) w.varint(0);
+  w.f32(0.0F);
+  return w;
+}
+
+// Up to the number of variables.
+ByteWriter up_to_variables(std::uint8_t block) {
+  ByteWriter w = up_to_lengths();
+  for (int k = 0; k < 3; ++k) w.varint(0);  // lengths, votes, right-hand side
+  w.u8(1);
+  w.u8(block);
+  return w;
+}
+
+void variables(ByteWriter& w, std::uint64_t count) {
+  w.varint(count);
+  for (std::uint64_t k = 0; k < count; ++k)
+    for (const std::uint64_t x : {std::uint64_t{1}, k, std::uint64_t{1}, std::uint64_t{1}})
+      w.varint(x);
+}
+
+Bytes with_zeros(ByteWriter& w) {
+  w.bytes(Bytes(1000, 0));
+  return w.release();
+}
+
+TEST_CASE("Counts that the letter cannot hold are refused", "[pose_graph]") {
+  const std::uint64_t count =
+      GENERATE(std::uint64_t{2000}, std::uint64_t{1} << 24U, std::uint64_t{1} << 32U,
+               std::uint64_t{1} << 61U, ~std::uint64_t{0});
+  CAPTURE(count);
+  const std::size_t before_kb = largest_resident_kb();
+  for (int field = 0; field < 7; ++field) {
+    CAPTURE(field);
+    ByteWriter w = field < 3 ? up_to_lengths() : up_to_variables(6);
+    if (field < 3) {
+      for (int k = 0; k < field; ++k) w.varint(0);  // lengths, votes, right-hand side
+    } else if (field == 4 || field == 5) {
+      variables(w, 2);  // couplings; told edges
+      if (field == 5) {
+        w.varint(0);
+        w.u8(0);
+      }
+    } else if (field == 6) {  // new weights
+      w = up_to_lengths();
+      for (int k = 0; k < 3; ++k) w.varint(0);
+      w.u8(0);
+    }
+    w.varint(count);
+    CHECK_FALSE(decode_up(with_zeros(w)));
+  }
+  ByteWriter w;
+  w.u8(2);
+  w.varint(1);
+  for (int k = 0; k < 3; ++k) w.u8(0);
+  for (int k = 0; k < 12; ++k) w.f64(1.0);
+  w.varint(count);  // of the step
+  CHECK_FALSE(decode_down(with_zeros(w)));
+  CHECK(largest_resident_kb() - before_kb < 64 * 1024);
+}
+
+TEST_CASE("Verdicts with numbers out of range are refused", "[pose_graph]") {
+  const auto with = [](auto&& change) {
+    DownLetter letter = some_down_letter(TreeVerdict::Next::kStep, TreeVerdict::Weighing::kWeigh);
+    change(letter.verdict);
+    return decode_down(encode(letter)).has_value();
+  };
+  CHECK(with([](TreeVerdict&) {}));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.scale = 1.5; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.scale = 0.0; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.mu = -1.0; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.barc = -1.0; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.noise_scale = 0.0; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.gradient = -1.0; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.cost = INFINITY; }));
+}
+
+TEST_CASE("Systems that contradict themselves are refused", "[pose_graph]") {
+  const auto with = [](auto&& change) {
+    UpLetter letter = some_up_letter(6, true);
+    change(*letter.system);
+    return decode_up(encode(letter)).has_value();
+  };
+  CHECK(with([](TreeSystem&) {}));
+  CHECK_FALSE(with([](TreeSystem& s) { s.pairs[0] = {0, 4}; }));
+  CHECK_FALSE(with([](TreeSystem& s) { s.pairs[0] = {0, 0}; }));
+  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].pair = 3; }));
+  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].kappa = 0.0F; }));
+  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].tau = -1.0F; }));
+  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].weight = 1.5F; }));
+  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].present.q.coeffs() *= 2.0F; }));
+  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].present.t.x() = std::nanf(""); }));
+  CHECK_FALSE(with([](TreeSystem& s) { s.schur.at(0)(0, 0) = std::nan(""); }));
+  CHECK_FALSE(with([](TreeSystem& s) { s.schur.between(0)(0, 0) = INFINITY; }));
+  const auto block = GENERATE(as<std::uint8_t>(), 0, 1, 4, 7, 255);
+  ByteWriter w = up_to_variables(block);
+  for (int k = 0; k < 4; ++k) w.varint(0);
+  CHECK_FALSE(decode_up(w.release()));
+}
+
+}  // namespace
+}  // namespace km

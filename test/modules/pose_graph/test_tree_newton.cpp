@@ -1,0 +1,136 @@
+#include <catch2/catch.hpp>
+
+#include "modules/pose_graph/tree_newton.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/solver_team.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kGap = 1e-9;  // relative to the cost
+
+auto newton(TreeNewtonOptions options) {
+  return [options](SessionGraph graph, TreePlace place) {
+    return std::make_unique<TreeNewton>(std::move(graph), std::move(place), options);
+  };
+}
+
+const TreeNewtonOptions kTrusting{.robust = false};
+
+TEST_CASE("A team finds the optimum of its graph, whatever the tree", "[pose_graph]") {
+  const unsigned seed = GENERATE(1U, 2U);
+  CAPTURE(seed);
+  const TeamProblem problem = random_team_problem(
+      {.robots = {0, 2, 5, 7}, .pairs = {{0, 2}, {2, 5}, {5, 7}, {0, 7}, {0, 5}}}, seed);
+  const CentralProblem central(problem);
+  const double optimum = central.optimum(problem.start);
+  const auto trees = {star(problem.members()), star(problem.members(), 2),
+                      chain(problem.members())};
+  for (const TeamTree& tree : trees) {
+    SolverTeam team = solver_team(problem, tree, {}, newton(kTrusting));
+    REQUIRE(team.run());
+    CHECK(team.refused() == 0);
+    CHECK(central.cost(team.poses()) == Approx(optimum).epsilon(kGap));
+    CHECK(team.member(0).state().cost == Approx(optimum).epsilon(kGap));
+  }
+}
+
+TEST_CASE("Letters that are late, doubled and out of order change nothing", "[pose_graph]") {
+  const TeamProblem problem = random_team_problem(
+      {.robots = {0, 2, 5, 7}, .pairs = {{0, 2}, {2, 5}, {5, 7}, {0, 7}}}, 3);
+  SolverTeam team = solver_team(problem, chain(problem.members()), {}, newton({}));
+  SolverTeam late = solver_team(problem, chain(problem.members()),
+                                {.max_delay = 5, .duplicated = 0.3}, newton({}));
+  REQUIRE(team.run());
+  REQUIRE(late.run());
+  for (const auto& [robot, poses] : team.poses())
+    for (std::size_t k = 0; k < poses.size(); ++k)
+      CHECK(late.poses().at(robot)[k].matrix() == poses[k].matrix());
+}
+
+TEST_CASE("Verticals are part of the cost", "[pose_graph]") {
+  const TeamProblem problem = random_team_problem(
+      {.robots = {1, 2, 3}, .pairs = {{1, 2}, {2, 3}}, .tilt_sigma = 0.01}, 4);
+  const CentralProblem central(problem);
+  SolverTeam team = solver_team(problem, chain(problem.members()), {}, newton(kTrusting));
+  REQUIRE(team.run());
+  CHECK(central.cost(team.poses()) == Approx(central.optimum(problem.start)).epsilon(kGap));
+}
+
+TEST_CASE("Robots that have gone hold the others where they were", "[pose_graph]") {
+  TeamProblem problem = random_team_problem(
+      {.robots = {1, 2, 3}, .pairs = {{1, 2}, {2, 3}, {1, 3}}}, 5);
+  problem.absent = {2};
+  const CentralProblem central(problem);
+  SolverTeam team = solver_team(problem, chain(problem.members()), {}, newton(kTrusting));
+  REQUIRE(team.run());
+  CHECK(central.cost(team.poses()) == Approx(central.optimum(problem.start)).epsilon(kGap));
+}
+
+TEST_CASE("A recorded graph is solved to its certified optimum", "[pose_graph]") {
+  const auto [file, optimum] = GENERATE(table<const char*, double>(
+      {{"pose_graphs/3d/smallGrid3D.g2o", 1025.398056}, {"pose_graphs/3d/sphere2500.g2o", 1687.005815},
+       {"pose_graphs/3d/parking-garage.g2o", 1.26252443},
+       {"pose_graphs/3d/torus3D.g2o", 24227.045560}}));
+  CAPTURE(file);
+  const auto path = shared_data(file);
+  if (!path) return;
+  const bool robust = GENERATE(false, true);
+  const std::size_t robots = GENERATE(3, 5);
+  const TeamProblem problem = deal_file(*path, robots);
+  SolverTeam team = solver_team(problem, chain(problem.members()), {},
+                                newton({.absolute_tolerance = 0.0, .patience_rounds = 8.0, .robust = robust}));
+  REQUIRE(team.run());
+  const SolverState state = team.member(1).state();
+  CHECK(CentralProblem(problem).cost(team.poses()) == Approx(optimum).epsilon(1e-6));
+  std::size_t bytes = 0;
+  for (const RobotId robot : problem.members()) bytes += team.bytes_of(robot);
+  WARN(file << " robots " << robots << " robust " << robust << ": rounds " << state.round << ", MB " << 1e-6 * static_cast<double>(bytes)
+            << ", scale " << state.noise_scale);
+}
+
+TEST_CASE("Verdicts that cannot follow are refused, and the true one is taken after all",
+          "[pose_graph]") {
+  using Next = TreeVerdict::Next;
+  const TeamProblem problem = random_team_problem({.robots = {1, 2}, .pairs = {{1, 2}}}, 6);
+  const TeamTree tree = star(problem.members());
+  TreeNewton root(session_graph(problem, 1), tree.at(1), kTrusting);
+  TreeNewton leaf(session_graph(problem, 2), tree.at(2), kTrusting);
+  const auto says = [&](std::uint32_t round, Next next, Eigen::Index size = 0) {
+    DownLetter letter{.verdict = {.round = round, .next = next}};
+    letter.step = Eigen::VectorXd::Constant(size, 1e-3);
+    return leaf.receive(1, encode(letter));
+  };
+  const auto carry_up = [&] {
+    while (leaf.ready())
+      for (const SolverLetter& letter : leaf.advance()) CHECK(root.receive(2, *letter.bytes));
+  };
+  CHECK_FALSE(says(0, Next::kStart));  // nobody has asked
+  carry_up();
+  CHECK_FALSE(says(1, Next::kStart));
+  for (const Next next : {Next::kStep, Next::kShorten, Next::kRefresh, Next::kDone})
+    CHECK_FALSE(says(0, next));  // nothing has begun
+  CHECK_FALSE(leaf.ready());
+  for (std::uint32_t round = 0; round < 100 && !leaf.done(); ++round) {
+    for (const SolverLetter& letter : root.advance()) {
+      const auto up = encode(UpLetter{.round = round + 2, .sums = {}});
+      if (!root.done()) CHECK_FALSE(root.receive(2, up));  // nobody is so far
+      CHECK(leaf.receive(1, *letter.bytes));
+      CHECK(leaf.receive(1, *letter.bytes));
+    }
+    carry_up();
+    if (leaf.done()) break;
+    CHECK(says(round, Next::kStop));  // an old one
+    if (round == 0) CHECK_FALSE(says(1, Next::kShorten));
+    CHECK_FALSE(says(round + 1, Next::kStart));
+    CHECK_FALSE(says(round + 1, Next::kCount));
+    CHECK_FALSE(says(round + 1, Next::kStep, 1));
+    CHECK_FALSE(leaf.ready());
+  }
+  const CentralProblem central(problem);
+  const TeamPoses poses{{1, root.poses()}, {2, leaf.poses()}};
+  CHECK(central.cost(poses) == Approx(central.optimum(problem.start)).epsilon(kGap));
+}
+
+}  // namespace
+}  // namespace km

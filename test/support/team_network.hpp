@@ -1,0 +1,370 @@
+#pragma once
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <random>
+#include <set>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "modules/core/precision.hpp"
+#include "modules/pose_graph/team_agent.hpp"
+#include "modules/pose_graph/team_message_bytes.hpp"
+#include "test/support/solver_team.hpp"
+
+namespace km {
+
+/// A link between two robots, the same both ways.
+struct NetworkLink {
+  bool up = true;
+  double min_delay_s = 1e-3;
+  double max_delay_s = 1e-3;  ///< Uniform: reorders if it is above the least.
+  double lost = 0.0;          ///< Probability.
+  double duplicated = 0.0;    ///< Probability of a second copy, delayed anew.
+};
+
+/// Agents of a team on a network in memory with virtual time: any links, which may come and go. All
+/// messages cross it as bytes.
+class TeamNetwork {
+ public:
+  struct Robot {
+    TeamPeer peer = {};
+    std::unique_ptr<TeamAgent> agent = {};
+    bool dead = false;
+    std::optional<Trajectory> trajectory = {};
+    OptimizerProgress progress = {};
+    ClosureVerdicts verdicts = {};
+    std::vector<std::string> notices = {};
+    std::size_t bytes = 0;  ///< Sent, every reader counted, also what is relayed and what is lost.
+    std::size_t parcels = 0;  ///< The same.
+    bool steps_now = true;
+  };
+
+  explicit TeamNetwork(unsigned seed = 1) : rng_(seed) {}
+
+  NetworkLink usual = {};  ///< What links are like that are not set.
+  /// How long a link that has gone is still taken to be there by its ends: short gaps go unnoticed.
+  double lease_s = 0.2;
+  std::map<RobotId, Robot> robots = {};
+  std::size_t undecodable = 0;  ///< Messages that agents have sent.
+  std::size_t lost = 0;         ///< Parcels.
+  /// After every step of a robot.
+  std::function<void(const Robot&)> on_step = {};
+  /// Sees every parcel before it is sent.
+  std::function<void(RobotId from, const Parcel&)> on_parcel = {};
+  /// Loses the parcels for which it is true.
+  std::function<bool(RobotId from, const Parcel&)> loses = {};
+
+  TeamAgent& add(TeamPeer peer, const PoseGraphConfig& config, const MemberSolverFactory& factory) {
+    Robot& robot = robots[peer.robot];
+    robot = Robot{.peer = peer};
+    robot.agent = std::make_unique<TeamAgent>(config, peer, factory);
+    for (auto& [id, other] : robots)
+      if (id != peer.robot) renew(peer.robot, id);
+    return *robot.agent;
+  }
+
+  /// Sets a link; nullptr-like defaults come from `usual`.
+  void set_link(RobotId a, RobotId b, const NetworkLink& link) {
+    links_[std::minmax(a, b)] = link;
+    renew(a, b);
+  }
+  void cut(RobotId a, RobotId b) { switch_link(a, b, false); }
+  void restore(RobotId a, RobotId b) { switch_link(a, b, true); }
+  void switch_link(RobotId a, RobotId b, bool up) {
+    NetworkLink link = this->link(a, b);
+    link.up = up;
+    set_link(a, b, link);
+  }
+  [[nodiscard]] NetworkLink link(RobotId a, RobotId b) const {
+    const auto found = links_.find(std::minmax(a, b));
+    return found == links_.end() ? usual : found->second;
+  }
+  /// Leaves only the links of `pairs`.
+  void wire(const std::vector<std::pair<RobotId, RobotId>>& pairs) {
+    for (const auto& [a, of_a] : robots)
+      for (const auto& [b, of_b] : robots) {
+        if (a >= b) continue;
+        const bool up = std::any_of(pairs.begin(), pairs.end(), [&](const auto& pair) {
+          return std::minmax(pair.first, pair.second) == std::minmax(a, b);
+        });
+        switch_link(a, b, up);
+      }
+  }
+
+  /// The process ends; what is in flight to it is lost. add() starts another one, revive() goes on
+  /// with the same.
+  void kill(RobotId robot) {
+    robots.at(robot).dead = true;
+    std::erase_if(in_flight_, [&](const auto& entry) { return entry.second.to == robot; });
+    for (const auto& [id, other] : robots)
+      if (id != robot) renew(robot, id);
+  }
+  void revive(RobotId robot) {
+    robots.at(robot).dead = false;
+    for (const auto& [id, other] : robots)
+      if (id != robot) renew(robot, id);
+  }
+
+  /// Calls `what` at time `at_s`.
+  void at(double at_s, std::function<void()> what) { schedule_.emplace(at_s, std::move(what)); }
+
+  [[nodiscard]] double now_s() const { return now_s_; }
+  [[nodiscard]] TeamAgent& agent(RobotId robot) { return *robots.at(robot).agent; }
+
+  /// Runs for `duration_s` of virtual time, or until `done`, which is asked after every step. True
+  /// if it was.
+  bool run(
+      double duration_s, const std::function<bool()>& done = [] { return false; }) {
+    const double end_s = now_s_ + duration_s;
+    while (true) {
+      double next_s = next_tick_s_;
+      if (!in_flight_.empty()) next_s = std::min(next_s, in_flight_.begin()->first);
+      if (!schedule_.empty()) next_s = std::min(next_s, schedule_.begin()->first);
+      if (busy_) next_s = now_s_;
+      if (next_s > end_s) break;
+      now_s_ = std::max(now_s_, next_s);
+      while (!schedule_.empty() && schedule_.begin()->first <= now_s_)
+        schedule_.extract(schedule_.begin()).mapped()();
+      deliver();
+      const bool tick = now_s_ >= next_tick_s_;
+      if (tick) next_tick_s_ = now_s_ + kTick_s;
+      busy_ = false;
+      for (auto& [id, robot] : robots)
+        if (!robot.dead && (tick || robot.steps_now)) step(robot);
+      if (done()) return true;
+    }
+    now_s_ = end_s;
+    return false;
+  }
+
+  /// Hands `from`'s message to `to` as if it had come over a link.
+  bool inject(RobotId from, RobotId to, const TeamMessage& message) {
+    robots.at(to).steps_now = busy_ = true;
+    return robots.at(to).agent->receive(from, std::make_shared<const TeamMessage>(message));
+  }
+
+  /// True if all robots that live are members of one settled session.
+  [[nodiscard]] bool all_settled() const {
+    std::size_t alive = 0;
+    for (const auto& [id, robot] : robots) alive += robot.dead ? 0 : 1;
+    return std::all_of(robots.begin(), robots.end(), [&](const auto& entry) {
+      const Robot& robot = entry.second;
+      return robot.dead || (robot.progress.settled && robot.progress.members.size() == alive);
+    });
+  }
+
+  /// What everyone is at, for messages of failed tests.
+  [[nodiscard]] std::string describe() const {
+    std::ostringstream text;
+    text << "at " << now_s_ << " s\n";
+    for (const auto& [id, robot] : robots) {
+      text << "robot " << id << (robot.dead ? " (dead)" : "") << ": frame "
+           << robot.agent->frame().robot << ", members";
+      for (const RobotId member : robot.progress.members) text << ' ' << member;
+      text << (robot.progress.settled ? ", settled" : "") << "; reaches";
+      for (const auto& [other, of_other] : robots)
+        if (other != id && robot.agent->relay().next_hop(other)) text << ' ' << other;
+      if (const SessionPart* part = robot.agent->part()) {
+        const Session& session = part->session();
+        text << "; session " << session.id.coordinator.robot << '/' << session.id.number
+             << (robot.agent->in_session() ? " running" : " over")
+             << (session.finished ? " finished" : "") << " stage "
+             << (part->stage() ? static_cast<int>(*part->stage()) : -1) << " round "
+             << part->state().round << " moved " << part->moved_s();
+      }
+      if (!robot.notices.empty()) text << "; " << robot.notices.back();
+      text << '\n';
+    }
+    return text.str();
+  }
+
+  /// What has been published; poses in one frame if all have the same anchor.
+  [[nodiscard]] TeamPoses trajectories() const {
+    TeamPoses poses;
+    for (const auto& [id, robot] : robots)
+      if (robot.trajectory) poses[id] = robot.trajectory->T_world_kf;
+    return poses;
+  }
+  /// Where the agents are at present, each in its own frame().
+  [[nodiscard]] TeamPoses poses() const {
+    TeamPoses poses;
+    for (const auto& [id, robot] : robots) poses[id] = robot.agent->poses();
+    return poses;
+  }
+
+ private:
+  static constexpr double kTick_s = 0.02;
+  struct Delivery {
+    RobotId from = 0;
+    RobotId to = 0;
+    TeamMessagePtr message = {};
+  };
+
+  [[nodiscard]] bool connected(RobotId a, RobotId b) const {
+    const auto at_a = robots.find(a), at_b = robots.find(b);
+    return at_a != robots.end() && at_b != robots.end() && !at_a->second.dead &&
+           !at_b->second.dead && link(a, b).up;
+  }
+
+  // The ends of a link notice what has become of it: at once if it is there, after the lease if
+  // not.
+  void renew(RobotId a, RobotId b) {
+    if (connected(a, b)) {
+      tell_alive(a, b);
+      tell_alive(b, a);
+      return;
+    }
+    at(now_s_ + lease_s, [this, a, b] {
+      if (connected(a, b)) return;
+      tell_lost(a, b);
+      tell_lost(b, a);
+    });
+  }
+  void tell_alive(RobotId to, RobotId of) {
+    const TeamPeer& peer = robots.at(of).peer;
+    std::optional<TeamPeer>& heard = heard_[{to, of}];
+    if (heard == peer) return;
+    heard = peer;
+    robots.at(to).agent->peer_alive(peer);
+    robots.at(to).steps_now = busy_ = true;
+  }
+  void tell_lost(RobotId to, RobotId of) {
+    std::optional<TeamPeer>& heard = heard_[{to, of}];
+    if (!heard) return;
+    heard.reset();
+    if (robots.contains(to)) robots.at(to).agent->peer_lost(of);
+  }
+
+  void step(Robot& robot) {
+    TeamOutput output = robot.agent->step(now_s_);
+    robot.steps_now = output.more;
+    busy_ |= output.more;
+    if (output.trajectory) robot.trajectory = std::move(output.trajectory);
+    if (output.progress) robot.progress = std::move(*output.progress);
+    if (output.verdicts) robot.verdicts = std::move(*output.verdicts);
+    for (std::string& notice : output.notices) robot.notices.push_back(std::move(notice));
+    for (const Parcel& parcel : output.parcels) send(robot, parcel);
+    if (on_step) on_step(robot);
+  }
+
+  void send(Robot& from, const Parcel& parcel) {
+    if (on_parcel) on_parcel(from.peer.robot, parcel);
+    const auto& [size, message] = across(parcel.message);
+    from.bytes += size;
+    ++from.parcels;
+    if (!message || !connected(from.peer.robot, parcel.next)) {
+      ++lost;
+      return;
+    }
+    const NetworkLink link = this->link(from.peer.robot, parcel.next);
+    std::uniform_real_distribution<double> uniform(0.0, 1.0);
+    if (uniform(rng_) < link.lost || (loses && loses(from.peer.robot, parcel))) {
+      ++lost;
+      return;
+    }
+    const int copies = uniform(rng_) < link.duplicated ? 2 : 1;
+    for (int copy = 0; copy < copies; ++copy) {
+      const double delay_s =
+          link.min_delay_s + (link.max_delay_s - link.min_delay_s) * uniform(rng_);
+      in_flight_.emplace(now_s_ + delay_s, Delivery{from.peer.robot, parcel.next, message});
+    }
+  }
+
+  // What arrives of a message, and how many bytes it takes.
+  const std::pair<std::size_t, TeamMessagePtr>& across(const TeamMessagePtr& message) {
+    if (last_sent_ == message) return last_across_;
+    const std::vector<std::uint8_t> bytes = encode(*message);
+    auto decoded = decode_team_message(bytes);
+    if (!decoded.value) ++undecodable;
+    last_sent_ = message;
+    last_across_ = {
+        bytes.size(),
+        decoded.value ? std::make_shared<const TeamMessage>(std::move(*decoded.value)) : nullptr};
+    return last_across_;
+  }
+
+  void deliver() {
+    while (!in_flight_.empty() && in_flight_.begin()->first <= now_s_) {
+      const Delivery delivery = in_flight_.extract(in_flight_.begin()).mapped();
+      Robot& to = robots.at(delivery.to);
+      if (!connected(delivery.from, delivery.to)) {
+        ++lost;
+        continue;
+      }
+      (void)to.agent->receive(delivery.from, delivery.message);
+      to.steps_now = true;
+    }
+  }
+
+  std::mt19937 rng_;
+  std::map<std::pair<RobotId, RobotId>, NetworkLink> links_;
+  std::map<std::pair<RobotId, RobotId>, std::optional<TeamPeer>> heard_;
+  std::multimap<double, Delivery> in_flight_;
+  std::multimap<double, std::function<void()>> schedule_;
+  TeamMessagePtr last_sent_;
+  std::pair<std::size_t, TeamMessagePtr> last_across_;
+  double now_s_ = 0.0;
+  double next_tick_s_ = 0.0;
+  bool busy_ = false;
+};
+
+/// Gives an agent the odometry of its robot.
+inline void feed_odometry(TeamAgent& agent, RobotId robot, const TeamProblem& problem) {
+  KeyframeOdometry first;
+  first.id = {robot, 0};
+  (void)agent.add(first);
+  for (const PoseEdge& e : problem.edges) {
+    if (!is_step(e) || e.from.robot != robot) continue;
+    KeyframeOdometry keyframe;
+    keyframe.id = e.to;
+    keyframe.T_previous_kf = e.T_from_to;
+    keyframe.covariance = covariance_of(e.precision);
+    (void)agent.add(keyframe);
+  }
+}
+
+inline Closure closure_of(const PoseEdge& e) {
+  Closure closure;
+  closure.from.id = e.from;
+  closure.to.id = e.to;
+  closure.T_from_to = e.T_from_to;
+  closure.covariance = covariance_of(e.precision);
+  return closure;
+}
+
+/// Of all closures between a and b that `problem` has.
+inline InlierSet inlier_set(const TeamProblem& problem, RobotId a, RobotId b,
+                            std::uint32_t version = 1) {
+  InlierSet set{std::min(a, b), std::max(a, b), version, {}};
+  for (const PoseEdge& e : problem.edges)
+    if (!is_step(e) && std::minmax(e.from.robot, e.to.robot) == std::minmax(a, b))
+      set.closures.push_back(e.id());
+  std::sort(set.closures.begin(), set.closures.end());
+  return set;
+}
+
+/// Gives an agent the closures of its robot, all of them inliers.
+inline void feed_closures(TeamAgent& agent, RobotId robot, const TeamProblem& problem,
+                          std::uint32_t version = 1) {
+  std::set<RobotId> others;
+  for (const PoseEdge& e : problem.edges) {
+    if (is_step(e) || (e.from.robot != robot && e.to.robot != robot)) continue;
+    (void)agent.add(closure_of(e));
+    others.insert(e.from.robot == robot ? e.to.robot : e.from.robot);
+  }
+  for (const RobotId other : others) (void)agent.add(inlier_set(problem, robot, other, version));
+}
+
+inline void feed(TeamAgent& agent, RobotId robot, const TeamProblem& problem) {
+  feed_odometry(agent, robot, problem);
+  feed_closures(agent, robot, problem);
+}
+
+}  // namespace km

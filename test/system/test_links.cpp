@@ -1,0 +1,154 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <random>
+
+#include "test/support/network.hpp"
+#include "test/support/process.hpp"
+#include "test/support/random_team.hpp"
+#include "test/support/temporary_folder.hpp"
+#include "test/system/recorded_team.hpp"
+#include "test/system/team_result.hpp"
+
+// Robots of which some do not hear each other: every one is a process in a network of its own.
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Links = std::vector<std::pair<int, int>>;
+
+Links all_links(int robots) {
+  Links links;
+  for (int a = 0; a < robots; ++a)
+    for (int b = a + 1; b < robots; ++b) links.emplace_back(a, b);
+  return links;
+}
+
+// A team on hosts of which those in `links` hear each other; robot k is on host k + 1.
+class Team {
+ public:
+  Team(const SplitGraph& graph, const Links& links, const fs::path& folder, std::string method)
+      : network_(static_cast<int>(graph.keyframes.size())),
+        folder_(folder),
+        method_(std::move(method)) {
+    const int robots = static_cast<int>(graph.keyframes.size());
+    for (const auto& [a, b] : all_links(robots))
+      if (std::find(links.begin(), links.end(), std::pair(a, b)) == links.end())
+        network_.set_link_between(a + 1, b + 1, false);
+    std::random_device device;
+    const int domain = std::uniform_int_distribution<int>(1, 230)(device);
+    for (int k = 0; k < robots; ++k) {
+      write_part(graph, static_cast<RobotId>(k), folder_ / ("part" + std::to_string(k) + ".g2o"));
+      robots_.push_back(std::make_unique<Process>(command(k, domain), network_.host(k + 1)));
+    }
+  }
+
+  // Exit codes of all.
+  std::vector<int> wait() {
+    std::vector<int> codes;
+    for (const auto& robot : robots_) codes.push_back(robot->wait());
+    return codes;
+  }
+
+ private:
+  [[nodiscard]] std::vector<std::string> command(int k, int domain) const {
+    const std::string number = std::to_string(k);
+    return {std::string(KM_BIN_DIR) + "/kimera_multi_robot",
+            "--robot",
+            number,
+            "--name",
+            "robot" + number,
+            "--graph",
+            (folder_ / ("part" + number + ".g2o")).string(),
+            "--rate",
+            "max",
+            "--output",
+            (folder_ / ("robot" + number)).string(),
+            "--domain",
+            std::to_string(domain),
+            "--interface",
+            "eth0",
+            "--set",
+            "pose_graph.method=" + method_,
+            "--log",
+            "warn"};
+  }
+
+  VirtualNetwork network_;
+  fs::path folder_;
+  std::string method_;
+  std::vector<std::unique_ptr<Process>> robots_;
+};
+
+struct Solved {
+  double cost = 0.0;
+  double one = 0.0;  // what one process comes to
+  std::size_t edges = 0;
+  double slowest_s = 0.0;
+};
+
+Solved solve(const SplitGraph& graph, const Links& links, const std::string& method = "newton") {
+  const int robots = static_cast<int>(graph.keyframes.size());
+  const TemporaryFolder folder;
+  const auto codes = Team(graph, links, folder.path(), method).wait();
+  CHECK(codes == std::vector<int>(codes.size(), 0));
+  Solved solved;
+  for (int k = 0; k < robots; ++k) {
+    CAPTURE(k);
+    const fs::path file = folder.path() / ("robot" + std::to_string(k)) / "summary.json";
+    const YAML::Node summary = YAML::LoadFile(file.string());
+    CHECK(summary["pgo"]["members"].size() == static_cast<std::size_t>(robots));
+    CHECK(summary["pgo"]["settled"].as<bool>());
+    CHECK(summary["exit_reason"].as<std::string>() == "all present robots have settled");
+    solved.slowest_s = std::max(solved.slowest_s, summary["seconds"].as<double>());
+  }
+  const TeamResult team = read_team(folder.path(), robots);
+  solved.edges = team.graph.edges.size();
+  solved.cost = cost_of(team.graph, team.poses);
+  solved.one = solved_in_one_process(folder.path(), robots);
+  return solved;
+}
+
+std::ostream& operator<<(std::ostream& out, const Solved& solved) {
+  return out << "cost " << solved.cost << " of " << solved.edges << " edges, "
+             << std::abs(solved.cost - solved.one) / solved.one << " of it from one process, "
+             << solved.slowest_s << " s";
+}
+
+constexpr double kSame = 1e-9;  // of the cost
+
+void check_alike(const Solved& some, const Solved& all, const char* what) {
+  std::cout << what << ": " << some << "; with all links: " << all << '\n';
+  CHECK(some.edges == all.edges);
+  CHECK(some.cost == Approx(all.cost).epsilon(kSame).margin(0.0));
+  CHECK(some.cost == Approx(some.one).epsilon(kSame).margin(0.0));
+  CHECK(all.cost == Approx(all.one).epsilon(kSame).margin(0.0));
+}
+
+TEST_CASE("A chain of five robots comes to what five that all hear each other come to",
+          "[system][namespaces]") {
+  if (!VirtualNetwork::available()) return;
+  const Links chain{{0, 1}, {1, 2}, {2, 3}, {3, 4}};
+  const SplitGraph graph = random_team(20, {0, 1, 2, 3, 4}, 40, {{0, 1}, {1, 2}, {2, 3}, {3, 4}});
+  check_alike(solve(graph, chain), solve(graph, all_links(5)), "chain of five");
+}
+
+TEST_CASE("A robot that not everyone hears is taken in", "[system][namespaces]") {
+  if (!VirtualNetwork::available()) return;
+  const std::string method = GENERATE("newton", "rbcd");
+  CAPTURE(method);
+  const SplitGraph graph = random_team(21, {0, 1, 2}, 40, {{0, 1}, {1, 2}});
+  const Solved cut = solve(graph, {{0, 1}, {1, 2}}, method);
+  const Solved whole = solve(graph, all_links(3), method);
+  if (method == "newton") return check_alike(cut, whole, "link 1-3 cut");
+  std::cout << "link 1-3 cut, rbcd: " << cut << "; with all links: " << whole << '\n';
+  CHECK(cut.edges == whole.edges);
+  CHECK(cut.cost == Approx(cut.one).epsilon(1e-4));  // rbcd stops when it has become slow
+}
+
+}  // namespace
+}  // namespace km
