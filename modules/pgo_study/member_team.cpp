@@ -9,13 +9,8 @@
 #include "modules/pose_graph/tree_front.hpp"
 
 namespace km {
-namespace {
 
 using Eigen::Index;
-
-constexpr int kChances = 2;
-
-}  // namespace
 
 MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> start, Factory make,
                        TeamShape shape)
@@ -154,6 +149,7 @@ bool MemberTeam::reconsider(RoundMeter& meter) {
   for (const auto& member : members_)
     for (const WeighedClosure& closure : member->verdicts().closures)
       decided_[closure.id] = closure.kept;
+  if (!state_.set_aside) return false;
   std::vector<SE3> poses;
   for (const auto& member : members_)
     poses.insert(poses.end(), member->poses().begin(), member->poses().end());
@@ -164,7 +160,7 @@ bool MemberTeam::reconsider(RoundMeter& meter) {
   const auto look_again = [&](const PoseEdge& e) {
     const auto decided = decided_.find(e.id());
     if (decided == decided_.end() || decided->second || chances_[e.id()] >= kChances ||
-        residual_of(e, pose(e.from), pose(e.to)) > state_.barc)
+        residual_of(e, pose(e.from), pose(e.to)) > kSecondChance * state_.barc)
       return;
     ++chances_[e.id()];
     decided_.erase(decided);

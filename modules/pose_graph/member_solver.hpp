@@ -20,6 +20,12 @@ struct SolverLetter {
   std::shared_ptr<const std::vector<std::uint8_t>> bytes;
 };
 
+/// A closure that was set aside unheard is weighed again in the next session, at most kChances
+/// times, if its residual is up to kSecondChance times barc: what it would have pulled at is loose
+/// without it.
+inline constexpr double kSecondChance = 5.0;
+inline constexpr int kChances = 2;
+
 /// How far the team is, as this member knows it.
 struct SolverState {
   std::uint32_t round = 0;   ///< Rounds of the team that are complete.
@@ -28,6 +34,7 @@ struct SolverState {
   double noise_scale = 1.0;  ///< Of the closures, as the team has found it.
   double barc = 0.0;  ///< Largest residual of a closure that is kept [sigma]; 0: none is rejected.
   std::uint32_t lag = 1;   ///< Every member has had the poses() of `round` less so many.
+  bool set_aside = false;  ///< Closures that stand alone were not heard: they may be true.
   bool failed = false;     ///< Given up: the graph of the team could not be solved.
 };
 

@@ -195,7 +195,9 @@ bool TeamAgent::take(const TeamPeer& sender, const MemberPoses& poses) {
   if (!in_order(poses))
     return refuse("poses of robot " + std::to_string(sender.robot) + " that are not in order");
   plan_outdated_ = true;
+  const bool in_it = part_ && part_->told_by(told_, sender.robot, 0) != nullptr;
   told_[sender.robot] = poses;
+  deserted_ |= in_it && poses.session != part_->session().id;
   if (!part_ || part_->told_by(told_, sender.robot, 0) == nullptr) return true;
   if (in_session()) part_->moved(now_s_);
   if (solved_) decide_with(poses);

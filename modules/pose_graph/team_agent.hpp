@@ -93,6 +93,7 @@ class TeamAgent {
     std::uint64_t boot = 0;
     std::optional<TeamStatus> status = {};
     std::optional<Session> session = {};  // the newest that it coordinates
+    std::uint32_t joined = 0;             // number of the last of these that this robot was in
     bool other_method = false;            // nothing will come of its edges
   };
   struct World {
@@ -183,8 +184,9 @@ class TeamAgent {
   std::uint32_t frame_version_ = 0;
   std::vector<SE3> poses_;  // T_frame_kf, of the last session and odometry since
   std::optional<SessionPart> part_;
-  bool over_ = true;     // nothing more comes of it
-  bool solved_ = false;  // and all members have its solution
+  bool over_ = true;       // nothing more comes of it
+  bool deserted_ = false;  // a member of it has gone on to another one
+  bool solved_ = false;    // and all members have its solution
   double started_s_ = 0.0;
   std::uint64_t sent_bytes_ = 0;        // for it, to every reader, and passed on
   std::map<ClosureId, bool> verdicts_;  // of that session

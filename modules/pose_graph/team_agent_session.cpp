@@ -18,9 +18,6 @@ constexpr double kHopelessPeriods = 15.0;
 // After so long without anything new [s] the team has come to rest.
 constexpr double kAtRest_s = 2.0;
 
-// A closure that was set aside unheard is weighed again at most so many times.
-constexpr int kChances = 2;
-
 bool same_members(const SessionPlan& x, const SessionPlan& y) {
   return x.members.size() == y.members.size() && !has_lost_member(x, y);
 }
@@ -113,8 +110,8 @@ bool TeamAgent::has_moved_on() const {
 bool TeamAgent::should_open() const {
   if (!part_) return true;
   const Session& session = part_->session();
-  const bool stalled =
-      !over_ && now_s_ - part_->moved_s() > kHopelessPeriods * config_.status_period_s;
+  const bool hopeless = now_s_ - part_->moved_s() > kHopelessPeriods * config_.status_period_s;
+  const bool stalled = !over_ && (deserted_ || hopeless);
   if (same_graph(session.plan, plan_)) return session.finished ? has_moved_on() : over_ || stalled;
   if (session.id.coordinator != self_ || has_lost_member(session.plan, plan_)) return true;
   return over_ ? !session.finished || (paid_for() && worthwhile()) : stalled;
@@ -150,9 +147,11 @@ bool TeamAgent::well_formed(const Session& session) const {
 }
 
 bool TeamAgent::accepts(const Session& session) const {
+  // The others would take what this robot says now for what it has said before it left.
+  if (session.id.number <= peers_.at(session.id.coordinator.robot).joined) return false;
   if (!part_) return true;
   const SessionId& running = part_->session().id;
-  if (session.id.coordinator == running.coordinator) return running.number < session.id.number;
+  if (session.id.coordinator == running.coordinator) return true;
   return session.id.coordinator.robot <= running.coordinator.robot ||
          !plan_.has_member(running.coordinator.robot);
 }
@@ -253,7 +252,9 @@ bool TeamAgent::join(const Session& session) {
   part_.emplace(session, self_, std::move(*part), factory_,
                 AlignmentTolerance{config_.alignment_rotation_rad, config_.alignment_translation_m},
                 config_.status_period_s, now_s_);
-  over_ = solved_ = false;
+  if (const auto peer = peers_.find(session.id.coordinator.robot); peer != peers_.end())
+    peer->second.joined = session.id.number;
+  over_ = solved_ = deserted_ = false;
   started_s_ = now_s_;
   sent_bytes_ = 0;
   verdicts_.clear();
@@ -347,8 +348,7 @@ void TeamAgent::decide_with(const MemberPoses& poses) {
   decide(of_both);
 }
 
-// Closures that were set aside have not been heard, and some were decided on from worse poses: those
-// that fit the solution may be true. Between robots both ends look at the poses that both have told.
+// Closures that were set aside have not been heard; those that may fit the solution may be true. Between robots both ends look at the poses that both have told.
 void TeamAgent::reconsider() {
   if (!reconsider_due_ || !part_->all_solved(told_)) return;
   reconsider_due_ = false;
@@ -379,7 +379,7 @@ bool TeamAgent::fits(const PoseEdge& closure) const {
     return told.T_frame_kf[static_cast<std::size_t>(at - told.keyframes.begin())].pose();
   };
   const auto from = pose(closure.from), to = pose(closure.to);
-  return from && to && residual_of(closure, *from, *to) <= part_->state().barc;
+  return from && to && residual_of(closure, *from, *to) <= kSecondChance * part_->state().barc;
 }
 
 // What follows from what the members have told.
@@ -432,7 +432,7 @@ void TeamAgent::leave(bool with_solution) {
       decide_with(*told);
   lengths_ = part_->lengths();
   if (!alone) team_lengths_ = lengths_;
-  reconsider_due_ = true;
+  reconsider_due_ = part_->state().set_aside;
 }
 
 }  // namespace km

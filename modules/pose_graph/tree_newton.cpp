@@ -425,9 +425,10 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
       phase_ = Phase::kDone;
       break;
   }
+  const bool set_aside = state_.set_aside || (v.next == Next::kStart && v.set_aside);
   state_ = {.round = round_ + 1, .cost = v.cost, .gradient = v.gradient,
             .noise_scale = v.noise_scale, .barc = options_.robust ? v.barc : 0.0,
-            .failed = state_.failed};
+            .set_aside = set_aside, .failed = state_.failed};
   if (!done()) phase_ = Phase::kUp;
   ++round_;
   std::vector<SolverLetter> letters;

@@ -33,6 +33,7 @@ class GatherSolver final : public MemberSolver {
     double largest_residual = std::numeric_limits<double>::infinity();
     std::set<ClosureId> rejects = {};  ///< As well.
     double barc = 0.0;
+    bool set_aside = false;  ///< What it says of itself, see SolverState.
   };
 
   GatherSolver(SessionGraph graph, TreePlace place, const Options& options)
@@ -82,6 +83,7 @@ class GatherSolver final : public MemberSolver {
             .cost = cost_,
             .gradient = gradient_,
             .barc = options_.barc,
+            .set_aside = options_.set_aside,
             .failed = failed_};
   }
   [[nodiscard]] ClosureVerdicts verdicts() const override {

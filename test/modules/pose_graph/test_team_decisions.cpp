@@ -265,7 +265,7 @@ TEST_CASE("closures that were set aside and fit get two more chances", "[pose_gr
   std::map<SessionId, std::set<std::optional<bool>>> sessions;  // what was decided before each
   const MemberSolverFactory factory = [&](const Session& session, SessionGraph graph,
                                           TreePlace place) {
-    GatherSolver::Options options{.barc = 100.0};
+    GatherSolver::Options options{.barc = 100.0, .set_aside = true};
     if (place.members.size() == kFour.size()) {
       const auto decided = graph.decided.find(closure->id());
       if (graph.self == 5 || graph.self == 9)

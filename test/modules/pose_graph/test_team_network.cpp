@@ -63,6 +63,8 @@ void check_optimal(const TeamNetwork& network, const TeamProblem& problem,
     REQUIRE(robot.trajectory);
     CHECK(robot.trajectory->anchor == anchor);
     CHECK(robot.progress.members == problem.members());
+    for (const auto& [what, times] : robot.agent->refused()) UNSCOPED_INFO(what << " " << times);
+    CHECK(robot.agent->refused().empty());
   }
   const CentralProblem whole(problem);
   const double optimum = whole.optimum(problem.start);
@@ -221,6 +223,12 @@ TEST_CASE("the others come to an end when a member dies, and it catches up when 
   network.on_parcel = [&](RobotId, const Parcel& parcel) {
     parcels += std::holds_alternative<TeamStatus>(*parcel.message) ? 0 : 1;
   };
+  std::map<RobotId, std::vector<SessionId>> sessions;
+  network.on_step = [&](const TeamNetwork::Robot& robot) {
+    std::vector<SessionId>& of_robot = sessions[robot.peer.robot];
+    const SessionId& id = robot.agent->part()->session().id;
+    if (of_robot.empty() || of_robot.back() != id) of_robot.push_back(id);
+  };
   (void)network.run(60.0, [&] { return parcels >= after_parcels && parcels > 0; });
   network.kill(gone);
   const double gone_s = network.now_s();
@@ -234,9 +242,15 @@ TEST_CASE("the others come to an end when a member dies, and it catches up when 
     if (id != gone) CHECK(robot.trajectory->anchor == 1);  // `world` stays
   CHECK(CentralProblem(more).cost(network.trajectories()) <= before * (1.0 + 1e-3));
   network.revive(gone);
+  const double back_s = network.now_s();
   (void)network.run(1.0);
   REQUIRE(settle(network, 60.0));
+  CHECK(network.now_s() - back_s < 10.0);
   check_optimal(network, more);
+  for (auto& [robot, of_robot] : sessions) {  // nobody can go on where it has left one
+    std::sort(of_robot.begin(), of_robot.end());
+    CHECK(std::adjacent_find(of_robot.begin(), of_robot.end()) == of_robot.end());
+  }
 }
 
 TEST_CASE("a team that falls apart goes on in two, in one frame, and becomes one again",
