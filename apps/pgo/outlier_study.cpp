@@ -120,7 +120,8 @@ TeamGraph spoil_in_clusters(const TeamGraph& graph, const Clusters& clusters,
   if (clusters.places == 0) return spoiled;
   const std::vector<bool> odometry = odometry_edges(graph);
   const auto closure = std::find(odometry.begin(), odometry.end(), false);
-  if (closure == odometry.end()) throw std::invalid_argument("spoil: the graph has no loop closure");
+  if (closure == odometry.end())
+    throw std::invalid_argument("spoil: the graph has no loop closure");
   const BlockEdge& claimed = graph.edges[static_cast<std::size_t>(closure - odometry.begin())];
   const auto length = static_cast<Eigen::Index>(clusters.size);
   std::mt19937 rng(seed);
@@ -131,9 +132,8 @@ TeamGraph spoil_in_clusters(const TeamGraph& graph, const Clusters& clusters,
     return std::uniform_int_distribution<Eigen::Index>(graph.first[robot],
                                                        graph.first[robot + 1] - length)(rng);
   };
-  const RandomOutlierModel model{.keyframes = 3,
-                                 .planar = graph.dimension == 2,
-                                 .half_side_m = half_side_m};
+  const RandomOutlierModel model{
+      .keyframes = 3, .planar = graph.dimension == 2, .half_side_m = half_side_m};
   for (std::size_t n = 0; n < clusters.places; ++n) {
     const Eigen::Index a = any_place(0);
     const Eigen::Index b = any_place(graph.robots() - 1);
@@ -177,10 +177,10 @@ OutlierStudy run_outlier_study(const TeamGraph& clean, const OutlierStudyOptions
         if (progress) progress(study.results.size(), all);
         const auto count = static_cast<std::size_t>(
             std::lround(0.01 * percent * static_cast<double>(study.true_closures)));
-        const TeamGraph spoiled = spoil_in_clusters(spoil(clean, count, study.half_side_m, seed),
-                                                    options.clusters, truth, study.half_side_m, seed);
-        OutlierResult result =
-            attempt(method, spoiled, clean.edges.size(), truth, options, meter);
+        const TeamGraph spoiled =
+            spoil_in_clusters(spoil(clean, count, study.half_side_m, seed), options.clusters, truth,
+                              study.half_side_m, seed);
+        OutlierResult result = attempt(method, spoiled, clean.edges.size(), truth, options, meter);
         result.share_percent = percent;
         result.seed = seed;
         result.false_closures = spoiled.edges.size() - clean.edges.size();

@@ -76,9 +76,9 @@ using OutlierProgress = std::function<void(std::size_t, std::size_t)>;
 [[nodiscard]] TeamGraph spoil(const TeamGraph& graph, std::size_t count, double half_side_m,
                               unsigned seed);
 
-/// Adds clusters of false closures, between the first robot and the last; `poses` say how the robots
-/// moved meanwhile. Otherwise as spoil(). Throws std::invalid_argument if a robot has not as many
-/// poses as a cluster closures.
+/// Adds clusters of false closures, between the first robot and the last; `poses` say how the
+/// robots moved meanwhile. Otherwise as spoil(). Throws std::invalid_argument if a robot has not as
+/// many poses as a cluster closures.
 [[nodiscard]] TeamGraph spoil_in_clusters(const TeamGraph& graph, const Clusters& clusters,
                                           const std::vector<SE3>& poses, double half_side_m,
                                           unsigned seed);

@@ -64,7 +64,8 @@ void define(CLI::App& app, OutlierStudyOptions& study) {
   app.add_option("--pcm-sigmas", study.pcm_sigmas,
                  "pcm: sigmas of all edges, in multiples of the file's")
       ->check(CLI::Range(0.01, 1000.0));
-  app.add_option("--clusters", study.clusters.places, "Of false closures that agree with each other")
+  app.add_option("--clusters", study.clusters.places,
+                 "Of false closures that agree with each other")
       ->check(CLI::Range(0, 10000));
   app.add_option("--cluster-size", study.clusters.size, "Closures in each")
       ->check(CLI::Range(1, 1000));

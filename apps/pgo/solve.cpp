@@ -38,7 +38,8 @@ constexpr const char* kDetails =
     "                    the same\n"
     "  centralized       the whole graph on one computer: Newton, certified; else the staircase\n"
     "                    of SE-Sync\n"
-    "  newton            what the robots run: Newton steps of the whole team up and down a tree of\n"
+    "  newton            what the robots run: Newton steps of the whole team up and down a tree "
+    "of\n"
     "                    robots. Finds out how noisy closures are and which are false (graduated\n"
     "                    non-convexity: weights, and a step, in turn), and ends with the optimum\n"
     "                    of those that it keeps; with --trust-all it keeps all\n"
@@ -140,12 +141,14 @@ void define_newton(CLI::App& app, SolveCommand& command) {
   SolverOptions& solver = command.solver;
   app.option_defaults()->group("newton");
   app.add_flag("--trust-all", solver.trust_all, "No closure is false");
-  app.add_option("--barc", solver.barc,
-                 "Residual [sigma] up to which a closure is kept, sqrt of its cost; 0: where all but\n"
-                 "one in a million Gaussian residuals lie, times the noise scale that the team finds")
+  app.add_option(
+         "--barc", solver.barc,
+         "Residual [sigma] up to which a closure is kept, sqrt of its cost; 0: where all but\n"
+         "one in a million Gaussian residuals lie, times the noise scale that the team finds")
       ->check(CLI::NonNegativeNumber);
-  app.add_flag("--tell-private", solver.tell_private,
-               "Poses that no closure to another robot ends on are told, too, where that saves bytes");
+  app.add_flag(
+      "--tell-private", solver.tell_private,
+      "Poses that no closure to another robot ends on are told, too, where that saves bytes");
   app.add_option_function<std::string>(
          "--links",
          [&solver](const std::string& shape) {
@@ -202,8 +205,7 @@ void run(const CLI::App& app, SolveCommand& command) {
   check(app, command);
   TeamGraph graph = command.input.read(app);
   if (command.no_vertical) graph.verticals.clear();
-  const Solution solution =
-      solve(graph, command.solver, command.optimum, cpu_meter());
+  const Solution solution = solve(graph, command.solver, command.optimum, cpu_meter());
   std::cout << solution_text(graph, solution);
   command.files.write([&](std::ostream& out) { write_solution_json(out, graph, solution); },
                       [&] { return gap_plot(solution); });

@@ -86,8 +86,8 @@ std::string judged_text(const Solution& solution) {
   std::ostringstream text;
   text << table(solution) << "chordal start in " << fixed(solution.start_s, 3) << " s, "
        << (judged.optimum_certified ? "optimum " : "least cost known ")
-       << rounded(judged.optimum, 9) << ", rounded cost "
-       << rounded(judged.rounded_cost, 9) << ", rank " << judged.rank << '\n'
+       << rounded(judged.optimum, 9) << ", rounded cost " << rounded(judged.rounded_cost, 9)
+       << ", rank " << judged.rank << '\n'
        << certificate_text(judged.certificate);
   if (solution.run.verification) text << verification_text(*solution.run.verification);
   return text.str();
@@ -121,10 +121,10 @@ std::string decision_text(const TeamGraph& graph, const Solution& solution) {
        << " times as noisy as the graph says; kept up to " << rounded(decision.threshold, 3)
        << " sigma of the graph\n"
        << solution.run.rounds.size() - 1 << " rounds, " << work_bytes(work)
-       << " sent, by one robot at most "
-       << bytes_text(static_cast<double>(decision.most_sent)) << " and to one "
-       << bytes_text(static_cast<double>(decision.most_received)) << ", critical path "
-       << fixed(work.critical_path_s, 3) << " s, CPU " << fixed(work.total_cpu_s, 3) << " s\n";
+       << " sent, by one robot at most " << bytes_text(static_cast<double>(decision.most_sent))
+       << " and to one " << bytes_text(static_cast<double>(decision.most_received))
+       << ", critical path " << fixed(work.critical_path_s, 3) << " s, CPU "
+       << fixed(work.total_cpu_s, 3) << " s\n";
   if (!decision.decided) text << "not decided: --rounds did not suffice\n";
   return text.str();
 }
@@ -137,7 +137,8 @@ std::string solution_text(const TeamGraph& graph, const Solution& solution) {
        << " edges, ";
   if (!graph.verticals.empty()) text << graph.verticals.size() << " verticals, ";
   text << graph.robots() << (graph.robots() == 1 ? " robot\n" : " robots\n")
-       << indefinite_text(graph.indefinite_edges) << (solution.judgement ? judged_text(solution) : decision_text(graph, solution));
+       << indefinite_text(graph.indefinite_edges)
+       << (solution.judgement ? judged_text(solution) : decision_text(graph, solution));
   return text.str();
 }
 
@@ -145,7 +146,8 @@ void write_solution_json(std::ostream& out, const TeamGraph& graph, const Soluti
   JsonWriter json(out);
   json.begin_object();
   json.fields("poses", graph.poses(), "edges", graph.edges.size(), "verticals",
-              graph.verticals.size(), "indefinite_edges", graph.indefinite_edges, "robots", graph.robots(), "method", solution.method);
+              graph.verticals.size(), "indefinite_edges", graph.indefinite_edges, "robots",
+              graph.robots(), "method", solution.method);
   json.objects("rounds", solution.run.rounds, [&](const TeamRound& round) {
     json.fields("cost", round.cost, "gradient_norm", round.gradient_norm, "bytes", round.work.bytes,
                 "critical_path_s", round.work.critical_path_s, "total_cpu_s",

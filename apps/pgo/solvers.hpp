@@ -42,7 +42,7 @@ struct Decision {
   double threshold = 0.0;     ///< Residual of an inlier [sigma of the graph].
   std::size_t most_sent = 0;  ///< By one robot [B], and received.
   std::size_t most_received = 0;
-  bool decided = false;       ///< Else the rounds did not suffice, or the team could not go on.
+  bool decided = false;  ///< Else the rounds did not suffice, or the team could not go on.
 };
 
 struct SolverRun {

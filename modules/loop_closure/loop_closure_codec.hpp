@@ -20,7 +20,7 @@ template <>
 struct Codec<KeyframeRequest> {
   using Wire = km_wire_KeyframeRequest;
   static constexpr const char* kTopic = "keyframe_requests";
-  static constexpr std::uint16_t kVersion = 2;
+  static constexpr std::uint16_t kVersion = 1;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_KeyframeRequest_desc; }
 
   struct Encoded {

@@ -30,13 +30,12 @@ CentralSolver::CentralSolver(std::vector<BlockEdge> edges, LiftedPoses start, in
                          {e.kappa, e.tau}});
   graph.upright = !verticals.empty();
   graph.verticals = std::move(verticals);
-  newton_ = std::make_unique<TreeNewton>(
-      std::move(graph), TreePlace{.members = {0}},
-      TreeNewtonOptions{.dimension = dimension,
-                        .absolute_tolerance = 0.0,
-                        .patience_rounds = kPatience,
-                        .max_rounds = kMaxRounds,
-                        .robust = false});
+  newton_ = std::make_unique<TreeNewton>(std::move(graph), TreePlace{.members = {0}},
+                                         TreeNewtonOptions{.dimension = dimension,
+                                                           .absolute_tolerance = 0.0,
+                                                           .patience_rounds = kPatience,
+                                                           .max_rounds = kMaxRounds,
+                                                           .robust = false});
   X_ = std::move(start);
 }
 

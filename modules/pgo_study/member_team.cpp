@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/team_plan.hpp"
@@ -87,11 +88,11 @@ void MemberTeam::tell_starts(std::vector<SE3> start, RoundMeter* meter) {
 }
 
 void MemberTeam::open_session() {
-  members_.clear();
+  const auto before = std::exchange(members_, {});
   post_.clear();
   for (std::size_t k = 0; k < parts_.size(); ++k) {
     parts_[k].decided = decided_;
-    parts_[k].noise_scale = state_.round > 0 ? state_.noise_scale : 0.0;
+    if (k < before.size()) parts_[k].lengths = before[k]->lengths();
     members_.push_back(make_(parts_[k], places_.at(k)));
   }
   rounds_before_ = rounds_;
@@ -109,12 +110,12 @@ bool MemberTeam::step(RoundMeter& meter) {
   if (done() && !reconsider(meter)) return false;
   const std::uint32_t round = rounds_ - rounds_before_ + 1;
   const auto arrived = [&] {
-    return std::all_of(members_.begin(), members_.end(), [&](const auto& m) {
-      return m->done() || m->state().round >= round;
-    });
+    return std::all_of(members_.begin(), members_.end(),
+                       [&](const auto& m) { return m->done() || m->state().round >= round; });
   };
   while (!arrived())
-    if (!pass_on(round, meter)) throw std::runtime_error("MemberTeam: the members wait for each other");
+    if (!pass_on(round, meter))
+      throw std::runtime_error("MemberTeam: the members wait for each other");
   ++rounds_;
   take_poses();
   return true;

@@ -5,10 +5,10 @@
 #include <memory>
 #include <vector>
 
-#include "modules/pose_graph/member_solver.hpp"
-#include "modules/pose_graph/session_graph.hpp"
 #include "modules/pgo_study/team_graph.hpp"
 #include "modules/pgo_study/team_solver.hpp"
+#include "modules/pose_graph/member_solver.hpp"
+#include "modules/pose_graph/session_graph.hpp"
 
 namespace km {
 

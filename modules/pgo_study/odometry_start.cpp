@@ -25,8 +25,9 @@ std::vector<SE3> chained(const TeamGraph& graph, const std::vector<bool>& odomet
     const auto [low, high] = std::minmax(graph.edges[k].i, graph.edges[k].j);
     if (begin <= low && high < end) edges.push_back(k);
   }
-  std::stable_sort(edges.begin(), edges.end(),
-                   [&](std::size_t a, std::size_t b) { return graph.edges[a].i < graph.edges[b].i; });
+  std::stable_sort(edges.begin(), edges.end(), [&](std::size_t a, std::size_t b) {
+    return graph.edges[a].i < graph.edges[b].i;
+  });
   std::vector<std::optional<SE3>> reached(static_cast<std::size_t>(end - begin));
   reached[0] = SE3::Identity();
   const auto reach_on = [&](bool step) {
@@ -49,8 +50,8 @@ std::vector<SE3> chained(const TeamGraph& graph, const std::vector<bool>& odomet
   std::vector<SE3> poses;
   for (const auto& T : reached) {
     if (!T)
-      throw std::invalid_argument("robot " + std::to_string(robot) + ": no edge leads to its pose " +
-                                  std::to_string(poses.size()));
+      throw std::invalid_argument("robot " + std::to_string(robot) +
+                                  ": no edge leads to its pose " + std::to_string(poses.size()));
     poses.push_back(*T);
   }
   return poses;
@@ -72,9 +73,8 @@ SE3 elected(const std::vector<Vote>& votes) {
   const std::size_t stride = (votes.size() + kMaxVotes - 1) / kMaxVotes;
   std::vector<Eigen::MatrixXd> candidates;
   for (std::size_t k = 0; k < votes.size(); k += stride)
-    candidates.emplace_back((votes[k].T_world_end * votes[k].T_own_end.inverse() * T_own_centre)
-                                .matrix()
-                                .topRows<3>());
+    candidates.emplace_back(
+        (votes[k].T_world_end * votes[k].T_own_end.inverse() * T_own_centre).matrix().topRows<3>());
   SE3 T_world_centre = SE3::Identity();
   T_world_centre.matrix().topRows<3>() = align_frames(candidates, {}).value().L;
   return T_world_centre * T_own_centre.inverse();
@@ -105,9 +105,9 @@ std::vector<SE3> odometry_start(const TeamGraph& graph) {
         votes[a].push_back({T_j * e.T_i_j.inverse(), T_i, odometry[k]});
     }
     if (votes.empty()) throw std::invalid_argument("the graph does not join all robots");
-    const auto next = std::max_element(votes.begin(), votes.end(), [](const auto& a, const auto& b) {
-      return a.second.size() < b.second.size();
-    });
+    const auto next = std::max_element(
+        votes.begin(), votes.end(),
+        [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
     const SE3 T_world_own = elected(next->second);
     for (Index i = graph.first[next->first]; i < graph.first[next->first + 1]; ++i)
       poses[static_cast<std::size_t>(i)] = T_world_own * poses[static_cast<std::size_t>(i)];

@@ -40,7 +40,8 @@ SessionGraph part_of(const TeamGraph& graph, std::size_t robot) {
     const bool inside = edge.from.robot == edge.to.robot;
     if (odometry[k] && inside) {
       const std::size_t n = ++steps[edge.from.robot];
-      Precision& mean = part.step_precision.try_emplace(edge.from.robot, edge.precision).first->second;
+      Precision& mean =
+          part.step_precision.try_emplace(edge.from.robot, edge.precision).first->second;
       mean.kappa += (e.kappa - mean.kappa) / static_cast<double>(n);
       mean.tau += (e.tau - mean.tau) / static_cast<double>(n);
     }

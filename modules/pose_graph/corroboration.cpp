@@ -55,9 +55,9 @@ double Corroboration::cycle_length(const Upward& one, const Upward& other) const
   const auto measured = [&](const Upward& c) {
     return UncertainPose{c.T_lower_upper, covariance_in(c.precision, dimension_)};
   };
-  const UncertainPose cycle =
-      compose(compose(compose(measured(one), chain(one.upper, other.upper)), inverse(measured(other))),
-              chain(other.lower, one.lower));
+  const UncertainPose cycle = compose(
+      compose(compose(measured(one), chain(one.upper, other.upper)), inverse(measured(other))),
+      chain(other.lower, one.lower));
   if (angle_of(cycle.T.linear()) > kLargestTurn) return std::numeric_limits<double>::infinity();
   const Vector6 xi = se3_log(cycle.T);
   if (dimension_ == 3) return std::sqrt(xi.dot(cycle.Sigma.ldlt().solve(xi)));

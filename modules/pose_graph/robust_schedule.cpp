@@ -67,8 +67,8 @@ void RobustSchedule::next(const Tally& tally) {
   }
   const bool same = tally.changed == 0;
   const bool hard = mu_ >= kHardMu;
-  decided_ = (same && (tally.fractional == 0 || hard)) ||
-             (hard && hard_updates_ >= kHardUpdates) || updates_ >= kMaxUpdates;
+  decided_ = (same && (tally.fractional == 0 || hard)) || (hard && hard_updates_ >= kHardUpdates) ||
+             updates_ >= kMaxUpdates;
   if (decided_) return;
   ++updates_;
   mu_ = std::min(kLargestMu, mu_ * (mu_ < kNearlyConvex ? kFastMuStep : kMuStep));

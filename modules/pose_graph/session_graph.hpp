@@ -39,7 +39,6 @@ struct SessionGraph {
   bool upright = false;                       ///< All members have verticals: the frame has z up.
   /// Decided in sessions before: kept or rejected. Closures that are not named are undecided.
   std::map<ClosureId, bool> decided = {};
-  double noise_scale = 0.0;  ///< Of closures, as found in a session before; 0: none was.
   std::set<ClosureId> trusted = {};  ///< Between robots, and not to be weighed; the same for both.
   /// Of cycles through closures that this robot counted in sessions before, see Corroboration.
   NoiseHistogram lengths = {};

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "modules/pose_graph/session_part.hpp"
 #include "modules/pose_graph/pose_graph_config.hpp"
+#include "modules/pose_graph/session_part.hpp"
 
 namespace km {
 

@@ -94,6 +94,7 @@ class TeamAgent {
     std::optional<TeamStatus> status = {};
     std::optional<Session> session = {};  // the newest that it coordinates
     std::uint32_t joined = 0;             // number of the last of these that this robot was in
+    std::uint32_t missed = 0;             // of the last one that it could not join
     bool other_method = false;            // nothing will come of its edges
   };
   struct World {

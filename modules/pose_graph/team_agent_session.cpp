@@ -171,9 +171,13 @@ void TeamAgent::consider(const Session& session) {
   // The others go on without this robot.
   if (from_own_coordinator && !member) return leave(part_->all_solved(told_));
   // Its coordinator must be known to be connected to this robot, and all members to be there.
-  if (member && !session.finished && accepts(session) && !misses_member(session.plan) &&
-      plan_.has_member(session.id.coordinator.robot) && !join(session))
-    refuse("a session of robot " + std::to_string(session.id.coordinator.robot) +
+  if (!member || session.finished || !accepts(session) || misses_member(session.plan) ||
+      !plan_.has_member(session.id.coordinator.robot) || join(session))
+    return;
+  // Asked again whenever something becomes known, and counted once.
+  const RobotId coordinator = session.id.coordinator.robot;
+  if (std::exchange(peers_.at(coordinator).missed, session.id.number) != session.id.number)
+    refuse("a session of robot " + std::to_string(coordinator) +
            " over closures that are not at hand");
 }
 
@@ -348,7 +352,8 @@ void TeamAgent::decide_with(const MemberPoses& poses) {
   decide(of_both);
 }
 
-// Closures that were set aside have not been heard; those that may fit the solution may be true. Between robots both ends look at the poses that both have told.
+// Closures that were set aside have not been heard; those that may fit the solution may be true.
+// Between robots both ends look at the poses that both have told.
 void TeamAgent::reconsider() {
   if (!reconsider_due_ || !part_->all_solved(told_)) return;
   reconsider_due_ = false;

@@ -60,9 +60,9 @@ Vector6 tangent_of_step(const Eigen::Ref<const VectorXd>& step) {
 
 double residual_of(const PoseEdge& edge, const SE3& T_world_from, const SE3& T_world_to) {
   const SE3 predicted = T_world_from * edge.T_from_to;
-  return std::sqrt(
-      edge.precision.kappa * (T_world_to.linear() - predicted.linear()).squaredNorm() +
-      edge.precision.tau * (T_world_to.translation() - predicted.translation()).squaredNorm());
+  return std::sqrt(edge.precision.kappa * (T_world_to.linear() - predicted.linear()).squaredNorm() +
+                   edge.precision.tau *
+                       (T_world_to.translation() - predicted.translation()).squaredNorm());
 }
 
 TreeFront::TreeFront(FrontGraph graph) : graph_(std::move(graph)) {
@@ -254,9 +254,9 @@ void TreeFront::add_own(std::span<const SE3> poses, Curvature curvature, BlockMa
     const HeldEdge& h = graph_.held[k];
     const bool from_own = h.edge.from.robot == graph_.self;
     const KeyframeIndex own = h.edge.end_on(graph_.self).index;
-    const BlockEdge e = weighed({0, 1, h.edge.T_from_to, h.edge.precision.kappa,
-                                 h.edge.precision.tau},
-                                weights_[edges_.size() + k]);
+    const BlockEdge e =
+        weighed({0, 1, h.edge.T_from_to, h.edge.precision.kappa, h.edge.precision.tau},
+                weights_[edges_.size() + k]);
     const EdgeModel model = from_own ? model_edge(e, poses[own], h.T_world_other, curvature)
                                      : model_edge(e, h.T_world_other, poses[own], curvature);
     A.diagonal.middleCols<kBlock>(kBlock * Index{own}) += part(from_own ? model.H_ii : model.H_jj);
@@ -392,8 +392,7 @@ void TreeFront::add_slopes(std::span<const SE3> poses, MatrixXd& C) const {
     const KeyframeIndex own = h.edge.end_on(graph_.self).index;
     const double w = weights_[edges_.size() + k];
     if (w < kRejected) continue;
-    const BlockEdge e{0, 1, h.edge.T_from_to, w * h.edge.precision.kappa,
-                      w * h.edge.precision.tau};
+    const BlockEdge e{0, 1, h.edge.T_from_to, w * h.edge.precision.kappa, w * h.edge.precision.tau};
     if (from_own)
       slope_edge(e, poses[own], h.T_world_other, model);
     else
@@ -440,7 +439,8 @@ VectorXd TreeFront::reduced() const {
 }
 
 // Of the one pose that is left its place is held, and how it is turned but for what verticals say
-// of its tilt: of the turns of the team as a whole, none of them resists the one about the vertical.
+// of its tilt: of the turns of the team as a whole, none of them resists the one about the
+// vertical.
 TreeFront::RootStep TreeFront::solve_root(bool upright) const {
   RootStep result{VectorXd::Zero(block() * static_cast<Index>(plan_->kept().size()))};
   if (!upright || result.kept.size() != 6) return result;
@@ -490,8 +490,8 @@ double TreeFront::cost(std::span<const SE3> poses) const {
     const double w = weights_[edges_.size() + k];
     const SE3& own = poses[h.edge.end_on(graph_.self).index];
     const bool from_own = h.edge.from.robot == graph_.self;
-    const double r = residual_of(h.edge, from_own ? own : h.T_world_other,
-                                 from_own ? h.T_world_other : own);
+    const double r =
+        residual_of(h.edge, from_own ? own : h.T_world_other, from_own ? h.T_world_other : own);
     if (w >= kRejected) cost += w * r * r;
   }
   if (block() == 6)

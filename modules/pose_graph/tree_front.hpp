@@ -23,8 +23,8 @@ struct HeldEdge {
 struct FrontGraph {
   RobotId self = 0;
   Eigen::Index poses = 0;
-  int dimension = 3;                   ///< 2: poses and measurements are planar.
-  std::vector<PoseEdge> edges = {};    ///< One end at least is of this robot.
+  int dimension = 3;                 ///< 2: poses and measurements are planar.
+  std::vector<PoseEdge> edges = {};  ///< One end at least is of this robot.
   std::vector<HeldEdge> held = {};
   std::vector<VerticalPrior> verticals = {};
   /// Own poses that others may be told of.
@@ -36,13 +36,13 @@ struct FrontGraph {
   bool free = true;
 };
 
-/// One robot's front in the Newton equations of a team, eliminated up a tree of robots: multifrontal
-/// Cholesky factorisation (Duff, Reid, ACM TOMS 1983) whose fronts are robots. Each robot adds its
-/// children's Schur complements to its own equations, eliminates the poses that no robot outside
-/// its subtree touches, and tells its parent what remains. Of these poses, those that are public
-/// may also be left to the parent, where eliminating them would couple more poses than it
-/// uncouples: then edges between them are told as such (ToldEdge). What is told of a robot's other
-/// poses is what they come to on those told, never they themselves.
+/// One robot's front in the Newton equations of a team, eliminated up a tree of robots:
+/// multifrontal Cholesky factorisation (Duff, Reid, ACM TOMS 1983) whose fronts are robots. Each
+/// robot adds its children's Schur complements to its own equations, eliminates the poses that no
+/// robot outside its subtree touches, and tells its parent what remains. Of these poses, those that
+/// are public may also be left to the parent, where eliminating them would couple more poses than
+/// it uncouples: then edges between them are told as such (ToldEdge). What is told of a robot's
+/// other poses is what they come to on those told, never they themselves.
 ///
 /// Nodes are the own poses in order, then poses of other robots that own edges end on ("followed",
 /// too: this robot knows where they are), then those that only children speak of. Not thread-safe.
@@ -138,8 +138,8 @@ class TreeFront {
   std::map<KeyframeId, int> foreign_;  // nodes that are not own poses
   std::size_t followed_ = 0;
   std::vector<Edge> edges_;
-  std::vector<double> weights_;            // of edges_, then of the held ones
-  std::vector<double> linearised_weights_; // of edges that are not told
+  std::vector<double> weights_;             // of edges_, then of the held ones
+  std::vector<double> linearised_weights_;  // of edges that are not told
   std::map<RobotId, Child> children_;
   std::shared_ptr<const EliminationPlan> plan_;
   std::optional<FrontalCholesky> factor_;

@@ -80,7 +80,6 @@ void write(Writer& w, const TreeSums& s) {
   w.f32(s.largest);
   for (const std::uint32_t n : {s.open, s.changed, s.fractional, s.isolated, s.fixed, s.poses})
     w.varint(n);
-  w.f32(s.noise_scale);
   w.varint(s.lengths.size());
   for (const auto& [bin, n] : s.lengths) {
     w.varint(bin);
@@ -100,7 +99,6 @@ TreeSums read_sums(Reader& r) {
   s.largest = r.small_number();
   for (std::uint32_t* n : {&s.open, &s.changed, &s.fractional, &s.isolated, &s.fixed, &s.poses})
     *n = r.varint_as<std::uint32_t>();
-  s.noise_scale = r.small_number();
   for (std::size_t n = r.count(kMaxElements, 2); n > 0; --n) {
     const auto bin = r.varint_as<std::uint16_t>();
     if (!s.lengths.empty() && bin <= s.lengths.rbegin()->first) r.fail();
@@ -260,7 +258,6 @@ void TreeSums::add(const TreeSums& other) {
   isolated += other.isolated;
   fixed += other.fixed;
   poses += other.poses;
-  noise_scale = std::max(noise_scale, other.noise_scale);
   for (const auto& [bin, n] : other.lengths) lengths[bin] += n;
   std::vector<PairVote> all;
   std::merge(votes.begin(), votes.end(), other.votes.begin(), other.votes.end(),

@@ -66,7 +66,6 @@ struct TreeSums {
   std::uint32_t isolated = 0;    ///< Closures set aside, see Corroboration.
   std::uint32_t fixed = 0;       ///< Edges to poses that are held.
   std::uint32_t poses = 0;
-  float noise_scale = 0.0F;                             ///< Found in a session before; 0: none was.
   std::map<std::uint16_t, std::uint32_t> lengths = {};  ///< See NoiseHistogram; at the start only.
   std::vector<PairVote> votes = {};                     ///< Ascending by (a, b).
 

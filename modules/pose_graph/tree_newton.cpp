@@ -155,8 +155,7 @@ void TreeNewton::build_front() {
   for (const PoseEdge& e : graph_.to_absent) {
     const auto decided = graph_.decided.find(e.id());
     const bool rejected = decided != graph_.decided.end() && !decided->second;
-    if (!rejected || !options_.robust)
-      front.held.push_back({e, start_of(e.other(graph_.self))});
+    if (!rejected || !options_.robust) front.held.push_back({e, start_of(e.other(graph_.self))});
   }
   for (const PoseEdge& e : graph_.between) front.open.insert(e.end_on(graph_.self).index);
   if (options_.tell_private)
@@ -192,7 +191,8 @@ void TreeNewton::count_closures(TreeSums& sums) const {
           static_cast<float>(residual_of(k.edge, start_of(k.edge.from), start_of(k.edge.to))));
     }
     const RobotId peer = std::max(k.edge.from.robot, k.edge.to.robot);
-    if (peer != graph_.self) ++votes.try_emplace(peer, PairVote{graph_.self, peer}).first->second.used;
+    if (peer != graph_.self)
+      ++votes.try_emplace(peer, PairVote{graph_.self, peer}).first->second.used;
   }
   for (const auto& [peer, vote] : votes) sums.votes.push_back(vote);
 }
@@ -204,7 +204,6 @@ UpLetter TreeNewton::first_letter() {
   sums.fixed = static_cast<std::uint32_t>(graph_.to_absent.size());
   count_closures(sums);
   if (!options_.robust || round_ > 0) return letter;
-  sums.noise_scale = static_cast<float>(graph_.noise_scale);
   const Corroboration::PoseOf pose = [this](const KeyframeId& id) { return start_of(id); };
   for (const auto& [peer, places] : by_peer()) {
     std::vector<PoseEdge> closures;
@@ -426,9 +425,13 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
       break;
   }
   const bool set_aside = state_.set_aside || (v.next == Next::kStart && v.set_aside);
-  state_ = {.round = round_ + 1, .cost = v.cost, .gradient = v.gradient,
-            .noise_scale = v.noise_scale, .barc = options_.robust ? v.barc : 0.0,
-            .set_aside = set_aside, .failed = state_.failed};
+  state_ = {.round = round_ + 1,
+            .cost = v.cost,
+            .gradient = v.gradient,
+            .noise_scale = v.noise_scale,
+            .barc = options_.robust ? v.barc : 0.0,
+            .set_aside = set_aside,
+            .failed = state_.failed};
   if (!done()) phase_ = Phase::kUp;
   ++round_;
   std::vector<SolverLetter> letters;

@@ -59,7 +59,7 @@ class TreeNewton final : public MemberSolver {
     Trust trust = Trust::kIn;
     bool aside = false;  ///< Stands alone: out for this session.
     bool odometry = false;
-    bool own = true;     ///< Among this robot's edges.
+    bool own = true;         ///< Among this robot's edges.
     double weight = 1.0;     ///< At the accepted poses.
     double candidate = 1.0;  ///< At those at hand.
   };
@@ -98,11 +98,11 @@ class TreeNewton final : public MemberSolver {
   std::map<RobotId, UpLetter> ups_;  // of the children, in this round
   Eigen::Index told_rows_ = 0;       // of the letter up in this round
   std::optional<DownLetter> down_;
-  std::vector<SE3> accepted_;   // own poses
-  std::vector<SE3> base_;       // followed poses, accepted
-  std::vector<SE3> at_hand_;    // followed poses
-  Eigen::MatrixXd step_;        // of followed poses
-  TreeVerdict told_;            // the last one
+  std::vector<SE3> accepted_;  // own poses
+  std::vector<SE3> base_;      // followed poses, accepted
+  std::vector<SE3> at_hand_;   // followed poses
+  Eigen::MatrixXd step_;       // of followed poses
+  TreeVerdict told_;           // the last one
   bool refresh_ = true;
   SolverState state_;
   std::optional<TreeRoot> root_;

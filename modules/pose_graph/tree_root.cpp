@@ -99,8 +99,6 @@ DownLetter TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   free_ = sums.fixed == 0;
   const std::optional<NoiseScale> noise = fit_noise(sums.lengths, options_.dimension);
   if (noise) noise_scale_ = noise->scale;
-  // Poses that were optimised since agree with the closures better than odometry does.
-  if (sums.noise_scale > 0.0F) noise_scale_ = sums.noise_scale;
   const double margin = noise_scale_ < 1.0 ? std::min(1.0, kMargin * noise_scale_) : noise_scale_;
   barc_ = options_.barc > 0.0 ? options_.barc : margin * default_threshold(options_.dimension);
   if (noise && noise->consistent >= kMostlyConsistent && sums.open > kFewIsolated)
@@ -162,9 +160,9 @@ DownLetter TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   DownLetter letter = say(Next::kStep);
   letter.step = root.kept;
   if (free_)
-    letter.verdict.drift =
-        drift_against(poses, front.substitute_back(root.kept).leftCols(static_cast<Index>(poses.size())),
-                      upright_);
+    letter.verdict.drift = drift_against(
+        poses, front.substitute_back(root.kept).leftCols(static_cast<Index>(poses.size())),
+        upright_);
   return letter;
 }
 

@@ -13,14 +13,15 @@ namespace km {
 struct TreeNewtonOptions {
   int dimension = 3;         ///< 2: poses and measurements are planar.
   double tolerance = 1e-13;  ///< Ends when a step promises less decrease, relative to the cost.
-  double absolute_tolerance = 1e-9;  ///< Or less than this: where nothing contradicts the cost is 0.
+  double absolute_tolerance =
+      1e-9;  ///< Or less than this: where nothing contradicts the cost is 0.
   /// Second derivatives are told anew, which costs an elimination and its bytes, when at the rate
   /// seen with the old ones more rounds than this would still be needed.
   double patience_rounds = 30.0;
   std::uint32_t max_rounds = 1000;  ///< Then it ends where it is.
   bool robust = true;               ///< Closures are weighed; else all are trusted.
-  double barc = 0.0;                ///< Largest residual of an inlier [sigma]; 0: the team finds it.
-  bool reject_odometry = false;     ///< Steps of odometry are weighed, too.
+  double barc = 0.0;             ///< Largest residual of an inlier [sigma]; 0: the team finds it.
+  bool reject_odometry = false;  ///< Steps of odometry are weighed, too.
   /// Poses that no closure to another robot ends on may be told as well, where that saves bytes.
   bool tell_private = false;
 };

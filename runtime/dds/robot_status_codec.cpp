@@ -43,10 +43,8 @@ Decoded<RobotStatus> Codec<RobotStatus>::decode(const Wire& wire) {
   if (wire.phase > km_wire_PHASE_LEAVING) return Result::refuse("unknown phase");
   if (!std::isfinite(wire.dataset_time_s)) return Result::refuse("time is not finite");
   const auto phase = static_cast<RobotPhase>(wire.phase);
-  constexpr std::uint16_t kWithLinks = 2;
-  const std::uint8_t told_before = phase >= RobotPhase::kSettled ? kManyLinks : 0;
   return Result::accept({wire.robot, name, phase, wire.dataset_time_s, wire.keyframes,
-                         wire.header.version < kWithLinks ? told_before : wire.settled_links});
+                         wire.settled_links});
 }
 
 }  // namespace km

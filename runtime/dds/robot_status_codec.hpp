@@ -10,7 +10,7 @@ template <>
 struct Codec<RobotStatus> {
   using Wire = km_wire_RobotStatus;
   static constexpr const char* kTopic = "robot_status";
-  static constexpr std::uint16_t kVersion = 2;
+  static constexpr std::uint16_t kVersion = 1;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_RobotStatus_desc; }
 
   struct Encoded {

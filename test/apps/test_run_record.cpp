@@ -44,6 +44,22 @@ TEST_CASE("what the optimiser rejects is no inlier, until it takes it back", "[r
   CHECK(record.inlier_closures().size() == 2);
 }
 
+TEST_CASE("of two measurements of a pair of keyframes the optimiser's is recorded", "[robot]") {
+  const ClosureId id{{1, 4}, {2, 3}};
+  Closure precise = closure_between(id), vague = closure_between(id);
+  precise.T_from_to.translation().x() = 1.0;
+  vague.covariance *= 4.0;
+  Closure unusable = precise;
+  unusable.covariance *= 0.0;
+  for (const auto& order : {std::vector{precise, vague}, std::vector{unusable, vague, precise}}) {
+    RunRecord record(2);
+    for (const Closure& closure : order) record.add(closure);
+    record.add(InlierSet{1, 2, 1, {id}});
+    REQUIRE(record.inlier_closures().size() == 1);
+    CHECK(record.inlier_closures()[0].T_from_to.translation().x() == 1.0);
+  }
+}
+
 TEST_CASE("a closure is the same from whichever end it was found", "[robot]") {
   const KeyframeId low{1, 4}, high{2, 3};
   Closure closure = closure_between({high, low});

@@ -107,9 +107,7 @@ class Eavesdropper {
     check_size(from, up.reduced.size());
   }
 
-  void hear(RobotId child, const DownLetter& down) {
-    check_size(child, down.step.size());
-  }
+  void hear(RobotId child, const DownLetter& down) { check_size(child, down.step.size()); }
 
   // Numbers are of the poses that the child has told of.
   void check_size(RobotId child, Eigen::Index size) {

@@ -165,7 +165,8 @@ TEST_CASE("a cover has an end of every closure, whatever their order", "[newton]
   // No pose could be left out.
   for (const KeyframeId& id : cover)
     CHECK(std::any_of(closures.begin(), closures.end(), [&](const ClosureId& closure) {
-      return (closure.from == id && !covered(closure.to)) || (closure.to == id && !covered(closure.from));
+      return (closure.from == id && !covered(closure.to)) ||
+             (closure.to == id && !covered(closure.from));
     }));
   std::shuffle(closures.begin(), closures.end(), rng);
   CHECK(cover_closures(closures) == cover);

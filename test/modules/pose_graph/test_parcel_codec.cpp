@@ -47,8 +47,10 @@ TEST_CASE("Of what counts with its newest only, all of one origin has one key", 
     const auto wire = written(message, kSelf).wire;
     return std::array<int, 4>{wire.origin, wire.kind, wire.to, wire.slot};
   };
-  CHECK(key(TeamStatus{.sender = kFar, .number = 1, .frame = {}}) == std::array<int, 4>{300, 0, 0, 0});
-  CHECK(key(TeamStatus{.sender = kFar, .number = 2, .frame = {}}) == std::array<int, 4>{300, 0, 0, 0});
+  CHECK(key(TeamStatus{.sender = kFar, .number = 1, .frame = {}}) ==
+        std::array<int, 4>{300, 0, 0, 0});
+  CHECK(key(TeamStatus{.sender = kFar, .number = 2, .frame = {}}) ==
+        std::array<int, 4>{300, 0, 0, 0});
   CHECK(key(Session{.id = {kFar, 4}, .plan = {}}) == std::array<int, 4>{300, 1, 0, 0});
   CHECK(key(MemberPoses{.sender = kFar, .stage = 1}) == std::array<int, 4>{300, 2, 0, 0});
   CHECK(key(letter(kFar, 1, 9)) != key(letter(kFar, 2, 9)));

@@ -96,7 +96,8 @@ TEST_CASE("The default threshold is a chi-squared quantile", "[pose_graph]") {
   // 99.9999 %, 6 and 3 degrees of freedom: the closed form of the former, erf in the latter.
   const double c6 = std::pow(default_threshold(3), 2), c3 = std::pow(default_threshold(2), 2);
   CHECK(std::exp(-c6 / 2.0) * (1.0 + c6 / 2.0 + c6 * c6 / 8.0) == Approx(1e-6).epsilon(1e-6));
-  CHECK(std::erfc(std::sqrt(c3 / 2.0)) + std::sqrt(2.0 * c3 / 3.14159265358979) * std::exp(-c3 / 2.0) ==
+  CHECK(std::erfc(std::sqrt(c3 / 2.0)) +
+            std::sqrt(2.0 * c3 / 3.14159265358979) * std::exp(-c3 / 2.0) ==
         Approx(1e-6).epsilon(1e-6));
 }
 

@@ -27,7 +27,6 @@ TreeSums some_sums() {
                 .isolated = 2,
                 .fixed = 0,
                 .poses = 4'000'000'000U,
-                .noise_scale = 3.9F,
                 .lengths = {{0, 1}, {90, 1'000'000}, {65535, 3}}};
   sums.votes = {{.a = 1, .b = 2, .used = 12},
                 {.a = 1, .b = 60000, .used = 0},
@@ -119,7 +118,6 @@ void check_same(const TreeSums& a, const TreeSums& b) {
   CHECK(a.isolated == b.isolated);
   CHECK(a.fixed == b.fixed);
   CHECK(a.poses == b.poses);
-  CHECK(a.noise_scale == b.noise_scale);
   CHECK(a.lengths == b.lengths);
   REQUIRE(a.votes.size() == b.votes.size());
   for (std::size_t k = 0; k < a.votes.size(); ++k) {

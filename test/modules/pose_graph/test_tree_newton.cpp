@@ -36,8 +36,8 @@ TEST_CASE("A team finds the optimum of its graph, whatever the tree", "[pose_gra
 }
 
 TEST_CASE("Letters that are late, doubled and out of order change nothing", "[pose_graph]") {
-  const TeamProblem problem = random_team_problem(
-      {.robots = {0, 2, 5, 7}, .pairs = {{0, 2}, {2, 5}, {5, 7}, {0, 7}}}, 3);
+  const TeamProblem problem =
+      random_team_problem({.robots = {0, 2, 5, 7}, .pairs = {{0, 2}, {2, 5}, {5, 7}, {0, 7}}}, 3);
   SolverTeam team = solver_team(problem, chain(problem.members()), {}, newton({}));
   SolverTeam late = solver_team(problem, chain(problem.members()),
                                 {.max_delay = 5, .duplicated = 0.3}, newton({}));
@@ -49,8 +49,8 @@ TEST_CASE("Letters that are late, doubled and out of order change nothing", "[po
 }
 
 TEST_CASE("Verticals are part of the cost", "[pose_graph]") {
-  const TeamProblem problem = random_team_problem(
-      {.robots = {1, 2, 3}, .pairs = {{1, 2}, {2, 3}}, .tilt_sigma = 0.01}, 4);
+  const TeamProblem problem =
+      random_team_problem({.robots = {1, 2, 3}, .pairs = {{1, 2}, {2, 3}}, .tilt_sigma = 0.01}, 4);
   const CentralProblem central(problem);
   SolverTeam team = solver_team(problem, chain(problem.members()), {}, newton(kTrusting));
   REQUIRE(team.run());
@@ -58,8 +58,8 @@ TEST_CASE("Verticals are part of the cost", "[pose_graph]") {
 }
 
 TEST_CASE("Robots that have gone hold the others where they were", "[pose_graph]") {
-  TeamProblem problem = random_team_problem(
-      {.robots = {1, 2, 3}, .pairs = {{1, 2}, {2, 3}, {1, 3}}}, 5);
+  TeamProblem problem =
+      random_team_problem({.robots = {1, 2, 3}, .pairs = {{1, 2}, {2, 3}, {1, 3}}}, 5);
   problem.absent = {2};
   const CentralProblem central(problem);
   SolverTeam team = solver_team(problem, chain(problem.members()), {}, newton(kTrusting));
@@ -68,25 +68,27 @@ TEST_CASE("Robots that have gone hold the others where they were", "[pose_graph]
 }
 
 TEST_CASE("A recorded graph is solved to its certified optimum", "[pose_graph]") {
-  const auto [file, optimum] = GENERATE(table<const char*, double>(
-      {{"pose_graphs/3d/smallGrid3D.g2o", 1025.398056}, {"pose_graphs/3d/sphere2500.g2o", 1687.005815},
-       {"pose_graphs/3d/parking-garage.g2o", 1.26252443},
-       {"pose_graphs/3d/torus3D.g2o", 24227.045560}}));
+  const auto [file, optimum] =
+      GENERATE(table<const char*, double>({{"pose_graphs/3d/smallGrid3D.g2o", 1025.398056},
+                                           {"pose_graphs/3d/sphere2500.g2o", 1687.005815},
+                                           {"pose_graphs/3d/parking-garage.g2o", 1.26252443},
+                                           {"pose_graphs/3d/torus3D.g2o", 24227.045560}}));
   CAPTURE(file);
   const auto path = shared_data(file);
   if (!path) return;
   const bool robust = GENERATE(false, true);
   const std::size_t robots = GENERATE(3, 5);
   const TeamProblem problem = deal_file(*path, robots);
-  SolverTeam team = solver_team(problem, chain(problem.members()), {},
-                                newton({.absolute_tolerance = 0.0, .patience_rounds = 8.0, .robust = robust}));
+  SolverTeam team =
+      solver_team(problem, chain(problem.members()), {},
+                  newton({.absolute_tolerance = 0.0, .patience_rounds = 8.0, .robust = robust}));
   REQUIRE(team.run());
   const SolverState state = team.member(1).state();
   CHECK(CentralProblem(problem).cost(team.poses()) == Approx(optimum).epsilon(1e-6));
   std::size_t bytes = 0;
   for (const RobotId robot : problem.members()) bytes += team.bytes_of(robot);
-  WARN(file << " robots " << robots << " robust " << robust << ": rounds " << state.round << ", MB " << 1e-6 * static_cast<double>(bytes)
-            << ", scale " << state.noise_scale);
+  WARN(file << " robots " << robots << " robust " << robust << ": rounds " << state.round << ", MB "
+            << 1e-6 * static_cast<double>(bytes) << ", scale " << state.noise_scale);
 }
 
 TEST_CASE("Verdicts that cannot follow are refused, and the true one is taken after all",
