@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <random>
 
+#include "modules/pgo_study/team_graph_file.hpp"
+#include "test/support/eavesdropper.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/system/team_run.hpp"
@@ -37,6 +39,13 @@ TEST_CASE("Two robots on the halves of a recording localise together", "[system]
   for (const char* file : {"odometry.tum", "optimized.tum", "pose_graph.g2o", "loop_closures.csv",
                            "traffic.csv", "timing.csv", "config.yaml", "summary.json"})
     CHECK(fs::file_size(folder.path() / "a" / file) > 0);
+
+  // The same graph solved once more: no keyframe that no closure leads to can be located.
+  Eavesdropper ear = listen_to(read_team_folder(folder.path()), false, 100);
+  CHECK(ear.letters() > 0);
+  CHECK(ear.private_poses() > 0);
+  CHECK(ear.misfits() == 0);
+  CHECK(ear.derivable().empty());
 }
 
 std::vector<std::string> robot_command(const std::string& id, const fs::path& dataset,

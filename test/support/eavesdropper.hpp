@@ -1,0 +1,156 @@
+#pragma once
+
+#include <catch2/catch.hpp>
+#include <map>
+#include <memory>
+#include <set>
+
+#include "modules/pgo_study/member_team.hpp"
+#include "modules/pgo_study/odometry_start.hpp"
+#include "modules/pose_graph/tree_letters.hpp"
+#include "modules/pose_graph/tree_newton.hpp"
+#include "test/support/overheard_member.hpp"
+
+// What somebody learns who reads every letter that the robots of a team send.
+
+namespace km {
+
+// Poses that are joined by relative poses.
+class Chains {
+ public:
+  void join(const KeyframeId& a, const KeyframeId& b) { parent_[root(a)] = root(b); }
+  [[nodiscard]] KeyframeId root(KeyframeId a) {
+    for (;;) {
+      KeyframeId& up = parent_.try_emplace(a, a).first->second;
+      if (up == a) return a;
+      a = up = parent_.at(up);
+    }
+  }
+
+ private:
+  std::map<KeyframeId, KeyframeId> parent_;
+};
+
+// All that robots tell each other, as one who reads everything understands it.
+class Eavesdropper {
+ public:
+  explicit Eavesdropper(const TeamGraph& graph) : dimension_(graph.dimension) {
+    for (std::size_t k = 0; k < graph.robots(); ++k) {
+      const auto robot = static_cast<RobotId>(k);
+      for (Eigen::Index i = 0; i < graph.poses_of(k); ++i)
+        all_.insert({robot, static_cast<KeyframeIndex>(i)});
+      public_.insert({robot, 0});
+      for (const PoseEdge& e : part_of(graph, k).between) public_.insert({e.from, e.to});
+    }
+  }
+
+  // Poses that the others have announced to a robot.
+  void announced(const SessionGraph& part) {
+    systems_.clear();
+    for (const auto& [id, T] : part.told) known_.insert(id);
+  }
+
+  void hear(RobotId from, const SolverLetter& letter) {
+    ++letters_;
+    bytes_ += letter.bytes->size();
+    if (is_up_letter(*letter.bytes)) {
+      const auto up = decode_up(*letter.bytes);
+      REQUIRE(up);
+      hear(from, *up);
+    } else {
+      const auto down = decode_down(*letter.bytes);
+      REQUIRE(down);
+      hear(letter.to, *down);
+    }
+  }
+
+  [[nodiscard]] const std::set<KeyframeId>& public_poses() const { return public_; }
+  [[nodiscard]] std::set<KeyframeId> named_private() const { return without_public(named_); }
+  [[nodiscard]] std::size_t private_poses() const { return all_.size() - public_.size(); }
+  [[nodiscard]] std::size_t letters() const { return letters_; }
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+  [[nodiscard]] std::size_t told_edges() const { return told_edges_; }
+  [[nodiscard]] std::size_t announced_poses() const { return known_.size(); }
+  // Sizes of right-hand sides and steps that are not those of the poses named.
+  [[nodiscard]] std::size_t misfits() const { return misfits_; }
+
+  // Private poses that are joined to an announced one, or to any other pose.
+  [[nodiscard]] std::set<KeyframeId> derivable() {
+    std::set<KeyframeId> from_known;
+    for (const KeyframeId& id : known_) from_known.insert(chains_.root(id));
+    std::map<KeyframeId, std::size_t> size;
+    for (const KeyframeId& id : all_) ++size[chains_.root(id)];
+    std::set<KeyframeId> found;
+    for (const KeyframeId& id : all_) {
+      const KeyframeId root = chains_.root(id);
+      if (known_.contains(id) || from_known.contains(root) || size[root] > 1) found.insert(id);
+    }
+    return without_public(found);
+  }
+
+ private:
+  void hear(RobotId from, const UpLetter& up) {
+    if (up.system) {
+      const TreeSystem& system = *up.system;
+      systems_[from] = system.variables.size();
+      for (const TreeVariable& v : system.variables) named_.insert(v.id);
+      for (const ToldEdge& e : system.edges) {
+        ++told_edges_;
+        const auto& [i, j] = system.pairs[static_cast<std::size_t>(e.pair)];
+        chains_.join(system.variables[static_cast<std::size_t>(i)].id,
+                     system.variables[static_cast<std::size_t>(j)].id);
+      }
+    }
+    check_size(from, up.reduced.size());
+  }
+
+  void hear(RobotId child, const DownLetter& down) { check_size(child, down.step.size()); }
+
+  // Numbers are of the poses that the child has told of.
+  void check_size(RobotId child, Eigen::Index size) {
+    const auto told = systems_.find(child);
+    const Eigen::Index block = dimension_ == 2 ? 3 : 6;
+    const Eigen::Index expected =
+        told == systems_.end() ? 0 : block * static_cast<Eigen::Index>(told->second);
+    if (size != 0 && size != expected) ++misfits_;
+  }
+
+  [[nodiscard]] std::set<KeyframeId> without_public(const std::set<KeyframeId>& ids) const {
+    std::set<KeyframeId> rest;
+    for (const KeyframeId& id : ids)
+      if (!public_.contains(id)) rest.insert(id);
+    return rest;
+  }
+
+  int dimension_;
+  std::set<KeyframeId> all_;
+  std::set<KeyframeId> public_;
+  std::set<KeyframeId> known_;  // announced
+  std::set<KeyframeId> named_;  // in letters
+  Chains chains_;
+  std::map<RobotId, std::size_t> systems_;  // by child: variables that it has told of
+  std::size_t letters_ = 0;
+  std::size_t bytes_ = 0;
+  std::size_t told_edges_ = 0;
+  std::size_t misfits_ = 0;
+};
+
+// As robots solve by default, but for no more than so many rounds.
+inline Eavesdropper listen_to(const TeamGraph& graph, bool tell_private, int max_rounds) {
+  Eavesdropper ear(graph);
+  const TreeNewtonOptions options{.dimension = graph.dimension, .tell_private = tell_private};
+  REQUIRE(options.robust);
+  MemberTeam team(graph, 3, odometry_start(graph), [&](SessionGraph part, TreePlace place) {
+    const RobotId self = part.self;
+    ear.announced(part);
+    auto member = std::make_unique<TreeNewton>(std::move(part), std::move(place), options);
+    return std::make_unique<OverheardMember>(
+        std::move(member), [&ear, self](const SolverLetter& letter) { ear.hear(self, letter); });
+  });
+  RoundMeter meter(graph.robots(), {});
+  for (int round = 0; round < max_rounds && team.step(meter); ++round) {
+  }
+  return ear;
+}
+
+}  // namespace km
