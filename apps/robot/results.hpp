@@ -16,7 +16,7 @@ struct RunSummary {
   std::string name;
   std::uint64_t frames = 0;                            ///< Stereo pairs played.
   std::uint64_t frames_skipped = 0;                    ///< Pairs that odometry was too slow for.
-  std::map<std::string, std::uint64_t> traffic_bytes;  ///< Sent, by category.
+  std::map<std::string, std::uint64_t> traffic_bytes;  ///< Sent by this robot, by category.
   double seconds = 0.0;                                ///< Wall time of the run.
   ProcessUsage process;
   MemoryTrend memory;

@@ -130,9 +130,12 @@ bool MemberTeam::pass_on(std::uint32_t round, RoundMeter& meter) {
   bool worked = !post_.empty();
   for (const Delivery& delivery : std::exchange(post_, {})) {
     received_[delivery.letter.to] += delivery.letter.bytes->size();
-    meter.run(delivery.letter.to, [&] {
-      (void)members_[delivery.letter.to]->receive(delivery.from, *delivery.letter.bytes);
+    const bool taken = meter.run(delivery.letter.to, [&] {
+      return members_[delivery.letter.to]->receive(delivery.from, *delivery.letter.bytes);
     });
+    if (!taken)
+      throw std::runtime_error("MemberTeam: robot " + std::to_string(delivery.letter.to) +
+                               " refuses a letter of robot " + std::to_string(delivery.from));
   }
   for (std::size_t k = 0; k < members_.size(); ++k) {
     if (members_[k]->state().round >= round || !members_[k]->ready()) continue;

@@ -35,6 +35,7 @@ struct SolverState {
   double barc = 0.0;  ///< Largest residual of a closure that is kept [sigma]; 0: none is rejected.
   std::uint32_t lag = 1;   ///< Every member has had the poses() of `round` less so many.
   bool set_aside = false;  ///< Closures that stand alone were not heard: they may be true.
+  bool held = false;       ///< Poses of robots that have gone hold those of the team.
   bool failed = false;     ///< Given up: the graph of the team could not be solved.
 };
 

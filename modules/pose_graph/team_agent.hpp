@@ -47,8 +47,10 @@ struct [[nodiscard]] TeamOutput {
 /// if it comes back as another process it is forgotten. What has been decided about closures
 /// carries over from session to session, and so does what they tell of their noise; both ends
 /// of a closure tell each other first. What a robot decides alone holds until it is in a team,
-/// which knows the noise better. Where closures were set aside unheard, those that fit the
-/// solution all the same are taken for undecided again, and one more session weighs them.
+/// which knows the noise better; what a team decides beside the poses of robots that have gone,
+/// until its next session: it may be those poses that are wrong. Where closures were set aside
+/// unheard, those that fit the solution all the same are taken for undecided again, and one more
+/// session weighs them.
 ///
 /// Where all members know which way is up, that is part of what they minimise, and `world` has z
 /// up.
@@ -168,7 +170,7 @@ class TeamAgent {
   bool reconsider_due_ = false;       // once all have told the solution
   std::uint32_t reconsidered_ = 0;    // so many times there was something to weigh again
   NoiseHistogram lengths_;            // of the closures that are decided
-  std::set<ClosureId> provisional_;   // decided alone
+  std::set<ClosureId> provisional_;   // decided without robots that are known of
   NoiseHistogram team_lengths_;       // without these
 
   std::uint64_t links_seen_ = 0;

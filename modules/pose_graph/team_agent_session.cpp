@@ -329,8 +329,13 @@ void TeamAgent::tell_poses() {
 
 void TeamAgent::decide(const std::vector<WeighedClosure>& verdicts) {
   if (verdicts.empty()) return;
-  for (const WeighedClosure& verdict : verdicts)
-    decided_[verdict.id] = verdicts_[verdict.id] = verdict.kept;
+  const bool for_good = part_->members().size() > 1 && !part_->state().held;
+  for (const auto& [id, kept] : verdicts) {
+    const auto before = decided_.find(id);
+    const bool is_new = before == decided_.end() || before->second != kept;
+    if (is_new && !for_good) provisional_.insert(id);
+    decided_[id] = verdicts_[id] = kept;
+  }
   verdicts_due_.emplace();
   for (const auto& [id, kept] : verdicts_) verdicts_due_->closures.push_back({id, kept});
 }
@@ -427,16 +432,12 @@ void TeamAgent::leave(bool with_solution) {
   publish_due_ = true;
   plan_outdated_ = true;
   if (!with_solution) return;
-  const std::vector<WeighedClosure> own = part_->verdicts().closures;
-  const bool alone = part_->members().size() == 1;
-  for (const WeighedClosure& verdict : own)
-    if (alone && !decided_.contains(verdict.id)) provisional_.insert(verdict.id);
-  decide(own);
+  decide(part_->verdicts().closures);
   for (const RobotId member : part_->members())
     if (const MemberPoses* told = part_->told_by(told_, member, 1); told && member != self_.robot)
       decide_with(*told);
   lengths_ = part_->lengths();
-  if (!alone) team_lengths_ = lengths_;
+  if (part_->members().size() > 1) team_lengths_ = lengths_;
   reconsider_due_ = part_->state().set_aside;
 }
 

@@ -431,6 +431,7 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
             .noise_scale = v.noise_scale,
             .barc = options_.robust ? v.barc : 0.0,
             .set_aside = set_aside,
+            .held = !v.free,
             .failed = state_.failed};
   if (!done()) phase_ = Phase::kUp;
   ++round_;

@@ -34,6 +34,7 @@ class GatherSolver final : public MemberSolver {
     std::set<ClosureId> rejects = {};  ///< As well.
     double barc = 0.0;
     bool set_aside = false;  ///< What it says of itself, see SolverState.
+    bool held = false;
   };
 
   GatherSolver(SessionGraph graph, TreePlace place, const Options& options)
@@ -84,6 +85,7 @@ class GatherSolver final : public MemberSolver {
             .gradient = gradient_,
             .barc = options_.barc,
             .set_aside = options_.set_aside,
+            .held = options_.held,
             .failed = failed_};
   }
   [[nodiscard]] ClosureVerdicts verdicts() const override {

@@ -286,6 +286,42 @@ TEST_CASE("closures that were set aside and fit get two more chances", "[pose_gr
     CHECK(network.agent(robot).decided().at(closure->id()) == at_last);
 }
 
+TEST_CASE("what is decided beside robots that have gone holds until they are back",
+          "[pose_graph][decisions]") {
+  const bool held = GENERATE(true, false);
+  CAPTURE(held);
+  const TeamProblem problem = problem_of(3);
+  const auto closure = std::find_if(problem.edges.begin(), problem.edges.end(), [](const auto& e) {
+    return e.id().from.robot == 2 && e.id().to.robot == 3;
+  });
+  REQUIRE(closure != problem.edges.end());
+  const MemberSolverFactory factory = [&](const Session&, SessionGraph graph, TreePlace place) {
+    GatherSolver::Options options;
+    const auto decided = graph.decided.find(closure->id());
+    const bool known_false = decided != graph.decided.end() && !decided->second;
+    if (place.members.size() == 3 || known_false) options.rejects = {closure->id()};
+    options.held = held && place.members.size() == 3;
+    return std::make_unique<GatherSolver>(std::move(graph), std::move(place), options);
+  };
+  TeamNetwork network;
+  add_all(network, problem, factory);
+  REQUIRE(settle(network));
+  const auto check_kept = [&](bool kept) {
+    for (const RobotId robot : {RobotId{2}, RobotId{3}})
+      CHECK(network.agent(robot).decided().at(closure->id()) == kept);
+  };
+  check_kept(true);
+  network.kill(9);
+  (void)network.run(10.0);
+  REQUIRE(settle(network));
+  check_kept(false);
+  network.revive(9);
+  (void)network.run(1.0);
+  REQUIRE(settle(network));
+  check_kept(held);
+  check_ends_agree(network);
+}
+
 namespace {
 
 // Everything that was recorded, each robot in its own frame by odometry.

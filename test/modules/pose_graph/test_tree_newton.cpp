@@ -64,6 +64,7 @@ TEST_CASE("Robots that have gone hold the others where they were", "[pose_graph]
   const CentralProblem central(problem);
   SolverTeam team = solver_team(problem, chain(problem.members()), {}, newton(kTrusting));
   REQUIRE(team.run());
+  for (const RobotId robot : problem.members()) CHECK(team.member(robot).state().held);
   CHECK(central.cost(team.poses()) == Approx(central.optimum(problem.start)).epsilon(kGap));
 }
 
