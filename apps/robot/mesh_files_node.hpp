@@ -19,10 +19,10 @@ namespace km {
 
 /// Channels of the mesh writer; they must outlive it.
 struct MeshFilesTopics {
-  Topic<KeyframeOdometry>& keyframes;
-  Topic<Trajectory>& trajectory;  ///< Of this robot.
-  Topic<MapMesh>& maps;
-  Topic<OptimizedMesh>& optimized;
+  In<KeyframeOdometry> keyframes;
+  In<Trajectory> trajectory;  ///< Of this robot.
+  In<MapMesh> maps;
+  In<OptimizedMesh> optimized;
 };
 
 /// Keeps a robot's meshes on disk while it runs, each file whole at any time.
@@ -53,7 +53,7 @@ class MeshFilesNode final : public Node {
   struct News {};  // something is to be taken
 
   template <typename T>
-  void follow(Topic<T>& topic, Latest<T>& newest) {
+  void follow(In<T> topic, Latest<T>& newest) {
     topic.subscribe([this, &newest](const std::shared_ptr<const T>& message) {
       newest.put(message);
       worker_.post(News());

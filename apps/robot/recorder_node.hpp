@@ -23,6 +23,10 @@ class RecorderNode final : public Node {
   /// Records everything published on `topic`, for any T that RunRecord takes.
   template <typename T>
   void record(Topic<T>& topic) {
+    record(In<T>(topic));
+  }
+  template <typename T>
+  void record(In<T> topic) {
     topic.subscribe([this](const std::shared_ptr<const T>& message) {
       worker_.post([this, message] {
         if (!frozen_) record_.add(*message);

@@ -10,7 +10,6 @@ namespace km {
 void RunRecord::add(const KeyframeOdometry& keyframe) {
   ++activity_;
   keyframes_.push_back(keyframe);
-  keyframes_.back().frame = nullptr;  // a run of an hour would keep every keyframe's images
 }
 
 void RunRecord::add(const Keyframe& keyframe) {

@@ -108,7 +108,7 @@ class RunRecord {
 
   RobotId robot_;
   std::vector<StampedPose> odometry_;
-  std::vector<KeyframeOdometry> keyframes_;          // without their images
+  std::vector<KeyframeOdometry> keyframes_;
   std::map<std::uint32_t, double> median_depths_m_;  // by keyframe
   std::size_t keypoints_ = 0;
   std::map<ClosureId, Closure> closures_;

@@ -21,6 +21,14 @@
 #include "runtime/dds/robot_status_codec.hpp"
 
 namespace km {
+namespace {
+
+template <typename T>
+void forward(In<T> from, Out<T> to) {
+  from.subscribe([to](const auto& message) { to.publish(message); });
+}
+
+}  // namespace
 
 template <typename NodeType, typename... Arguments>
 NodeType& Robot::add(bool feeds, Arguments&&... arguments) {
@@ -35,11 +43,6 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     : identity_{.robot = options.robot, .name = options.name, .boot = random_boot_id()},
       participant_(config.dds, identity_),
       supervisor_(signals) {
-  topics_.keyframe_odometry.subscribe([this](const auto& keyframe) {
-    KeyframeOdometry pose = *keyframe;
-    pose.frame = nullptr;
-    topics_.keyframe_poses.publish(std::move(pose));
-  });
   auto bridge = std::make_unique<DdsBridge>(participant_);
   bridge_ = bridge.get();
   if (auto* reader = std::get_if<std::unique_ptr<DatasetReader>>(&input))
@@ -48,8 +51,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     add_playback(config, options.rate, std::get<RecordedGraph>(std::move(input)));
   add_back_end(config);
   if (mapping) add_mesh_correction(config, options.output);
-  share_meshes(config.mesh_chunks);
-  add_network();
+  add_network(share_meshes(config.mesh_chunks));
   add_records();
   nodes_.push_back(bridge_);
   supervisor_.add(std::move(bridge));
@@ -59,20 +61,27 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
                         std::unique_ptr<DatasetReader> reader,
                         const std::optional<MappingPlan>& mapping) {
   const SensorRig rig = reader->rig();
-  sensors_ = &add<SensorsNode>(true, config.sensors, rate, std::move(reader), topics_.packets,
-                               topics_.sensors_end);
+  sensors_ =
+      &add<SensorsNode>(true, config.sensors, rate, std::move(reader),
+                        SensorsTopics{.packets = topics_.packets, .end = topics_.sensors_end});
   add<VioNode>(true, identity_.robot, rig, config.tracker, config.vio,
-               VioTopics{topics_.packets, topics_.odometry, topics_.keyframe_odometry,
-                         topics_.located_frames});
+               VioTopics{.packets = topics_.packets,
+                         .odometry = topics_.odometry,
+                         .keyframes = topics_.keyframe_odometry,
+                         .frames = topics_.located_frames});
   if (mapping) add_mapping(config, rate, rig.stereo, *mapping);
-  add<KeyframeFeaturesNode>(true, config.keyframe_features, rig.stereo, topics_.keyframe_odometry,
-                            topics_.keyframes);
+  add<KeyframeFeaturesNode>(true, config.keyframe_features, rig.stereo,
+                            KeyframeFeaturesTopics{.odometry = topics_.keyframe_odometry,
+                                                   .frames = topics_.located_frames,
+                                                   .keyframes = topics_.keyframes});
   vocabulary_ =
       std::make_shared<const Vocabulary>(load_vocabulary(find_shipped_file(config.run.vocabulary)));
-  add<PlaceRecognitionNode>(
-      false, config.place_recognition, identity_.robot, vocabulary_,
-      PlaceRecognitionTopics{topics_.keyframes, topics_.peer_bows, topics_.own_bows,
-                             topics_.candidates, topics_.place_queries});
+  add<PlaceRecognitionNode>(false, config.place_recognition, identity_.robot, vocabulary_,
+                            PlaceRecognitionTopics{.keyframes = topics_.keyframes,
+                                                   .peer_bows = topics_.bows.from_peers(),
+                                                   .own_bows = topics_.bows.to_peers(),
+                                                   .candidates = topics_.candidates,
+                                                   .queries = topics_.place_queries});
   topics_.sensors_end.subscribe([this](const auto&) { source_ended_ = true; });
 }
 
@@ -88,93 +97,110 @@ void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig&
   const PinholeCamera camera = sensor.camera();
   add<DenseSensingNode>(true, std::move(sensor), plan.sensor.labels, config.mapping.rate_hz,
                         overflow,
-                        DenseSensingTopics{topics_.located_frames, topics_.dense_frames,
-                                           topics_.dense_sensing_progress});
+                        DenseSensingTopics{.located = topics_.located_frames,
+                                           .frames = topics_.dense_frames,
+                                           .progress = topics_.dense_sensing_progress});
   add<SemanticMappingNode>(true, map, camera, plan.palette, config.mapping.mesh_interval_s,
                            overflow,
-                           SemanticMappingTopics{topics_.dense_frames, topics_.superseded_surface,
-                                                 topics_.maps, topics_.mapping_progress});
+                           SemanticMappingTopics{.frames = topics_.dense_frames,
+                                                 .superseded = topics_.superseded_surface,
+                                                 .maps = topics_.maps,
+                                                 .progress = topics_.mapping_progress});
 }
 
 void Robot::add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder) {
-  mesh_deformation_ = &add<MeshDeformationNode>(
-      false, config.mesh_deformation, identity_.robot,
-      MeshDeformationTopics{topics_.maps, topics_.keyframe_poses, topics_.trajectory,
-                            topics_.optimized_meshes, topics_.superseded_surface});
+  mesh_deformation_ =
+      &add<MeshDeformationNode>(false, config.mesh_deformation, identity_.robot,
+                                MeshDeformationTopics{.maps = topics_.maps,
+                                                      .keyframes = topics_.keyframe_odometry,
+                                                      .trajectory = topics_.trajectory,
+                                                      .optimized = topics_.optimized_meshes,
+                                                      .superseded = topics_.superseded_surface});
   mesh_files_ = &add<MeshFilesNode>(false, folder,
-                                    MeshFilesTopics{topics_.keyframe_poses, topics_.trajectory,
-                                                    topics_.maps, topics_.optimized_meshes});
+                                    MeshFilesTopics{.keyframes = topics_.keyframe_odometry,
+                                                    .trajectory = topics_.trajectory,
+                                                    .maps = topics_.maps,
+                                                    .optimized = topics_.optimized_meshes});
 }
 
 // Others may hold the robot's map without having one themselves, and the other way round.
-void Robot::share_meshes(const MeshChunksConfig& config) {
-  if (config.publish && mesh_deformation_ != nullptr) {
-    auto& chunks =
-        add<MeshChunksNode>(false, config, identity_.robot, std::as_const(topics_.own_chunks));
+CrossingEnds Robot::share_meshes(const MeshChunksConfig& config) {
+  const CrossingEnds ends{.send = config.publish && mesh_deformation_ != nullptr,
+                          .receive = config.collect};
+  if (ends.send) {
+    auto& chunks = add<MeshChunksNode>(false, config, identity_.robot, topics_.chunks.to_peers());
     topics_.optimized_meshes.subscribe([&chunks](const auto& optimized) {
       chunks.offer(optimized->anchor, {optimized, &optimized->mesh});
     });
-    bridge_->send(topics_.own_chunks, TopicKind::kState, TrafficCategory::kOther);
   }
-  if (config.collect) {
-    peer_meshes_ = &add<TeamMeshNode>(false, topics_.peer_chunks);
-    bridge_->receive(topics_.peer_chunks, TopicKind::kState, TrafficCategory::kOther);
-  }
+  if (ends.receive) peer_meshes_ = &add<TeamMeshNode>(false, topics_.chunks.from_peers());
+  return ends;
 }
 
 void Robot::add_playback(const RobotConfig& config, double rate, RecordedGraph graph) {
   add<GraphPlaybackNode>(true, config.graph_playback, rate, std::move(graph),
-                         GraphPlaybackTopics{topics_.keyframe_odometry, topics_.keyframes,
-                                             topics_.measured_closures, topics_.playback_end});
+                         GraphPlaybackTopics{.odometry = topics_.keyframe_odometry,
+                                             .keyframes = topics_.keyframes,
+                                             .closures = topics_.measured_closures,
+                                             .end = topics_.playback_end});
   topics_.playback_end.subscribe([this](const auto&) { source_ended_ = true; });
 }
 
 void Robot::add_back_end(const RobotConfig& config) {
-  add<LoopClosureNode>(
-      false, config.loop_closure, identity_.robot, vocabulary_,
-      LoopClosureTopics{topics_.keyframes, topics_.candidates, topics_.measured_closures,
-                        topics_.peer_requests, topics_.peer_replies, bridge_->peers().events(),
-                        topics_.peer_bows, topics_.own_requests, topics_.own_replies,
-                        topics_.own_closures, topics_.outcomes});
-  topics_.own_closures.subscribe(
-      [this](const auto& closure) { topics_.closures.publish(closure); });
-  pcm_ = &add<PcmNode>(false, config.pcm, identity_.robot, topics_.closures,
-                       topics_.own_inlier_sets, &bridge_->peers().events());
+  const In<PeerEvent> peer_events = bridge_->peers().events();
+  add<LoopClosureNode>(false, config.loop_closure, identity_.robot, vocabulary_,
+                       LoopClosureTopics{.keyframes = topics_.keyframes,
+                                         .candidates = topics_.candidates,
+                                         .measured_closures = topics_.measured_closures,
+                                         .peer_requests = topics_.requests.from_peers(),
+                                         .peer_replies = topics_.replies.from_peers(),
+                                         .peer_events = peer_events,
+                                         .peer_bows = topics_.bows.from_peers(),
+                                         .own_requests = topics_.requests.to_peers(),
+                                         .own_replies = topics_.replies.to_peers(),
+                                         .own_closures = topics_.own_closures,
+                                         .outcomes = topics_.outcomes});
+  forward<Closure>(topics_.own_closures, topics_.closures);
+  forward<Closure>(topics_.shared_closures.from_peers(), topics_.closures);
+  pcm_ = &add<PcmNode>(false, config.pcm, identity_.robot,
+                       PcmTopics{.closures = topics_.closures,
+                                 .peer_events = peer_events,
+                                 .inlier_sets = topics_.own_inlier_sets});
   add<TeamNode>(false, config.pose_graph, TeamPeer{identity_.robot, identity_.boot},
-                TeamTopics{topics_.keyframe_poses, topics_.closures, topics_.own_inlier_sets,
-                           topics_.peer_inlier_sets, bridge_->peers().events(),
-                           topics_.peer_parcels, topics_.own_parcels, topics_.trajectory,
-                           topics_.progress, topics_.closure_verdicts});
+                TeamTopics{.odometry = topics_.keyframe_odometry,
+                           .closures = topics_.closures,
+                           .inlier_sets = topics_.own_inlier_sets,
+                           .peer_inlier_sets = topics_.shared_inlier_sets.from_peers(),
+                           .peer_events = peer_events,
+                           .peer_parcels = topics_.parcels.from_peers(),
+                           .parcels = topics_.parcels.to_peers(),
+                           .trajectory = topics_.trajectory,
+                           .progress = topics_.progress,
+                           .verdicts = topics_.closure_verdicts});
 }
 
-// What crosses between robots, and how: the kinds of topic are those of runtime/dds/topic_kind.hpp.
-void Robot::add_network() {
+void Robot::add_network(CrossingEnds meshes) {
   using enum TopicKind;
   using enum TrafficCategory;
   DdsBridge& dds = *bridge_;
   Topics& t = topics_;
-  dds.send(t.own_bows, kEvent, kPlaceRecognition);
-  dds.receive(t.peer_bows, kEvent, kPlaceRecognition);
-  dds.send(t.own_requests, kRequest, kGeometricVerification);
-  dds.receive_addressed(t.peer_requests, kRequest, kGeometricVerification);
-  dds.send(t.own_replies, kRequest, kGeometricVerification);
-  dds.receive_addressed(t.peer_replies, kRequest, kGeometricVerification);
+  // All that crosses between robots: for what, and what its bytes are counted under.
+  dds.exchange(t.bows, kEvent, kPlaceRecognition);
+  dds.exchange(t.requests, kRequest, kGeometricVerification);
+  dds.exchange(t.replies, kRequest, kGeometricVerification);
+  dds.exchange(t.shared_closures, kEvent, kGeometricVerification);
+  dds.exchange(t.shared_inlier_sets, kState, kPoseGraphOptimization);
+  dds.exchange(t.parcels, kRequest, kPoseGraphOptimization);
+  dds.exchange(t.chunks, kState, kOther, meshes);
+  dds.exchange(t.status, kStatus, kOther);
   // A closure, and whether it is an inlier, is of use to the robots it joins and to no others.
-  t.own_closures.subscribe([&t](const auto& closure) {
+  t.own_closures.subscribe([to = t.shared_closures.to_peers()](const auto& closure) {
     if (closure->to.id.robot != closure->from.id.robot)
-      t.closures_to_peers.publish(Addressed<Closure>{closure->to.id.robot, closure});
+      to.publish(Addressed<Closure>{closure->to.id.robot, closure});
   });
-  dds.send(t.closures_to_peers, kEvent, kGeometricVerification);
-  dds.receive_addressed(t.closures, kEvent, kGeometricVerification);
-  t.own_inlier_sets.subscribe([&t](const auto& set) {
-    if (set->a != set->b) t.inlier_sets_to_peers.publish(Addressed<InlierSet>{set->b, set});
+  t.own_inlier_sets.subscribe([to = t.shared_inlier_sets.to_peers()](const auto& set) {
+    if (set->a != set->b) to.publish(Addressed<InlierSet>{set->b, set});
   });
-  dds.send(t.inlier_sets_to_peers, kState, kPoseGraphOptimization);
-  dds.receive_addressed(t.peer_inlier_sets, kState, kPoseGraphOptimization);
-  dds.send(t.own_parcels, kRequest, kPoseGraphOptimization);
-  dds.receive_addressed(t.peer_parcels, kRequest, kPoseGraphOptimization);
-  dds.send(t.own_status, kStatus, kOther);
-  dds.receive(t.peer_status, kStatus, kOther);
   dds.peers().events().subscribe([this](const auto& event) {
     if (event->kind == PeerEventKind::kConflict && event->identity.robot == identity_.robot)
       id_taken_ = true;
@@ -184,12 +210,12 @@ void Robot::add_network() {
 void Robot::add_records() {
   recorder_ = &add<RecorderNode>(false, identity_.robot);
   recorder_->record(topics_.odometry);
-  recorder_->record(topics_.keyframe_poses);
+  recorder_->record(topics_.keyframe_odometry);
   recorder_->record(topics_.keyframes);
   recorder_->record(topics_.closures);
   recorder_->record(topics_.outcomes);
   recorder_->record(topics_.own_inlier_sets);
-  recorder_->record(topics_.peer_inlier_sets);
+  recorder_->record(topics_.shared_inlier_sets.from_peers());
   recorder_->record(topics_.trajectory);
   recorder_->record(topics_.progress);
   recorder_->record(topics_.closure_verdicts);
@@ -205,7 +231,8 @@ void Robot::add_records() {
         ++keyframes_;
       });
   status_ = &add<RobotStatusNode>(
-      false, [this] { return own_status(); }, topics_.own_status, topics_.peer_status);
+      false, [this] { return own_status(); },
+      RobotStatusTopics{.own = topics_.status.to_peers(), .peers = topics_.status.from_peers()});
 }
 
 RobotStatus Robot::own_status() const {

@@ -35,15 +35,13 @@
 
 namespace km {
 
-/// Every channel of a robot. `own_*` goes to the other robots, `peer_*` comes from them; the rest
-/// stays inside.
+/// Every channel of a robot. What is no Crossing stays inside.
 struct Topics {
   Topic<SensorPacket> packets;
   Topic<SensorsEnd> sensors_end;
   Topic<GraphPlaybackEnd> playback_end;
   Topic<OdometryState> odometry;
   Topic<KeyframeOdometry> keyframe_odometry;
-  Topic<KeyframeOdometry> keyframe_poses;  // the same without images, for those who hold them long
   Topic<Keyframe> keyframes;
   Topic<LocatedFrame> located_frames;
   Topic<DenseFrame> dense_frames;
@@ -51,27 +49,25 @@ struct Topics {
   Topic<MapMesh> maps;
   Topic<OptimizedMesh> optimized_meshes;
   Topic<SupersededSurface> superseded_surface;
-  Topic<MeshChunk> own_chunks, peer_chunks;
   Topic<MappingProgress> mapping_progress;
   Topic<RelativePose> measured_closures;
-  Topic<KeyframeBow> own_bows, peer_bows;
   Topic<PlaceQuery> place_queries;
   Topic<LoopCandidate> candidates;
-  Topic<Addressed<KeyframeRequest>> own_requests;
-  Topic<Addressed<KeyframeReply>> own_replies;
-  Topic<KeyframeRequest> peer_requests;
-  Topic<KeyframeReply> peer_replies;
   Topic<ClosureOutcome> outcomes;
   Topic<Closure> own_closures, closures;  // the latter: own and received
-  Topic<Addressed<Closure>> closures_to_peers;
-  Topic<InlierSet> own_inlier_sets, peer_inlier_sets;
-  Topic<Addressed<InlierSet>> inlier_sets_to_peers;
-  Topic<Addressed<TeamParcel>> own_parcels;
-  Topic<TeamParcel> peer_parcels;
+  Topic<InlierSet> own_inlier_sets;
   Topic<Trajectory> trajectory;
   Topic<OptimizerProgress> progress;
   Topic<ClosureVerdicts> closure_verdicts;
-  Topic<RobotStatus> own_status, peer_status;
+
+  Crossing<KeyframeBow> bows;
+  AddressedCrossing<KeyframeRequest> requests;
+  AddressedCrossing<KeyframeReply> replies;
+  AddressedCrossing<Closure> shared_closures;
+  AddressedCrossing<InlierSet> shared_inlier_sets;
+  AddressedCrossing<TeamParcel> parcels;
+  Crossing<MeshChunk> chunks;
+  Crossing<RobotStatus> status;
 };
 
 /// What the robot perceives: a recording of sensors, or a recorded pose graph.
@@ -122,10 +118,10 @@ class Robot {
   void add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
                    const MappingPlan& plan);
   void add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder);
-  void share_meshes(const MeshChunksConfig& config);
+  [[nodiscard]] CrossingEnds share_meshes(const MeshChunksConfig& config);
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_back_end(const RobotConfig& config);
-  void add_network();
+  void add_network(CrossingEnds meshes);
   void add_records();
   [[nodiscard]] RobotStatus own_status() const;
 

@@ -26,15 +26,15 @@ struct Vertical {
 };
 
 /// A new keyframe as odometry hands it on. Its pose is chained from the relative poses, so that
-/// T_odom_kf is constant once published although odometry refines its recent past.
+/// T_odom_kf is constant once published although odometry refines its recent past. Its images, if
+/// there are any, are those of the LocatedFrame with its stamp.
 struct KeyframeOdometry {
   KeyframeId id;
   Stamp stamp = 0;
-  SE3 T_odom_kf = SE3::Identity();           ///< Product of the relative poses up to here.
-  SE3 T_previous_kf = SE3::Identity();       ///< Pose in the keyframe before; odom for the first.
-  Matrix6 covariance = Matrix6::Zero();      ///< Of T_previous_kf; zero for the first.
-  std::optional<Vertical> vertical = {};     ///< Here; none where there is no inertial sensing.
-  std::shared_ptr<const StereoFrame> frame;  ///< Null where there are no images (recorded graphs).
+  SE3 T_odom_kf = SE3::Identity();        ///< Product of the relative poses up to here.
+  SE3 T_previous_kf = SE3::Identity();    ///< Pose in the keyframe before; odom for the first.
+  Matrix6 covariance = Matrix6::Zero();   ///< Of T_previous_kf; zero for the first.
+  std::optional<Vertical> vertical = {};  ///< Here; none where there is no inertial sensing.
 };
 
 /// An image and where its camera was, relative to the keyframes: what is built from such images

@@ -16,9 +16,9 @@ namespace km {
 
 /// Channels of the dense sensing node; they must outlive it.
 struct DenseSensingTopics {
-  Topic<LocatedFrame>& located;                 ///< In, in order of time.
-  const Topic<DenseFrame>& frames;              ///< Out.
-  const Topic<DenseSensingProgress>& progress;  ///< Out: with every frame that was due.
+  In<LocatedFrame> located;  ///< In order of time.
+  Out<DenseFrame> frames;
+  Out<DenseSensingProgress> progress;  ///< With every frame that was due.
 };
 
 /// Makes depth and labels of the frames that are due, as a thread: one DenseSensor.

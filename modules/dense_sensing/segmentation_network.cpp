@@ -10,6 +10,7 @@
 #include <string>
 
 #include "modules/core/text_rows.hpp"
+#include "modules/images/image_view.hpp"
 
 namespace km {
 namespace {
@@ -113,8 +114,7 @@ struct SegmentationNetwork::State {
         net(read_network(config.network)) {}
 
   cv::Mat run(const GrayImage& image) {
-    const cv::Mat grey(image.height, image.width, CV_8UC1,
-                       const_cast<std::uint8_t*>(image.pixels.data()));
+    const cv::Mat grey = view(image);
     cv::Mat resized;
     cv::resize(grey, resized, {config.width_px, config.height_px}, 0.0, 0.0,
                grey.cols > config.width_px ? cv::INTER_AREA : cv::INTER_LINEAR);

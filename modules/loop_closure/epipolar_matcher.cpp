@@ -6,10 +6,7 @@
 #include <cstdlib>
 #include <limits>
 #include <opencv2/imgproc.hpp>
-#include <stdexcept>
-#include <string>
-
-#include "modules/loop_closure/image_view.hpp"
+#include <optional>
 
 namespace km {
 namespace {
@@ -29,23 +26,6 @@ constexpr int kNeighbour = 2;               // [px]
 constexpr int kMaxLeftRightDifference = 1;  // [px]
 constexpr double kMaxRefinement_px = 1.5;   // in disparity
 constexpr double kMaxRowOffset_px = 1.5;    // what calibration leaves of the epipolar constraint
-
-// Axes of the rectified frame, in the left camera: x along the baseline, z midway between the
-// optical axes, as far as x leaves it free.
-Eigen::Matrix3d rectifying_rotation(const StereoRig& rig) {
-  const SE3 T_left_right = rig.T_left_right();
-  const Eigen::Vector3d x = T_left_right.translation().normalized();
-  const Eigen::Vector3d z_right = T_left_right.linear().col(2);
-  const Eigen::Vector3d z_mean = (Eigen::Vector3d::UnitZ() + z_right).normalized();
-  if (!(z_right.z() > 0.87) || !(x.x() > 0.87))
-    throw std::invalid_argument(
-        "EpipolarMatcher: the right camera must look the way of the left one and stand to its "
-        "right");
-  const Eigen::Vector3d y = z_mean.cross(x).normalized();
-  Eigen::Matrix3d R_rect_left;
-  R_rect_left << x.transpose(), y.transpose(), x.cross(y).transpose();
-  return R_rect_left;
-}
 
 // Local mean removed: what is left does not depend on exposure.
 cv::Mat flattened(const cv::Mat& image) {
@@ -165,45 +145,13 @@ std::optional<Refined> refine(const NormalisedPatch& reference, const cv::Mat& t
 
 EpipolarMatcher::EpipolarMatcher(const StereoRig& rig, const KeyframeFeaturesConfig& config)
     : config_(checked(config)),
-      focal_px_(0.5 * (rig.cameras[0].fx + rig.cameras[0].fy)),
-      baseline_m_(rig.baseline_m()),
-      R_rect_left_(rectifying_rotation(rig)),
-      size_(rig.cameras[0].width, rig.cameras[0].height) {
-  const auto& [left, right] = rig.cameras;
-  if (left.width != right.width || left.height != right.height || size_.empty())
-    throw std::invalid_argument("EpipolarMatcher: the cameras must be of equal, positive size");
-  const Eigen::Vector3d axis = R_rect_left_ * Eigen::Vector3d::UnitZ();
-  centre_ = Eigen::Vector2d(left.cx, left.cy) - focal_px_ * axis.hnormalized();
-
-  const Eigen::Matrix3d R_left_right = rig.T_left_right().linear();
-  const Eigen::Matrix3d R_cam_rect[2] = {R_rect_left_.transpose(),
-                                         R_left_right.transpose() * R_rect_left_.transpose()};
-  for (std::size_t c = 0; c < 2; ++c) {
-    cv::Mat xy(size_, CV_32FC2);
-    for (int y = 0; y < size_.height; ++y)
-      for (int x = 0; x < size_.width; ++x) {
-        const Eigen::Vector2d rectified = (Eigen::Vector2d(x, y) - centre_) / focal_px_;
-        const Eigen::Vector3d ray = R_cam_rect[c] * rectified.homogeneous();
-        const Eigen::Vector2d raw = rig.cameras[c].project(ray.hnormalized());
-        xy.at<cv::Vec2f>(y, x) = {static_cast<float>(raw.x()), static_cast<float>(raw.y())};
-      }
-    cv::convertMaps(xy, cv::noArray(), map_[c], map_fraction_[c], CV_16SC2);
-  }
-}
+      rectification_(rig, Rectification::Centre::kLeftAxis),
+      focal_baseline_(rectification_.camera().fx * rig.baseline_m()) {}
 
 EpipolarMatcher::Rectified EpipolarMatcher::rectify(const StereoFrame& frame) const {
   Rectified images;
-  const GrayImage* raw[2] = {&frame.left, &frame.right};
-  cv::Mat* rectified[2] = {&images.left, &images.right};
-  for (int c = 0; c < 2; ++c) {
-    const std::size_t pixels = static_cast<std::size_t>(size_.area());
-    if (raw[c]->width != size_.width || raw[c]->height != size_.height ||
-        raw[c]->pixels.size() != pixels)
-      throw std::invalid_argument("EpipolarMatcher: image of " + std::to_string(raw[c]->width) +
-                                  'x' + std::to_string(raw[c]->height) + ", expected " +
-                                  std::to_string(size_.width) + 'x' + std::to_string(size_.height));
-    cv::remap(view(*raw[c]), *rectified[c], map_[c], map_fraction_[c], cv::INTER_LINEAR);
-  }
+  images.left = rectification_.rectified(frame.left, 0);
+  images.right = rectification_.rectified(frame.right, 1);
   images.left_flat = flattened(images.left);
   images.right_flat = flattened(images.right);
   return images;
@@ -212,18 +160,17 @@ EpipolarMatcher::Rectified EpipolarMatcher::rectify(const StereoFrame& frame) co
 float EpipolarMatcher::disparity(const Rectified& images, const Eigen::Vector2d& pixel) const {
   const cv::Point at(static_cast<int>(std::lround(pixel.x())),
                      static_cast<int>(std::lround(pixel.y())));
-  if (!inside(images.left, pixel) || at.x < kSearchLeft || at.x + kSearchColumns > size_.width)
+  if (!inside(images.left, pixel) || at.x < kSearchLeft || at.x + kSearchColumns > images.left.cols)
     return 0.0F;
-  const double fb = focal_px_ * baseline_m_;
   const Search leftwards{
-      static_cast<int>(fb / config_.max_depth_m),
-      std::min(static_cast<int>(fb / config_.min_depth_m) + 1, at.x - kSearchLeft), 1};
+      static_cast<int>(focal_baseline_ / config_.max_depth_m),
+      std::min(static_cast<int>(focal_baseline_ / config_.min_depth_m) + 1, at.x - kSearchLeft), 1};
   const std::optional<int> shift = best_shift(images.left_flat, images.right_flat, at, leftwards);
   if (!shift) return 0.0F;
   const cv::Point in_right(at.x - *shift, at.y);
   const Search rightwards{leftwards.first,
-                          std::min(static_cast<int>(fb / config_.min_depth_m) + 1,
-                                   size_.width - kSearchLeft - in_right.x),
+                          std::min(static_cast<int>(focal_baseline_ / config_.min_depth_m) + 1,
+                                   images.left.cols - kSearchLeft - in_right.x),
                           -1};
   const std::optional<int> back =
       best_shift(images.right_flat, images.left_flat, in_right, rightwards);
@@ -243,13 +190,14 @@ float EpipolarMatcher::disparity(const Rectified& images, const Eigen::Vector2d&
 std::vector<float> EpipolarMatcher::inverse_depths(
     const StereoFrame& frame, std::span<const Eigen::Vector2f> bearings) const {
   const Rectified images = rectify(frame);
-  const double fb = focal_px_ * baseline_m_;
+  const PinholeCamera& camera = rectification_.camera();
+  const Eigen::Matrix3d R_rect_left = rectification_.R_left_rect().transpose();
   std::vector<float> result(bearings.size(), 0.0F);
   for (std::size_t i = 0; i < bearings.size(); ++i) {
-    const Eigen::Vector3d ray = R_rect_left_ * bearings[i].cast<double>().homogeneous();
-    const float d = disparity(images, focal_px_ * ray.hnormalized() + centre_);
+    const Eigen::Vector3d ray = R_rect_left * bearings[i].cast<double>().homogeneous();
+    const float d = disparity(images, camera.project(ray.hnormalized()));
     // Depth along the rectified axis is f * baseline / d; the ray scales it to the left camera's.
-    const double inverse_depth = d * ray.z() / fb;
+    const double inverse_depth = d * ray.z() / focal_baseline_;
     if (inverse_depth >= 1.0 / config_.max_depth_m && inverse_depth <= 1.0 / config_.min_depth_m)
       result[i] = static_cast<float>(inverse_depth);
   }

@@ -6,6 +6,7 @@
 
 #include "modules/core/camera.hpp"
 #include "modules/core/frame.hpp"
+#include "modules/images/rectification.hpp"
 #include "modules/loop_closure/keyframe_features_config.hpp"
 
 namespace km {
@@ -19,9 +20,8 @@ namespace km {
 /// are safe to call from several threads.
 class EpipolarMatcher {
  public:
-  /// Throws ConfigError if `config` is out of bounds, std::invalid_argument if the cameras are not
-  /// of equal size, or look too far apart (more than 30 degrees) or along the baseline to be
-  /// rectified.
+  /// Throws ConfigError if `config` is out of bounds, std::invalid_argument for a rig that
+  /// Rectification refuses.
   EpipolarMatcher(const StereoRig& rig, const KeyframeFeaturesConfig& config);
 
   /// Inverse depth [1/m] along the optical axis of the left camera for each bearing of the left
@@ -40,12 +40,8 @@ class EpipolarMatcher {
   [[nodiscard]] float disparity(const Rectified& images, const Eigen::Vector2d& pixel) const;
 
   KeyframeFeaturesConfig config_;
-  double focal_px_ = 0.0;  // of the rectified images: that of the left camera
-  double baseline_m_ = 0.0;
-  Eigen::Vector2d centre_;       // principal point of both rectified images
-  Eigen::Matrix3d R_rect_left_;  // left camera to rectified
-  cv::Size size_;
-  cv::Mat map_[2], map_fraction_[2];  // rectified pixel to raw pixel, fixed point
+  Rectification rectification_;
+  double focal_baseline_;  // [px m]
 };
 
 }  // namespace km

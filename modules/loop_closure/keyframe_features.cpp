@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "modules/core/depth_lookup.hpp"
-#include "modules/loop_closure/image_view.hpp"
+#include "modules/images/image_view.hpp"
 
 namespace km {
 namespace {
@@ -94,14 +94,6 @@ KeyframeFeatureExtractor::KeyframeFeatureExtractor(const StereoRig& rig,
   if (rig.depth_source == DepthSource::kRightImage) stereo_.emplace(rig, config);
 }
 
-KeyframeFeatures KeyframeFeatureExtractor::without_images() const {
-  KeyframeFeatures features;
-  features.T_body_cam = rig_.cameras[0].T_body_cam;
-  features.focal_px = 0.5 * (rig_.cameras[0].fx + rig_.cameras[0].fy);
-  features.baseline_m = rig_.baseline_m();
-  return features;
-}
-
 KeyframeFeatures KeyframeFeatureExtractor::extract(const StereoFrame& frame) const {
   if (!fits(frame, rig_))
     throw std::invalid_argument("KeyframeFeatureExtractor: images of another size than the rig's");
@@ -115,7 +107,10 @@ KeyframeFeatures KeyframeFeatureExtractor::extract(const StereoFrame& frame) con
   cv::Mat descriptors;
   orb->compute(image, corners, descriptors);  // drops what is too near the border
 
-  KeyframeFeatures features = without_images();
+  KeyframeFeatures features;
+  features.T_body_cam = rig_.cameras[0].T_body_cam;
+  features.focal_px = 0.5 * (rig_.cameras[0].fx + rig_.cameras[0].fy);
+  features.baseline_m = rig_.baseline_m();
   std::vector<Eigen::Vector2f> pixels, bearings;
   for (const int i : by_response(corners)) {  // OpenCV has sorted them by octave
     const cv::KeyPoint& corner = corners[static_cast<std::size_t>(i)];

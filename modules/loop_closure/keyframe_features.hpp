@@ -27,9 +27,6 @@ class KeyframeFeatureExtractor {
   /// std::invalid_argument if the frame does not fit the rig (see fits()).
   [[nodiscard]] KeyframeFeatures extract(const StereoFrame& frame) const;
 
-  /// The rig's numbers without any keypoint: for a keyframe that has no images.
-  [[nodiscard]] KeyframeFeatures without_images() const;
-
  private:
   [[nodiscard]] std::vector<float> inverse_depths(const StereoFrame& frame,
                                                   std::span<const Eigen::Vector2f> pixels,

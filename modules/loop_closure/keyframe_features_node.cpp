@@ -12,31 +12,38 @@ constexpr std::size_t kQueueCapacity = 64;
 }  // namespace
 
 KeyframeFeaturesNode::KeyframeFeaturesNode(const KeyframeFeaturesConfig& config,
-                                           const std::optional<StereoRig>& rig,
-                                           Topic<KeyframeOdometry>& odometry,
-                                           const Topic<Keyframe>& keyframes)
-    : keyframes_(keyframes),
+                                           const StereoRig& rig,
+                                           const KeyframeFeaturesTopics& topics)
+    : extractor_(rig, config),
+      keyframes_(topics.keyframes),
       worker_(
-          kQueueCapacity, Overflow::kBlock, [this](const auto& message) { step(*message); },
+          kQueueCapacity, Overflow::kBlock,
+          [this](const Input& input) {
+            std::visit([this](const auto& message) { step(*message); }, input);
+          },
           "keyframe_features") {
-  if (rig) extractor_.emplace(*rig, checked(config));
-  odometry.subscribe([this](const auto& message) { worker_.post(message); });
+  topics.odometry.subscribe([this](const auto& message) { worker_.post(message); });
+  topics.frames.subscribe([this](const auto& message) { worker_.post(message); });
 }
 
 void KeyframeFeaturesNode::step(const KeyframeOdometry& odometry) {
   if (odometry.id.index != next_index_)
     throw std::invalid_argument("keyframe " + to_string(odometry.id) + " came where index " +
                                 std::to_string(next_index_) + " was due");
-  if (odometry.frame && !extractor_)
-    throw std::invalid_argument("keyframe " + to_string(odometry.id) +
-                                " has images, but the rig is unknown");
   ++next_index_;
   chain_ = compose(chain_, {odometry.T_previous_kf, odometry.covariance});
   chain_.T = odometry.T_odom_kf;  // the same product, without its rounding
-  Keyframe keyframe;
+  Keyframe& keyframe = without_images_.emplace_back();
   keyframe.odometry = {odometry.id, odometry.T_odom_kf, chain_.Sigma};
   keyframe.stamp = odometry.stamp;
-  if (odometry.frame) keyframe.features = extractor_->extract(*odometry.frame);
+}
+
+void KeyframeFeaturesNode::step(const LocatedFrame& located) {
+  if (without_images_.empty() || without_images_.front().stamp != located.frame->stamp) return;
+  KeyframeFeatures features = extractor_.extract(*located.frame);
+  Keyframe keyframe = std::move(without_images_.front());
+  without_images_.pop_front();
+  keyframe.features = std::move(features);
   keyframes_.publish(std::move(keyframe));
 }
 

@@ -1,8 +1,9 @@
 #pragma once
 
+#include <deque>
 #include <exception>
-#include <optional>
 #include <string_view>
+#include <variant>
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/odometry.hpp"
@@ -13,32 +14,42 @@
 
 namespace km {
 
+/// Channels of the keyframe features node; they must outlive it.
+struct KeyframeFeaturesTopics {
+  In<KeyframeOdometry> odometry;  ///< Indices 0, 1, 2, ...
+  In<LocatedFrame> frames;        ///< Each keyframe's comes after it, in the same order.
+  Out<Keyframe> keyframes;
+};
+
 /// Makes Keyframes of the keyframes of odometry: features from the images, and the covariance
-/// accumulated along the chain. In: `odometry`, indices 0, 1, 2, ... Out: `keyframes`. A keyframe
-/// without images (recorded pose graphs) has no features.
+/// accumulated along the chain.
 class KeyframeFeaturesNode final : public Node {
  public:
-  /// Without a `rig` no keyframe may have images. Throws ConfigError if `config` is out of bounds,
-  /// std::invalid_argument if the rig cannot be rectified. Both topics outlive the node.
-  KeyframeFeaturesNode(const KeyframeFeaturesConfig& config, const std::optional<StereoRig>& rig,
-                       Topic<KeyframeOdometry>& odometry, const Topic<Keyframe>& keyframes);
+  /// Throws ConfigError if `config` is out of bounds, std::invalid_argument if the rig cannot be
+  /// rectified.
+  KeyframeFeaturesNode(const KeyframeFeaturesConfig& config, const StereoRig& rig,
+                       const KeyframeFeaturesTopics& topics);
 
   std::string_view name() const override { return "keyframe_features"; }
   void start() override { worker_.start(); }
   void stop() noexcept override { worker_.stop(); }
   std::exception_ptr error() const override { return worker_.error(); }
 
-  /// Handles one input synchronously. The thread calls only this; so can tests and replay. Throws
-  /// std::invalid_argument for an index that does not follow the one before, or images without a
-  /// rig.
+  /// Handle one input synchronously. The thread calls only these; so can tests and replay. Throw
+  /// std::invalid_argument for an index that does not follow the one before, and for images of a
+  /// keyframe that do not fit the rig.
   void step(const KeyframeOdometry& odometry);
+  void step(const LocatedFrame& located);
 
  private:
-  std::optional<KeyframeFeatureExtractor> extractor_;
-  const Topic<Keyframe>& keyframes_;
+  using Input = std::variant<Topic<KeyframeOdometry>::Message, Topic<LocatedFrame>::Message>;
+
+  const KeyframeFeatureExtractor extractor_;
+  const Out<Keyframe> keyframes_;
+  std::deque<Keyframe> without_images_;
   UncertainPose chain_;  // from the first keyframe's odometry frame to the latest keyframe
   std::uint32_t next_index_ = 0;
-  Worker<Topic<KeyframeOdometry>::Message> worker_;  // last member: stops first
+  Worker<Input> worker_;  // last member: stops first
 };
 
 }  // namespace km

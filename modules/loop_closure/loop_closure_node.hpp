@@ -30,17 +30,17 @@ namespace km {
 
 /// Channels of the loop closure node; they must outlive it.
 struct LoopClosureTopics {
-  Topic<Keyframe>& keyframes;              ///< In: own.
-  Topic<LoopCandidate>& candidates;        ///< In: pairs that look like the same place.
-  Topic<RelativePose>& measured_closures;  ///< In: known ones, from own keyframes.
-  Topic<KeyframeRequest>& peer_requests;   ///< In: for own keyframes.
-  Topic<KeyframeReply>& peer_replies;      ///< In: to this robot's requests.
-  Topic<PeerEvent>& peer_events;           ///< In: who comes and goes.
-  Topic<KeyframeBow>& peer_bows;           ///< In: words of the peers' keyframes.
-  const Topic<Addressed<KeyframeRequest>>& own_requests;
-  const Topic<Addressed<KeyframeReply>>& own_replies;
-  const Topic<Closure>& own_closures;     ///< Out: verified.
-  const Topic<ClosureOutcome>& outcomes;  ///< Out: whenever a candidate gets further or stops.
+  In<Keyframe> keyframes;              ///< Own.
+  In<LoopCandidate> candidates;        ///< Pairs that look like the same place.
+  In<RelativePose> measured_closures;  ///< Known ones, from own keyframes.
+  In<KeyframeRequest> peer_requests;   ///< For own keyframes.
+  In<KeyframeReply> peer_replies;      ///< To this robot's requests.
+  In<PeerEvent> peer_events;           ///< Who comes and goes.
+  In<KeyframeBow> peer_bows;           ///< Words of the peers' keyframes.
+  Out<Addressed<KeyframeRequest>> own_requests;
+  Out<Addressed<KeyframeReply>> own_replies;
+  Out<Closure> own_closures;     ///< Verified.
+  Out<ClosureOutcome> outcomes;  ///< Whenever a candidate gets further or stops.
 };
 
 /// Time passes: requests that are due are sent.

@@ -21,8 +21,7 @@ constexpr double kBurst_s = 0.5;
 
 }  // namespace
 
-MeshChunksNode::MeshChunksNode(const MeshChunksConfig& config, RobotId self,
-                               const Topic<MeshChunk>& chunks)
+MeshChunksNode::MeshChunksNode(const MeshChunksConfig& config, RobotId self, Out<MeshChunk> chunks)
     : config_(checked(config)),
       self_(self),
       chunks_(chunks),

@@ -26,8 +26,8 @@ class MeshChunksNode final : public Node {
     std::shared_ptr<const LabelledMesh> mesh;
   };
 
-  /// Throws ConfigError if `config` is out of bounds. `chunks`, out, must outlive the node.
-  MeshChunksNode(const MeshChunksConfig& config, RobotId self, const Topic<MeshChunk>& chunks);
+  /// Throws ConfigError if `config` is out of bounds. `chunks` go to the peers.
+  MeshChunksNode(const MeshChunksConfig& config, RobotId self, Out<MeshChunk> chunks);
   ~MeshChunksNode() override { stop(); }
 
   /// The newest mesh counts. Thread-safe; returns at once.
@@ -51,7 +51,7 @@ class MeshChunksNode final : public Node {
 
   const MeshChunksConfig config_;
   const RobotId self_;
-  const Topic<MeshChunk>& chunks_;
+  const Out<MeshChunk> chunks_;
   ChunkSchedule schedule_;
   double budget_bytes_ = 0.0;  // may be sent now
   double budget_time_s_ = 0.0;

@@ -68,24 +68,6 @@ bool parse_line(const std::string& line, PlyHeader& header, bool& has_format) {
 
 }  // namespace
 
-std::size_t size_of(PlyType type) {
-  switch (type) {
-    case PlyType::kInt8:
-    case PlyType::kUint8:
-      return 1;
-    case PlyType::kInt16:
-    case PlyType::kUint16:
-      return 2;
-    case PlyType::kInt32:
-    case PlyType::kUint32:
-    case PlyType::kFloat:
-      return 4;
-    case PlyType::kDouble:
-      return 8;
-  }
-  throw std::logic_error("PlyType");
-}
-
 PlyHeader read_ply_header(std::istream& stream) {
   PlyHeader header;
   bool has_format = false;

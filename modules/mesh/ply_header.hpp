@@ -10,9 +10,6 @@ namespace km {
 enum class PlyFormat { kAscii, kLittleEndian, kBigEndian };
 enum class PlyType { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
 
-/// Bytes of one value.
-[[nodiscard]] std::size_t size_of(PlyType type);
-
 struct PlyProperty {
   std::string name;
   PlyType type = PlyType::kFloat;

@@ -11,7 +11,7 @@ constexpr std::size_t kQueue = 4096;
 
 }  // namespace
 
-TeamMeshNode::TeamMeshNode(Topic<MeshChunk>& chunks)
+TeamMeshNode::TeamMeshNode(In<MeshChunk> chunks)
     : worker_(
           kQueue, Overflow::kBlock, [this](const auto& chunk) { take(*chunk); }, "team_mesh") {
   chunks.subscribe([this](const auto& chunk) { worker_.post(chunk); });

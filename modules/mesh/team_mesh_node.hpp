@@ -15,8 +15,8 @@ namespace km {
 /// Holds the meshes that other robots send.
 class TeamMeshNode final : public Node {
  public:
-  /// `chunks`, in: received ones; must outlive the node.
-  explicit TeamMeshNode(Topic<MeshChunk>& chunks);
+  /// `chunks`: received ones.
+  explicit TeamMeshNode(In<MeshChunk> chunks);
   ~TeamMeshNode() override { stop(); }
 
   /// Meshes as far as they have arrived, by robot. Takes time in proportion. Thread-safe.

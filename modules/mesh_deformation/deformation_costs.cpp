@@ -33,13 +33,9 @@ SE3 from_graph_pose(const double* block) {
 }
 
 bool GraphPoseManifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {
-  const Eigen::Map<const Eigen::Quaterniond> q(x);
-  const Eigen::Map<const Vector6> d(delta);
-  const Eigen::Quaterniond q_plus = q * Eigen::Quaterniond(so3_exp(d.head<3>()));
-  const Eigen::Vector3d t_plus =
-      Eigen::Map<const Eigen::Vector3d>(x + 4) + q.toRotationMatrix() * d.tail<3>();
-  Eigen::Map<Eigen::Quaterniond>{x_plus_delta} = q_plus.normalized();
-  Eigen::Map<Eigen::Vector3d>{x_plus_delta + 4} = t_plus;
+  const GraphPose moved =
+      to_graph_pose(retract(from_graph_pose(x), Eigen::Map<const Vector6>(delta)));
+  std::copy(moved.begin(), moved.end(), x_plus_delta);
   return true;
 }
 
@@ -49,7 +45,7 @@ bool GraphPoseManifold::PlusJacobian(const double* /*x*/, double* jacobian) cons
 }
 
 bool GraphPoseManifold::Minus(const double* y, const double* x, double* y_minus_x) const {
-  Eigen::Map<Vector6>{y_minus_x} = anchor_term(from_graph_pose(x), from_graph_pose(y)).residual;
+  Eigen::Map<Vector6>{y_minus_x} = local_coordinates(from_graph_pose(x), from_graph_pose(y));
   return true;
 }
 

@@ -19,7 +19,7 @@ using GraphPose = std::array<double, 7>;
 [[nodiscard]] GraphPose to_graph_pose(const SE3& T);
 [[nodiscard]] SE3 from_graph_pose(const double* block);
 
-/// R' = R exp(rotation), t' = t + R translation.
+/// retract() and local_coordinates() on pose blocks.
 class GraphPoseManifold final : public ceres::Manifold {
  public:
   int AmbientSize() const override { return 7; }

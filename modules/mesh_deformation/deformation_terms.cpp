@@ -32,9 +32,7 @@ RotationTerm rotation_term(const Eigen::Matrix3d& R_odom_kf, const SE3& T_world_
 AnchorTerm anchor_term(const SE3& anchor, const SE3& pose) {
   const Eigen::Matrix3d R_anchor_pose = anchor.linear().transpose() * pose.linear();
   AnchorTerm term;
-  term.residual.head<3>() = so3_log(R_anchor_pose);
-  term.residual.tail<3>() =
-      anchor.linear().transpose() * (pose.translation() - anchor.translation());
+  term.residual = local_coordinates(anchor, pose);
   term.by_pose.setZero();
   term.by_pose.topLeftCorner<3, 3>() = so3_right_jacobian_inverse(term.residual.head<3>());
   term.by_pose.bottomRightCorner<3, 3>() = R_anchor_pose;

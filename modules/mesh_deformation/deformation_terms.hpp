@@ -6,8 +6,7 @@
 
 namespace km {
 
-// Residuals of the deformation graph and their derivatives by the right perturbation
-// delta = [rotation; translation] of a pose: R' = R exp(rotation), t' = t + R translation.
+// Residuals of the deformation graph and their derivatives by the step of a pose's retract().
 
 using Matrix36 = Eigen::Matrix<double, 3, 6>;
 
@@ -32,8 +31,8 @@ struct RotationTerm {
 [[nodiscard]] RotationTerm rotation_term(const Eigen::Matrix3d& R_odom_kf, const SE3& T_world_kf,
                                          const SE3& T_world_node);
 
-/// First term of eq. (1): X - anchor as the tangent vector of the retraction above, so that the
-/// pose is the anchor perturbed by the residual.
+/// First term of eq. (1): X - anchor as local_coordinates(), so that the pose is the anchor
+/// retracted by the residual.
 struct AnchorTerm {
   Vector6 residual;  ///< [rad; m]
   Matrix6 by_pose;

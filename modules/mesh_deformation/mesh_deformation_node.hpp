@@ -22,11 +22,11 @@ namespace km {
 
 /// Channels of the mesh deformation node; they must outlive it.
 struct MeshDeformationTopics {
-  Topic<MapMesh>& maps;                        ///< In: the newest counts.
-  Topic<KeyframeOdometry>& keyframes;          ///< In: own ones, ascending.
-  Topic<Trajectory>& trajectory;               ///< In: own, the newest counts.
-  const Topic<OptimizedMesh>& optimized;       ///< Out.
-  const Topic<SupersededSurface>& superseded;  ///< Out: of the maps, for the mapper.
+  In<MapMesh> maps;                ///< The newest counts.
+  In<KeyframeOdometry> keyframes;  ///< Own ones, ascending.
+  In<Trajectory> trajectory;       ///< Own, the newest counts.
+  Out<OptimizedMesh> optimized;
+  Out<SupersededSurface> superseded;  ///< Of the maps, for the mapper.
 };
 
 /// Corrects the robot's mesh when its map or its trajectory changed: a MeshCorrector on its thread.
@@ -75,8 +75,8 @@ class MeshDeformationNode final : public Node {
 
   const MeshDeformationConfig config_;
   const RobotId self_;
-  const Topic<OptimizedMesh>& optimized_;
-  const Topic<SupersededSurface>& superseded_;
+  const Out<OptimizedMesh> optimized_;
+  const Out<SupersededSurface> superseded_;
   MeshCorrector corrector_;
   Topic<MapMesh>::Message map_;
   std::uint64_t map_version_ = 0;

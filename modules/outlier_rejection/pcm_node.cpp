@@ -18,19 +18,17 @@ std::string text_of(RobotId a, RobotId b) {
 
 }  // namespace
 
-PcmNode::PcmNode(const PcmConfig& config, RobotId self, Topic<Closure>& closures,
-                 const Topic<InlierSet>& inlier_sets, Topic<PeerEvent>* peer_events)
+PcmNode::PcmNode(const PcmConfig& config, RobotId self, const PcmTopics& topics)
     : config_(checked(config)),
       self_(self),
-      inlier_sets_(inlier_sets),
+      inlier_sets_(topics.inlier_sets),
       worker_(
           kQueue, Overflow::kBlock, [this](const Input& input) { handle(input); },
           PcmConfig::kSection),
       ticks_(
           steady_duration(config.publish_period_s), [this] { worker_.post(Tick{}); }, "pcm tick") {
-  closures.subscribe([this](const auto& message) { worker_.post(message); });
-  if (peer_events != nullptr)
-    peer_events->subscribe([this](const auto& message) { worker_.post(message); });
+  topics.closures.subscribe([this](const auto& message) { worker_.post(message); });
+  topics.peer_events.subscribe([this](const auto& message) { worker_.post(message); });
 }
 
 void PcmNode::start() {

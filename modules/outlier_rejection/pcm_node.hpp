@@ -21,21 +21,25 @@
 
 namespace km {
 
+/// Channels of the PCM node; they must outlive it.
+struct PcmTopics {
+  In<Closure> closures;        ///< Own and received ones, in any order, repeated or not.
+  In<PeerEvent> peer_events;   ///< The keyframes of a peer that has restarted are others.
+  Out<InlierSet> inlier_sets;  ///< Versions ascending per pair.
+};
+
 /// Decides which closures are optimised, for every pair in which this robot has the lower id and
-/// for the closures inside it. In: `closures`, the robot's own and received ones, in any order,
-/// repeated or not. Out: `inlier_sets`, versions ascending per pair. Closures of other pairs are
-/// left to their deciders, unusable ones refused with a warning.
+/// for the closures inside it. Closures of other pairs are left to their deciders, unusable ones
+/// refused with a warning.
 ///
 /// Which they are is told by PcmConfig::selection. By default all, since the optimiser weighs them;
 /// but two robots are joined only once independent closures agree (WitnessedPair), or when
-/// PcmConfig::witness_wait_s is over or no witness can come any more, which is logged. Closures inside the robot join nothing and
-/// are published at once.
+/// PcmConfig::witness_wait_s is over or no witness can come any more, which is logged. Closures
+/// inside the robot join nothing and are published at once.
 class PcmNode final : public Node {
  public:
-  /// Throws ConfigError if `config` is out of bounds. All topics must outlive the node. Of a peer
-  /// that `peer_events` says has restarted everything is forgotten: its keyframes are others now.
-  PcmNode(const PcmConfig& config, RobotId self, Topic<Closure>& closures,
-          const Topic<InlierSet>& inlier_sets, Topic<PeerEvent>* peer_events = nullptr);
+  /// Throws ConfigError if `config` is out of bounds.
+  PcmNode(const PcmConfig& config, RobotId self, const PcmTopics& topics);
   ~PcmNode() override { stop(); }
 
   std::string_view name() const override { return PcmConfig::kSection; }
@@ -78,7 +82,7 @@ class PcmNode final : public Node {
 
   const PcmConfig config_;
   const RobotId self_;
-  const Topic<InlierSet>& inlier_sets_;
+  const Out<InlierSet> inlier_sets_;
   std::map<RobotId, Pair> pairs_;  // by the other robot; `self_` for closures inside this one
   std::map<RobotId, std::uint32_t> version_of_;
   std::atomic<bool> no_more_ = false;

@@ -22,11 +22,11 @@ namespace km {
 
 /// Channels of the place recognition node; they must outlive it.
 struct PlaceRecognitionTopics {
-  Topic<Keyframe>& keyframes;              ///< In: own, ascending.
-  Topic<KeyframeBow>& peer_bows;           ///< In: of peers; own ones that come back are ignored.
-  const Topic<KeyframeBow>& own_bows;      ///< Out: every own keyframe, for the peers.
-  const Topic<LoopCandidate>& candidates;  ///< Out.
-  const Topic<PlaceQuery>& queries;        ///< Out: one per keyframe heard of.
+  In<Keyframe> keyframes;     ///< Own, ascending.
+  In<KeyframeBow> peer_bows;  ///< Of peers; own ones that come back are ignored.
+  Out<KeyframeBow> own_bows;  ///< Every own keyframe, for the peers.
+  Out<LoopCandidate> candidates;
+  Out<PlaceQuery> queries;  ///< One per keyframe heard of.
 };
 
 /// Finds places seen before: own keyframes among earlier own ones, and keyframes of peers, as they

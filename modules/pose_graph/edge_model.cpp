@@ -103,8 +103,4 @@ VerticalModel model_vertical(const VerticalPrior& prior, const Eigen::Matrix3d& 
   return model;
 }
 
-SE3 move_along(const SE3& T, const Vector6& xi) {
-  return make_pose(T.linear() * so3_exp(xi.head<3>()), T.translation() + T.linear() * xi.tail<3>());
-}
-
 }  // namespace km

@@ -41,7 +41,4 @@ struct VerticalModel {
 [[nodiscard]] VerticalModel model_vertical(const VerticalPrior& prior, const Eigen::Matrix3d& R,
                                            Curvature curvature);
 
-/// The pose reached from `T` along tangent vector `xi`: R exp(w), t + R v.
-[[nodiscard]] SE3 move_along(const SE3& T, const Vector6& xi);
-
 }  // namespace km

@@ -28,10 +28,10 @@ struct GraphPlaybackEnd {
 
 /// Where a played graph goes. All topics must outlive the node.
 struct GraphPlaybackTopics {
-  const Topic<KeyframeOdometry>& odometry;  ///< Without images.
-  const Topic<Keyframe>& keyframes;         ///< Without features; covariance since keyframe 0.
-  const Topic<RelativePose>& closures;
-  const Topic<GraphPlaybackEnd>& end;
+  Out<KeyframeOdometry> odometry;
+  Out<Keyframe> keyframes;  ///< Without features; covariance since keyframe 0.
+  Out<RelativePose> closures;
+  Out<GraphPlaybackEnd> end;
 };
 
 /// Plays one robot's part of a recorded pose graph as if it were being driven: keyframe after

@@ -17,16 +17,16 @@ namespace km {
 
 /// Channels of the team node; they must outlive it.
 struct TeamTopics {
-  Topic<KeyframeOdometry>& odometry;            ///< In: own keyframes, ascending.
-  Topic<Closure>& closures;                     ///< In: own and received ones.
-  Topic<InlierSet>& inlier_sets;                ///< In: decided here.
-  Topic<InlierSet>& peer_inlier_sets;           ///< In: decided by other robots.
-  Topic<PeerEvent>& peer_events;                ///< In: who is heard directly.
-  Topic<TeamParcel>& peer_parcels;              ///< In: from robots that are heard directly.
-  const Topic<Addressed<TeamParcel>>& parcels;  ///< Out: to robots that are heard directly.
-  const Topic<Trajectory>& trajectory;          ///< Out.
-  const Topic<OptimizerProgress>& progress;     ///< Out.
-  const Topic<ClosureVerdicts>& verdicts;       ///< Out, after sessions that weigh closures.
+  In<KeyframeOdometry> odometry;       ///< Own keyframes, ascending.
+  In<Closure> closures;                ///< Own and received ones.
+  In<InlierSet> inlier_sets;           ///< Decided here.
+  In<InlierSet> peer_inlier_sets;      ///< Decided by other robots.
+  In<PeerEvent> peer_events;           ///< Who is heard directly.
+  In<TeamParcel> peer_parcels;         ///< From robots that are heard directly.
+  Out<Addressed<TeamParcel>> parcels;  ///< To robots that are heard directly.
+  Out<Trajectory> trajectory;
+  Out<OptimizerProgress> progress;
+  Out<ClosureVerdicts> verdicts;  ///< After sessions that weigh closures.
 };
 
 /// One robot's part of the team's pose graph optimisation: a TeamAgent on its thread.

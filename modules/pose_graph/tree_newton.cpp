@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "modules/core/lie.hpp"
 #include "modules/pose_graph/closure_cover.hpp"
 #include "modules/pose_graph/corroboration.hpp"
 
@@ -388,7 +389,7 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
   std::map<RobotId, VectorXd> step_of_child;
   const auto move = [&](double scale) {
     for (std::size_t k = 0; k < base_.size(); ++k) {
-      at_hand_[k] = move_along(base_[k], scale * tangent_of_step(step_.col(static_cast<Index>(k))));
+      at_hand_[k] = retract(base_[k], scale * tangent_of_step(step_.col(static_cast<Index>(k))));
       if (!at_hand_[k].matrix().allFinite() || at_hand_[k].translation().norm() > kOutOfTheWorld_m)
         throw std::runtime_error("TreeNewton: a step that leads out of the world");
     }

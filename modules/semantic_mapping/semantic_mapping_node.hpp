@@ -16,10 +16,10 @@ namespace km {
 
 /// Channels of the mapping node; they must outlive it.
 struct SemanticMappingTopics {
-  Topic<DenseFrame>& frames;               ///< In, in order of time.
-  Topic<SupersededSurface>& superseded;    ///< In: of the maps; the newest counts.
-  const Topic<MapMesh>& maps;              ///< Out: the whole map.
-  const Topic<MappingProgress>& progress;  ///< Out: with every frame.
+  In<DenseFrame> frames;             ///< In order of time.
+  In<SupersededSurface> superseded;  ///< Of the maps; the newest counts.
+  Out<MapMesh> maps;                 ///< The whole map.
+  Out<MappingProgress> progress;     ///< With every frame.
 };
 
 /// Builds a robot's map as a thread: one SemanticMapper. The mesh is published every few seconds,

@@ -57,7 +57,7 @@ LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file, int flags,
   cv::Mat decoded = cv::imdecode(encoded, mode);
   if (decoded.empty())
     return failure(ImageStatus::kUnreadable, file, "not an image that can be decoded");
-  if (!size.empty() && decoded.size() != size)
+  if (decoded.size() != size)
     return failure(ImageStatus::kWrongSize, file,
                    text(decoded.size()) + " px, the calibration says " + text(size));
   return {ImageStatus::kOk, {}, std::move(decoded)};

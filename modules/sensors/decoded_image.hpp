@@ -8,7 +8,7 @@
 namespace km {
 
 /// Any image file as OpenCV decodes it with the cv::ImreadModes `flags`; its orientation tag is
-/// ignored. No size is asked for where `size` is empty. Never kWrongFormat.
+/// ignored. Never kWrongFormat.
 [[nodiscard]] LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file, int flags,
                                                 const cv::Size& size);
 

@@ -32,8 +32,6 @@ const char* to_string(ReaderFault fault) {
       return "depth or label images without a frame";
     case ReaderFault::kUnknownColor:
       return "label images with colours that are not in the palette";
-    case ReaderFault::kWithoutPose:
-      return "frames without a pose";
   }
   return "unknown faults";
 }

@@ -24,7 +24,6 @@ enum class ReaderFault {
   kWrongImageFormat,   ///< Not the bits or channels of its kind: depth, labels.
   kImageWithoutFrame,  ///< A depth or label image that belongs to no frame.
   kUnknownColor,       ///< A label image with colours that are not in the palette.
-  kWithoutPose,        ///< A frame without a given pose.
 };
 
 /// A short plural for tables and log lines: "malformed rows".

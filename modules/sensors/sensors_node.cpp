@@ -9,14 +9,12 @@
 namespace km {
 
 SensorsNode::SensorsNode(const SensorsConfig& config, double rate,
-                         std::unique_ptr<DatasetReader> reader, const Topic<SensorPacket>& packets,
-                         const Topic<SensorsEnd>& end)
+                         std::unique_ptr<DatasetReader> reader, const SensorsTopics& topics)
     : reader_(std::move(reader)),
       listed_(reader_->pair_count()),
       filter_(checked(config).max_lag_s),
       clock_(rate),
-      packets_(packets),
-      end_(end),
+      topics_(topics),
       worker_(
           static_cast<std::size_t>(config.read_ahead), Overflow::kBlock,
           [this](const Input& input) {
@@ -57,7 +55,7 @@ void SensorsNode::decode() {
 void SensorsNode::step(const Packet& packet) {
   if (!clock_.wait_until(packet->frame->stamp)) return;
   if (const Packet due = filter_.take(packet, clock_.lag_s())) {
-    packets_.publish(due);
+    topics_.packets.publish(due);
     ++published_;
   } else {
     ++skipped_;
@@ -71,7 +69,7 @@ void SensorsNode::step(const EndOfData& data) {
   std::istringstream faults(to_string(data.faults));
   for (std::string line; std::getline(faults, line);) log::warn(name()) << line;
   log::info(name()) << "end of data: " << published_ << " frames, " << skipped_ << " skipped";
-  end_.publish(SensorsEnd{published_, skipped_, data.faults});
+  topics_.end.publish(SensorsEnd{published_, skipped_, data.faults});
 }
 
 }  // namespace km

@@ -26,16 +26,21 @@ struct SensorsEnd {
   ReaderReport faults;        ///< Of the recording.
 };
 
-/// Plays a recording. Out: `packets`, `end`. One thread decodes ahead, another publishes each
+/// Channels of the sensors node; they must outlive it.
+struct SensorsTopics {
+  Out<SensorPacket> packets;
+  Out<SensorsEnd> end;
+};
+
+/// Plays a recording. One thread decodes ahead, another publishes each
 /// packet when it is due; a consumer whose queue is full (kBlock) holds publication up, and at a
 /// finite rate pairs that became later than max_lag_s are skipped, their inertial samples kept.
 class SensorsNode final : public Node {
  public:
   /// `rate`: dataset seconds per second; infinity: as fast as consumers take it. Throws ConfigError
-  /// if `config` is out of bounds and std::invalid_argument for a bad rate. Both topics must
-  /// outlive the node.
+  /// if `config` is out of bounds and std::invalid_argument for a bad rate.
   SensorsNode(const SensorsConfig& config, double rate, std::unique_ptr<DatasetReader> reader,
-              const Topic<SensorPacket>& packets, const Topic<SensorsEnd>& end);
+              const SensorsTopics& topics);
   ~SensorsNode() override { stop(); }
 
   std::string_view name() const override { return "sensors"; }
@@ -68,8 +73,7 @@ class SensorsNode final : public Node {
   const std::size_t listed_;
   LagFilter filter_;
   ReplayClock clock_;
-  const Topic<SensorPacket>& packets_;
-  const Topic<SensorsEnd>& end_;
+  const SensorsTopics topics_;
   std::atomic<std::size_t> published_ = 0;
   std::atomic<std::size_t> skipped_ = 0;
   std::atomic<bool> stopped_ = false;

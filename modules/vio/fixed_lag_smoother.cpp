@@ -56,7 +56,7 @@ std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
   hold_first();
   for (int pass = 0; pass < 2; ++pass) {
     locate_landmarks();
-    if (!solve(kStartIterations).usable) return std::nullopt;
+    if (!optimize(window_, kStartIterations).usable) return std::nullopt;
     reject_outliers();
   }
   // The prior stays at the guess of the biases; heading and position have not moved.
@@ -77,18 +77,13 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame) {
   decide_keyframe();
   locate_landmarks();
   SmootherUpdate update;
-  update.solution = solve(config_.iterations);
+  update.solution = optimize(window_, config_.iterations);
   update.outliers = reject_outliers();
   update.state = newest.state;
   update.keyframe = newest.keyframe;
   update.landmarks = static_cast<int>(std::count_if(
       window_.landmarks.begin(), window_.landmarks.end(), [](const auto& l) { return l.located; }));
   return update;
-}
-
-WindowSolution FixedLagSmoother::solve(int iterations) {
-  return config_.solver == SmootherSolver::kCeres ? optimize_by_ceres(window_, iterations)
-                                                  : optimize(window_, iterations);
 }
 
 void FixedLagSmoother::append(const InertialFrame& frame, OdometryState state) {

@@ -68,7 +68,6 @@ class FixedLagSmoother {
   [[nodiscard]] bool leaving(Stamp stamp) const;
 
  private:
-  WindowSolution solve(int iterations);
   void append(const InertialFrame& frame, OdometryState state);  // by value: it may be the window's
   void decide_keyframe();
   int reject_outliers();

@@ -2,7 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "modules/vio/residuals/retraction.hpp"
+#include "modules/core/lie.hpp"
 
 namespace km {
 namespace {

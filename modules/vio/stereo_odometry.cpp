@@ -2,7 +2,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "modules/vio/residuals/retraction.hpp"
+#include "modules/core/lie.hpp"
 #include "modules/vio/triangulation.hpp"
 
 namespace km {

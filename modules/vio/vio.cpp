@@ -118,11 +118,11 @@ void Vio::try_start(VioResult& result) {
       ++statistics_.starts;
       result.states = *states;
       running_ = true;
-      hand_on_first(states->front(), held_.front().frame, result);
+      hand_on_first(states->front(), result);
       locate(states->front(), held_.front().frame, result);
       for (std::size_t k = 1; k < held_.size(); ++k) {
         if (smoother_.window().frames[k].keyframe && due((*states)[k], *held_[k].frame))
-          hand_on((*states)[k], held_[k].frame, result);
+          hand_on((*states)[k], result);
         locate((*states)[k], held_[k].frame, result);
       }
       held_.clear();
@@ -165,7 +165,7 @@ void Vio::advance(const Held& held, VioResult& result) {
   result.states.push_back(result.smoother->state);
   const bool last_chance = last_keyframe_ && smoother_.leaving(last_keyframe_->stamp);
   if (result.smoother->keyframe && (last_chance || due(result.smoother->state, *held.frame)))
-    hand_on(result.smoother->state, held.frame, result);
+    hand_on(result.smoother->state, result);
   locate(result.smoother->state, held.frame, result);
 }
 

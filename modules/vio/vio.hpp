@@ -78,8 +78,8 @@ class Vio {
   void restart(Held held);
   [[nodiscard]] bool plausible(const SmootherUpdate& update) const;
   void continue_from_last_pose(std::vector<OdometryState>& states) const;
-  void hand_on_first(const OdometryState& state, const Frame& frame, VioResult& result);
-  void hand_on(const OdometryState& state, const Frame& frame, VioResult& result);
+  void hand_on_first(const OdometryState& state, VioResult& result);
+  void hand_on(const OdometryState& state, VioResult& result);
   [[nodiscard]] std::optional<Vertical> vertical_at(const OdometryState& state) const;
   void locate(const OdometryState& state, const Frame& frame, VioResult& result);
   [[nodiscard]] bool locates_points(const StereoFrame& frame) const;
@@ -95,9 +95,9 @@ class Vio {
   std::optional<Stamp> last_image_;
   std::vector<Held> held_;  // Not empty: starting.
   bool running_ = false;
-  std::optional<OdometryState> last_;              // Last state that was given out.
-  std::optional<KeyframeOdometry> last_keyframe_;  // Without its images.
-  SE3 T_chain_odom_ = SE3::Identity();             // From live odometry to the chain of keyframes.
+  std::optional<OdometryState> last_;  // Last state that was given out.
+  std::optional<KeyframeOdometry> last_keyframe_;
+  SE3 T_chain_odom_ = SE3::Identity();  // From live odometry to the chain of keyframes.
 };
 
 }  // namespace km

@@ -4,11 +4,6 @@
 
 namespace km {
 
-/// Who minimises the smoother's cost; both reach the same minimum. On MH_01_easy an image costs
-/// 4.3 ms with kSchur and 6.8 ms with kCeres (3 iterations, medians, tracker included): most of
-/// Ceres' time goes into building its problem of some 2000 residual blocks anew for every image.
-enum class SmootherSolver { kSchur, kCeres };
-
 /// Parameters of Vio without its feature tracker. Field names are the YAML keys below `vio:`.
 struct VioConfig {
   static constexpr const char* kSection = "vio";
@@ -19,9 +14,8 @@ struct VioConfig {
   /// Most recent images kept besides keyframes. Fewer: faster.
   int window_recent = 3;
 
-  /// Steps of the optimisation for every image, and who makes them.
+  /// Steps of the optimisation for every image.
   int iterations = 3;
-  SmootherSolver solver = SmootherSolver::kSchur;
 
   /// Standard deviation of a tracked image point [px].
   double noise_px = 0.7;
@@ -98,8 +92,6 @@ struct VioConfig {
     visitor.field("window_keyframes", window_keyframes, {3, 50}, "of the smoother");
     visitor.field("window_recent", window_recent, {1, 20}, "images beside the keyframes");
     visitor.field("iterations", iterations, {1, 50}, "for every image");
-    visitor.field("solver", solver,
-                  {{"schur", SmootherSolver::kSchur}, {"ceres", SmootherSolver::kCeres}});
     visitor.field("noise_px", noise_px, {0.01, 20.0}, "[px]");
     visitor.field("loss_scale", loss_scale, {0.1, 1e3}, "[standard deviations]");
     visitor.field("outlier_px", outlier_px, {0.1, 100.0}, "[px]");

@@ -51,7 +51,7 @@ std::optional<Vertical> Vio::vertical_at(const OdometryState& state) const {
                   config_.tilt_sigma * std::sqrt(config_.tilt_keyframes)};
 }
 
-void Vio::hand_on_first(const OdometryState& state, const Frame& frame, VioResult& result) {
+void Vio::hand_on_first(const OdometryState& state, VioResult& result) {
   KeyframeOdometry keyframe;
   keyframe.stamp = state.stamp;
   keyframe.T_odom_kf = T_chain_odom_ * state.T_odom_body;
@@ -65,10 +65,9 @@ void Vio::hand_on_first(const OdometryState& state, const Frame& frame, VioResul
   }
   last_keyframe_ = keyframe;
   result.keyframes.push_back(keyframe);
-  result.keyframes.back().frame = frame;
 }
 
-void Vio::hand_on(const OdometryState& state, const Frame& frame, VioResult& result) {
+void Vio::hand_on(const OdometryState& state, VioResult& result) {
   const auto relative = smoother_.relative_pose(last_keyframe_->stamp, state.stamp);
   KeyframeOdometry keyframe;
   keyframe.id = {robot_, last_keyframe_->id.index + 1};
@@ -89,7 +88,6 @@ void Vio::hand_on(const OdometryState& state, const Frame& frame, VioResult& res
   keyframe.T_odom_kf = last_keyframe_->T_odom_kf * keyframe.T_previous_kf;
   last_keyframe_ = keyframe;
   result.keyframes.push_back(keyframe);
-  result.keyframes.back().frame = frame;
 }
 
 }  // namespace km

@@ -12,10 +12,10 @@ namespace km {
 
 /// Channels of the odometry node; they must outlive it.
 struct VioTopics {
-  Topic<SensorPacket>& packets;              ///< In, in order of time.
-  const Topic<OdometryState>& odometry;      ///< Out: one per image, in order of time.
-  const Topic<KeyframeOdometry>& keyframes;  ///< Out: indices without gaps.
-  const Topic<LocatedFrame>& frames;         ///< Out: one per image, after its keyframe.
+  In<SensorPacket> packets;         ///< In order of time.
+  Out<OdometryState> odometry;      ///< One per image, in order of time.
+  Out<KeyframeOdometry> keyframes;  ///< Indices without gaps.
+  Out<LocatedFrame> frames;         ///< One per image, after its keyframe.
 };
 
 /// Stereo-inertial odometry as a thread: one Vio. A full queue holds the sensors up.

@@ -7,9 +7,9 @@
 
 #include "modules/core/frame.hpp"
 #include "modules/core/odometry.hpp"
+#include "modules/vio/imu_factor.hpp"
 #include "modules/vio/marginalization.hpp"
-#include "modules/vio/residuals/imu_factor.hpp"
-#include "modules/vio/residuals/reprojection.hpp"
+#include "modules/vio/reprojection.hpp"
 #include "modules/vio/tracked_frame.hpp"
 
 namespace km {

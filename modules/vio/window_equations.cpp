@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "modules/vio/residuals/retraction.hpp"
+#include "modules/core/lie.hpp"
 
 namespace km {
 namespace {

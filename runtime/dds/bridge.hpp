@@ -7,6 +7,8 @@
 #include <optional>
 #include <string_view>
 #include <thread>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "runtime/dds/codec.hpp"
@@ -28,13 +30,36 @@ struct Addressed {
   std::shared_ptr<const T> message;
 };
 
+/// A channel between robots: what is published here on `to_peers` comes out of `from_peers` there.
+/// One end can only be written and the other only read, so that no node takes one for the other.
+template <typename T, typename Sent = T>
+class Crossing {
+ public:
+  [[nodiscard]] Out<Sent> to_peers() { return own_; }
+  [[nodiscard]] In<T> from_peers() { return peers_; }
+
+ private:
+  friend class DdsBridge;
+  Topic<Sent> own_;
+  Topic<T> peers_;
+};
+
+/// Likewise, from one robot to one other.
+template <typename T>
+using AddressedCrossing = Crossing<T, Addressed<T>>;
+
+/// Which ends of a crossing a robot uses: it is not sent what it does not receive.
+struct CrossingEnds {
+  bool send = true;
+  bool receive = true;
+};
+
 /// Carries topics between robots: in-process Topic<T> <-> DDS topic, through Codec<T>.
 ///
-/// Wire it (send, receive) before start(). What is published on a sent topic is encoded and
-/// written on the bridge's sending thread: DDS never blocks here for want of a receiver (all kinds
-/// keep the last sample per key), but a thin link can hold up the socket, and no algorithm should
-/// wait for that. What is received is published on the bridge's receive thread, one for all
-/// topics. A topic that is received must not be the one that is sent: messages would echo.
+/// Wire it (exchange) before start(). What is published to the peers is encoded and written on the
+/// bridge's sending thread: DDS never blocks here for want of a receiver (all kinds keep the last
+/// sample per key), but a thin link can hold up the socket, and no algorithm should wait for that.
+/// What is received is published on the bridge's receive thread, one for all topics.
 ///
 /// The bridge is the last of the nodes to stop: it then sends what is queued, and waits up to two
 /// seconds until the peers have acknowledged it.
@@ -44,23 +69,13 @@ class DdsBridge final : public Node {
   explicit DdsBridge(const DdsParticipant& participant);
   ~DdsBridge() override;
 
-  /// Sends what is published on `from` to all robots.
-  template <typename T>
-  void send(Topic<T>& from, TopicKind kind, TrafficCategory category);
+  /// Joins `crossing`, which outlives the bridge, to those of the other robots: with all of them,
+  /// or, if it is addressed, each message with the robot it is for and no other.
+  template <typename T, typename Sent>
+  void exchange(Crossing<T, Sent>& crossing, TopicKind kind, TrafficCategory category,
+                CrossingEnds ends = {});
 
-  /// Sends what is published on `from` to the robot it is addressed to, and to no other.
-  template <typename T>
-  void send(Topic<Addressed<T>>& from, TopicKind kind, TrafficCategory category);
-
-  /// Publishes on `to` what other robots send to all.
-  template <typename T>
-  void receive(const Topic<T>& to, TopicKind kind, TrafficCategory category);
-
-  /// Publishes on `to` what other robots send to this one alone.
-  template <typename T>
-  void receive_addressed(const Topic<T>& to, TopicKind kind, TrafficCategory category);
-
-  /// Needs a received topic of kind kStatus: presence is its liveliness.
+  /// Needs a crossing of kind kStatus: presence is its liveliness.
   [[nodiscard]] Peers& peers() { return peers_; }
 
   /// Counts since the start. Thread-safe.
@@ -78,8 +93,6 @@ class DdsBridge final : public Node {
   OutgoingTopic& add_outgoing(TopicSpec spec);
   void add_incoming(TopicSpec spec, bool addressed, IncomingTopic::HeaderOf header_of,
                     IncomingTopic::Handler handler);
-  template <typename T>
-  void add_incoming(const Topic<T>& to, TopicKind kind, TrafficCategory category, bool addressed);
   void post(Job job) { sender_.post(std::move(job)); }
   void receive_until_stopped();
   void await_acknowledgements() noexcept;
@@ -100,55 +113,42 @@ class DdsBridge final : public Node {
 namespace detail {
 
 template <typename T>
-void write_encoded(OutgoingTopic& topic, std::optional<RobotId> to, const T& message) {
+void write_encoded(OutgoingTopic& topic, const T& message, std::optional<RobotId> to = {}) {
   auto encoded = Codec<T>::encode(message);
   encoded.wire.header.version = Codec<T>::kVersion;
   topic.write(to, encoded.wire.header, &encoded.wire);
 }
 
+template <typename T>
+void write_encoded(OutgoingTopic& topic, const Addressed<T>& message) {
+  write_encoded(topic, *message.message, message.to);
+}
+
 }  // namespace detail
 
-template <typename T>
-void DdsBridge::send(Topic<T>& from, TopicKind kind, TrafficCategory category) {
-  OutgoingTopic& topic = add_outgoing({Codec<T>::kTopic, &Codec<T>::descriptor(), kind, category});
-  from.subscribe([this, &topic](const std::shared_ptr<const T>& message) {
-    post([&topic, message] { detail::write_encoded<T>(topic, std::nullopt, *message); });
-  });
-}
-
-template <typename T>
-void DdsBridge::send(Topic<Addressed<T>>& from, TopicKind kind, TrafficCategory category) {
-  OutgoingTopic& topic = add_outgoing({Codec<T>::kTopic, &Codec<T>::descriptor(), kind, category});
-  from.subscribe([this, &topic](const std::shared_ptr<const Addressed<T>>& message) {
-    post([&topic, message] { detail::write_encoded<T>(topic, message->to, *message->message); });
-  });
-}
-
-template <typename T>
-void DdsBridge::receive(const Topic<T>& to, TopicKind kind, TrafficCategory category) {
-  add_incoming<T>(to, kind, category, false);
-}
-
-template <typename T>
-void DdsBridge::receive_addressed(const Topic<T>& to, TopicKind kind, TrafficCategory category) {
-  add_incoming<T>(to, kind, category, true);
-}
-
-template <typename T>
-void DdsBridge::add_incoming(const Topic<T>& to, TopicKind kind, TrafficCategory category,
-                             bool addressed) {
+template <typename T, typename Sent>
+void DdsBridge::exchange(Crossing<T, Sent>& crossing, TopicKind kind, TrafficCategory category,
+                         CrossingEnds ends) {
+  const TopicSpec spec{Codec<T>::kTopic, &Codec<T>::descriptor(), kind, category};
+  if (ends.send) {
+    OutgoingTopic& topic = add_outgoing(spec);
+    crossing.own_.subscribe([this, &topic](const std::shared_ptr<const Sent>& message) {
+      post([&topic, message] { detail::write_encoded(topic, *message); });
+    });
+  }
+  if (!ends.receive) return;
   using Wire = typename Codec<T>::Wire;
   const auto header_of = [](const void* wire) -> const km_wire_Header& {
     return static_cast<const Wire*>(wire)->header;
   };
-  const auto handler = [&to](const void* wire) -> const char* {
+  const auto handler = [to = Out<T>(crossing.peers_)](const void* wire) -> const char* {
     Decoded<T> decoded = Codec<T>::decode(*static_cast<const Wire*>(wire));
     if (!decoded.value) return decoded.refusal;
     to.publish(std::move(*decoded.value));
     return nullptr;
   };
-  add_incoming({Codec<T>::kTopic, &Codec<T>::descriptor(), kind, category}, addressed, header_of,
-               handler);
+  constexpr bool kAddressed = !std::is_same_v<T, Sent>;
+  add_incoming(spec, kAddressed, header_of, handler);
 }
 
 }  // namespace km

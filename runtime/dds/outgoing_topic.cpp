@@ -1,12 +1,29 @@
 #include "runtime/dds/outgoing_topic.hpp"
 
-#include <string_view>
+#include <dds/ddsi/ddsi_cdrstream.h>
 
 #include "runtime/dds/qos.hpp"
-#include "runtime/dds/serialized_size.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
+namespace {
+
+// Bytes of `wire` as DDS sends it: encoding header included, padded to 4. Serialises a second time:
+// dds_write() does not tell, and dds_writecdr() needs the writer's ddsi_sertype, to which Cyclone
+// 0.10 gives no access. Measured: 24 us for a keyframe of 1,000 points.
+std::uint64_t serialized_size(const dds_topic_descriptor_t& type, const void* wire) {
+  constexpr std::uint32_t kXcdr2 = 2;  // the encoding of @appendable types
+  constexpr std::uint64_t kEncodingHeader = 4;
+  dds_ostream_t stream;
+  dds_ostream_init(&stream, 0, kXcdr2);
+  dds_stream_write(&stream, static_cast<const char*>(wire), type.m_ops);
+  const std::uint64_t size = stream.m_index;
+  dds_ostream_fini(&stream);
+  return (kEncodingHeader + size + 3) / 4 * 4;
+}
+
+}  // namespace
+
 std::string partition_of(RobotId robot) {
   return "robot" + std::to_string(robot);
 }

@@ -22,7 +22,7 @@ class Peers {
   Peers& operator=(const Peers&) = delete;
 
   /// Published on the receive thread. Subscribe before the bridge starts.
-  [[nodiscard]] Topic<PeerEvent>& events() { return events_; }
+  [[nodiscard]] In<PeerEvent> events() { return events_; }
 
   /// Robots of the team ever met by this one, ascending by id.
   [[nodiscard]] std::vector<Peer> list() const;

@@ -6,11 +6,12 @@
 namespace km {
 
 RobotStatusNode::RobotStatusNode(std::function<RobotStatus()> provider,
-                                 const Topic<RobotStatus>& own, Topic<RobotStatus>& peers)
+                                 const RobotStatusTopics& topics)
     : periodic_(
           std::chrono::milliseconds(500),
-          [provider = std::move(provider), &own] { own.publish(provider()); }, "robot_status") {
-  peers.subscribe([this](const Topic<RobotStatus>::Message& status) {
+          [provider = std::move(provider), own = topics.own] { own.publish(provider()); },
+          "robot_status") {
+  topics.peers.subscribe([this](const Topic<RobotStatus>::Message& status) {
     const std::lock_guard lock(mutex_);
     latest_[status->robot] = *status;
   });

@@ -12,13 +12,18 @@
 
 namespace km {
 
-/// Publishes this robot's status twice a second and keeps the latest of each peer. Bridge both
-/// topics as kStatus: they carry the presence of the robots.
+/// Channels of the status node; they must outlive it.
+struct RobotStatusTopics {
+  Out<RobotStatus> own;
+  In<RobotStatus> peers;
+};
+
+/// Publishes this robot's status twice a second and keeps the latest of each peer. Both topics
+/// cross as kStatus: they carry the presence of the robots.
 class RobotStatusNode final : public Node {
  public:
-  /// `provider` is called on this node's thread. The topics outlive the node.
-  RobotStatusNode(std::function<RobotStatus()> provider, const Topic<RobotStatus>& own,
-                  Topic<RobotStatus>& peers);
+  /// `provider` is called on this node's thread.
+  RobotStatusNode(std::function<RobotStatus()> provider, const RobotStatusTopics& topics);
 
   /// Latest of each robot heard of, ascending by id. Thread-safe.
   [[nodiscard]] std::vector<RobotStatus> peers() const;

@@ -23,7 +23,9 @@ struct Bench {
   Topic<Trajectory> trajectory;
   Topic<MapMesh> maps;
   Topic<OptimizedMesh> optimized;
-  MeshFilesNode node{folder.path(), {keyframes, trajectory, maps, optimized}};
+  MeshFilesNode node{
+      folder.path(),
+      {.keyframes = keyframes, .trajectory = trajectory, .maps = maps, .optimized = optimized}};
 
   [[nodiscard]] LabelledMesh written(const char* file) const {
     return read_ply(folder.path() / file);
@@ -43,8 +45,8 @@ TEST_CASE("A mesh goes to where its first keyframe belongs", "[robot][mapping]")
   bench.node.start();
   const SE3 T_odom_first = make_pose(so3_exp(Eigen::Vector3d(0.0, 0.0, 0.3)), {1.0, 2.0, 0.5});
   const SE3 T_world_first = make_pose(so3_exp(Eigen::Vector3d(0.1, 0.0, -1.0)), {-4.0, 0.0, 1.0});
-  bench.keyframes.publish({.id = {2, 0}, .T_odom_kf = T_odom_first, .frame = nullptr});
-  bench.keyframes.publish({.id = {2, 1}, .T_odom_kf = SE3::Identity(), .frame = nullptr});
+  bench.keyframes.publish({.id = {2, 0}, .T_odom_kf = T_odom_first});
+  bench.keyframes.publish({.id = {2, 1}, .T_odom_kf = SE3::Identity()});
   bench.trajectory.publish({2, 2, {SE3::Identity()}});  // not yet joined to the team
   bench.maps.publish(triangle());
   bench.optimized.publish({.mesh = triangle().mesh, .report = {}});

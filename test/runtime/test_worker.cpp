@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "runtime/topic.hpp"
@@ -63,6 +64,21 @@ TEST_CASE("A topic hands one shared message to every subscriber, in order", "[to
   CHECK(heard[0].first == 1);
   CHECK(heard[1].first == 2);
   CHECK(heard[0].second == heard[1].second);
+}
+
+// A node cannot write what it is to read, nor take what comes from peers for what goes to them.
+static_assert(!std::is_convertible_v<In<int>, Out<int>>);
+static_assert(!std::is_convertible_v<Out<int>, In<int>>);
+
+TEST_CASE("What is published through one handle of a topic is heard through another", "[topic]") {
+  Topic<int> topic;
+  const In<int> in = topic;
+  const Out<int> out = topic;
+  std::vector<int> heard;
+  in.subscribe([&](const auto& message) { heard.push_back(*message); });
+  out.publish(7);
+  out.publish(std::make_shared<const int>(8));
+  CHECK(heard == std::vector<int>{7, 8});
 }
 
 }  // namespace

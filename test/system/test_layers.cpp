@@ -23,11 +23,13 @@ namespace fs = std::filesystem;
 
 // Modules an algorithm may use beside core and itself.
 const std::map<std::string, std::set<std::string>> kModuleUses = {
-    {"loop_closure", {"place_recognition"}},
+    {"dense_sensing", {"images"}},
+    {"loop_closure", {"images", "place_recognition"}},
+    {"vio", {"images"}},
     {"pose_graph", {"outlier_rejection"}},
     {"pgo_study", {"pose_graph", "outlier_rejection"}},
-    {"evaluation", {"mesh"}},
-    {"simulation", {"mesh"}},
+    {"evaluation", {"images", "mesh"}},
+    {"simulation", {"images", "mesh"}},
     {"semantic_mapping", {"mesh"}},
     {"mesh_deformation", {"mesh"}},
 };

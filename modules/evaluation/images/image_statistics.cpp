@@ -3,6 +3,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "modules/images/image_view.hpp"
+
 namespace km {
 namespace {
 
@@ -13,11 +15,6 @@ const ImageStatisticsOptions& checked(const ImageStatisticsOptions& options) {
   if (!(options.max_step_s > 0.0))
     throw std::invalid_argument("image statistics: max_step_s is not positive");
   return options;
-}
-
-// OpenCV has no read-only view: not to be written to.
-cv::Mat view(const GrayImage& image) {
-  return {image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.pixels.data())};
 }
 
 }  // namespace

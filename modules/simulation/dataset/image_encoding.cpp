@@ -4,6 +4,8 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "modules/images/image_view.hpp"
+
 namespace km {
 namespace {
 
@@ -16,12 +18,6 @@ void require_size(int width, int height, std::size_t pixels) {
     throw std::invalid_argument("an image of " + std::to_string(width) + 'x' +
                                 std::to_string(height) + " has not " + std::to_string(pixels) +
                                 " pixels");
-}
-
-// cv::Mat has no view of constant data.
-template <typename Pixel>
-cv::Mat view(int width, int height, int type, const std::vector<Pixel>& pixels) {
-  return {height, width, type, const_cast<Pixel*>(pixels.data())};
 }
 
 std::vector<std::uint8_t> encode(const cv::Mat& image, ImageFormat format) {
@@ -42,7 +38,7 @@ std::string extension(ImageFormat format) {
 
 std::vector<std::uint8_t> encode_gray(const GrayImage& image, ImageFormat format) {
   require_size(image.width, image.height, image.pixels.size());
-  return encode(view(image.width, image.height, CV_8UC1, image.pixels), format);
+  return encode(view(image), format);
 }
 
 std::vector<std::uint8_t> encode_color(int width, int height, const std::vector<std::uint8_t>& rgb,

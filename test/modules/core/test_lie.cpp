@@ -50,6 +50,17 @@ TEST_CASE("The adjoint moves a perturbation from the right to the left", "[core]
   CHECK(((T * se3_exp(xi)).matrix() - (se3_exp(adjoint(T) * xi) * T).matrix()).norm() < 1e-10);
 }
 
+TEST_CASE("Local coordinates undo a retraction, to first order T exp(delta)", "[core]") {
+  const unsigned seed = GENERATE(range(0U, 5U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const SE3 T = random_pose(rng);
+  const Vector6 delta = 0.5 * random_vector<6>(rng);
+  CHECK((local_coordinates(T, retract(T, delta)) - delta).norm() < 1e-12);
+  const Vector6 small = 1e-5 * delta;
+  CHECK((retract(T, small).matrix() - (T * se3_exp(small)).matrix()).norm() < 1e-9);
+}
+
 TEST_CASE("The nearest rotation of a reflection is a rotation", "[core]") {
   const Eigen::Matrix3d R = nearest_rotation(Eigen::Vector3d(1.0, 1.0, -0.5).asDiagonal());
   CHECK(R.determinant() == Approx(1.0));

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "modules/dense_sensing/stereo_depth.hpp"
+#include "modules/images/image_view.hpp"
 
 namespace km {
 
@@ -22,11 +23,7 @@ struct TriangulatedCorner {
 inline std::vector<TriangulatedCorner> triangulated_corners(const StereoFrame& frame,
                                                             const StereoRig& rig,
                                                             double max_gap = 0.0015) {
-  const auto as_mat = [](const GrayImage& image) {
-    return cv::Mat(image.height, image.width, CV_8UC1,
-                   const_cast<std::uint8_t*>(image.pixels.data()));
-  };
-  const cv::Mat left = as_mat(frame.left), right = as_mat(frame.right);
+  const cv::Mat left = view(frame.left), right = view(frame.right);
   std::vector<cv::Point2f> corners, found, back;
   cv::goodFeaturesToTrack(left, corners, 400, 0.01, 12.0);
   std::vector<std::uint8_t> ok, ok_back;

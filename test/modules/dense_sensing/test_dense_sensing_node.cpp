@@ -30,8 +30,11 @@ struct Bench {
     frames.subscribe([this](const auto& message) { published.push_back(*message); });
     progress.subscribe([this](const auto& message) { last = *message; });
     node = std::make_unique<DenseSensingNode>(DenseSensor(rig, {.labels = LabelsFrom::kImages}),
-                                              LabelsFrom::kImages, 5.0, overflow,
-                                              DenseSensingTopics{located, frames, progress});
+                                              LabelsFrom::kImages, 5.0, overflow, topics());
+  }
+
+  DenseSensingTopics topics() {
+    return {.located = located, .frames = frames, .progress = progress};
   }
 
   LocatedFrame frame(int i, bool with_depth) const {
@@ -89,11 +92,10 @@ TEST_CASE("A sensor that is too slow gives up the oldest frames", "[dense_sensin
 }
 
 TEST_CASE("A rate that is none is refused", "[dense_sensing_node]") {
-  const Bench bench;
-  Topic<LocatedFrame> located;
+  Bench bench;
   const double rate_hz = GENERATE(0.0, -5.0, std::numeric_limits<double>::infinity());
   CHECK_THROWS_AS(DenseSensingNode(DenseSensor(bench.rig, {}), LabelsFrom::kNone, rate_hz,
-                                   Overflow::kBlock, {located, bench.frames, bench.progress}),
+                                   Overflow::kBlock, bench.topics()),
                   std::invalid_argument);
 }
 

@@ -6,11 +6,36 @@
 namespace km {
 namespace {
 
+StereoRig small_rig() {
+  PinholeCamera camera;
+  camera.width = 320;
+  camera.height = 240;
+  camera.fx = camera.fy = 200.0;
+  camera.cx = 160.0;
+  camera.cy = 120.0;
+  return rgbd_rig(camera, 0.1);
+}
+
+LocatedFrame blank(Stamp stamp) {
+  return {std::make_shared<const StereoFrame>(
+              StereoFrame{stamp, {320, 240, std::vector<std::uint8_t>(320 * 240, 128)}, {}}),
+          0, SE3::Identity()};
+}
+
+LocatedFrame tiled(Stamp stamp) {
+  StereoFrame frame = *blank(stamp).frame;
+  for (std::size_t i = 0; i < frame.left.pixels.size(); ++i)
+    if ((i % 320 / 20 + i / 320 / 20) % 2 == 0) frame.left.pixels[i] = 20;
+  return {std::make_shared<const StereoFrame>(std::move(frame)), 0, SE3::Identity()};
+}
+
 struct Chain {
   Topic<KeyframeOdometry> odometry;
+  Topic<LocatedFrame> frames;
   Topic<Keyframe> keyframes;
   std::vector<Keyframe> published;
-  KeyframeFeaturesNode node{{}, std::nullopt, odometry, keyframes};
+  KeyframeFeaturesNode node{
+      {}, small_rig(), {.odometry = odometry, .frames = frames, .keyframes = keyframes}};
 
   Chain() {
     keyframes.subscribe([this](const auto& message) { published.push_back(*message); });
@@ -28,12 +53,12 @@ TEST_CASE("the covariance of a keyframe is accumulated along the chain",
     if (i == 0) step.Sigma.setZero();
     expected = compose(expected, step);
     steps.push_back(expected);
-    chain.node.step({.id = {4, i},
-                     .stamp = i,
-                     .T_odom_kf = expected.T,
-                     .T_previous_kf = step.T,
-                     .covariance = step.Sigma,
-                     .frame = nullptr});
+    chain.node.step(KeyframeOdometry{.id = {4, i},
+                                     .stamp = i,
+                                     .T_odom_kf = expected.T,
+                                     .T_previous_kf = step.T,
+                                     .covariance = step.Sigma});
+    chain.node.step(blank(i));
   }
   REQUIRE(chain.published.size() == 20);
   CHECK(chain.published[0].odometry.covariance.isZero());
@@ -46,18 +71,33 @@ TEST_CASE("the covariance of a keyframe is accumulated along the chain",
   }
 }
 
-TEST_CASE("keyframes out of order, and images without a rig, are misuse",
+TEST_CASE("a keyframe has the features of the image with its stamp, through the thread",
           "[keyframe_features_node]") {
   Chain chain;
-  KeyframeOdometry odometry;
-  odometry.id.index = 1;
-  CHECK_THROWS_AS(chain.node.step(odometry), std::invalid_argument);
-  odometry.id.index = 0;
-  odometry.frame = std::make_shared<const StereoFrame>();
-  CHECK_THROWS_AS(chain.node.step(odometry), std::invalid_argument);
-  odometry.frame = nullptr;
-  chain.node.step(odometry);
-  CHECK(chain.published.size() == 1);
+  chain.node.start();
+  // As odometry starts: several keyframes, then all images.
+  chain.odometry.publish(KeyframeOdometry{.id = {4, 0}, .stamp = 10});
+  chain.odometry.publish(KeyframeOdometry{.id = {4, 1}, .stamp = 30});
+  chain.frames.publish(blank(10));
+  chain.frames.publish(blank(20));
+  chain.frames.publish(tiled(30));
+  chain.frames.publish(blank(40));
+  chain.node.stop();
+  CHECK(chain.node.error() == nullptr);
+  REQUIRE(chain.published.size() == 2);
+  CHECK(chain.published[0].stamp == 10);
+  CHECK(chain.published[0].features.keypoints.empty());
+  CHECK(chain.published[1].stamp == 30);
+  CHECK_FALSE(chain.published[1].features.keypoints.empty());
+}
+
+TEST_CASE("keyframes out of order, and images that do not fit the rig, are misuse",
+          "[keyframe_features_node]") {
+  Chain chain;
+  CHECK_THROWS_AS(chain.node.step(KeyframeOdometry{.id = {4, 1}}), std::invalid_argument);
+  chain.node.step(KeyframeOdometry{.id = {4, 0}});
+  const LocatedFrame empty{std::make_shared<const StereoFrame>(), 0, SE3::Identity()};
+  CHECK_THROWS_AS(chain.node.step(empty), std::invalid_argument);
 }
 
 }  // namespace

@@ -16,8 +16,17 @@ constexpr RobotId kPeer = 9;
 struct Robot {
   explicit Robot(RobotId self, const LoopClosureConfig& config = {})
       : node(config, self, std::make_shared<const Vocabulary>(toy_vocabulary(200)),
-             {keyframes, candidates, measured, peer_requests, peer_replies, peer_events, peer_bows,
-              own_requests, own_replies, own_closures, outcomes}) {
+             {.keyframes = keyframes,
+              .candidates = candidates,
+              .measured_closures = measured,
+              .peer_requests = peer_requests,
+              .peer_replies = peer_replies,
+              .peer_events = peer_events,
+              .peer_bows = peer_bows,
+              .own_requests = own_requests,
+              .own_replies = own_replies,
+              .own_closures = own_closures,
+              .outcomes = outcomes}) {
     own_requests.subscribe([this](const auto& m) { requests.push_back(*m); });
     own_replies.subscribe([this](const auto& m) { replies.push_back(*m); });
     own_closures.subscribe([this](const auto& m) { closures.push_back(*m); });

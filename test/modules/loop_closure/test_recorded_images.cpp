@@ -6,9 +6,9 @@
 #include "modules/loop_closure/keyframe_features_node.hpp"
 #include "modules/loop_closure/verifier.hpp"
 #include "modules/sensors/image_file.hpp"
-#include "modules/sensors/rgbd_folder_reader.hpp"
 #include "test/modules/loop_closure/recorded_keyframes.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/recorded_kitchen.hpp"
 #include "test/support/shared_data.hpp"
 
 namespace km {
@@ -120,10 +120,10 @@ TEST_CASE("closures of V1_01 are many, accurate, and as uncertain as they say", 
 TEST_CASE("closures of an RGB-D recording are in the right place", "[verifier]") {
   const auto folder = shared_data("7scenes_redkitchen");
   if (!folder) return;
-  RgbdFolderReader reader(*folder);
-  const KeyframeFeatureExtractor extractor(reader.rig(), {});
+  RecordedKitchen kitchen(*folder);
+  const KeyframeFeatureExtractor extractor(kitchen.rig(), {});
   std::vector<RecordedKeyframe> keyframes[2];
-  for (int i = 0; const auto frame = reader.next(); ++i)
+  for (int i = 0; const auto frame = kitchen.next(); ++i)
     if (i % 6 == 0)
       keyframes[i / 125].push_back(
           {frame->frame->stamp, frame->T_world_cam, extractor.extract(*frame->frame)});

@@ -98,9 +98,10 @@ TEST_CASE("Cells and steps at their bounds can be sent", "[node]") {
 // A robot with the mesh's part of the wiring.
 struct MeshRobot {
   MeshRobot(std::shared_ptr<const DdsDomain> domain, RobotId id)
-      : basis(std::move(domain), id), sender(fast(), id, own), team(peers) {
-    basis.bridge.send(own, TopicKind::kState, TrafficCategory::kOther);
-    basis.bridge.receive(peers, TopicKind::kState, TrafficCategory::kOther);
+      : basis(std::move(domain), id),
+        sender(fast(), id, chunks.to_peers()),
+        team(chunks.from_peers()) {
+    basis.bridge.exchange(chunks, TopicKind::kState, TrafficCategory::kOther);
   }
   ~MeshRobot() { stop(); }
   static MeshChunksConfig fast() {
@@ -132,7 +133,7 @@ struct MeshRobot {
     });
   }
 
-  Topic<MeshChunk> own, peers;
+  Crossing<MeshChunk> chunks;
   TestRobot basis;
   MeshChunksNode sender;
   TeamMeshNode team;

@@ -1,10 +1,10 @@
 #include <catch2/catch.hpp>
-#include <functional>
 #include <numbers>
 #include <random>
 
 #include "modules/core/lie.hpp"
 #include "modules/mesh_deformation/deformation_terms.hpp"
+#include "test/support/numeric_jacobian.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {
@@ -17,24 +17,6 @@ const Eigen::Matrix3d kHalfTurn =
 
 SE3 at(double x, double y, double z) {
   return make_pose(Eigen::Matrix3d::Identity(), {x, y, z});
-}
-
-SE3 retracted(const SE3& T, const Vector6& delta) {
-  return make_pose(T.linear() * so3_exp(delta.head<3>()),
-                   T.translation() + T.linear() * delta.tail<3>());
-}
-
-// Central differences of f at zero.
-template <int N>
-Eigen::Matrix<double, N, 6> numeric(
-    const std::function<Eigen::Matrix<double, N, 1>(const Vector6&)>& f) {
-  constexpr double kStep = 1e-6;
-  Eigen::Matrix<double, N, 6> J;
-  for (int c = 0; c < 6; ++c) {
-    const Vector6 step = kStep * Vector6::Unit(c);
-    J.col(c) = (f(step) - f(-step)) / (2.0 * kStep);
-  }
-  return J;
 }
 
 constexpr double kDerivative = 1e-5;  // central differences of step 1e-6, values up to 10
@@ -72,10 +54,10 @@ TEST_CASE("The derivatives of rigidity are those of differences", "[mesh_deforma
   const SE3 b = random_pose(rng, 3.0);
   const Eigen::Vector3d point = random_vector<3>(rng);
   const RigidityTerm term = rigidity_term(a, point, b);
-  const Matrix36 by_a = numeric<3>(
-      [&](const Vector6& d) { return rigidity_term(retracted(a, d), point, b).residual; });
-  const Matrix36 by_b = numeric<3>(
-      [&](const Vector6& d) { return rigidity_term(a, point, retracted(b, d)).residual; });
+  const Matrix36 by_a = numeric_jacobian<6>(
+      [&](const Vector6& d) { return rigidity_term(retract(a, d), point, b).residual; });
+  const Matrix36 by_b = numeric_jacobian<6>(
+      [&](const Vector6& d) { return rigidity_term(a, point, retract(b, d)).residual; });
   CHECK((term.by_a - by_a).cwiseAbs().maxCoeff() < kDerivative);
   CHECK((term.by_b - by_b).cwiseAbs().maxCoeff() < kDerivative);
 }
@@ -99,11 +81,11 @@ TEST_CASE("The derivatives of the rotation term are those of differences", "[mes
   const SE3 node =
       make_pose(keyframe.linear() * R_odom_kf.transpose() * so3_exp(turn), random_vector<3>(rng));
   const RotationTerm term = rotation_term(R_odom_kf, keyframe, node);
-  const Matrix36 by_keyframe = numeric<3>([&](const Vector6& d) {
-    return rotation_term(R_odom_kf, retracted(keyframe, d), node).residual;
+  const Matrix36 by_keyframe = numeric_jacobian<6>([&](const Vector6& d) {
+    return rotation_term(R_odom_kf, retract(keyframe, d), node).residual;
   });
-  const Matrix36 by_node = numeric<3>([&](const Vector6& d) {
-    return rotation_term(R_odom_kf, keyframe, retracted(node, d)).residual;
+  const Matrix36 by_node = numeric_jacobian<6>([&](const Vector6& d) {
+    return rotation_term(R_odom_kf, keyframe, retract(node, d)).residual;
   });
   CHECK((term.by_keyframe - by_keyframe).cwiseAbs().maxCoeff() < kDerivative);
   CHECK((term.by_node - by_node).cwiseAbs().maxCoeff() < kDerivative);
@@ -116,11 +98,11 @@ TEST_CASE("The anchor term is the tangent vector from the anchor", "[mesh_deform
   const SE3 anchor = random_pose(rng);
   Vector6 delta;
   delta << 2.0 * random_vector<3>(rng).normalized(), random_vector<3>(rng);
-  const SE3 pose = retracted(anchor, delta);
+  const SE3 pose = retract(anchor, delta);
   const AnchorTerm term = anchor_term(anchor, pose);
   CHECK((term.residual - delta).norm() < 1e-9);  // metres of ten, through rotations
-  const Matrix6 by_pose = numeric<6>(
-      [&](const Vector6& d) { return anchor_term(anchor, retracted(pose, d)).residual; });
+  const Matrix6 by_pose = numeric_jacobian<6>(
+      [&](const Vector6& d) { return anchor_term(anchor, retract(pose, d)).residual; });
   CHECK((term.by_pose - by_pose).cwiseAbs().maxCoeff() < kDerivative);
 }
 

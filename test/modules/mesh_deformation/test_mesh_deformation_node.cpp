@@ -27,11 +27,17 @@ struct Robot {
       changed.notify_all();
     });
   }
-  MeshDeformationTopics topics() { return {maps, keyframes, trajectory, optimized, superseded}; }
+  MeshDeformationTopics topics() {
+    return {.maps = maps,
+            .keyframes = keyframes,
+            .trajectory = trajectory,
+            .optimized = optimized,
+            .superseded = superseded};
+  }
 
   [[nodiscard]] std::shared_ptr<const KeyframeOdometry> keyframe(std::size_t i) const {
-    return std::make_shared<const KeyframeOdometry>(KeyframeOdometry{
-        .id = {kSelf, static_cast<KeyframeIndex>(i)}, .T_odom_kf = T_odom_kf[i], .frame = nullptr});
+    return std::make_shared<const KeyframeOdometry>(
+        KeyframeOdometry{.id = {kSelf, static_cast<KeyframeIndex>(i)}, .T_odom_kf = T_odom_kf[i]});
   }
   [[nodiscard]] std::shared_ptr<const Trajectory> solution(double radius_m) const {
     Trajectory result{.robot = kSelf, .anchor = 2, .T_world_kf = {}};

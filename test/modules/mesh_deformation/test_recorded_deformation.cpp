@@ -8,8 +8,8 @@
 #include "modules/core/lie.hpp"
 #include "modules/mesh_deformation/local_mesh_optimizer.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
-#include "modules/sensors/rgbd_folder_reader.hpp"
 #include "test/modules/semantic_mapping/surface_distance.hpp"
+#include "test/support/recorded_kitchen.hpp"
 #include "test/support/shared_data.hpp"
 
 namespace km {
@@ -81,17 +81,16 @@ TEST_CASE("A recorded kitchen mapped with drift is corrected to agree with the f
           "[mesh_deformation][slow]") {
   const auto folder = shared_data("7scenes_redkitchen");
   if (!folder) return;
-  RgbdFolderReader reader(*folder);
+  RecordedKitchen kitchen(*folder);
   SemanticMappingConfig mapping;
   mapping.voxel_size_m = 0.05;
-  const PinholeCamera& camera = reader.rig().cameras[0];
+  const PinholeCamera& camera = kitchen.rig().cameras[0];
   Robot first{SemanticMapper(mapping, camera)};
   Robot given{SemanticMapper(mapping, camera)};
   Robot drifted{SemanticMapper(mapping, camera)};
-  const std::size_t half = reader.frame_count() / 2;  // frames 0 to 496, and 500 to 996
+  const std::size_t half = kitchen.frame_count() / 2;  // frames 0 to 496, and 500 to 996
   Drift drift(half);
-  for (std::size_t frame = 0; const auto posed = reader.next(); ++frame) {
-    if (posed->frame->depth == nullptr) continue;
+  for (std::size_t frame = 0; const auto posed = kitchen.next(); ++frame) {
     if (frame < half) {
       first.integrate(*posed, posed->T_world_cam);
     } else {

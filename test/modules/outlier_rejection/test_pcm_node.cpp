@@ -16,7 +16,7 @@ namespace {
 // Collects what a topic publishes; usable from any thread.
 class Recorder {
  public:
-  explicit Recorder(Topic<InlierSet>& topic) {
+  explicit Recorder(In<InlierSet> topic) {
     topic.subscribe([this](const auto& message) {
       const std::lock_guard lock(mutex_);
       sets_.push_back(*message);
@@ -35,8 +35,13 @@ class Recorder {
 struct Team {
   std::mt19937 rng{1};
   Topic<Closure> closures;
+  Topic<PeerEvent> peer_events;
   Topic<InlierSet> inlier_sets;
   Recorder recorder{inlier_sets};
+
+  PcmTopics topics() {
+    return {.closures = closures, .peer_events = peer_events, .inlier_sets = inlier_sets};
+  }
 
   // Exact to a millimetre, weighed as such: all agree.
   std::vector<Closure> agreeing(RobotId a, RobotId b, std::size_t count) {
@@ -68,7 +73,7 @@ PcmConfig tolerant() {
 
 TEST_CASE("The PCM node publishes sets that grew, with rising versions", "[node]") {
   Team team;
-  PcmNode node(tolerant(), 2, team.closures, team.inlier_sets);
+  PcmNode node(tolerant(), 2, team.topics());
   const auto closures = team.agreeing(2, 5, 5);
 
   node.step(closures[0]);
@@ -98,7 +103,7 @@ TEST_CASE("The PCM node publishes sets that grew, with rising versions", "[node]
 
 TEST_CASE("The PCM node decides for the pairs in which it is the lower, and for itself", "[node]") {
   Team team;
-  PcmNode node(tolerant(), 4, team.closures, team.inlier_sets);
+  PcmNode node(tolerant(), 4, team.topics());
   for (const Closure& closure : team.agreeing_inside(4, 4)) node.step(closure);
   for (const auto& [a, b] : {std::pair<RobotId, RobotId>{9, 4}, {3, 4}, {5, 6}})
     for (const Closure& closure : team.agreeing(a, b, 4)) node.step(closure);
@@ -112,7 +117,7 @@ TEST_CASE("The PCM node decides for the pairs in which it is the lower, and for 
 
 TEST_CASE("The PCM node survives closures that cannot be weighed", "[node]") {
   Team team;
-  PcmNode node(tolerant(), 0, team.closures, team.inlier_sets);
+  PcmNode node(tolerant(), 0, team.topics());
   auto closures = team.agreeing(0, 1, 4);
   closures[1].T_from_to.translation().x() = std::numeric_limits<double>::quiet_NaN();
   for (const Closure& closure : closures) node.step(closure);
@@ -127,7 +132,7 @@ TEST_CASE("The PCM node says that a search was cut short, and how much may be mi
   config.bounds_per_transform = false;
   config.max_search_nodes = 1;
   config.selection = ClosureSelection::kPcm;
-  PcmNode node(config, 0, team.closures, team.inlier_sets);
+  PcmNode node(config, 0, team.topics());
   const CapturedLog log;
   const Chain a(0), b(1);  // closures agree where their translations differ by half a metre
   for (std::uint32_t n = 0; n < 300; ++n) {
@@ -142,7 +147,7 @@ TEST_CASE("The PCM node says that a search was cut short, and how much may be mi
 
 TEST_CASE("The PCM node's thread handles what was published before it stops", "[node]") {
   Team team;
-  PcmNode node(tolerant(), 0, team.closures, team.inlier_sets);
+  PcmNode node(tolerant(), 0, team.topics());
   node.start();
   for (const Closure& closure : team.agreeing(0, 1, 40)) team.closures.publish(closure);
   node.stop();  // drains the queue, then publishes the last set
@@ -155,7 +160,7 @@ TEST_CASE("The PCM node's thread handles what was published before it stops", "[
 
 TEST_CASE("All closures of two robots are published once independent ones agree", "[node]") {
   Team team;
-  PcmNode node(PcmConfig{}, 2, team.closures, team.inlier_sets);
+  PcmNode node(PcmConfig{}, 2, team.topics());
   auto closures = team.agreeing(2, 5, 20);
   closures[1].T_from_to = random_pose(team.rng);  // false, and a neighbour of the first
   node.step(closures[0]);
@@ -180,7 +185,7 @@ TEST_CASE("Robots joined by one place wait for a second one, and it is said", "[
   Team team;
   PcmConfig config;
   config.witness_wait_s = 30.0;
-  PcmNode node(config, 2, team.closures, team.inlier_sets);
+  PcmNode node(config, 2, team.topics());
   const CapturedLog log;
   const auto closures = team.agreeing(2, 5, 3);  // all neighbours
   node.step(closures[0]);
@@ -201,7 +206,7 @@ TEST_CASE("Robots joined by one place wait for a second one, and it is said", "[
 
 TEST_CASE("At the end of all runs nobody waits for a witness", "[node]") {
   Team team;
-  PcmNode node(PcmConfig{}, 2, team.closures, team.inlier_sets);
+  PcmNode node(PcmConfig{}, 2, team.topics());
   const CapturedLog log;
   node.step(team.agreeing(2, 5, 1)[0]);
   node.publish_changes(10.0);
@@ -214,7 +219,7 @@ TEST_CASE("At the end of all runs nobody waits for a witness", "[node]") {
 
 TEST_CASE("Closures inside the robot need no witness", "[node]") {
   Team team;
-  PcmNode node(PcmConfig{}, 4, team.closures, team.inlier_sets);
+  PcmNode node(PcmConfig{}, 4, team.topics());
   node.step(team.agreeing_inside(4, 4)[0]);
   node.publish_changes(0.0);
   REQUIRE(team.recorder.sets().size() == 1);
@@ -223,8 +228,7 @@ TEST_CASE("Closures inside the robot need no witness", "[node]") {
 
 TEST_CASE("Of a peer that has restarted the closures are forgotten", "[node]") {
   Team team;
-  Topic<PeerEvent> peer_events;
-  PcmNode node(PcmConfig{}, 2, team.closures, team.inlier_sets, &peer_events);
+  PcmNode node(PcmConfig{}, 2, team.topics());
   const auto before = team.agreeing(2, 5, 20);
   const auto after = team.agreeing(2, 5, 20);
   for (const Closure& closure : before) node.step(closure);

@@ -17,8 +17,8 @@ struct Moved {
   SE3 T_j;
 
   [[nodiscard]] double cost(const Vector12& xi) const {
-    const SE3 i = move_along(T_i, xi.head<6>());
-    const SE3 j = move_along(T_j, xi.tail<6>());
+    const SE3 i = retract(T_i, xi.head<6>());
+    const SE3 j = retract(T_j, xi.tail<6>());
     return edge.kappa * (j.linear() - i.linear() * edge.T_i_j.linear()).squaredNorm() +
            edge.tau * (j.translation() - i.translation() - i.linear() * edge.T_i_j.translation())
                           .squaredNorm();

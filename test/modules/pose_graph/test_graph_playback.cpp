@@ -35,8 +35,11 @@ struct Played {
     });
     end_topic.subscribe([this](const auto& m) { ends.push_back(*m); });
   }
-  GraphPlaybackTopics topics() const {
-    return {odometry_topic, keyframe_topic, closure_topic, end_topic};
+  GraphPlaybackTopics topics() {
+    return {.odometry = odometry_topic,
+            .keyframes = keyframe_topic,
+            .closures = closure_topic,
+            .end = end_topic};
   }
 };
 
@@ -80,7 +83,6 @@ TEST_CASE("A played graph chains its odometry with the covariance of the chain",
     }
     CHECK(played.odometry[i].id == KeyframeId{6, i});
     CHECK(played.odometry[i].stamp == i * 250'000'000);
-    CHECK(played.odometry[i].frame == nullptr);
     CHECK(played.odometry[i].T_odom_kf.isApprox(T_odom_kf.T, 1e-12));
     CHECK(played.keyframes[i].stamp == played.odometry[i].stamp);
     CHECK(played.keyframes[i].odometry.id == KeyframeId{6, i});

@@ -24,8 +24,16 @@ struct Robot {
   }
 
   TeamTopics topics() {
-    return {odometry,     closures, inlier_sets, peer_inlier_sets, peer_events,
-            peer_parcels, parcels,  trajectory,  progress,         verdicts};
+    return {.odometry = odometry,
+            .closures = closures,
+            .inlier_sets = inlier_sets,
+            .peer_inlier_sets = peer_inlier_sets,
+            .peer_events = peer_events,
+            .peer_parcels = peer_parcels,
+            .parcels = parcels,
+            .trajectory = trajectory,
+            .progress = progress,
+            .verdicts = verdicts};
   }
 
   // What `other` sends to this one arrives.

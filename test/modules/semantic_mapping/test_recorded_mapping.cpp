@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "modules/semantic_mapping/semantic_mapper.hpp"
-#include "modules/sensors/rgbd_folder_reader.hpp"
 #include "test/modules/semantic_mapping/surface_distance.hpp"
+#include "test/support/recorded_kitchen.hpp"
 #include "test/support/shared_data.hpp"
 
 namespace km {
@@ -15,14 +15,13 @@ namespace {
 TEST_CASE("Two halves of a recorded kitchen agree where they overlap", "[semantic_mapping][slow]") {
   const auto folder = shared_data("7scenes_redkitchen");
   if (!folder) return;
-  RgbdFolderReader reader(*folder);
+  RecordedKitchen kitchen(*folder);
   SemanticMappingConfig config;
   config.voxel_size_m = 0.05;
-  SemanticMapper first(config, reader.rig().cameras[0]), second(config, reader.rig().cameras[0]);
-  const std::size_t half = reader.frame_count() / 2;
+  SemanticMapper first(config, kitchen.rig().cameras[0]), second(config, kitchen.rig().cameras[0]);
+  const std::size_t half = kitchen.frame_count() / 2;
   KeyframeIndex frame = 0;
-  while (const auto posed = reader.next()) {
-    if (posed->frame->depth == nullptr) continue;
+  while (const auto posed = kitchen.next()) {
     SemanticMapper& mapper = frame < half ? first : second;
     REQUIRE(mapper.integrate(*posed->frame->depth, nullptr, posed->T_world_cam, frame++).status ==
             IntegrationStatus::kIntegrated);

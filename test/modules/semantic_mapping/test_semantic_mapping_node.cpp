@@ -25,7 +25,8 @@ struct Bench {
     progress.subscribe([this](const auto& message) { last = *message; });
     node = std::make_unique<SemanticMappingNode>(
         settings(), small_camera(), two_classes(), 3.0, overflow,
-        SemanticMappingTopics{frames, superseded, maps, progress});
+        SemanticMappingTopics{
+            .frames = frames, .superseded = superseded, .maps = maps, .progress = progress});
   }
 };
 

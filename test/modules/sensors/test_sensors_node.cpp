@@ -43,6 +43,8 @@ class FakeReader final : public DatasetReader {
 };
 
 struct Run {
+  SensorsTopics topics() { return {.packets = packets, .end = end}; }
+
   Topic<SensorPacket> packets;
   Topic<SensorsEnd> end;
   std::vector<Stamp> stamps;
@@ -61,7 +63,7 @@ TEST_CASE("Every packet is published in order, then the end", "[sensors]") {
   Run run;
   SensorsConfig config;
   config.max_lag_s = 1e6;
-  SensorsNode node(config, rate, std::make_unique<FakeReader>(100), run.packets, run.end);
+  SensorsNode node(config, rate, std::make_unique<FakeReader>(100), run.topics());
   node.start();
   const SensorsEnd end = run.ended.get_future().get();
   node.stop();
@@ -80,7 +82,7 @@ TEST_CASE("Pairs that are late at a finite rate are skipped and counted", "[sens
   SensorsConfig config;
   config.max_lag_s = 0.0;
   // At this rate all packets are due with the first one: the others are late.
-  SensorsNode node(config, 1e12, std::make_unique<FakeReader>(10), run.packets, run.end);
+  SensorsNode node(config, 1e12, std::make_unique<FakeReader>(10), run.topics());
   node.start();
   const SensorsEnd end = run.ended.get_future().get();
   CHECK(end.published == 1);
@@ -92,7 +94,7 @@ TEST_CASE("A node that waits for the next packet stops at once", "[sensors]") {
   std::promise<void> first;
   run.packets.subscribe([&](const auto&) { first.set_value(); });
   // The second packet is due in an hour; the reader is not exhausted either.
-  SensorsNode node({}, 1.0, std::make_unique<FakeReader>(1000, 3600.0), run.packets, run.end);
+  SensorsNode node({}, 1.0, std::make_unique<FakeReader>(1000, 3600.0), run.topics());
   node.start();
   first.get_future().get();
   node.stop();
@@ -103,7 +105,7 @@ TEST_CASE("A node that waits for the next packet stops at once", "[sensors]") {
 
 TEST_CASE("A reader that throws ends the node with its exception", "[sensors]") {
   Run run;
-  SensorsNode node({}, kMax, std::make_unique<FakeReader>(3, 0.05, true), run.packets, run.end);
+  SensorsNode node({}, kMax, std::make_unique<FakeReader>(3, 0.05, true), run.topics());
   node.start();
   while (node.error() == nullptr) std::this_thread::yield();
   node.stop();
@@ -115,9 +117,9 @@ TEST_CASE("Unusable parameters of the node are refused", "[sensors]") {
   Run run;
   SensorsConfig config;
   config.read_ahead = 0;
-  CHECK_THROWS_AS(SensorsNode(config, 1.0, std::make_unique<FakeReader>(1), run.packets, run.end),
+  CHECK_THROWS_AS(SensorsNode(config, 1.0, std::make_unique<FakeReader>(1), run.topics()),
                   ConfigError);
-  CHECK_THROWS_AS(SensorsNode({}, 0.0, std::make_unique<FakeReader>(1), run.packets, run.end),
+  CHECK_THROWS_AS(SensorsNode({}, 0.0, std::make_unique<FakeReader>(1), run.topics()),
                   std::invalid_argument);
 }
 

@@ -34,15 +34,6 @@ struct Overrides {
     std::istringstream(it->second) >> value;
     used[name] = true;
   }
-  template <typename T, std::size_t N>
-  requires std::is_enum_v<T>
-  void field(const char* name, T& value, const Choice<std::type_identity_t<T>> (&choices)[N],
-             const char* /*comment*/ = "") {
-    const auto it = values.find(name);
-    if (it == values.end()) return;
-    for (const auto& choice : choices)
-      if (it->second == choice.name) value = choice.value, used[name] = true;
-  }
 };
 
 double percentile(std::vector<double> values, double share) {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "modules/core/lie.hpp"
+#include "modules/images/image_view.hpp"
 #include "modules/vio/local_warp.hpp"
 #include "modules/vio/patch_alignment.hpp"
 #include "modules/vio/patch_template.hpp"
@@ -10,11 +11,6 @@
 
 namespace km {
 namespace {
-
-cv::Mat as_mat(const GrayImage& image) {
-  return cv::Mat(image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.pixels.data()))
-      .clone();
-}
 
 // The texture warped so that texture point A^-1 (px - centre) is seen at px, scaled in contrast.
 cv::Mat warped_texture(const Eigen::Matrix2f& A, const Eigen::Vector2f& centre, double gain,
@@ -95,7 +91,7 @@ TEST_CASE("The local warp is the derivative of the image of a facing surface", "
 
 TEST_CASE("Patch correlation is blind to gain and offset and nothing else", "[vio]") {
   const StereoRig rig = test_rig();
-  const cv::Mat picture = as_mat(TexturedPlane{}.render(rig.cameras[0], SE3::Identity()));
+  const cv::Mat picture = view(TexturedPlane{}.render(rig.cameras[0], SE3::Identity())).clone();
   const cv::Mat dimmed = picture / 2 + 30;
   const PatchTemplate patch(picture, 150, 80);
   CHECK(patch.has_contrast());
@@ -107,7 +103,7 @@ TEST_CASE("Patch correlation is blind to gain and offset and nothing else", "[vi
 TEST_CASE("A flat patch is like no other", "[vio]") {
   const StereoRig rig = test_rig();
   const cv::Mat flat(240, 376, CV_8UC1, cv::Scalar(100));
-  const cv::Mat other = as_mat(TexturedPlane{}.render(rig.cameras[0], SE3::Identity()));
+  const cv::Mat other = view(TexturedPlane{}.render(rig.cameras[0], SE3::Identity())).clone();
   CHECK_FALSE(PatchTemplate(flat, 90, 90).has_contrast());
   CHECK(PatchTemplate(other, 90, 90).correlation(flat, 90, 90) == 0.0F);
 }

@@ -1,98 +1,29 @@
-// Ceres' logging defines CHECK too: it must come first and give the name up.
-#include "modules/vio/residuals/imu_cost.hpp"
-#include "modules/vio/residuals/pose_block.hpp"
-#include "modules/vio/residuals/prior_cost.hpp"
-#include "modules/vio/residuals/reprojection_cost.hpp"
-#undef CHECK
 #include <catch2/catch.hpp>
 
+#include "modules/vio/marginalization.hpp"
 #include "synthetic_motion.hpp"
+#include "test/support/numeric_jacobian.hpp"
 
 namespace km {
 namespace {
 
-using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-// A cost function at a point. Blocks of seven are poses, moved by their manifold.
-struct Evaluation {
-  const ceres::CostFunction& cost;
-  std::vector<std::vector<double>> blocks;
-
-  Eigen::VectorXd residual() const {
-    Eigen::VectorXd r(cost.num_residuals());
-    std::vector<const double*> pointers;
-    for (const auto& block : blocks) pointers.push_back(block.data());
-    REQUIRE(cost.Evaluate(pointers.data(), r.data(), nullptr));
-    return r;
-  }
-
-  RowMatrix analytic(std::size_t b) const {
-    std::vector<const double*> pointers;
-    for (const auto& block : blocks) pointers.push_back(block.data());
-    RowMatrix J(cost.num_residuals(), static_cast<int>(blocks[b].size()));
-    std::vector<double*> jacobians(blocks.size(), nullptr);
-    jacobians[b] = J.data();
-    Eigen::VectorXd r(cost.num_residuals());
-    REQUIRE(cost.Evaluate(pointers.data(), r.data(), jacobians.data()));
-    return J.leftCols(blocks[b].size() == 7 ? 6 : J.cols());
-  }
-
-  RowMatrix numeric(std::size_t b) {
-    constexpr double kStep = 1e-6;
-    const std::vector<double> at = blocks[b];
-    const int columns = at.size() == 7 ? 6 : static_cast<int>(at.size());
-    const auto moved = [&](int column, double step) {
-      Eigen::VectorXd delta = Eigen::VectorXd::Zero(columns);
-      delta(column) = step;
-      if (at.size() == 7)
-        REQUIRE(PoseManifold().Plus(at.data(), delta.data(), blocks[b].data()));
-      else
-        blocks[b][static_cast<std::size_t>(column)] = at[static_cast<std::size_t>(column)] + step;
-      const Eigen::VectorXd r = residual();
-      blocks[b] = at;
-      return r;
-    };
-    RowMatrix J(cost.num_residuals(), columns);
-    for (int c = 0; c < columns; ++c) J.col(c) = (moved(c, kStep) - moved(c, -kStep)) / (2 * kStep);
-    return J;
-  }
-
-  void check_jacobians(double tolerance) {
-    for (std::size_t b = 0; b < blocks.size(); ++b) {
-      CAPTURE(b);
-      const RowMatrix expected = numeric(b);
-      CHECK((analytic(b) - expected).norm() < tolerance * (1.0 + expected.norm()));
-    }
-  }
-};
-
-std::vector<double> values(const PoseBlock& block) {
-  return {block.begin(), block.end()};
+void check_derivative(const Eigen::MatrixXd& analytic, const Eigen::MatrixXd& numeric) {
+  CHECK((analytic - numeric).norm() < 1e-6 * (1.0 + numeric.norm()));  // entries reach 1e6
 }
-std::vector<double> values(const MotionBlock& block) {
-  return {block.begin(), block.end()};
+
+// `state` moved along [rotation, translation, velocity, gyro bias, accelerometer bias].
+OdometryState moved(OdometryState state, const Vector15& d) {
+  state.T_odom_body = retract(state.T_odom_body, d.head<6>());
+  state.v_odom += d.segment<3>(6);
+  state.gyro_bias += d.segment<3>(9);
+  state.accel_bias += d.segment<3>(12);
+  return state;
 }
 
 OdometryState perturbed(const OdometryState& state, double size, std::mt19937& rng) {
-  OdometryState s = state;
-  s.T_odom_body = retract(s.T_odom_body, size * random_vector<6>(rng));
-  s.v_odom += size * random_vector<3>(rng);
-  s.gyro_bias += 0.1 * size * random_vector<3>(rng);
-  s.accel_bias += size * random_vector<3>(rng);
-  return s;
-}
-
-TEST_CASE("The pose manifold's difference undoes its sum", "[vio]") {
-  const unsigned seed = GENERATE(range(0U, 5U));
-  CAPTURE(seed);
-  std::mt19937 rng(seed);
-  const PoseBlock x = pose_block(random_pose(rng));
-  const Vector6 delta = 0.5 * random_vector<6>(rng);
-  PoseBlock y;
-  Vector6 back;
-  REQUIRE(PoseManifold().Plus(x.data(), delta.data(), y.data()));
-  REQUIRE(PoseManifold().Minus(y.data(), x.data(), back.data()));
-  CHECK((back - delta).norm() < 1e-12);
+  Vector15 d = size * random_vector<15>(rng);
+  d.segment<3>(9) *= 0.1;
+  return moved(state, d);
 }
 
 TEST_CASE("Reprojection Jacobians agree with differences", "[vio]") {
@@ -103,9 +34,19 @@ TEST_CASE("Reprojection Jacobians agree with differences", "[vio]") {
   const ViewModel view = view_model(synthetic_rig().stereo.cameras[camera], 0.7);
   const SE3 T = random_pose(rng);
   const Eigen::Vector3d p = T * Eigen::Vector3d(3.0, 0.5, -0.4);
-  const ReprojectionCost cost(view, Eigen::Vector2d(0.1, -0.2));
-  Evaluation evaluation{cost, {values(pose_block(T)), {p.x(), p.y(), p.z()}}};
-  evaluation.check_jacobians(1e-6);
+  const Eigen::Vector2d bearing(0.1, -0.2);
+  const auto error = [&](const SE3& T_odom_body, const Eigen::Vector3d& p_odom) {
+    Eigen::Vector2d r;
+    REQUIRE(reprojection_error(view, bearing, T_odom_body, p_odom, r));
+    return r;
+  };
+  ReprojectionTerm term;
+  REQUIRE(linearize_reprojection(view, bearing, T, T, p, term));
+  CHECK(term.r == error(T, p));
+  check_derivative(term.J_pose,
+                   numeric_jacobian<6>([&](const Vector6& d) { return error(retract(T, d), p); }));
+  check_derivative(term.J_point,
+                   numeric_jacobian<3>([&](const Eigen::Vector3d& d) { return error(T, p + d); }));
 }
 
 TEST_CASE("A reprojection error is in standard deviations of the image point", "[vio]") {
@@ -129,15 +70,14 @@ TEST_CASE("With a first estimate only the derivatives are taken there", "[vio]")
   const SE3 T_first = retract(T, 0.05 * random_vector<6>(rng));
   const Eigen::Vector3d p = T * Eigen::Vector3d(3.0, 0.5, -0.4);
   const Eigen::Vector2d bearing(0.1, -0.2);
-  const std::vector<double> point{p.x(), p.y(), p.z()};
-  const ReprojectionCost plain(view, bearing), held(view, bearing, T_first);
-  const Evaluation now{plain, {values(pose_block(T)), point}};
-  const Evaluation first{plain, {values(pose_block(T_first)), point}};
-  const Evaluation both{held, {values(pose_block(T)), point}};
-  CHECK((both.residual() - now.residual()).norm() < 1e-12);
-  CHECK((both.analytic(0) - first.analytic(0)).norm() < 1e-9);
-  CHECK((both.analytic(1) - first.analytic(1)).norm() < 1e-9);
-  CHECK((both.analytic(0) - now.analytic(0)).norm() > 1e-3);
+  ReprojectionTerm now, first, both;
+  REQUIRE(linearize_reprojection(view, bearing, T, T, p, now));
+  REQUIRE(linearize_reprojection(view, bearing, T_first, T_first, p, first));
+  REQUIRE(linearize_reprojection(view, bearing, T, T_first, p, both));
+  CHECK((both.r - now.r).norm() < 1e-12);
+  CHECK((both.J_pose - first.J_pose).norm() < 1e-9);
+  CHECK((both.J_point - first.J_point).norm() < 1e-9);
+  CHECK((both.J_pose - now.J_pose).norm() > 1e-3);
 }
 
 TEST_CASE("Inertial Jacobians agree with differences", "[vio]") {
@@ -148,13 +88,15 @@ TEST_CASE("Inertial Jacobians agree with differences", "[vio]") {
   const Stamp from = 100'000'000, to = 400'000'000;
   ImuPreintegration imu(ImuNoise{}, 0.01 * random_vector<3>(rng), 0.05 * random_vector<3>(rng));
   REQUIRE(imu.add(motion.samples(from, to, 5'000'000), from, to));
-  const ImuCost cost(ImuFactor(imu, kGravity_mps2));
+  const ImuFactor factor(imu, kGravity_mps2);
   const OdometryState i = perturbed(motion.state(from), 0.1, rng);
   const OdometryState j = perturbed(motion.state(to), 0.1, rng);
-  Evaluation evaluation{cost,
-                        {values(pose_block(i.T_odom_body)), values(motion_block(i)),
-                         values(pose_block(j.T_odom_body)), values(motion_block(j))}};
-  evaluation.check_jacobians(1e-6);  // entries reach 1e6: relative
+  const ImuTerm term = factor.linearize(i, j, i, j);
+  CHECK(term.r == factor.error(i, j));
+  check_derivative(term.J_i, numeric_jacobian<15>(
+                                 [&](const Vector15& d) { return factor.error(moved(i, d), j); }));
+  check_derivative(term.J_j, numeric_jacobian<15>(
+                                 [&](const Vector15& d) { return factor.error(i, moved(j, d)); }));
 }
 
 TEST_CASE("The inertial error of the true motion is zero, whatever the frame", "[vio]") {
@@ -185,24 +127,30 @@ TEST_CASE("An inertial factor over no time is refused", "[vio]") {
   CHECK_THROWS_AS(ImuFactor(imu, kGravity_mps2), std::invalid_argument);
 }
 
-TEST_CASE("Prior Jacobians agree with differences at the first estimates", "[vio]") {
+TEST_CASE("At its first estimates a prior's offset moves as its states do", "[vio]") {
   std::mt19937 rng(11);
   StatePrior prior;
+  std::vector<const OdometryState*> states;
   for (std::uint64_t k = 0; k < 3; ++k) {
     prior.frames.push_back(k);
     prior.linearization.push_back(perturbed({}, 1.0, rng));
   }
-  prior.J = Eigen::MatrixXd(20, prior.dimension());
-  for (int c = 0; c < prior.J.cols(); ++c) prior.J.col(c) = random_vector<20>(rng);
-  prior.r = random_vector<20>(rng);
-  const PriorCost cost(prior);
-  std::vector<std::vector<double>> blocks{values(pose_block(prior.linearization[0].T_odom_body)),
-                                          values(motion_block(prior.linearization[0]))};
-  for (std::size_t k = 1; k < 3; ++k)
-    blocks.push_back(values(pose_block(prior.linearization[k].T_odom_body)));
-  Evaluation evaluation{cost, blocks};
-  CHECK((evaluation.residual() - prior.r).norm() < 1e-12);
-  evaluation.check_jacobians(1e-6);
+  for (const OdometryState& state : prior.linearization) states.push_back(&state);
+  CHECK(prior_offset(prior, states).norm() < 1e-12);
+  for (std::size_t k = 0; k < 3; ++k) {
+    CAPTURE(k);
+    const Eigen::MatrixXd by_state = numeric_jacobian<15>([&](const Vector15& d) {
+      const OdometryState state = moved(prior.linearization[k], d);
+      std::vector<const OdometryState*> others = states;
+      others[k] = &state;
+      return prior_offset(prior, others);
+    });
+    Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(prior.dimension(), 15);
+    const Eigen::Index column = k == 0 ? 0 : 9 + 6 * static_cast<Eigen::Index>(k);
+    const Eigen::Index size = k == 0 ? 15 : 6;  // only the first has velocity and biases
+    expected.block(column, 0, size, size).setIdentity();
+    check_derivative(expected, by_state);
+  }
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ inline bool eventually(const std::function<bool()>& condition) {
 template <typename T>
 class Inbox {
  public:
-  explicit Inbox(Topic<T>& topic) {
+  explicit Inbox(In<T> topic) {
     topic.subscribe([this](const std::shared_ptr<const T>& message) {
       const std::lock_guard lock(mutex_);
       messages_.push_back(*message);
@@ -107,16 +107,13 @@ struct TestRobot {
                     {id, "robot" + std::to_string(id), protocol, random_boot_id()}),
         bridge(participant),
         status([id] { return RobotStatus{.robot = id, .name = "robot" + std::to_string(id)}; },
-               status_out, status_in),
+               {.own = statuses.to_peers(), .peers = statuses.from_peers()}),
         peer_events(bridge.peers().events()),
-        received(pings_in),
-        received_addressed(addressed_in) {
-    bridge.send(status_out, TopicKind::kStatus, TrafficCategory::kOther);
-    bridge.receive(status_in, TopicKind::kStatus, TrafficCategory::kOther);
-    bridge.send(pings_out, ping_kind, TrafficCategory::kPlaceRecognition);
-    bridge.receive(pings_in, ping_kind, TrafficCategory::kPlaceRecognition);
-    bridge.send(addressed_out, addressed_kind, TrafficCategory::kGeometricVerification);
-    bridge.receive_addressed(addressed_in, addressed_kind, TrafficCategory::kGeometricVerification);
+        received(pings.from_peers()),
+        received_addressed(addressed_pings.from_peers()) {
+    bridge.exchange(statuses, TopicKind::kStatus, TrafficCategory::kOther);
+    bridge.exchange(pings, ping_kind, TrafficCategory::kPlaceRecognition);
+    bridge.exchange(addressed_pings, addressed_kind, TrafficCategory::kGeometricVerification);
   }
   ~TestRobot() { stop(); }
 
@@ -130,10 +127,10 @@ struct TestRobot {
   }
   RobotId id() const { return participant.identity().robot; }
   void ping(std::uint32_t index, std::vector<std::uint8_t> payload = {}) {
-    pings_out.publish({id(), index, std::move(payload)});
+    pings.to_peers().publish({id(), index, std::move(payload)});
   }
   void ping_one(RobotId to, std::uint32_t index, std::vector<std::uint8_t> payload = {}) {
-    addressed_out.publish(
+    addressed_pings.to_peers().publish(
         {to, std::make_shared<const Ping>(Ping{id(), index, std::move(payload)})});
   }
   static std::size_t matching(const std::vector<PeerEvent>& events, PeerEventKind kind,
@@ -170,9 +167,9 @@ struct TestRobot {
   }
 
   DdsParticipant participant;
-  Topic<RobotStatus> status_out, status_in;
-  Topic<Ping> pings_out, pings_in, addressed_in;
-  Topic<Addressed<Ping>> addressed_out;
+  Crossing<RobotStatus> statuses;
+  Crossing<Ping> pings;
+  AddressedCrossing<Ping> addressed_pings;
   DdsBridge bridge;
   RobotStatusNode status;
   Inbox<PeerEvent> peer_events;

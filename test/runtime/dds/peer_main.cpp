@@ -53,8 +53,8 @@ void report(TestRobot& robot) {
           std::to_string(ping->index));
     };
   };
-  robot.pings_in.subscribe(print("ping"));
-  robot.addressed_in.subscribe(print("one"));
+  robot.pings.from_peers().subscribe(print("ping"));
+  robot.addressed_pings.from_peers().subscribe(print("one"));
 }
 
 void obey(TestRobot& robot) {

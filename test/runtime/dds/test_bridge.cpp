@@ -280,7 +280,7 @@ TEST_CASE("Two robots with one id are told so", "[dds]") {
 TEST_CASE("A subscriber that throws does not stop the robot from hearing", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4);
-  b.pings_in.subscribe([](const auto& ping) {
+  b.pings.from_peers().subscribe([](const auto& ping) {
     if (ping->index == 0) throw std::runtime_error("subscriber");
   });
   a.start();

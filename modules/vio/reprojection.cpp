@@ -1,4 +1,4 @@
-#include "modules/vio/residuals/reprojection.hpp"
+#include "modules/vio/reprojection.hpp"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "modules/vio/residuals/imu_factor.hpp"
+#include "modules/vio/imu_factor.hpp"
 
 #include <Eigen/Cholesky>
 #include <cmath>

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "modules/core/frame.hpp"
+
+namespace km {
+
+/// Pixels as OpenCV sees them, without a copy: row-major, of OpenCV's `type`. OpenCV has no
+/// read-only view: not to be written to.
+template <typename Pixel>
+[[nodiscard]] cv::Mat view(int width, int height, int type, const std::vector<Pixel>& pixels) {
+  return {height, width, type, const_cast<Pixel*>(pixels.data())};
+}
+
+[[nodiscard]] inline cv::Mat view(const GrayImage& image) {
+  return view(image.width, image.height, CV_8UC1, image.pixels);
+}
+
+}  // namespace km
