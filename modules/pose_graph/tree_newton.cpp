@@ -407,7 +407,7 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
     case Next::kStep:
       accept();
       take_step(letter.step, v, step_of_child);
-      move(1.0);
+      move(v.scale);
       break;
     case Next::kShorten:
       move(v.scale);

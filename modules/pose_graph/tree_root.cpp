@@ -15,6 +15,11 @@ using Next = TreeVerdict::Next;
 using Weighing = TreeVerdict::Weighing;
 
 constexpr double kShorten = 0.25;
+constexpr double kLengthen = 4.0;
+// Over a rise Newton's steps often lead down: while weights change, the cost may rise this often in
+// a row, to so many times what it was.
+constexpr int kMaxRises = 2;
+constexpr double kMaxRise = 1.5;
 constexpr double kRounding = 1e-13;  // of the cost: a smaller increase is none
 constexpr int kMaxBacktracks = 12;
 constexpr int kMaxBacktracksUndecided = 8;
@@ -120,11 +125,16 @@ DownLetter TreeRoot::start(bool set_aside, const TreeSums& sums) {
 DownLetter TreeRoot::decide(const TreeSums& sums, std::uint32_t round, const TreeFront& front,
                             std::span<const SE3> poses, bool factorised) {
   round_ = round;
-  const double limit = sums.base_cost * (1.0 + kRounding) + options_.absolute_tolerance;
+  const bool may_rise = weighing_ != Weighing::kDecided && rises_ < kMaxRises;
+  const double limit =
+      sums.base_cost * (may_rise ? kMaxRise : 1.0 + kRounding) + options_.absolute_tolerance;
   if (!at_base_ && !(sums.cost <= limit)) return go_back();
   if (!at_base_) {
     retried_ = false;
     stale_ = true;
+    rises_ = sums.cost > sums.base_cost ? rises_ + 1 : 0;
+    // While weights change, what is much too long now is too long next time, too.
+    length_ = std::min(1.0, backtracks_ > 0 ? length_ : kLengthen * length_);
     backtracks_ = 0;
   }
   cost_ = sums.cost;
@@ -157,7 +167,9 @@ DownLetter TreeRoot::step(const TreeSums& sums, const TreeFront& front,
     return refresh(true, weighing_);
   }
   at_base_ = false;
+  if (decided) length_ = 1.0;
   DownLetter letter = say(Next::kStep);
+  letter.verdict.scale = length_;
   letter.step = root.kept;
   if (free_)
     letter.verdict.drift = drift_against(
@@ -183,7 +195,7 @@ DownLetter TreeRoot::go_back() {
     return refresh(false, Weighing::kHold);
   }
   DownLetter letter = say(Next::kShorten);
-  letter.verdict.scale = std::pow(kShorten, backtracks_);
+  letter.verdict.scale = length_ *= kShorten;
   return letter;
 }
 
@@ -192,6 +204,7 @@ DownLetter TreeRoot::refresh(bool accept, Weighing weighing) {
   weighing_ = weighing;
   at_base_ = true;
   stale_ = false;
+  length_ = 1.0;
   last_decrement_.reset();
   DownLetter letter = say(Next::kRefresh);
   letter.verdict.accept = accept;

@@ -72,6 +72,8 @@ class TreeRoot {
   bool stale_ = false;    // a step has been accepted since second derivatives were told
   bool retried_ = false;  // from these poses, with fresh ones
   int backtracks_ = 0;    // in a row
+  int rises_ = 0;         // accepted, in a row
+  double length_ = 1.0;   // of a step, of Newton's; 1 once all is decided
   std::optional<double> last_decrement_;  // found with the present second derivatives
 };
 
