@@ -2,7 +2,6 @@
 
 #include <sys/ioctl.h>
 #include <unistd.h>
-
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -12,7 +11,6 @@
 #include <utility>
 
 #include "runtime/clock.hpp"
-#include "runtime/status_line.hpp"
 
 namespace km {
 

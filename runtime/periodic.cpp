@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "runtime/thread_name.hpp"
+#include "runtime/thread.hpp"
 
 namespace km {
 

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "modules/mesh/ply_file.hpp"
-#include "runtime/background_thread.hpp"
+#include "runtime/thread.hpp"
 
 namespace km {
 namespace {

@@ -9,7 +9,7 @@
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/mesh/map_mesh.hpp"
-#include "modules/mesh_deformation/optimized_mesh.hpp"
+#include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "runtime/latest.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"

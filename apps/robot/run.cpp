@@ -18,7 +18,6 @@
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 #include "runtime/metrics.hpp"
-#include "runtime/status_line.hpp"
 
 namespace km {
 namespace {

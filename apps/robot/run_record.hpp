@@ -10,11 +10,11 @@
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/core/stamped_pose.hpp"
-#include "modules/dense_sensing/dense_sensing_progress.hpp"
+#include "modules/dense_sensing/dense_sensor.hpp"
 #include "modules/mesh/map_mesh.hpp"
-#include "modules/mesh_deformation/optimized_mesh.hpp"
+#include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/pose_graph/closure_verdicts.hpp"
-#include "modules/semantic_mapping/mapping_progress.hpp"
+#include "modules/semantic_mapping/semantic_mapper.hpp"
 
 namespace km {
 

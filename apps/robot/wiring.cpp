@@ -18,7 +18,7 @@
 #include "modules/pose_graph/team_node.hpp"
 #include "modules/semantic_mapping/semantic_mapping_node.hpp"
 #include "modules/vio/vio_node.hpp"
-#include "runtime/dds/robot_status_codec.hpp"
+#include "runtime/dds/robot_status.hpp"
 
 namespace km {
 namespace {

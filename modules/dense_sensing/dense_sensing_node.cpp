@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
-#include "runtime/background_thread.hpp"
 #include "runtime/log.hpp"
+#include "runtime/thread.hpp"
 
 namespace km {
 namespace {

@@ -6,7 +6,6 @@
 
 #include "modules/core/dense_frame.hpp"
 #include "modules/core/odometry.hpp"
-#include "modules/dense_sensing/dense_sensing_progress.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"

@@ -1,13 +1,135 @@
 #include "modules/dense_sensing/stereo_depth.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <string>
 #include <utility>
-
-#include "modules/dense_sensing/disparity_refinement.hpp"
+#include <vector>
 
 namespace km {
 namespace {
+
+PinholeCamera shrunk(PinholeCamera camera, int factor) {
+  camera.width /= factor;
+  camera.height /= factor;
+  camera.fx /= factor;
+  camera.fy /= factor;
+  // Pixel centres are whole numbers: pixel 0 of the smaller image is the mean of the first ones.
+  camera.cx = (camera.cx + 0.5) / factor - 0.5;
+  camera.cy = (camera.cy + 0.5) / factor - 0.5;
+  return camera;
+}
+
+constexpr int kHalf = 3;  // the window has 7 x 7 pixels
+constexpr int kSteps = 16;
+constexpr float kMaxMove_px = 0.5F;
+constexpr float kMinTexture = 4.0F;  // mean squared gradient in the window [grey levels^2 / px^2]
+
+// The images do not agree in a window where what remains of their difference is more than noise
+// (standard deviation) and more than this share of the left image's variance.
+constexpr float kNoise = 5.0F;  // [grey levels]
+constexpr float kMaxRest = 0.4F;
+
+// What a window sums up over its pixels that have a disparity. g: gradient of the right image along
+// the row [grey levels / 32 px], e: right minus left [grey levels / 16], l: left. Whole numbers:
+// what goes into a running sum comes out again without a rest.
+struct Sums {
+  std::int32_t n = 0, g = 0, e = 0, gg = 0, ge = 0, ee = 0, l = 0, ll = 0;
+
+  Sums& operator+=(const Sums& o) {
+    n += o.n, g += o.g, e += o.e, gg += o.gg, ge += o.ge, ee += o.ee, l += o.l, ll += o.ll;
+    return *this;
+  }
+  Sums& operator-=(const Sums& o) {
+    n -= o.n, g -= o.g, e -= o.e, gg -= o.gg, ge -= o.ge, ee -= o.ee, l -= o.l, ll -= o.ll;
+    return *this;
+  }
+};
+
+// Of every pixel of a row by itself.
+void fill_row(const std::uint8_t* left, const std::uint8_t* right, const std::int16_t* steps,
+              int width, std::vector<Sums>& row) {
+  for (int x = 0; x < width; ++x) {
+    Sums& sums = row[static_cast<std::size_t>(x)];
+    sums = {};
+    const int at = kSteps * x - steps[x];
+    const int below = at / kSteps;
+    if (steps[x] <= 0 || at < kSteps || below + 2 >= width) continue;
+    const int share = at % kSteps;
+    const auto between = [&](int i) { return (kSteps - share) * right[i] + share * right[i + 1]; };
+    sums.n = 1;
+    sums.g = between(below + 1) - between(below - 1);
+    sums.e = between(below) - kSteps * left[x];
+    sums.gg = sums.g * sums.g;
+    sums.ge = sums.g * sums.e;
+    sums.ee = sums.e * sums.e;
+    sums.l = left[x];
+    sums.ll = sums.l * sums.l;
+  }
+}
+
+// Sum of the products of two quantities' deviations from their means, from their sums.
+float spread(std::int32_t product, std::int32_t a, std::int32_t b, float n) {
+  return static_cast<float>(product) - static_cast<float>(a) * static_cast<float>(b) / n;
+}
+
+// `disparity` moved to where the window agrees best, up to a difference in brightness common to all
+// its pixels; 0 if it does not agree there.
+float refined(float disparity, const Sums& w) {
+  if (w.n == 0) return disparity;  // too near the rim to compare
+  const auto n = static_cast<float>(w.n);
+  const float texture = spread(w.gg, w.g, w.g, n) / 1024.0F;
+  const float match = spread(w.ge, w.g, w.e, n) / 512.0F;
+  float rest = spread(w.ee, w.e, w.e, n) / 256.0F;
+  float move = texture > kMinTexture * n ? match / texture : 0.0F;
+  if (std::abs(move) > kMaxMove_px) move = 0.0F;
+  rest += (move * texture - 2.0F * match) * move;
+  const bool agrees = rest <= kNoise * kNoise * n || rest <= kMaxRest * spread(w.ll, w.l, w.l, n);
+  return agrees ? disparity + move : 0.0F;
+}
+
+// Disparities [px], 32-bit floats, moved to where the left image and the right one, shifted by
+// them, agree best around each pixel: one Gauss-Newton step on the squared difference in a window,
+// brightness apart. `steps` is what OpenCV's matchers give, sixteenths of a pixel, not positive
+// where there is none; there the result is 0, and where the images, although both have texture, do
+// not agree in the window. Moves of more than half a pixel are not made, nor any where the window
+// has no texture. Both images are 8-bit grey of the same size as `steps`.
+cv::Mat refined_disparities(const cv::Mat& left, const cv::Mat& right, const cv::Mat& steps) {
+  const int width = steps.cols, height = steps.rows;
+  const auto columns_count = static_cast<std::size_t>(width);
+  constexpr std::size_t kRows = 2 * kHalf + 1;
+  // The rows of the window, and their sum, column by column: both move down with it.
+  std::array<std::vector<Sums>, kRows> rows;
+  for (auto& row : rows) row.resize(columns_count);
+  std::vector<Sums> columns(columns_count);
+  cv::Mat result(height, width, CV_32FC1);
+  for (int below = 0; below < height + kHalf; ++below) {
+    std::vector<Sums>& row = rows[static_cast<std::size_t>(below) % kRows];
+    for (std::size_t x = 0; x < columns_count; ++x) columns[x] -= row[x];
+    if (below < height)
+      fill_row(left.ptr(below), right.ptr(below), steps.ptr<std::int16_t>(below), width, row);
+    else
+      std::fill(row.begin(), row.end(), Sums{});
+    for (std::size_t x = 0; x < columns_count; ++x) columns[x] += row[x];
+    const int y = below - kHalf;
+    if (y < 0) continue;
+    const auto* given = steps.ptr<std::int16_t>(y);
+    auto* row_result = result.ptr<float>(y);
+    Sums window;
+    for (int x = 0; x < kHalf && x < width; ++x) window += columns[static_cast<std::size_t>(x)];
+    for (int x = 0; x < width; ++x) {
+      if (x + kHalf < width) window += columns[static_cast<std::size_t>(x + kHalf)];
+      if (x > kHalf) window -= columns[static_cast<std::size_t>(x - kHalf - 1)];
+      row_result[x] = given[x] > 0 ? refined(static_cast<float>(given[x]) / kSteps, window) : 0.0F;
+    }
+  }
+  return result;
+}
 
 constexpr int kDisparityUnit = 16;  // the matcher searches multiples of it
 
@@ -44,6 +166,44 @@ cv::Ptr<cv::StereoSGBM> make_matcher(const StereoDepthConfig& config, int dispar
 }
 
 }  // namespace
+
+StereoRectification::StereoRectification(const StereoRig& rig, int downscale)
+    : full_(rig, Rectification::Centre::kImage),
+      camera_(shrunk(full_.camera(), downscale)),
+      baseline_m_(rig.baseline_m()),
+      label_size_(rig.cameras[0].width, rig.cameras[0].height),
+      seen_(cv::Mat::zeros(camera_.height, camera_.width, CV_8UC1)) {
+  for (int y = 0; y < camera_.height; ++y)
+    for (int x = 0; x < camera_.width; ++x) {
+      const Eigen::Vector3d ray((x - camera_.cx) / camera_.fx, (y - camera_.cy) / camera_.fy, 1.0);
+      const auto pixel = seen_pixel(rig.cameras[0], full_.R_left_rect() * ray);
+      seen_.at<std::uint8_t>(y, x) = pixel ? 255 : 0;
+      left_pixel_.push_back(pixel ? static_cast<std::int32_t>(std::lround(pixel->y())) *
+                                            label_size_.width +
+                                        static_cast<std::int32_t>(std::lround(pixel->x()))
+                                  : kOutside);
+    }
+}
+
+cv::Mat StereoRectification::rectified(const GrayImage& image, std::size_t side) const {
+  cv::Mat full = full_.rectified(image, side);
+  if (full.size() == seen_.size()) return full;
+  cv::Mat small;
+  const int factor = full.cols / camera_.width;
+  cv::resize(full(cv::Rect(0, 0, camera_.width * factor, camera_.height * factor)), small,
+             seen_.size(), 0.0, 0.0, cv::INTER_AREA);
+  return small;
+}
+
+LabelImage StereoRectification::rectified(const LabelImage& labels) const {
+  CV_Assert(cv::Size(labels.width, labels.height) == label_size_);
+  LabelImage result{camera_.width, camera_.height, {}};
+  result.ids.reserve(left_pixel_.size());
+  for (const std::int32_t index : left_pixel_)
+    result.ids.push_back(index == kOutside ? LabelId{0}
+                                           : labels.ids[static_cast<std::size_t>(index)]);
+  return result;
+}
 
 StereoDepth::StereoDepth(const StereoRig& rig, const StereoDepthConfig& config)
     : config_(checked_depths(config)),

@@ -1,13 +1,35 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <list>
 #include <map>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "modules/core/ids.hpp"
+#include "modules/core/keyframe.hpp"
 
 namespace km {
+
+/// Asks the owner of `keyframe` for its odometry, points and descriptors, of which those come that
+/// keyframe `own` of the requester may show, too.
+struct KeyframeRequest {
+  RobotId requester = 0;
+  std::uint32_t number = 0;  ///< Counts the requester's requests.
+  KeyframeId keyframe;
+  KeyframeIndex own = 0;
+};
+
+/// The answer. `found` is false where the owner has no such keyframe (yet): then only the
+/// keyframe's id is set.
+struct KeyframeReply {
+  std::uint32_t number = 0;  ///< Of the request.
+  bool found = false;
+  Keyframe keyframe;
+};
 
 /// When to ask which peer for which keyframe. Every keyframe wanted is asked for until it arrives:
 /// a few at a time per peer, again after a time-out that doubles up to eightfold while there is no
@@ -54,6 +76,37 @@ class KeyframeRequests {
   double timeout_s_;
   int max_outstanding_;
   std::map<RobotId, Peer> peers_;
+};
+
+/// Keeps the keyframes used last, at most `capacity`. Not thread-safe.
+class KeyframeCache {
+ public:
+  explicit KeyframeCache(std::size_t capacity) : capacity_(capacity) {}
+
+  void put(std::shared_ptr<const Keyframe> keyframe) {
+    const KeyframeId id = keyframe->odometry.id;
+    if (const auto old = place_.find(id); old != place_.end()) by_use_.erase(old->second);
+    by_use_.push_front(std::move(keyframe));
+    place_[id] = by_use_.begin();
+    if (by_use_.size() <= capacity_) return;
+    place_.erase(by_use_.back()->odometry.id);
+    by_use_.pop_back();
+  }
+
+  /// Null if it is not (or no longer) there.
+  std::shared_ptr<const Keyframe> get(const KeyframeId& id) {
+    const auto found = place_.find(id);
+    if (found == place_.end()) return nullptr;
+    by_use_.splice(by_use_.begin(), by_use_, found->second);
+    return by_use_.front();
+  }
+
+ private:
+  using ByUse = std::list<std::shared_ptr<const Keyframe>>;
+
+  std::size_t capacity_;
+  ByUse by_use_;  // latest first
+  std::map<KeyframeId, ByUse::iterator> place_;
 };
 
 }  // namespace km

@@ -6,8 +6,8 @@
 #include <span>
 #include <utility>
 
+#include "runtime/dds/codec.hpp"
 #include "runtime/dds/wire_pose.hpp"
-#include "runtime/dds/wire_sequence.hpp"
 
 namespace km {
 namespace {

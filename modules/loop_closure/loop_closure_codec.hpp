@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "modules/core/pose_graph.hpp"
-#include "modules/loop_closure/keyframe_exchange.hpp"
+#include "modules/loop_closure/keyframe_requests.hpp"
 #include "runtime/dds/codec.hpp"
 
 namespace km {

@@ -13,12 +13,10 @@
 
 #include "modules/core/keyframe.hpp"
 #include "modules/core/pose_graph.hpp"
-#include "modules/loop_closure/keyframe_cache.hpp"
-#include "modules/loop_closure/keyframe_exchange.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
 #include "modules/loop_closure/request_economy.hpp"
 #include "modules/loop_closure/verifier.hpp"
-#include "modules/place_recognition/keyframe_bow.hpp"
+#include "modules/place_recognition/bag_of_words.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 #include "runtime/dds/bridge.hpp"
 #include "runtime/node.hpp"

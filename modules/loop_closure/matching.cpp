@@ -1,6 +1,10 @@
 #include "modules/loop_closure/matching.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
+#include <optional>
+#include <tuple>
 #include <utility>
 
 #include "modules/place_recognition/hamming.hpp"
@@ -55,6 +59,103 @@ std::vector<Bits256> bits_of(std::span<const OrbDescriptor> descriptors) {
   return bits;
 }
 
+// Keypoints of one image in square cells, to find those near a place.
+class KeypointGrid {
+ public:
+  KeypointGrid(const KeyframeFeatures& features, double cell_px) : cell_(cell_px) {
+    for (const Keypoint& keypoint : features.keypoints)
+      pixels_.push_back(features.focal_px * keypoint.bearing.cast<double>());
+    Eigen::Vector2d high = Eigen::Vector2d::Zero();
+    for (const Eigen::Vector2d& pixel : pixels_) {
+      low_ = low_.cwiseMin(pixel);
+      high = high.cwiseMax(pixel);
+    }
+    // Features may come from another robot: however far apart they are, the grid stays small.
+    constexpr double kMaxCellsAcross = 512.0;
+    cell_ = std::max(cell_, (high - low_).maxCoeff() / kMaxCellsAcross);
+    columns_ = static_cast<int>((high.x() - low_.x()) / cell_) + 1;
+    rows_ = static_cast<int>((high.y() - low_.y()) / cell_) + 1;
+    cells_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
+    for (std::uint32_t i = 0; i < pixels_.size(); ++i) {
+      const Eigen::Vector2i cell = cell_of(pixels_[i]);
+      cells_[index(cell.x(), cell.y())].push_back(i);
+    }
+  }
+
+  const Eigen::Vector2d& pixel(std::size_t i) const { return pixels_[i]; }
+
+  /// Calls visit(i) for every keypoint at most one cell away from that of `pixel`.
+  void near(const Eigen::Vector2d& pixel, auto&& visit) const {
+    if (!((pixel - low_).minCoeff() >= -cell_)) return;
+    if (pixel.x() > low_.x() + (columns_ + 1) * cell_ || pixel.y() > low_.y() + (rows_ + 1) * cell_)
+      return;
+    const Eigen::Vector2i centre = cell_of(pixel);
+    for (int y = std::max(centre.y() - 1, 0); y <= std::min(centre.y() + 1, rows_ - 1); ++y)
+      for (int x = std::max(centre.x() - 1, 0); x <= std::min(centre.x() + 1, columns_ - 1); ++x)
+        for (const std::uint32_t i : cells_[index(x, y)]) visit(i);
+  }
+
+ private:
+  Eigen::Vector2i cell_of(const Eigen::Vector2d& pixel) const {
+    return ((pixel - low_) / cell_).array().floor().cast<int>();
+  }
+  std::size_t index(int x, int y) const { return static_cast<std::size_t>(y * columns_ + x); }
+
+  double cell_;
+  int columns_ = 0, rows_ = 0;
+  Eigen::Vector2d low_ = Eigen::Vector2d::Zero();
+  std::vector<Eigen::Vector2d> pixels_;
+  std::vector<std::vector<std::uint32_t>> cells_;
+};
+
+// A keypoint seen from the other camera.
+struct Projection {
+  Eigen::Vector2d pixel;
+  double inverse_depth;
+};
+
+std::optional<Projection> project(const SE3& T_to_from, const Keypoint& keypoint, double focal_px) {
+  const auto rho = static_cast<double>(keypoint.inverse_depth);
+  const Eigen::Vector3d h = T_to_from.linear() * keypoint.bearing.cast<double>().homogeneous() +
+                            rho * T_to_from.translation();
+  constexpr double kLeastDepthRatio = 1e-3;
+  if (!(h.z() > kLeastDepthRatio)) return std::nullopt;
+  return Projection{focal_px * h.hnormalized(), rho / h.z()};
+}
+
+struct Candidate {
+  std::uint32_t index;
+  int distance;
+};
+
+// The best match of one descriptor among the keypoints near its projection.
+std::optional<Candidate> best_near(const Projection& projection, const OrbDescriptor& descriptor,
+                                   const KeyframeFeatures& features, const KeypointGrid& grid,
+                                   const GuidedMatchRules& rules) {
+  // Octaves repeat a corner: a rival this close to the best one is the same corner.
+  constexpr double kSameCorner_px = 3.0;
+  const Bits256 query = to_bits(descriptor);
+  const double disparity_scale = features.focal_px * features.baseline_m;
+  std::vector<Candidate> near;
+  grid.near(projection.pixel, [&](std::uint32_t i) {
+    if ((grid.pixel(i) - projection.pixel).norm() > rules.radius_px) return;
+    const Keypoint& keypoint = features.keypoints[i];
+    const double off = static_cast<double>(keypoint.inverse_depth) - projection.inverse_depth;
+    if (keypoint.has_depth() && std::abs(off) * disparity_scale > rules.radius_px) return;
+    const unsigned bits = hamming_distance(query, to_bits(features.descriptors[i]));
+    near.push_back({i, static_cast<int>(bits)});
+  });
+  const auto best = std::min_element(near.begin(), near.end(), [](const auto& l, const auto& r) {
+    return l.distance < r.distance;
+  });
+  if (best == near.end() || best->distance > rules.max_distance) return std::nullopt;
+  for (const Candidate& rival : near)
+    if ((grid.pixel(rival.index) - grid.pixel(best->index)).norm() > kSameCorner_px &&
+        best->distance > rules.max_ratio * rival.distance)
+      return std::nullopt;
+  return *best;
+}
+
 }  // namespace
 
 std::vector<Match> match_descriptors(std::span<const OrbDescriptor> a,
@@ -64,6 +165,42 @@ std::vector<Match> match_descriptors(std::span<const OrbDescriptor> a,
   if (has_popcount()) return match_popcount(bits_of(a), bits_of(b), rules);
 #endif
   return match_portable(bits_of(a), bits_of(b), rules);
+}
+
+std::vector<Match> match_guided(const SE3& T_a_b, const KeyframeFeatures& a,
+                                const KeyframeFeatures& b, const GuidedMatchRules& rules) {
+  std::vector<Match> found;
+  if (a.keypoints.empty() || b.keypoints.empty()) return found;
+  const KeypointGrid grid_a(a, rules.radius_px);
+  const KeypointGrid grid_b(b, rules.radius_px);
+  const SE3 T_b_a = T_a_b.inverse();
+  for (std::uint32_t i = 0; i < a.keypoints.size(); ++i) {
+    if (!a.keypoints[i].has_depth()) continue;
+    const std::optional<Projection> projection = project(T_b_a, a.keypoints[i], b.focal_px);
+    if (!projection) continue;
+    const auto best = best_near(*projection, a.descriptors[i], b, grid_b, rules);
+    if (best) found.push_back({i, best->index, best->distance});
+  }
+  for (std::uint32_t j = 0; j < b.keypoints.size(); ++j) {
+    if (!b.keypoints[j].has_depth()) continue;
+    const std::optional<Projection> projection = project(T_a_b, b.keypoints[j], a.focal_px);
+    if (!projection) continue;
+    const auto best = best_near(*projection, b.descriptors[j], a, grid_a, rules);
+    if (best) found.push_back({best->index, j, best->distance});
+  }
+
+  // Each keypoint once, the most alike pairs first.
+  std::sort(found.begin(), found.end(), [](const Match& l, const Match& r) {
+    return std::tie(l.distance, l.a, l.b) < std::tie(r.distance, r.a, r.b);
+  });
+  std::vector<bool> used_a(a.keypoints.size()), used_b(b.keypoints.size());
+  std::erase_if(found, [&](const Match& m) {
+    if (used_a[m.a] || used_b[m.b]) return true;
+    used_a[m.a] = used_b[m.b] = true;
+    return false;
+  });
+  std::sort(found.begin(), found.end());
+  return found;
 }
 
 }  // namespace km

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "modules/core/keyframe.hpp"
+#include "modules/loop_closure/relative_pose.hpp"
 
 namespace km {
 
@@ -25,10 +26,24 @@ struct MatchRules {
 
 /// Pairs that are each other's nearest descriptor and pass `rules` (the ratio is that of Lowe,
 /// "Distinctive Image Features from Scale-Invariant Keypoints", IJCV 2004), in ascending order of
-/// `a`. Of equally near descriptors the first counts. Without a second descriptor in `b` there is no
-/// ratio and so no match. O(|a| |b|): see the benchmark.
+/// `a`. Of equally near descriptors the first counts. Without a second descriptor in `b` there is
+/// no ratio and so no match. O(|a| |b|): see the benchmark.
 [[nodiscard]] std::vector<Match> match_descriptors(std::span<const OrbDescriptor> a,
                                                    std::span<const OrbDescriptor> b,
                                                    const MatchRules& rules);
+
+/// Where and how alike a match must be once the pose is roughly known.
+struct GuidedMatchRules {
+  double radius_px = 8.0;  ///< Around the projection, at the finest level.
+  double max_ratio = 0.9;  ///< Best distance over second best inside the radius.
+  int max_distance = 64;   ///< [bit]
+};
+
+/// Matches under a known pose: every point with depth of one keyframe is projected into the other,
+/// both ways, and compared with the descriptors near its projection whose depth does not
+/// contradict it. Pairs that are each other's best, ascending in a.
+[[nodiscard]] std::vector<Match> match_guided(const SE3& T_a_b, const KeyframeFeatures& a,
+                                              const KeyframeFeatures& b,
+                                              const GuidedMatchRules& rules);
 
 }  // namespace km

@@ -1,16 +1,146 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <random>
 #include <span>
 #include <vector>
 
 #include "modules/core/geometry.hpp"
-#include "modules/loop_closure/ransac.hpp"
-#include "modules/loop_closure/transfer_error.hpp"
+#include "modules/core/keyframe.hpp"
 
 namespace km {
+
+/// Standard deviations of what a keyframe measures, at the finest level of the pyramid.
+struct ImageNoise {
+  double keypoint_px = 1.0;   ///< Position in the image; grows by 1.2 with each octave.
+  double disparity_px = 0.5;  ///< Stereo disparity at the keyframe's focal length.
+};
+
+/// A keypoint as a measurement: m = (x, y, rho) with the bearing (x, y) on z = 1 and rho the
+/// inverse depth [1/m]. Stereo noise is Gaussian in m, whatever the depth, unlike in the point.
+struct ImagePoint {
+  Eigen::Vector3d m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d variance = Eigen::Vector3d::Ones();  ///< Of the entries of m, independent.
+  bool has_depth = false;
+
+  /// Precondition: has_depth.
+  [[nodiscard]] Eigen::Vector3d point() const {
+    return {m.x() / m.z(), m.y() / m.z(), 1.0 / m.z()};
+  }
+};
+
+[[nodiscard]] ImagePoint image_point(const KeyframeFeatures& features, std::size_t index,
+                                     const ImageNoise& noise);
+
+/// A point of keyframe a, carried into keyframe b by T_b_a, against what b measured.
+///
+/// The homogeneous point (x, y, 1, rho) maps to h = R (x, y, 1) + rho t, which is the measurement
+/// (h_x / h_z, h_y / h_z, rho / h_z) in b: no division by the depth in a, so that points far away
+/// are as harmless as near ones. `Sigma` is the covariance of r to first order from the noise of
+/// BOTH points: minimising chi2 is maximum likelihood over the pose and the true points. If b has
+/// no depth the third entry is absent: zero residual, zero rows.
+struct TransferError {
+  bool in_front = false;                        ///< False: behind camera b, the rest is unset.
+  int dim = 0;                                  ///< 3 with depth on both sides, 2 if only a has it.
+  Eigen::Vector3d r = Eigen::Vector3d::Zero();  ///< Predicted minus measured.
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  double chi2 = 0.0;
+  Eigen::Vector3d likely = Eigen::Vector3d::Zero();  ///< True m of a that fits both sides best.
+};
+
+/// Precondition: a.has_depth.
+[[nodiscard]] TransferError transfer_error(const SE3& T_b_a, const ImagePoint& a,
+                                           const ImagePoint& b);
+
+/// The same with the map linearised about `m` in place of a's measurement: what to minimise over
+/// the pose with m = transfer_error(T_b_a, a, b).likely. About the measurement itself, its noise is
+/// in the residual and in the derivative alike, and the pose is drawn towards no motion, by the
+/// relative variance of the disparities ("attenuation", Fuller, "Measurement Error Models", 1987).
+[[nodiscard]] TransferError transfer_error(const SE3& T_b_a, const ImagePoint& a,
+                                           const ImagePoint& b, const Eigen::Vector3d& m);
+
+/// Derivative of the point m = (x, y, rho) of a, carried into b, with respect to xi in
+/// T_a_b * exp(xi). Precondition: in front.
+[[nodiscard]] Eigen::Matrix<double, 3, 6> transfer_jacobian(const SE3& T_b_a,
+                                                            const Eigen::Vector3d& m);
+
+/// How long to sample.
+struct RansacOptions {
+  double confidence = 0.999;  ///< Probability of having drawn one sample without outliers.
+  int max_iterations = 2000;
+};
+
+/// The model with the least cost and the data that agree with it.
+template <typename Model>
+struct RansacResult {
+  std::optional<Model> model;        ///< Empty if no sample gave one.
+  std::vector<std::size_t> inliers;  ///< Ascending.
+  double cost = std::numeric_limits<double>::infinity();
+  int iterations = 0;
+};
+
+/// Random sample consensus (Fischler and Bolles, CACM 1981) with truncated costs (MSAC: Torr and
+/// Zisserman, "MLESAC", CVIU 2000) and a local optimisation of each new best model (Chum, Matas,
+/// Kittler, "Locally Optimized RANSAC", DAGM 2003). The number of iterations adapts to the best
+/// share of inliers. Deterministic by the state of `rng`.
+///
+/// `Problem` provides, for data 0 .. size() - 1:
+///     static constexpr std::size_t kSampleSize;
+///     std::size_t size() const;
+///     std::size_t drawable() const;  // samples hold numbers 0 .. drawable() - 1, which need not
+///                                    // be those of the data: only solve() reads them
+///     std::optional<Model> solve(std::span<const std::size_t> sample) const;  // minimal
+///     double error(const Model&, std::size_t i) const;   // 0 .. 1 inlier, above 1 outlier
+///     std::optional<Model> polish(const Model&, std::span<const std::size_t> inliers) const;
+template <typename Model, typename Problem>
+[[nodiscard]] RansacResult<Model> ransac(const Problem& problem, const RansacOptions& options,
+                                         std::mt19937& rng) {
+  RansacResult<Model> best;
+  const std::size_t n = problem.size();
+  const std::size_t drawable = problem.drawable();
+  if (drawable < Problem::kSampleSize) return best;
+
+  const auto consider = [&](const Model& model) {
+    double cost = 0.0;
+    std::vector<std::size_t> inliers;
+    for (std::size_t i = 0; i < n && cost < best.cost; ++i) {
+      const double error = problem.error(model, i);
+      if (error <= 1.0) inliers.push_back(i);
+      cost += std::min(error, 1.0);
+    }
+    if (!(cost < best.cost)) return false;
+    best.model = model;
+    best.cost = cost;
+    best.inliers = std::move(inliers);
+    return true;
+  };
+
+  std::uniform_int_distribution<std::size_t> draw(0, drawable - 1);
+  double needed = options.max_iterations;
+  for (; best.iterations < needed; ++best.iterations) {
+    std::array<std::size_t, Problem::kSampleSize> sample;
+    for (std::size_t k = 0; k < sample.size();) {
+      sample[k] = draw(rng);
+      if (std::find(sample.begin(), sample.begin() + k, sample[k]) == sample.begin() + k) ++k;
+    }
+    const std::optional<Model> model = problem.solve(sample);
+    if (!model || !consider(*model)) continue;
+    const std::optional<Model> polished = problem.polish(*best.model, best.inliers);
+    if (polished) consider(*polished);
+    const double share = static_cast<double>(best.inliers.size()) / static_cast<double>(n);
+    const double clean = std::pow(share, static_cast<double>(sample.size()));
+    const double adapted =
+        std::log1p(-options.confidence) / std::log1p(-std::min(clean, 1 - 1e-12));
+    if (clean > 0.0) needed = std::min(needed, std::ceil(adapted));
+  }
+  return best;
+}
 
 /// T_a_b that minimises sum |p_a - T_a_b p_b|^2 in closed form (Arun, Huang, Blostein,
 /// "Least-Squares Fitting of Two 3-D Point Sets", PAMI 1987, with the reflection resolved as in

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "modules/core/lie.hpp"
-#include "modules/loop_closure/guided_matching.hpp"
 #include "modules/loop_closure/matching.hpp"
 #include "modules/loop_closure/relative_pose.hpp"
 

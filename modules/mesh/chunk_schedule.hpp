@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/mesh/mesh_chunk.hpp"
+#include "modules/mesh/mesh_chunks.hpp"
 
 namespace km {
 

@@ -1,6 +1,7 @@
 #include "modules/mesh/mesh_chunks_node.hpp"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
 #include "modules/mesh/mesh_chunks.hpp"
@@ -82,6 +83,27 @@ void MeshChunksNode::send(double now_s) {
     budget_bytes_ -= static_cast<double>(wire_bytes(*chunk));
     chunks_.publish(*std::move(chunk));
   }
+}
+
+TeamMeshNode::TeamMeshNode(In<MeshChunk> chunks)
+    : worker_(
+          kQueue, Overflow::kBlock, [this](const auto& chunk) { take(*chunk); }, "team_mesh") {
+  chunks.subscribe([this](const auto& chunk) { worker_.post(chunk); });
+}
+
+void TeamMeshNode::take(const MeshChunk& chunk) {
+  const ChunkVerdict verdict = [&] {
+    const std::lock_guard lock(mutex_);
+    return team_.add(chunk);
+  }();
+  if (verdict != ChunkVerdict::kTaken)
+    log::limited(log::Level::kWarn, name(), std::to_string(chunk.key.robot))
+        << "a chunk of robot " << chunk.key.robot << "'s mesh is ignored: " << to_string(verdict);
+}
+
+std::vector<RobotMesh> TeamMeshNode::snapshot() const {
+  const std::lock_guard lock(mutex_);
+  return team_.snapshot();
 }
 
 }  // namespace km

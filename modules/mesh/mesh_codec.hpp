@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "modules/mesh/mesh_chunk.hpp"
+#include "modules/mesh/mesh_chunks.hpp"
 #include "runtime/dds/codec.hpp"
 
 namespace km {

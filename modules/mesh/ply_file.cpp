@@ -3,15 +3,122 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <fstream>
+#include <istream>
+#include <map>
+#include <sstream>
+#include <stdexcept>
 #include <string>
-
-#include "modules/mesh/ply_header.hpp"
+#include <system_error>
+#include <vector>
 
 namespace km {
 namespace {
+
+enum class PlyFormat { kAscii, kLittleEndian, kBigEndian };
+enum class PlyType { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
+
+struct PlyProperty {
+  std::string name;
+  PlyType type = PlyType::kFloat;
+  bool is_list = false;
+  PlyType count_type = PlyType::kUint8;  // Of a list's length.
+};
+
+struct PlyElement {
+  std::string name;
+  std::size_t count = 0;
+  std::vector<PlyProperty> properties;
+};
+
+struct PlyHeader {
+  PlyFormat format = PlyFormat::kAscii;
+  std::vector<PlyElement> elements;
+};
+
+PlyType type_of(const std::string& name) {
+  static const std::map<std::string, PlyType> types = {
+      {"char", PlyType::kInt8},     {"int8", PlyType::kInt8},     {"uchar", PlyType::kUint8},
+      {"uint8", PlyType::kUint8},   {"short", PlyType::kInt16},   {"int16", PlyType::kInt16},
+      {"ushort", PlyType::kUint16}, {"uint16", PlyType::kUint16}, {"int", PlyType::kInt32},
+      {"int32", PlyType::kInt32},   {"uint", PlyType::kUint32},   {"uint32", PlyType::kUint32},
+      {"float", PlyType::kFloat},   {"float32", PlyType::kFloat}, {"double", PlyType::kDouble},
+      {"float64", PlyType::kDouble}};
+  const auto found = types.find(name);
+  if (found == types.end()) throw std::runtime_error("unknown type '" + name + "'");
+  return found->second;
+}
+
+PlyFormat format_of(const std::string& name) {
+  if (name == "ascii") return PlyFormat::kAscii;
+  if (name == "binary_little_endian") return PlyFormat::kLittleEndian;
+  if (name == "binary_big_endian") return PlyFormat::kBigEndian;
+  throw std::runtime_error("unknown format '" + name + "'");
+}
+
+PlyProperty parse_property(std::istringstream& words) {
+  PlyProperty property;
+  std::string type;
+  words >> type;
+  if (type == "list") {
+    std::string count_type;
+    words >> count_type >> type;
+    property.is_list = true;
+    property.count_type = type_of(count_type);
+  }
+  property.type = type_of(type);
+  if (!(words >> property.name)) throw std::runtime_error("property without a name");
+  return property;
+}
+
+// False at end_header.
+bool parse_line(const std::string& line, PlyHeader& header, bool& has_format) {
+  std::istringstream words(line);
+  std::string key;
+  words >> key;
+  if (key == "end_header") return false;
+  if (key == "format") {
+    std::string format;
+    words >> format;
+    header.format = format_of(format);
+    has_format = true;
+  } else if (key == "element") {
+    PlyElement element;
+    if (!(words >> element.name >> element.count)) throw std::runtime_error("bad element");
+    header.elements.push_back(element);
+  } else if (key == "property") {
+    if (header.elements.empty()) throw std::runtime_error("property before any element");
+    header.elements.back().properties.push_back(parse_property(words));
+  } else if (!key.empty() && key != "comment" && key != "obj_info") {
+    throw std::runtime_error("unknown keyword '" + key.substr(0, 20) + "'");
+  }
+  return true;
+}
+
+// Reads up to and with `end_header`. Throws std::runtime_error with what is wrong and the line.
+PlyHeader read_ply_header(std::istream& stream) {
+  PlyHeader header;
+  bool has_format = false;
+  std::string line;
+  for (int number = 1; std::getline(stream, line); ++number) {
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    if (number == 1) {
+      if (line != "ply") throw std::runtime_error("line 1: not a PLY file");
+      continue;
+    }
+    try {
+      if (parse_line(line, header, has_format)) continue;
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error("line " + std::to_string(number) + ": " + error.what());
+    }
+    if (!has_format) throw std::runtime_error("header without a format line");
+    return header;
+  }
+  throw std::runtime_error("header without end_header");
+}
 
 // Values of the body one after the other, whatever the encoding.
 class Body {
@@ -186,6 +293,39 @@ LabelledMesh read(std::istream& stream) {
   return mesh;
 }
 
+static_assert(std::endian::native == std::endian::little, "PLY is written as it lies in memory");
+
+template <typename T>
+void put(std::string& bytes, const T& value) {
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof(T));
+}
+
+std::string header(const LabelledMesh& mesh) {
+  std::string text = "ply\nformat binary_little_endian 1.0\nelement vertex ";
+  text += std::to_string(mesh.vertices.size());
+  text += "\nproperty float x\nproperty float y\nproperty float z\n";
+  if (!mesh.colors.empty())
+    text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  if (!mesh.labels.empty()) text += "property uchar label\n";
+  text += "element face " + std::to_string(mesh.faces.size());
+  text += "\nproperty list uchar uint vertex_indices\nend_header\n";
+  return text;
+}
+
+std::string encode(const LabelledMesh& mesh) {
+  std::string bytes = header(mesh);
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) put(bytes, mesh.vertices[i][axis]);
+    if (!mesh.colors.empty()) put(bytes, mesh.colors[i]);
+    if (!mesh.labels.empty()) put(bytes, mesh.labels[i]);
+  }
+  for (const auto& face : mesh.faces) {
+    put(bytes, std::uint8_t{3});
+    put(bytes, face);
+  }
+  return bytes;
+}
+
 }  // namespace
 
 LabelledMesh read_ply(const std::filesystem::path& file) {
@@ -196,6 +336,22 @@ LabelledMesh read_ply(const std::filesystem::path& file) {
   } catch (const std::runtime_error& error) {
     throw MeshFileError(file.string() + ": " + error.what());
   }
+}
+
+void write_ply(const std::filesystem::path& file, const LabelledMesh& mesh) {
+  std::filesystem::path partial = file;
+  partial += ".part";
+  const std::string bytes = encode(mesh);
+  std::ofstream stream(partial, std::ios::binary);
+  stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  stream.close();
+  std::error_code error;
+  if (stream) std::filesystem::rename(partial, file, error);
+  if (stream && !error) return;
+  std::error_code ignored;
+  std::filesystem::remove(partial, ignored);
+  throw MeshFileError(file.string() + ": cannot be written" +
+                      (error ? ": " + error.message() : " (no such folder, or the disk is full)"));
 }
 
 }  // namespace km

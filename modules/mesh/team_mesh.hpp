@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "modules/mesh/labelled_mesh.hpp"
-#include "modules/mesh/mesh_chunk.hpp"
+#include "modules/mesh/mesh_chunks.hpp"
 
 namespace km {
 

@@ -1,14 +1,51 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/mesh_node.hpp"
 
 namespace km {
+
+/// Triangles between points that were each seen for some time.
+struct TimedTriangles {
+  std::vector<Eigen::Vector3d> points;  ///< [m]
+  std::vector<SeenBy> seen_by;          ///< Of each point.
+  std::vector<LabelledMesh::Face> faces;
+};
+
+/// Points that are left, and the one that each point was merged into.
+struct CollapsedPoints {
+  std::vector<std::uint32_t> kept;     ///< Index of a point; twice where surfaces cross there.
+  std::vector<std::uint32_t> kept_of;  ///< For each point an index into `kept`.
+};
+
+/// Decimates by half-edge collapses in OpenMesh until `target` points are left that belong to
+/// faces, or no collapse is possible. See extend() for their order; points seen further apart in
+/// time than the window are not merged. Faces may meet in any way: where more than two share an
+/// edge, the surface is cut open.
+[[nodiscard]] CollapsedPoints collapse_edges(const TimedTriangles& triangles, std::size_t target,
+                                             KeyframeIndex window_keyframes);
+
+/// Vertices of a mesh put together by cells of a grid, and the triangles between them.
+struct VertexClusters {
+  TimedTriangles triangles;           ///< A point per cluster: that of its vertex.
+  std::vector<std::uint32_t> vertex;  ///< Of each cluster the vertex nearest to its centroid.
+  std::vector<std::uint32_t> cluster_of_vertex;  ///< kNoIndex for vertices that were left out.
+};
+
+/// Clusters those vertices of `map` whose `node_of_vertex` is kNoIndex, in cells of `width_m`.
+/// Vertices of a cell are in one cluster if they were seen within the window of its first. Faces
+/// whose corners lie in three clusters remain, each once. Linear.
+[[nodiscard]] VertexClusters cluster_vertices(const MapMesh& map,
+                                              std::span<const std::uint32_t> node_of_vertex,
+                                              double width_m, KeyframeIndex window_keyframes);
 
 /// How coarse the simplified mesh is, and what it keeps apart.
 struct DecimationScale {

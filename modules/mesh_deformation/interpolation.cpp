@@ -1,14 +1,120 @@
 #include "modules/mesh_deformation/interpolation.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <nanoflann.hpp>
+#include <numeric>
+#include <span>
+#include <utility>
+#include <vector>
 
-#include "modules/mesh_deformation/node_tree.hpp"
+#include "modules/mesh_deformation/mesh_node.hpp"
 
 namespace km {
 namespace {
+
+// A node and its squared distance [m^2] from where it was asked for.
+struct NearNode {
+  double distance2 = 0.0;
+  std::uint32_t node = kNoIndex;
+};
+
+struct Nodes {
+  std::vector<Eigen::Vector3d> positions;
+  std::vector<SeenBy> seen_by;
+  std::vector<std::uint32_t> indices;
+
+  // What nanoflann asks of a set of points.
+  [[nodiscard]] std::size_t kdtree_get_point_count() const { return positions.size(); }
+  [[nodiscard]] double kdtree_get_pt(std::size_t i, std::size_t axis) const {
+    return positions[i][static_cast<Eigen::Index>(axis)];
+  }
+  template <typename Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+};
+
+// The nearest points so far, for nanoflann; passes over those of another time. Of points at equal
+// distance the lower index comes first.
+class NearestInTime {
+ public:
+  using DistanceType = double;
+  using IndexType = std::uint32_t;
+
+  NearestInTime(const Nodes& nodes, const SeenBy& seen_by, KeyframeIndex window,
+                std::span<NearNode> found, double limit2)
+      : nodes_(nodes), seen_by_(seen_by), window_(window), found_(found), limit2_(limit2) {}
+
+  [[nodiscard]] std::size_t size() const { return count_; }
+  [[nodiscard]] bool full() const { return count_ == found_.size(); }
+  [[nodiscard]] double worstDist() const { return full() ? found_[count_ - 1].distance2 : limit2_; }
+
+  bool addPoint(double distance2, std::uint32_t i) {
+    if (distance2 >= worstDist() || keyframe_gap(nodes_.seen_by[i], seen_by_) > window_)
+      return true;
+    const std::uint32_t node = nodes_.indices[i];
+    std::size_t place = full() ? count_ - 1 : count_++;
+    for (; place > 0; --place) {
+      const NearNode& closer = found_[place - 1];
+      if (closer.distance2 < distance2 || (closer.distance2 == distance2 && closer.node < node))
+        break;
+      found_[place] = closer;
+    }
+    found_[place] = {distance2, node};
+    return true;
+  }
+
+ private:
+  const Nodes& nodes_;
+  const SeenBy& seen_by_;
+  KeyframeIndex window_;
+  std::span<NearNode> found_;
+  double limit2_;
+  std::size_t count_ = 0;
+};
+
+// Nearest nodes in space among those that are near in time: a k-d tree of fixed nodes.
+class NodeTree {
+ public:
+  // Of those of `nodes` that are listed. They are copied.
+  NodeTree(std::span<const MeshNode> nodes, std::span<const std::uint32_t> listed,
+           KeyframeIndex window_keyframes)
+      : nodes_(chosen(nodes, listed)), window_(window_keyframes), index_(3, nodes_) {}
+
+  // Fills `found` with the nearest nodes whose time of sight is within the window of `seen_by`, by
+  // distance, closer than the root of `limit2`. Returns how many there are.
+  std::size_t nearest(const Eigen::Vector3d& point, const SeenBy& seen_by,
+                      std::span<NearNode> found,
+                      double limit2 = std::numeric_limits<double>::infinity()) const {
+    if (found.empty()) return 0;
+    NearestInTime nearest(nodes_, seen_by, window_, found, limit2);
+    index_.findNeighbors(nearest, point.data(), nanoflann::SearchParams());
+    return nearest.size();
+  }
+
+ private:
+  static Nodes chosen(std::span<const MeshNode> nodes, std::span<const std::uint32_t> listed) {
+    Nodes result;
+    for (const std::uint32_t i : listed) {
+      result.positions.push_back(nodes[i].position);
+      result.seen_by.push_back(nodes[i].seen_by);
+      result.indices.push_back(i);
+    }
+    return result;
+  }
+
+  Nodes nodes_;
+  KeyframeIndex window_;
+  nanoflann::KDTreeSingleIndexAdaptor<
+      nanoflann::L2_Simple_Adaptor<double, Nodes, double, std::uint32_t>, Nodes, 3, std::uint32_t>
+      index_;  // refers to nodes_
+};
 
 constexpr std::size_t kMaxNeighbours = 8;
 constexpr double kNoWeight = 1e-12;  // of a sum whose terms are at most one
@@ -74,7 +180,9 @@ void Interpolation::update(std::span<const Eigen::Vector3f> vertices,
                            std::span<const SeenBy> seen_by, std::span<const MeshNode> nodes,
                            std::span<const std::uint32_t> before,
                            std::span<const std::uint32_t> changed) {
-  const NodeTree tree(nodes, window_keyframes_);
+  std::vector<std::uint32_t> all(nodes.size());
+  std::iota(all.begin(), all.end(), 0U);
+  const NodeTree tree(nodes, all, window_keyframes_);
   const NodeTree changed_tree(nodes, changed, window_keyframes_);
   Interpolation next(neighbours_, window_keyframes_);
   next.nodes_.resize(vertices.size() * neighbours_);
@@ -85,7 +193,9 @@ void Interpolation::update(std::span<const Eigen::Vector3f> vertices,
     const std::uint32_t old = before[v];
     if (old != kNoIndex) {
       const double reach_m = reach_m_[old];
-      if (!changed_tree.any_within(vertices[v].cast<double>(), seen_by[v], reach_m * reach_m)) {
+      NearNode closer;
+      if (changed_tree.nearest(vertices[v].cast<double>(), seen_by[v], {&closer, 1},
+                               reach_m * reach_m) == 0) {
         std::ranges::copy(nodes_of(old), next.nodes_.begin() + static_cast<std::ptrdiff_t>(to));
         std::ranges::copy(weights_of(old), next.weights_.begin() + static_cast<std::ptrdiff_t>(to));
         next.reach_m_[v] = reach_m_[old];
@@ -93,8 +203,10 @@ void Interpolation::update(std::span<const Eigen::Vector3f> vertices,
       }
     }
     const Binding binding = bind_vertex(tree, vertices[v], seen_by[v], neighbours_);
-    std::copy_n(binding.nodes.begin(), neighbours_, &next.nodes_[to]);
-    std::copy_n(binding.weights.begin(), neighbours_, &next.weights_[to]);
+    for (std::size_t j = 0; j < neighbours_; ++j) {
+      next.nodes_[to + j] = binding.nodes[j];
+      next.weights_[to + j] = binding.weights[j];
+    }
     next.reach_m_[v] = binding.reach_m;
   }
   *this = std::move(next);

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "modules/mesh_deformation/map_mesh_check.hpp"
+#include "modules/mesh_deformation/local_mesh_optimizer.hpp"
 #include "modules/mesh_deformation/surface_heirs.hpp"
 
 namespace km {

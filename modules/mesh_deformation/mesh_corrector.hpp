@@ -6,8 +6,9 @@
 #include <vector>
 
 #include "modules/core/geometry.hpp"
+#include "modules/core/ids.hpp"
+#include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/map_mesh.hpp"
-#include "modules/mesh/superseded_surface.hpp"
 #include "modules/mesh_deformation/keyframe_motion.hpp"
 #include "modules/mesh_deformation/local_mesh_optimizer.hpp"
 #include "modules/mesh_deformation/mesh_deformation_config.hpp"
@@ -66,6 +67,17 @@ class MeshCorrector {
   LabelledMesh optimized_;
   MeshDeformationReport report_;
   SE3 T_published_optimized_ = SE3::Identity();  // how its result has been moved since
+};
+
+/// A robot's mesh, corrected to agree with its optimised trajectory.
+struct OptimizedMesh {
+  RobotId robot = 0;
+  RobotId anchor = 0;            ///< Robot whose odometry frame is `world`.
+  LabelledMesh mesh;             ///< In `world`.
+  MeshDeformationReport report;  ///< Of the last optimisation.
+  bool deformed = true;  ///< False: no optimisation was due, the mesh before was moved as a whole.
+  double seconds = 0.0;  ///< Time this took.
+  std::size_t superseded_faces = 0;  ///< Of the map, left out: another visit saw them better.
 };
 
 }  // namespace km

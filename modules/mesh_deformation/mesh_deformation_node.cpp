@@ -7,9 +7,9 @@
 #include <string>
 #include <utility>
 
-#include "runtime/background_thread.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
+#include "runtime/thread.hpp"
 
 namespace km {
 namespace {

@@ -10,7 +10,6 @@
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
-#include "modules/mesh_deformation/optimized_mesh.hpp"
 #include "runtime/latest.hpp"
 #include "runtime/metrics.hpp"
 #include "runtime/node.hpp"

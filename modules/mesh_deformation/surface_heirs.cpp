@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "modules/mesh_deformation/node_grid.hpp"
+#include "modules/mesh_deformation/mesh_node.hpp"
 
 namespace km {
 namespace {

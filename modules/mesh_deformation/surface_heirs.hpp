@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "modules/mesh/labelled_mesh.hpp"
-#include "modules/mesh/superseded_surface.hpp"
+#include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/mesh_node.hpp"
 
 namespace km {

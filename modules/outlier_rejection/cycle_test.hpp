@@ -7,8 +7,8 @@
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/pose_graph.hpp"
+#include "modules/outlier_rejection/pair_cycle.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"
-#include "modules/outlier_rejection/prepared_closure.hpp"
 
 namespace km {
 

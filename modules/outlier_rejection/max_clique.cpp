@@ -4,7 +4,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "modules/outlier_rejection/clique_heuristic.hpp"
 #include "modules/outlier_rejection/clique_search.hpp"
 
 namespace km {

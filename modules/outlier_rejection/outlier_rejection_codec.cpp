@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "runtime/dds/codec.hpp"
 #include "runtime/dds/wire_pose.hpp"
-#include "runtime/dds/wire_sequence.hpp"
 
 namespace km {
 

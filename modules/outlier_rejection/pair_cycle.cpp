@@ -8,6 +8,9 @@
 namespace km {
 namespace {
 
+// Added to a closure's variances so that exact cycles can be weighed: 1e-6 rad and 1e-6 m.
+constexpr double kLeastVariance = 1e-12;
+
 // What odometry added between two keyframes of a chain, wherever both are seen from.
 BlockCovariance added(const KeyframeId& i, const BlockCovariance& at_i, const KeyframeId& k,
                       const BlockCovariance& at_k) {
@@ -19,6 +22,18 @@ std::int64_t steps(const KeyframeId& i, const KeyframeId& k) {
 }
 
 }  // namespace
+
+PreparedClosure::PreparedClosure(const OrientedClosure& closure)
+    : id(closure.id),
+      a(closure.a.id),
+      b(closure.b.id),
+      t_odoma_a(closure.a.T_odom_kf.translation()),
+      T_odoma_odomb(closure.a.T_odom_kf * closure.T_a_b.T * closure.b.T_odom_kf.inverse()),
+      odometry_a(transported(closure.a.T_odom_kf, BlockCovariance(closure.a.covariance))),
+      odometry_b(transported(closure.b.T_odom_kf, BlockCovariance(closure.b.covariance))),
+      measured(transported(
+          closure.a.T_odom_kf * closure.T_a_b.T,
+          BlockCovariance(closure.T_a_b.Sigma + kLeastVariance * Matrix6::Identity()))) {}
 
 PairCycle::PairCycle(const PreparedClosure& i, const PreparedClosure& k)
     : i_(i), k_(k), T_(i.T_odoma_odomb * k.T_odoma_odomb.inverse()) {}

@@ -2,9 +2,86 @@
 
 #include <cstdint>
 
-#include "modules/outlier_rejection/prepared_closure.hpp"
+#include "modules/core/covariance.hpp"
+#include "modules/core/geometry.hpp"
+#include "modules/core/lie.hpp"
+#include "modules/core/pose_graph.hpp"
 
 namespace km {
+
+/// A symmetric 6x6 matrix, tangent [rotation; translation], by the three blocks that say it all:
+/// [rr rt; rt^T tt]. Moving it into another frame costs a third of the same with Matrix6.
+struct BlockCovariance {
+  Eigen::Matrix3d rr = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d rt = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d tt = Eigen::Matrix3d::Zero();
+
+  BlockCovariance() = default;
+  /// The lower left block of `Sigma` is taken for the transpose of the upper right one.
+  explicit BlockCovariance(const Matrix6& Sigma)
+      : rr(Sigma.topLeftCorner<3, 3>()),
+        rt(Sigma.topRightCorner<3, 3>()),
+        tt(Sigma.bottomRightCorner<3, 3>()) {}
+
+  [[nodiscard]] Matrix6 matrix() const {
+    Matrix6 Sigma;
+    Sigma << rr, rt, rt.transpose(), tt;
+    return Sigma;
+  }
+
+  BlockCovariance& operator+=(const BlockCovariance& other) {
+    rr += other.rr;
+    rt += other.rt;
+    tt += other.tt;
+    return *this;
+  }
+  friend BlockCovariance operator-(const BlockCovariance& x, const BlockCovariance& y) {
+    BlockCovariance difference;
+    difference.rr = x.rr - y.rr;
+    difference.rt = x.rt - y.rt;
+    difference.tt = x.tt - y.tt;
+    return difference;
+  }
+};
+
+/// adjoint(T) * Sigma * adjoint(T)^T.
+[[nodiscard]] inline BlockCovariance transported(const SE3& T, const BlockCovariance& Sigma) {
+  const Eigen::Matrix3d R = T.linear();
+  const Eigen::Matrix3d K = skew(T.translation());
+  const Eigen::Matrix3d B = R * Sigma.rt * R.transpose();
+  BlockCovariance moved;
+  moved.rr = R * Sigma.rr * R.transpose();
+  moved.rt = B - moved.rr * K;  // K^T = -K
+  const Eigen::Matrix3d KB = K * B;
+  moved.tt = R * Sigma.tt * R.transpose() + KB + KB.transpose() - K * moved.rr * K;
+  return moved;
+}
+
+/// A closure turned so that a.id < b.id: the direction it was measured in does not matter to a
+/// cycle. Covariances are scaled to what the test assumes.
+struct OrientedClosure {
+  ClosureId id;
+  OdometryPose a;
+  OdometryPose b;
+  UncertainPose T_a_b;
+};
+
+/// What every cycle through this closure takes from it, computed once.
+///
+/// Seen from odom_a, where robot a began, covariances do not depend on the rest of the cycle: that
+/// of the closure is one matrix, and that of the odometry between two keyframes is the difference
+/// of what had accumulated at each.
+struct PreparedClosure {
+  explicit PreparedClosure(const OrientedClosure& closure);
+
+  ClosureId id;
+  KeyframeId a, b;
+  Eigen::Vector3d t_odoma_a;
+  SE3 T_odoma_odomb;           ///< Where b's odometry began, as this closure has it.
+  BlockCovariance odometry_a;  ///< Accumulated at a, seen from odom_a.
+  BlockCovariance odometry_b;  ///< Accumulated at b, seen from odom_b.
+  BlockCovariance measured;    ///< Of the closure, at b, seen from odom_a.
+};
 
 /// The cycle through two closures between the same robots: from ai along closure i, the odometry of
 /// b, closure k reversed and the odometry of a; seen from odom_a, where it begins and ends.

@@ -3,6 +3,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "modules/core/ids.hpp"
+#include "modules/core/stamp.hpp"
+
 namespace km {
 
 /// How often one visual word occurs in an image.
@@ -17,5 +20,28 @@ struct WordCount {
 /// vocabulary it determines the weighted vector exactly, at a fraction of its size: this is what
 /// robots send each other.
 using BagOfWords = std::vector<WordCount>;
+
+/// The words of one keyframe, as robots send them to each other.
+struct KeyframeBow {
+  KeyframeId id;
+  Stamp stamp = 0;
+  std::uint64_t vocabulary = 0;  ///< Vocabulary::id(): words of another one cannot be compared.
+  BagOfWords words;
+};
+
+/// Sparse TF-IDF vector of one image, of L1 norm 1 (or empty, if no word of the image says
+/// anything). words[i] has weight weights[i] > 0; words are strictly ascending.
+struct BowVector {
+  std::vector<std::uint32_t> words;
+  std::vector<float> weights;
+
+  bool operator==(const BowVector&) const = default;
+};
+
+/// Similarity of two images in [0, 1]: s(v, w) = 1 - 0.5 * | v/|v| - w/|w| |_1 (Galvez-Lopez and
+/// Tardos, "Bags of Binary Words for Fast Place Recognition in Image Sequences", TRO 2012; Nister
+/// and Stewenius, CVPR 2006). For vectors of norm 1 without negative entries this is the sum of
+/// min(v_i, w_i) over the common words. Linear in the number of words.
+[[nodiscard]] double score(const BowVector& v, const BowVector& w);
 
 }  // namespace km

@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "modules/place_recognition/bow_vector.hpp"
+#include "modules/place_recognition/bag_of_words.hpp"
 
 namespace km {
 
@@ -35,7 +35,7 @@ struct BowMatches {
 
 /// Images by the words they contain (inverted index), searched for the ones most alike.
 ///
-/// score(), see bow_vector.hpp, needs only the words two images share: a query walks the postings
+/// score(), see bag_of_words.hpp, needs only the words two images share: a query walks the postings
 /// of its own words and adds up min(v_i, w_i) per image. Time is that of the postings touched, and
 /// does not depend on thresholds. Const members are thread-safe.
 class BowDatabase {

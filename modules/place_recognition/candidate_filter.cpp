@@ -7,7 +7,6 @@
 #include <utility>
 
 namespace km {
-
 namespace {
 
 constexpr std::size_t kBeside = 3;

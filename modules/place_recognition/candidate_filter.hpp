@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "modules/core/ids.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/place_recognition/bow_database.hpp"
 #include "modules/place_recognition/place_recognition_config.hpp"
@@ -67,6 +68,21 @@ class CandidateFilter {
   BowDatabase database_;
   std::vector<Stamp> stamps_;  // ascending
   BowVector last_;
+};
+
+/// What the place recognition node did with a keyframe.
+enum class PlaceQueryStatus {
+  kSearched,         ///< See `search`, which may have refused it as well.
+  kOtherVocabulary,  ///< The peer uses another vocabulary: nothing of it can be compared.
+  kUnknownWords,     ///< Words beyond the vocabulary, although it claims to be ours.
+  kRepeated,         ///< This keyframe has arrived before.
+};
+
+/// A keyframe that was searched for, or why it was not: for counting and reports.
+struct PlaceQuery {
+  KeyframeId query;
+  PlaceQueryStatus status = PlaceQueryStatus::kSearched;
+  CandidateSearch search;  ///< Indices are those of own keyframes.
 };
 
 }  // namespace km

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "modules/place_recognition/bow_vector.hpp"
+#include "modules/place_recognition/bag_of_words.hpp"
 
 namespace km {
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "modules/place_recognition/packed_bits.hpp"
-#include "runtime/dds/wire_sequence.hpp"
+#include "runtime/dds/codec.hpp"
 
 namespace km {
 namespace {

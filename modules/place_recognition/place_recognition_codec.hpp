@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/place_recognition/keyframe_bow.hpp"
+#include "modules/place_recognition/bag_of_words.hpp"
 #include "runtime/dds/codec.hpp"
 
 namespace km {

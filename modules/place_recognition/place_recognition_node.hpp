@@ -9,10 +9,9 @@
 
 #include "modules/core/keyframe.hpp"
 #include "modules/core/pose_graph.hpp"
+#include "modules/place_recognition/bag_of_words.hpp"
 #include "modules/place_recognition/candidate_filter.hpp"
-#include "modules/place_recognition/keyframe_bow.hpp"
 #include "modules/place_recognition/peer_history.hpp"
-#include "modules/place_recognition/place_query.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"

@@ -16,7 +16,7 @@ namespace km {
 //       20     4  N, nodes with the root
 //       24     4  W, words
 //       28     4  zero
-//       32     8  fingerprint of what follows and of k and L, see vocabulary_data.hpp
+//       32     8  fingerprint of what follows and of k and L, see vocabulary.hpp
 //       40     N  children per node
 //     40+N  32 (N-1)  centres of nodes 1 to N-1
 //       ...  4 W  idf per word, float

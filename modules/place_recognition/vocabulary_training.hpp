@@ -7,7 +7,7 @@
 
 #include "modules/core/config.hpp"
 #include "modules/core/keyframe.hpp"
-#include "modules/place_recognition/vocabulary_data.hpp"
+#include "modules/place_recognition/vocabulary.hpp"
 
 namespace km {
 

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "modules/pose_graph/team_message_bytes.hpp"
-#include "runtime/dds/wire_sequence.hpp"
+#include "runtime/dds/codec.hpp"
 
 namespace km {
 namespace {

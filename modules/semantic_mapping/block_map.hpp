@@ -1,15 +1,69 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <utility>
 #include <vector>
 
-#include "modules/semantic_mapping/voxel_block.hpp"
+#include "modules/core/ids.hpp"
+#include "modules/semantic_mapping/voxel_labels.hpp"
 
 namespace km {
+
+/// Side of a block in voxels.
+inline constexpr int kBlockSide = 8;
+inline constexpr std::size_t kBlockRows = 64;  ///< Rows along x.
+inline constexpr std::size_t kBlockVoxels = 512;
+
+/// Voxels nearer to a surface than this, in voxels, vote on labels and say what a keyframe saw;
+/// blocks are allocated so far around a surface. The vertices of the mesh lie between two such.
+inline constexpr float kNearVoxels = 2.0F;
+
+/// Place of a voxel in a block's arrays; x, y, z in [0, 8).
+inline constexpr std::size_t voxel_index(int x, int y, int z) {
+  return static_cast<std::size_t>(x + kBlockSide * (y + kBlockSide * z));
+}
+
+/// The mesh of the cells of one block: cell (x, y, z) has its lowest corner at voxel (x, y, z).
+struct BlockMesh {
+  static constexpr std::uint32_t kNone = 0xFFFFFFFF;
+
+  BlockMesh() { vertex_of_edge.fill(kNone); }
+
+  /// Vertex on the edge from a voxel to the next one along an axis, at 3 * voxel_index + axis.
+  std::array<std::uint32_t, 3 * kBlockVoxels> vertex_of_edge;
+  std::vector<std::array<std::uint32_t, 3>> faces;
+  std::vector<std::uint16_t> cell_of_face;  ///< voxel_index of the cell's lowest corner.
+};
+
+/// 8 x 8 x 8 voxels of the map. Voxel (x, y, z) samples the point
+/// (8 position + (x, y, z)) * voxel size of the odometry frame.
+struct VoxelBlock {
+  Eigen::Vector3i position = Eigen::Vector3i::Zero();  ///< [blocks]
+
+  /// Signed distance along the optical axis [m], positive in free space; of a voxel that was never
+  /// observed (weight 0), nothing.
+  std::array<float, kBlockVoxels> distance = {};
+  std::array<float, kBlockVoxels> weight = {};
+
+  /// Null until a labelled frame showed the block.
+  std::unique_ptr<std::array<VoxelLabels, kBlockVoxels>> labels;
+
+  /// Null until a face of the mesh has a vertex on one of the block's edges.
+  std::unique_ptr<BlockMesh> mesh;
+
+  /// Bit x of row y + 8 z: the voxel was seen near a surface since the block was last meshed.
+  std::array<std::uint8_t, kBlockRows> near_rows = {};
+
+  std::uint64_t selected_in = 0;    ///< Number of the last frame in which it was chosen.
+  KeyframeIndex last_seen = 0;      ///< When surface was last seen in it.
+  double last_seen_m = 0.0;         ///< Way of the camera until it was last chosen for surface.
+  KeyframeIndex changed_since = 0;  ///< Of the changes not yet meshed, the first.
+  bool changed = false;             ///< Since it was last meshed.
+};
 
 /// The blocks of a map, hashed by their position (open addressing, linear probing). References to
 /// blocks stay valid until they are erased. The order of blocks() follows from the calls alone.

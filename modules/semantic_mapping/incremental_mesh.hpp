@@ -5,8 +5,6 @@
 #include <vector>
 
 #include "modules/mesh/map_mesh.hpp"
-#include "modules/mesh/superseded_surface.hpp"
-#include "modules/semantic_mapping/block_cells.hpp"
 #include "modules/semantic_mapping/block_map.hpp"
 #include "modules/semantic_mapping/marching_cubes.hpp"
 #include "modules/semantic_mapping/voxel_labels.hpp"

@@ -1,9 +1,12 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
+
+#include "modules/semantic_mapping/block_map.hpp"
 
 namespace km {
 
@@ -36,6 +39,49 @@ class MarchingCubes {
  private:
   std::array<std::uint16_t, 257> first_ = {};
   std::vector<Triangle> triangles_;
+};
+
+/// The cells of one block with the values at their corners, which reach into the first layer of the
+/// blocks above along each axis.
+class BlockCells {
+ public:
+  /// Copies the values. Voxels of weight up to `min_weight` count as not observed. The blocks must
+  /// live as long as this.
+  BlockCells(VoxelBlock& block, BlockMap& map, float min_weight);
+
+  /// Cells of row (y, z), as bits by x, that the surface passes through: all corners observed, and
+  /// of both signs.
+  [[nodiscard]] unsigned crossed(int y, int z) const;
+
+  /// Bit c: corner c of the cell is negative (see MarchingCubes).
+  [[nodiscard]] unsigned negative_corners(int x, int y, int z) const;
+
+  /// Signed distance at a voxel, coordinates in [0, 8].
+  [[nodiscard]] float value(int x, int y, int z) const {
+    return values_[row_of(y, z)][static_cast<std::size_t>(x)];
+  }
+
+  /// The block that a voxel with coordinates in [0, 8] belongs to. Precondition: it was observed.
+  [[nodiscard]] VoxelBlock& block_of(int x, int y, int z) const {
+    return *blocks_[static_cast<std::size_t>((x >> 3) | (y >> 3) << 1 | (z >> 3) << 2)];
+  }
+
+  /// False if no cell is crossed, cheaply.
+  [[nodiscard]] bool any() const { return any_; }
+
+ private:
+  static constexpr int kSide = kBlockSide + 1;
+
+  [[nodiscard]] static std::size_t row_of(int y, int z) {
+    return static_cast<std::size_t>(y + kSide * z);
+  }
+  void copy_row(int y, int z, float min_weight);
+
+  std::array<VoxelBlock*, 8> blocks_ = {};  // by offset: x + 2 y + 4 z; null: none
+  std::array<std::array<float, kSide>, kSide * kSide> values_;
+  std::array<std::uint16_t, kSide* kSide> negative_ = {};  // bits by x
+  std::array<std::uint16_t, kSide* kSide> observed_ = {};
+  bool any_ = false;
 };
 
 }  // namespace km

@@ -9,7 +9,6 @@
 
 #include "modules/semantic_mapping/block_fusion.hpp"
 #include "modules/semantic_mapping/block_map.hpp"
-#include "modules/semantic_mapping/block_selection.hpp"
 #include "modules/semantic_mapping/depth_view.hpp"
 
 namespace km {

@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "runtime/background_thread.hpp"
 #include "runtime/log.hpp"
+#include "runtime/thread.hpp"
 
 namespace km {
 namespace {

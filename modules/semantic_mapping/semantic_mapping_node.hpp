@@ -5,7 +5,6 @@
 #include <string_view>
 
 #include "modules/core/dense_frame.hpp"
-#include "modules/semantic_mapping/mapping_progress.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "runtime/latest.hpp"
 #include "runtime/node.hpp"

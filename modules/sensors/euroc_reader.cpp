@@ -7,7 +7,7 @@
 #include <string>
 
 #include "modules/sensors/euroc_rig.hpp"
-#include "modules/sensors/ordered_rows.hpp"
+#include "modules/sensors/text_file.hpp"
 
 namespace km {
 namespace {

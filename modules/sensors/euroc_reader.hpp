@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "modules/sensors/dataset_reader.hpp"
-#include "modules/sensors/side_images.hpp"
-#include "modules/sensors/stereo_pairs.hpp"
+#include "modules/sensors/frame_files.hpp"
 
 namespace km {
 

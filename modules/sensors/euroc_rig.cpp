@@ -1,16 +1,134 @@
 #include "modules/sensors/euroc_rig.hpp"
 
+#include <yaml-cpp/yaml.h>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "modules/core/geometry.hpp"
+#include "modules/core/lie.hpp"
 #include "modules/sensors/dataset_reader.hpp"
-#include "modules/sensors/sensor_yaml.hpp"
+#include "modules/sensors/text_file.hpp"
 
 namespace km {
 namespace {
+
+constexpr double kMaxNonOrthonormality = 1e-3;
+
+std::optional<double> finite_number(const YAML::Node& node) {
+  double value = 0.0;
+  if (!YAML::convert<double>::decode(node, value) || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+// One sensor.yaml of a EuRoC/ASL folder. Every getter throws DatasetError with file and line for
+// what is missing or not what it should be.
+class SensorYaml {
+ public:
+  explicit SensorYaml(std::filesystem::path file) : file_(std::move(file)) {
+    std::string text = read_file(file_);
+    if (text.starts_with('%')) text.front() = '#';  // OpenCV's "%YAML:1.0" is not YAML
+    try {
+      root_ = YAML::Load(text);
+    } catch (const YAML::Exception& e) {
+      throw DatasetError(at_line(file_, e.mark.line + 1) + ": not YAML: " + e.msg);
+    }
+    if (!root_.IsMap()) throw DatasetError(file_.string() + ": no keys found");
+  }
+
+  [[nodiscard]] bool has(const char* key) const {
+    const YAML::Node node = root_[key];
+    return node && !node.IsNull();
+  }
+
+  [[nodiscard]] std::string word(const char* key) const {
+    const YAML::Node node = child(root_, key);
+    if (!node.IsScalar()) fail(node, std::string(key) + " is not a word");
+    return node.Scalar();
+  }
+
+  // nullopt for what is not a number, infinite or not-a-number.
+  [[nodiscard]] std::optional<double> number(const char* key) const {
+    return finite_number(child(root_, key));
+  }
+
+  // Positive and finite.
+  [[nodiscard]] double positive(const char* key) const {
+    const std::optional<double> value = number(key);
+    if (!value || *value <= 0.0) fail(key, std::string(key) + " is not a positive number");
+    return *value;
+  }
+
+  // The same, or `otherwise` without the key.
+  [[nodiscard]] double positive(const char* key, double otherwise) const {
+    return has(key) ? positive(key) : otherwise;
+  }
+
+  // `count` finite numbers. `meaning` is said where there are not as many.
+  [[nodiscard]] std::vector<double> numbers(const char* key, std::size_t count,
+                                            const char* meaning) const {
+    return numbers(child(root_, key), key, count, meaning);
+  }
+
+  // T_BS, its rotation made exact; see read_euroc_rig() for what is refused.
+  [[nodiscard]] SE3 extrinsics() const;
+
+  // Refuses the value of a key that exists.
+  [[noreturn]] void fail(const char* key, const std::string& problem) const {
+    fail(child(root_, key), problem);
+  }
+
+ private:
+  [[nodiscard]] YAML::Node child(const YAML::Node& map, const char* key) const {
+    const YAML::Node node = map.IsMap() ? map[key] : YAML::Node(YAML::NodeType::Undefined);
+    if (!node || node.IsNull()) throw DatasetError(file_.string() + ": key " + key + " is missing");
+    return node;
+  }
+
+  [[noreturn]] void fail(const YAML::Node& node, const std::string& problem) const {
+    throw DatasetError(at_line(file_, node.Mark().line + 1) + ": " + problem);
+  }
+
+  [[nodiscard]] std::vector<double> numbers(const YAML::Node& node, const std::string& key,
+                                            std::size_t count, const char* meaning) const {
+    if (!node.IsSequence()) fail(node, key + " is not a list of numbers");
+    if (node.size() != count)
+      fail(node, key + " has " + std::to_string(node.size()) + " numbers, expected " +
+                     std::to_string(count) + " (" + meaning + ')');
+    std::vector<double> values;
+    for (const YAML::Node& element : node) {
+      const std::optional<double> value = finite_number(element);
+      if (!value) fail(element, key + " holds something that is not a finite number");
+      values.push_back(*value);
+    }
+    return values;
+  }
+
+  std::filesystem::path file_;
+  YAML::Node root_;
+};
+
+SE3 SensorYaml::extrinsics() const {
+  const YAML::Node data = child(child(root_, "T_BS"), "data");
+  const std::vector<double> values = numbers(data, "T_BS", 16, "4x4, row by row");
+  const Eigen::Matrix4d T =
+      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
+  if (T.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) fail(data, "T_BS: last row is not 0 0 0 1");
+
+  const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
+  const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm();
+  if (error > kMaxNonOrthonormality)
+    fail(data, "T_BS is not a rotation: |R R^T - I| = " + std::to_string(error) + ", at most " +
+                   std::to_string(kMaxNonOrthonormality) + " is accepted");
+  if (R.determinant() < 0.0) fail(data, "T_BS is a reflection: det R = -1");
+  return make_pose(nearest_rotation(R), T.topRightCorner<3, 1>());
+}
 
 constexpr double kMinBaseline_m = 1e-3;
 constexpr double kDefaultDepthScale_m = 1e-3;

@@ -1,11 +1,67 @@
 #include "modules/sensors/image_file.hpp"
 
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <iterator>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
+#include <string_view>
 #include <utility>
-
-#include "modules/sensors/decoded_image.hpp"
+#include <vector>
 
 namespace km {
+namespace {
+
+std::vector<char> read_bytes(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::error_code ignored;  // a size that cannot be had reads as an empty file, which is refused
+  const auto size = std::filesystem::file_size(file, ignored);
+  std::vector<char> bytes(ignored ? 0 : size);
+  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(stream.gcount()));
+  return bytes;
+}
+
+// The marker must lie near the end: embedded thumbnails have one of their own.
+bool is_truncated(std::string_view bytes) {
+  const std::string_view tail =
+      bytes.substr(bytes.size() - std::min<std::size_t>(64, bytes.size()));
+  if (bytes.starts_with("\xFF\xD8")) return tail.find("\xFF\xD9") == tail.npos;
+  if (bytes.starts_with("\x89PNG")) return tail.find("IEND") == tail.npos;
+  return false;
+}
+
+LoadedImage<cv::Mat> failure(ImageStatus status, const std::filesystem::path& file,
+                             const std::string& why) {
+  return {status, file.string() + ": " + why, {}};
+}
+
+std::string text(const cv::Size& size) {
+  return std::to_string(size.width) + 'x' + std::to_string(size.height);
+}
+
+constexpr std::uint16_t kNoMeasurement = 65535;
+constexpr double kMaxStored_mm = 65535.0;
+
+// Ids of an image of BGR or BGRA pixels. Labels come in runs: one lookup for each.
+void map_colors(const cv::Mat& image, const LabelPalette& palette, LabelResult& result) {
+  const int channels = image.channels();
+  std::optional<std::array<std::uint8_t, 3>> last;
+  std::optional<LabelId> id;
+  for (int y = 0; y < image.rows; ++y) {
+    const std::uint8_t* bgr = image.ptr(y);
+    for (int x = 0; x < image.cols; ++x, bgr += channels) {
+      const std::array<std::uint8_t, 3> color = {bgr[2], bgr[1], bgr[0]};
+      if (color != last) id = palette.id_of(color);
+      last = color;
+      result.image.ids.push_back(id.value_or(0));
+      result.unknown_pixels += id ? 0 : 1;
+    }
+  }
+}
+
+}  // namespace
 
 ReaderFault fault_of(ImageStatus status) {
   switch (status) {
@@ -25,6 +81,75 @@ ImageResult load_gray_image(const std::filesystem::path& file, int width, int he
   if (loaded.status != ImageStatus::kOk) return failure_of<GrayImage>(std::move(loaded));
   const cv::Mat& decoded = loaded.image;
   return {ImageStatus::kOk, {}, {width, height, {decoded.datastart, decoded.dataend}}};
+}
+
+LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file, int flags,
+                                  const cv::Size& size) {
+  if (!std::filesystem::is_regular_file(file))
+    return failure(ImageStatus::kMissing, file, "no such image");
+  std::vector<char> bytes = read_bytes(file);
+  if (bytes.empty()) return failure(ImageStatus::kUnreadable, file, "empty or unreadable file");
+  if (is_truncated({bytes.data(), bytes.size()}))
+    return failure(ImageStatus::kUnreadable, file, "truncated image");
+
+  const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8UC1, bytes.data());
+  // IMREAD_UNCHANGED is -1, orientation included: a flag more would make it another mode.
+  const int mode = flags == cv::IMREAD_UNCHANGED
+                       ? flags
+                       : flags | static_cast<int>(cv::IMREAD_IGNORE_ORIENTATION);
+  cv::Mat decoded = cv::imdecode(encoded, mode);
+  if (decoded.empty())
+    return failure(ImageStatus::kUnreadable, file, "not an image that can be decoded");
+  if (decoded.size() != size)
+    return failure(ImageStatus::kWrongSize, file,
+                   text(decoded.size()) + " px, the calibration says " + text(size));
+  return {ImageStatus::kOk, {}, std::move(decoded)};
+}
+
+DepthResult load_depth_image(const std::filesystem::path& file, int width, int height,
+                             double scale_m, const DepthRange& range) {
+  LoadedImage<cv::Mat> loaded = decode_image(file, cv::IMREAD_UNCHANGED, {width, height});
+  if (loaded.status != ImageStatus::kOk) return failure_of<DepthImage>(std::move(loaded));
+  const cv::Mat& decoded = loaded.image;
+  if (decoded.type() != CV_16UC1)
+    return {ImageStatus::kWrongFormat,
+            file.string() + ": " + std::to_string(8 * decoded.elemSize1()) + " bits and " +
+                std::to_string(decoded.channels()) +
+                " channels, depth is an image of 16 bits and one channel",
+            {}};
+  DepthResult result;
+  result.image = {width, height, {decoded.begin<std::uint16_t>(), decoded.end<std::uint16_t>()}};
+  const double scale_mm = 1e3 * scale_m, min_mm = 1e3 * range.min_m;
+  const double max_mm = std::min(1e3 * range.max_m, kMaxStored_mm);
+  for (std::uint16_t& value : result.image.millimetres) {
+    const double depth_mm = scale_mm * value;
+    const bool measured =
+        value != 0 && value != kNoMeasurement && depth_mm >= min_mm && depth_mm <= max_mm;
+    value = measured ? static_cast<std::uint16_t>(depth_mm + 0.5) : std::uint16_t{0};
+  }
+  return result;
+}
+
+LabelResult load_label_image(const std::filesystem::path& file, int width, int height,
+                             const LabelPalette& palette) {
+  LoadedImage<cv::Mat> loaded = decode_image(file, cv::IMREAD_UNCHANGED, {width, height});
+  if (loaded.status != ImageStatus::kOk) return {failure_of<LabelImage>(std::move(loaded)), 0};
+  const cv::Mat& decoded = loaded.image;
+  LabelResult result;
+  result.image = {width, height, {}};
+  if (decoded.type() == CV_8UC1) {
+    result.image.ids.assign(decoded.begin<std::uint8_t>(), decoded.end<std::uint8_t>());
+    return result;
+  }
+  const bool is_color = decoded.type() == CV_8UC3 || decoded.type() == CV_8UC4;
+  const std::string problem = !is_color ? "labels are 8-bit ids or 8-bit colours"
+                              : palette.classes().empty()
+                                  ? "labels as colours, but no label_palette.csv to map them"
+                                  : "";
+  if (!problem.empty()) return {{ImageStatus::kWrongFormat, file.string() + ": " + problem, {}}, 0};
+  result.image.ids.reserve(decoded.total());
+  map_colors(decoded, palette, result);
+  return result;
 }
 
 }  // namespace km

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <opencv2/core.hpp>
 #include <string>
 
+#include "modules/core/camera.hpp"
 #include "modules/core/frame.hpp"
-#include "modules/sensors/reader_report.hpp"
+#include "modules/core/label_palette.hpp"
+#include "modules/sensors/dataset_reader.hpp"
 
 namespace km {
 
@@ -26,5 +30,32 @@ using ImageResult = LoadedImage<GrayImage>;
 /// PNG and JPEG files without their end marker count as unreadable: decoders fill what is missing
 /// of a truncated JPEG with grey and report success.
 [[nodiscard]] ImageResult load_gray_image(const std::filesystem::path& file, int width, int height);
+
+/// Any image file as OpenCV decodes it with the cv::ImreadModes `flags`; its orientation tag is
+/// ignored. Never kWrongFormat.
+[[nodiscard]] LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file, int flags,
+                                                const cv::Size& size);
+
+/// What decode_image() said, for an image of another type.
+template <typename Image>
+[[nodiscard]] LoadedImage<Image> failure_of(LoadedImage<cv::Mat> decoded) {
+  return {decoded.status, std::move(decoded.problem), {}};
+}
+
+using DepthResult = LoadedImage<DepthImage>;
+
+/// Reads a 16-bit image of one channel whose values are depths in units of `scale_m` [m]. No depth:
+/// 0, 65535 (what many sensors write), and what lies outside `range` or beyond 65.535 m.
+[[nodiscard]] DepthResult load_depth_image(const std::filesystem::path& file, int width, int height,
+                                           double scale_m, const DepthRange& range);
+
+struct LabelResult : LoadedImage<LabelImage> {
+  std::size_t unknown_pixels = 0;  ///< Of a colour that the palette does not have: id 0.
+};
+
+/// Reads a label image: 8 bits of one channel are ids; of three or four channels colours, mapped to
+/// ids by `palette` (Kimera-Semantics' format), transparency ignored.
+[[nodiscard]] LabelResult load_label_image(const std::filesystem::path& file, int width, int height,
+                                           const LabelPalette& palette);
 
 }  // namespace km

@@ -7,9 +7,10 @@
 #include <string_view>
 #include <thread>
 #include <variant>
+#include <vector>
 
+#include "modules/core/frame.hpp"
 #include "modules/sensors/dataset_reader.hpp"
-#include "modules/sensors/lag_filter.hpp"
 #include "modules/sensors/sensors_config.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/metrics.hpp"
@@ -18,6 +19,23 @@
 #include "runtime/worker.hpp"
 
 namespace km {
+
+/// Gives up the images of packets that come too late, as a camera would overwrite them, and keeps
+/// their inertial samples.
+class LagFilter {
+ public:
+  /// Throws std::invalid_argument unless max_lag_s >= 0.
+  explicit LagFilter(double max_lag_s);
+
+  /// What to publish of a packet that is `lag_s` late: the packet, with the samples of those given
+  /// up before it in front of its own; or null if it is given up itself.
+  [[nodiscard]] std::shared_ptr<const SensorPacket> take(
+      const std::shared_ptr<const SensorPacket>& packet, double lag_s);
+
+ private:
+  double max_lag_s_;
+  std::vector<ImuSample> held_back_;  // of the packets given up since the last one taken
+};
 
 /// The recording is over; published once, after its last packet. Not published by a stop before.
 struct SensorsEnd {

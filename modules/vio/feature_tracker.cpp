@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/video/tracking.hpp>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "modules/core/depth_lookup.hpp"
-#include "modules/vio/klt.hpp"
-#include "modules/vio/local_warp.hpp"
+#include "modules/vio/feature_detector.hpp"
+#include "modules/vio/patches.hpp"
+#include "modules/vio/track_motion.hpp"
 
 namespace km {
 namespace {
@@ -16,6 +19,48 @@ constexpr float kMinCorrelation = 0.85F;   // Of a track with the patch it began
 constexpr float kMaxCorrectionPx = 2.0F;   // By which the patch may correct KLT.
 constexpr int kSearchEvery = 4;            // Images, for features that stereo has not found.
 constexpr double kMaxInverseDepth = 20.0;  // [1/m]; a carried depth beyond is no use.
+constexpr float kMinSpacing = 0.4F;  // Of min_distance_px: tracks may come nearer than corners.
+
+std::vector<cv::Point2f> to_cv(std::span<const Eigen::Vector2f> points) {
+  std::vector<cv::Point2f> result;
+  result.reserve(points.size());
+  for (const Eigen::Vector2f& p : points) result.emplace_back(p.x(), p.y());
+  return result;
+}
+
+// Where points were found in another image.
+struct KltResult {
+  std::vector<Eigen::Vector2f> px;  // One for each point; without meaning where not found.
+  std::vector<bool> found;          // Converged inside the image.
+};
+
+// Pyramidal Lucas-Kanade tracking of the windows around `points` of `from` in `to`, started at
+// `starts` (Bouguet, "Pyramidal Implementation of the Lucas Kanade Feature Tracker", 2001).
+// `levels`: coarsest pyramid level used. `from` needs derivatives.
+KltResult track_klt(const ImagePyramid& from, const ImagePyramid& to,
+                    std::span<const Eigen::Vector2f> points,
+                    std::span<const Eigen::Vector2f> starts, int window_px, int levels) {
+  KltResult result;
+  if (points.empty()) return result;
+  std::vector<cv::Point2f> there = to_cv(starts);
+  std::vector<unsigned char> status;
+  constexpr int kMaxSteps = 8;
+  constexpr double kStopPx = 0.05;         // AlignmentPatch does the rest.
+  constexpr double kMinEigenvalue = 1e-4;  // As OpenCV scales it: rejects flat windows.
+  const cv::TermCriteria stop(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kMaxSteps, kStopPx);
+  cv::calcOpticalFlowPyrLK(from.maps(), to.maps(), to_cv(points), there, status, cv::noArray(),
+                           cv::Size(window_px, window_px), levels, stop,
+                           cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
+  const cv::Size size = to.level(0).size();
+  for (std::size_t i = 0; i < there.size(); ++i) {
+    const bool inside = there[i].x >= 0.0F && there[i].y >= 0.0F &&
+                        there[i].x <= static_cast<float>(size.width - 1) &&
+                        there[i].y <= static_cast<float>(size.height - 1);
+    result.px.emplace_back(there[i].x, there[i].y);
+    result.found.push_back(status[i] != 0 && inside);
+  }
+  return result;
+}
 
 void check_rig(const StereoRig& rig) {
   for (const PinholeCamera& camera : rig.cameras) {
@@ -252,6 +297,69 @@ TrackedFrame FeatureTracker::output() const {
     result.features.push_back({track.id, track.left, track.right, track.length});
   }
   return result;
+}
+
+void FeatureTracker::drop_crowded(std::vector<Step>& steps) {
+  const float spacing = kMinSpacing * static_cast<float>(config_.min_distance_px);
+  DistanceGrid grid(cv::Size(rig_.cameras[0].width, rig_.cameras[0].height), spacing);
+  statistics_.crowded += static_cast<int>(std::erase_if(steps, [&grid](const Step& step) {
+    if (!grid.is_free(step.now.px)) return true;  // The older of two came first.
+    grid.add(step.now.px);
+    return false;
+  }));
+}
+
+std::optional<SE3> FeatureTracker::drop_outliers(std::vector<Step>& steps, const SE3& guess) {
+  std::vector<DepthPair> pairs;
+  for (const Step& step : steps) {
+    if (step.depth_before) pairs.push_back(step.depth_pair());
+  }
+  constexpr double kNoisePx = 1.0;
+  const std::optional<SE3> motion = estimate_motion(pairs, guess, kNoisePx / focal_px_, rng_);
+  if (motion) {
+    drop_by_motion(steps, *motion);
+  } else {
+    drop_by_two_points(steps, guess);
+  }
+  return motion;
+}
+
+void FeatureTracker::drop_by_motion(std::vector<Step>& steps, const SE3& T_previous_current) {
+  const double threshold = config_.max_reprojection_px / focal_px_;
+  const auto disagrees = [&](Step& step) {
+    if (step.depth_before) {
+      const DepthPair pair = step.depth_pair();
+      if (reprojection_distance(pair, T_previous_current) < threshold) {
+        step.now.inverse_depth = pair.inverse_depth / transfer(pair, T_previous_current).z();
+        return false;
+      }
+    }
+    // Without a depth, or with a wrong one, the landmark still lies on its epipolar line.
+    return epipolar_distance({step.left_before, step.now.left}, T_previous_current.linear(),
+                             T_previous_current.translation()) >= threshold;
+  };
+  std::vector<Step> kept;
+  for (Step& step : steps) {
+    if (!disagrees(step)) kept.push_back(std::move(step));
+  }
+  statistics_.motion = static_cast<int>(steps.size() - kept.size());
+  steps = std::move(kept);
+}
+
+void FeatureTracker::drop_by_two_points(std::vector<Step>& steps, const SE3& guess) {
+  std::vector<BearingPair> pairs;
+  for (const Step& step : steps) pairs.push_back({step.left_before, step.now.left});
+  // Looser: here the rotation is the gyroscope's, whose bias alone may be worth two pixels.
+  const double threshold = 2.0 * config_.max_reprojection_px / focal_px_;
+  const TwoPointResult result = two_point_ransac(pairs, guess.linear(), threshold, rng_);
+  std::vector<Step> kept;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    if (!result.inlier[i]) continue;
+    steps[i].now.inverse_depth = steps[i].depth_before;
+    kept.push_back(std::move(steps[i]));
+  }
+  statistics_.motion = static_cast<int>(steps.size() - kept.size());
+  steps = std::move(kept);
 }
 
 }  // namespace km

@@ -9,12 +9,11 @@
 
 #include "modules/core/camera.hpp"
 #include "modules/core/frame.hpp"
-#include "modules/vio/depth_matcher.hpp"
 #include "modules/vio/feature_detector.hpp"
 #include "modules/vio/image_pyramid.hpp"
-#include "modules/vio/patch_alignment.hpp"
+#include "modules/vio/patches.hpp"
 #include "modules/vio/stereo_matcher.hpp"
-#include "modules/vio/stereo_motion.hpp"
+#include "modules/vio/track_motion.hpp"
 #include "modules/vio/tracked_frame.hpp"
 #include "modules/vio/tracker_config.hpp"
 

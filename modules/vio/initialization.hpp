@@ -37,7 +37,7 @@ inline constexpr std::size_t kMinStartImages = 5;
 /// Where the body is and how it moves, from images and inertial samples alone.
 ///
 /// At rest, when the images AND both inertial sensors say so: upright by the mean accelerometer,
-/// gyro bias its mean, no velocity. Else metric motion from stereo (stereo_odometry()), after which
+/// gyro bias its mean, no velocity. Else metric motion from stereo, after which
 /// gyro bias, then velocities, gravity and accelerometer bias follow linearly from the
 /// preintegrated samples, as in VINS-Mono (Qin et al., TRO 2018, Sec. V-B), the scale being known
 /// from stereo; gravity has the length of `config`, the accelerometer bias a prior of

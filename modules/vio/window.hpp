@@ -7,9 +7,8 @@
 
 #include "modules/core/frame.hpp"
 #include "modules/core/odometry.hpp"
-#include "modules/vio/imu_factor.hpp"
 #include "modules/vio/marginalization.hpp"
-#include "modules/vio/reprojection.hpp"
+#include "modules/vio/residuals.hpp"
 #include "modules/vio/tracked_frame.hpp"
 
 namespace km {
@@ -58,5 +57,11 @@ void observe(Window& window, const TrackedFrame& tracked);
 
 /// True if the landmark was seen in the last frame.
 [[nodiscard]] bool tracked_now(const Window& window, const WindowLandmark& landmark);
+
+/// Sets landmark.p_odom and `located` from its observations and the window's poses: the point
+/// nearest to all rays, refined on the reprojection errors (Gauss-Newton). It stays unlocated if
+/// it comes to lie behind a camera, if an error exceeds `max_error` [standard deviations, root mean
+/// square], or if its distance along the last ray is uncertain by more than a third.
+void locate(const Window& window, double max_error, WindowLandmark& landmark);
 
 }  // namespace km

@@ -1,13 +1,31 @@
 #include "modules/vio/window_optimizer.hpp"
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
-#include "modules/vio/window_equations.hpp"
+#include "modules/core/lie.hpp"
 
 namespace km {
 namespace {
+
+// Cauchy loss rho(s) = c^2 log(1 + s / c^2) of a squared error s; its derivative is the weight.
+double cauchy(double s, double c) {
+  return c * c * std::log1p(s / (c * c));
+}
+double cauchy_weight(double s, double c) {
+  return 1.0 / (1.0 + s / (c * c));
+}
+
+std::vector<const OdometryState*> prior_states(const Window& window) {
+  std::vector<const OdometryState*> states;
+  for (const std::uint64_t id : window.prior.frames)
+    states.push_back(&window.frames[frame_index(window, id)].state);
+  return states;
+}
 
 constexpr double kInitialDamping = 1e-6;
 constexpr double kMaxDamping = 1e3;
@@ -28,7 +46,221 @@ struct Snapshot {
   }
 };
 
+bool seen_by_oldest(const WindowLandmark& landmark) {
+  return landmark.located && landmark.observations.front().frame == 0;
+}
+
+// The frames that the marginalisation of the oldest concerns, it included.
+std::vector<std::size_t> concerned_frames(const Window& window) {
+  std::vector<bool> concerned(window.frames.size(), false);
+  concerned[0] = concerned[1] = true;
+  for (const std::uint64_t id : window.prior.frames) concerned[frame_index(window, id)] = true;
+  for (const WindowLandmark& landmark : window.landmarks) {
+    if (!seen_by_oldest(landmark)) continue;
+    for (const WindowObservation& o : landmark.observations)
+      if (window.frames[o.frame].keyframe) concerned[o.frame] = true;
+  }
+  std::vector<std::size_t> frames;
+  for (std::size_t k = 0; k < concerned.size(); ++k)
+    if (concerned[k]) frames.push_back(k);
+  return frames;
+}
+
+// The prior that the oldest frame leaves.
+StatePrior prior_after_oldest(const Window& window) {
+  WindowEquations equations(window, 0.0);
+  equations.add_prior();
+  equations.add_imu(1);
+  for (const WindowLandmark& landmark : window.landmarks)
+    if (seen_by_oldest(landmark)) equations.add_landmark(landmark, true);
+
+  const std::vector<FirstEstimate> held = first_estimates(window);
+  std::vector<Eigen::Index> variables;
+  std::vector<const OdometryState*> states;
+  StatePrior prior;
+  for (const std::size_t k : concerned_frames(window)) {
+    for (Eigen::Index v = 0; v < (k <= 1 ? 15 : 6); ++v)
+      variables.push_back(15 * static_cast<Eigen::Index>(k) + v);
+    if (k == 0) continue;
+    const WindowFrame& frame = window.frames[k];
+    states.push_back(&frame.state);
+    prior.frames.push_back(frame.id);
+    prior.linearization.push_back(held[k].applied_to(frame.state));
+  }
+  const Eigen::MatrixXd full = equations.H().selfadjointView<Eigen::Lower>();
+  const SquareRootPrior root =
+      marginalize(full(variables, variables), equations.g()(variables), 15);
+  prior.J = root.J;
+  // The gradient was taken at the current states; the prior counts from the first estimates.
+  prior.r = root.r - root.J * prior_offset(prior, states);
+  return prior;
+}
+
 }  // namespace
+
+WindowEquations::WindowEquations(const Window& window, double damping)
+    : window_(window), damping_(damping) {
+  const std::vector<FirstEstimate> held = first_estimates(window);
+  for (std::size_t k = 0; k < held.size(); ++k)
+    linearization_.push_back(held[k].applied_to(window.frames[k].state));
+  const auto n = 15 * static_cast<Eigen::Index>(window.frames.size());
+  H_.setZero(n, n);
+  g_.setZero(n);
+  couplings_.reserve(8 * window.landmarks.size());
+  eliminated_.reserve(window.landmarks.size());
+}
+
+void WindowEquations::add_prior() {
+  const StatePrior& prior = window_.prior;
+  if (prior.frames.empty()) return;
+  const Eigen::VectorXd r = prior.J * prior_offset(prior, prior_states(window_)) + prior.r;
+  cost_ += 0.5 * r.squaredNorm();
+  const Eigen::MatrixXd H = prior.J.transpose() * prior.J;
+  const Eigen::VectorXd g = prior.J.transpose() * r;
+  struct Span {
+    Eigen::Index from, to, size;
+  };
+  std::vector<Span> spans;
+  for (std::size_t k = 0; k < prior.frames.size(); ++k)
+    spans.push_back({k == 0 ? 0 : 9 + 6 * static_cast<Eigen::Index>(k),
+                     15 * static_cast<Eigen::Index>(frame_index(window_, prior.frames[k])),
+                     k == 0 ? 15 : 6});
+  for (const Span& row : spans) {
+    g_.segment(row.to, row.size) += g.segment(row.from, row.size);
+    for (const Span& col : spans)
+      if (col.from <= row.from)
+        H_.block(row.to, col.to, row.size, col.size) +=
+            H.block(row.from, col.from, row.size, col.size);
+  }
+}
+
+void WindowEquations::add_imu(std::size_t frame) {
+  const WindowFrame& i = window_.frames[frame - 1];
+  const WindowFrame& j = window_.frames[frame];
+  const ImuTerm term =
+      j.imu->linearize(i.state, j.state, linearization_[frame - 1], linearization_[frame]);
+  const auto a = 15 * static_cast<Eigen::Index>(frame - 1);
+  const auto b = a + 15;
+  cost_ += 0.5 * term.r.squaredNorm();
+  H_.block<15, 15>(a, a).noalias() += term.J_i.transpose() * term.J_i;
+  H_.block<15, 15>(b, a).noalias() += term.J_j.transpose() * term.J_i;
+  H_.block<15, 15>(b, b).noalias() += term.J_j.transpose() * term.J_j;
+  g_.segment<15>(a).noalias() += term.J_i.transpose() * term.r;
+  g_.segment<15>(b).noalias() += term.J_j.transpose() * term.r;
+}
+
+void WindowEquations::add_landmark(const WindowLandmark& landmark, bool keyframes_only) {
+  if (!landmark.located) return;
+  const auto counts = [&](const WindowObservation& o) {
+    return !keyframes_only || window_.frames[o.frame].keyframe;
+  };
+  if (std::count_if(landmark.observations.begin(), landmark.observations.end(), counts) < 2) return;
+  Eigen::Matrix3d V = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  const std::size_t first = couplings_.size();
+  ReprojectionTerm term;
+  for (const WindowObservation& o : landmark.observations) {
+    if (!counts(o)) continue;
+    const SE3& T = window_.frames[o.frame].state.T_odom_body;
+    const SE3& T_linearization = linearization_[o.frame].T_odom_body;
+    const auto at = 15 * static_cast<Eigen::Index>(o.frame);
+    Coupling coupling{o.frame, Eigen::Matrix<double, 6, 3>::Zero(),
+                      Eigen::Matrix<double, 6, 3>::Zero()};
+    Matrix6 A = Matrix6::Zero();
+    Vector6 a = Vector6::Zero();
+    for (std::size_t c = 0; c < 2; ++c) {
+      if (!o.bearings[c] || !linearize_reprojection(window_.views[c], *o.bearings[c], T,
+                                                    T_linearization, landmark.p_odom, term))
+        continue;
+      const double s = term.r.squaredNorm();
+      const double w = cauchy_weight(s, window_.loss_scale);
+      cost_ += 0.5 * cauchy(s, window_.loss_scale);
+      const Eigen::Matrix<double, 6, 2> wJ_T = w * term.J_pose.transpose();
+      A.noalias() += wJ_T * term.J_pose;
+      a.noalias() += wJ_T * term.r;
+      coupling.W.noalias() += wJ_T * term.J_point;
+      V.noalias() += w * term.J_point.transpose() * term.J_point;
+      b.noalias() += w * term.J_point.transpose() * term.r;
+    }
+    H_.block<6, 6>(at, at) += A;
+    g_.segment<6>(at) += a;
+    couplings_.push_back(coupling);
+  }
+  V.diagonal() *= 1.0 + damping_;
+  V.diagonal().array() += 1e-9;  // a landmark at infinity keeps its distance
+  const Eigen::Matrix3d V_inverse = V.inverse();
+  const Eigen::Vector3d step = V_inverse * b;
+  for (std::size_t k = first; k < couplings_.size(); ++k) {
+    Coupling& row = couplings_[k];
+    row.Y.noalias() = row.W * V_inverse;
+    const auto at = 15 * static_cast<Eigen::Index>(row.frame);
+    g_.segment<6>(at).noalias() -= row.W * step;
+    for (std::size_t m = first; m <= k; ++m)
+      H_.block<6, 6>(at, 15 * static_cast<Eigen::Index>(couplings_[m].frame)).noalias() -=
+          row.Y * couplings_[m].W.transpose();
+  }
+  eliminated_.push_back({static_cast<std::size_t>(&landmark - window_.landmarks.data()), step,
+                         first, couplings_.size() - first});
+}
+
+void WindowEquations::add_all() {
+  add_prior();
+  for (std::size_t k = 1; k < window_.frames.size(); ++k)
+    if (window_.frames[k].imu) add_imu(k);
+  for (const WindowLandmark& landmark : window_.landmarks) add_landmark(landmark);
+}
+
+Eigen::VectorXd WindowEquations::solve() const {
+  Eigen::MatrixXd damped = H_;
+  damped.diagonal() *= 1.0 + damping_;
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(damped);
+  if (llt.info() != Eigen::Success) return {};
+  return llt.solve(-g_);
+}
+
+void WindowEquations::apply(const Eigen::VectorXd& dx, Window& target) const {
+  for (const Eliminated& e : eliminated_) {
+    Eigen::Vector3d step = e.step;
+    for (std::size_t k = e.first; k < e.first + e.count; ++k)
+      step.noalias() += couplings_[k].Y.transpose() *
+                        dx.segment<6>(15 * static_cast<Eigen::Index>(couplings_[k].frame));
+    target.landmarks[e.landmark].p_odom -= step;
+  }
+  for (std::size_t k = 0; k < target.frames.size(); ++k) {
+    const auto at = 15 * static_cast<Eigen::Index>(k);
+    OdometryState& state = target.frames[k].state;
+    state.T_odom_body = retract(state.T_odom_body, dx.segment<6>(at));
+    state.v_odom += dx.segment<3>(at + 6);
+    state.gyro_bias += dx.segment<3>(at + 9);
+    state.accel_bias += dx.segment<3>(at + 12);
+  }
+}
+
+double window_cost(const Window& window) {
+  double cost = 0.0;
+  if (!window.prior.frames.empty()) {
+    const auto dx = prior_offset(window.prior, prior_states(window));
+    cost += 0.5 * (window.prior.J * dx + window.prior.r).squaredNorm();
+  }
+  for (std::size_t k = 1; k < window.frames.size(); ++k)
+    if (window.frames[k].imu)
+      cost += 0.5 * window.frames[k]
+                        .imu->error(window.frames[k - 1].state, window.frames[k].state)
+                        .squaredNorm();
+  Eigen::Vector2d r;
+  for (const WindowLandmark& landmark : window.landmarks) {
+    if (!landmark.located || landmark.observations.size() < 2) continue;
+    for (const WindowObservation& o : landmark.observations)
+      for (std::size_t c = 0; c < 2; ++c) {
+        if (!o.bearings[c]) continue;
+        if (!reprojection_error(window.views[c], *o.bearings[c],
+                                window.frames[o.frame].state.T_odom_body, landmark.p_odom, r))
+          return std::numeric_limits<double>::infinity();
+        cost += 0.5 * cauchy(r.squaredNorm(), window.loss_scale);
+      }
+  }
+  return cost;
+}
 
 WindowSolution optimize(Window& window, int max_iterations) {
   WindowSolution result;
@@ -53,6 +285,28 @@ WindowSolution optimize(Window& window, int max_iterations) {
   }
   result.usable = std::isfinite(result.final_cost);
   return result;
+}
+
+void forget_frame(Window& window, std::size_t frame) {
+  window.frames.erase(window.frames.begin() + static_cast<std::ptrdiff_t>(frame));
+  for (WindowLandmark& landmark : window.landmarks) {
+    std::erase_if(landmark.observations, [&](const auto& o) { return o.frame == frame; });
+    for (WindowObservation& o : landmark.observations) o.frame -= o.frame > frame;
+  }
+  std::erase_if(window.landmarks, [](const auto& l) { return l.observations.empty(); });
+}
+
+void marginalize_oldest(Window& window) {
+  window.frames[1].keyframe = true;  // in the prior: it can only leave by marginalisation
+  window.prior = prior_after_oldest(window);
+  for (WindowLandmark& landmark : window.landmarks) {
+    if (!seen_by_oldest(landmark)) continue;
+    std::erase_if(landmark.observations,  // what the prior has used must not count again
+                  [&](const auto& o) { return window.frames[o.frame].keyframe; });
+    landmark.located = false;
+  }
+  std::erase_if(window.landmarks, [](const auto& l) { return l.observations.empty(); });
+  forget_frame(window, 0);
 }
 
 }  // namespace km

@@ -6,7 +6,7 @@
 
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
-#include "runtime/thread_name.hpp"
+#include "runtime/thread.hpp"
 
 namespace km {
 namespace {

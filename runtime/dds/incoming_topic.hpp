@@ -1,7 +1,8 @@
 #pragma once
 
 #include <dds/ddsi/ddsi_serdata.h>
-
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
@@ -11,9 +12,30 @@
 #include <vector>
 
 #include "runtime/dds/outgoing_topic.hpp"
-#include "runtime/dds/sequence_tracker.hpp"
 
 namespace km {
+
+/// Which numbers of a counted stream have arrived, in whatever order: drops duplicates, counts
+/// gaps. Memory is bounded: of more than kMaxIntervals separate runs, the oldest are joined, and
+/// what lay between them stays missing for good.
+class SequenceTracker {
+ public:
+  static constexpr std::size_t kMaxIntervals = 1024;
+
+  /// `from_zero`: the stream is expected whole, else from the lowest number that arrives.
+  explicit SequenceTracker(bool from_zero) : from_zero_(from_zero) {}
+
+  /// Records `number`. False if it had arrived before.
+  [[nodiscard]] bool is_new(std::uint32_t number);
+
+  /// How many numbers below the highest have not arrived (yet).
+  [[nodiscard]] std::uint64_t missing() const;
+
+ private:
+  bool from_zero_;
+  std::uint64_t lost_ = 0;                             // given up in joined runs
+  std::map<std::uint64_t, std::uint64_t> end_of_run_;  // begin -> end, half open, disjoint
+};
 
 /// The receiving end of a topic. Everything that arrives is untrusted: what is not from an
 /// accepted peer, not new, or not decodable is counted by reason, logged at a limited rate, and

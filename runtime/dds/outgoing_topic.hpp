@@ -14,7 +14,7 @@
 #include "runtime/dds/entity.hpp"
 #include "runtime/dds/participant.hpp"
 #include "runtime/dds/peers.hpp"
-#include "runtime/dds/topic_kind.hpp"
+#include "runtime/dds/qos.hpp"
 #include "runtime/dds/traffic.hpp"
 
 namespace km {

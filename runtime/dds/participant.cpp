@@ -1,13 +1,104 @@
 #include "runtime/dds/participant.hpp"
 
+#include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netdb.h>
+#include <sys/socket.h>
 #include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <memory>
+#include <sstream>
 #include <string_view>
+#include <system_error>
 
-#include "runtime/dds/cyclone_xml.hpp"
+#include "modules/core/config.hpp"
+#include "modules/core/xml_text.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
 namespace {
+
+// Empty if the host is known.
+std::string why_unknown(const std::string& host) {
+  const std::size_t colon = host.find(':');
+  const std::string name = host.substr(0, colon);
+  const std::string port = colon != host.npos ? host.substr(colon + 1) : "0";
+  addrinfo hints{};
+  hints.ai_family = AF_INET;
+  hints.ai_socktype = SOCK_DGRAM;
+  hints.ai_flags = AI_NUMERICSERV;
+  addrinfo* found = nullptr;
+  const int error = getaddrinfo(name.c_str(), port.c_str(), &hints, &found);
+  if (error != 0) return gai_strerror(error);
+  freeaddrinfo(found);
+  return {};
+}
+
+std::string milliseconds(double seconds) {
+  return std::to_string(std::llround(seconds * 1e3)) + "ms";
+}
+
+void write_general(std::ostream& xml, const DdsConfig& config, const NetworkInterface& interface) {
+  const bool multicast = config.discovery == Discovery::kMulticast;
+  xml << "<General><Interfaces><NetworkInterface name='" << xml_escaped(interface.name) << '\'';
+  // Linux does not flag loopback as capable of multicast, yet it is.
+  if (multicast && interface.loopback) xml << " multicast='true'";
+  // Data goes by unicast: on radio, multicast runs at the base rate and without acknowledgement.
+  xml << "/></Interfaces><AllowMulticast>" << (multicast ? "spdp" : "false")
+      << "</AllowMulticast><MaxMessageSize>" << config.max_message_bytes
+      << "B</MaxMessageSize><FragmentSize>" << config.fragment_bytes
+      << "B</FragmentSize></General>";
+}
+
+// Where the discovery of the robots 0, 1, ... of a host listens: the port mapping of RTPS with its
+// default parameters.
+int discovery_port(int domain, int index) {
+  return 7400 + 250 * domain + 10 + 2 * index;
+}
+
+// Robots on this host cost nothing on the network: the whole range is asked. Elsewhere each port
+// that is asked is a packet on the air.
+void write_peers(std::ostream& xml, const DdsConfig& config, const std::string& own_address) {
+  xml << "<Peers><Peer address='" << own_address << "'/>";
+  for (const std::string& peer : config.peers) {
+    if (peer == own_address) continue;
+    if (peer.find(':') != std::string::npos) {
+      xml << "<Peer address='" << xml_escaped(peer) << "'/>";
+      continue;
+    }
+    for (int i = 0; i < config.robots_per_peer; ++i)
+      xml << "<Peer address='" << xml_escaped(peer) << ':' << discovery_port(config.domain, i)
+          << "'/>";
+  }
+  xml << "</Peers>";
+}
+
+void write_discovery(std::ostream& xml, const DdsConfig& config,
+                     const NetworkInterface& interface) {
+  const bool by_address = config.discovery == Discovery::kPeers || !config.peers.empty();
+  // Fixed ports are needed where robots are found by address, and only there: without them any
+  // number of robots fits on one host.
+  xml << "<Discovery><ParticipantIndex>" << (by_address ? "auto" : "none")
+      << "</ParticipantIndex><MaxAutoParticipantIndex>" << config.max_participant_index
+      << "</MaxAutoParticipantIndex><LeaseDuration>" << milliseconds(config.lease_s)
+      << "</LeaseDuration><SPDPInterval>" << milliseconds(config.spdp_interval_s)
+      << "</SPDPInterval><Tag>" << xml_escaped(config.team) << "</Tag>";
+  if (by_address) write_peers(xml, config, interface.address);
+  xml << "</Discovery>";
+}
+
+void write_internal(std::ostream& xml, const DdsConfig& config) {
+  xml << "<Internal><SocketReceiveBufferSize max='" << config.receive_buffer_bytes
+      << "B'/><BurstSize><MaxRexmit>" << config.max_rexmit_bytes << "B</MaxRexmit>";
+  if (config.max_init_transmit_percent >= 0)
+    xml << "<MaxInitTransmit>" << config.max_init_transmit_percent << "</MaxInitTransmit>";
+  xml << "</BurstSize><NackDelay>" << milliseconds(config.nack_delay_ms * 1e-3) << "</NackDelay>"
+      << "<Watermarks><WhcHigh>64MB</WhcHigh><WhcHighInit>64MB</WhcHighInit>"
+         "<WhcAdaptive>false</WhcAdaptive></Watermarks></Internal>";
+}
 
 // DDS reports trouble with the network here, from its own threads.
 void log_line(void* /*argument*/, const dds_log_data_t* data) {
@@ -38,6 +129,63 @@ dds_entity_t create_participant(const DdsConfig& config, const RobotIdentity& id
 }
 
 }  // namespace
+
+std::vector<NetworkInterface> network_interfaces() {
+  ifaddrs* first = nullptr;
+  if (getifaddrs(&first) != 0)
+    throw std::system_error(errno, std::generic_category(), "cannot list the network interfaces");
+  const std::unique_ptr<ifaddrs, decltype(&freeifaddrs)> owner(first, &freeifaddrs);
+
+  std::vector<NetworkInterface> interfaces;
+  for (const ifaddrs* entry = first; entry != nullptr; entry = entry->ifa_next) {
+    if (entry->ifa_addr == nullptr || entry->ifa_addr->sa_family != AF_INET) continue;
+    if ((entry->ifa_flags & IFF_UP) == 0) continue;
+    const auto* address = reinterpret_cast<const sockaddr_in*>(entry->ifa_addr);
+    std::array<char, INET_ADDRSTRLEN> text{};
+    inet_ntop(AF_INET, &address->sin_addr, text.data(), text.size());
+    interfaces.push_back({.name = entry->ifa_name,
+                          .address = text.data(),
+                          .multicast = (entry->ifa_flags & IFF_MULTICAST) != 0,
+                          .loopback = (entry->ifa_flags & IFF_LOOPBACK) != 0});
+  }
+  return interfaces;
+}
+
+NetworkInterface select_interface(const std::vector<NetworkInterface>& interfaces,
+                                  const std::string& name) {
+  const auto rank = [](const NetworkInterface& i) { return i.loopback ? 0 : i.multicast ? 2 : 1; };
+  const NetworkInterface* best = nullptr;
+  for (const NetworkInterface& candidate : interfaces) {
+    if (!name.empty() && candidate.name != name) continue;
+    if (best == nullptr || rank(candidate) > rank(*best)) best = &candidate;
+  }
+  if (best != nullptr) return *best;
+
+  std::string known;
+  for (const NetworkInterface& i : interfaces)
+    known += (known.empty() ? "" : ", ") + i.name + " (" + i.address + ")";
+  throw ConfigError(
+      "dds.interface = " + (name.empty() ? "(any)" : name) +
+      ": no such IPv4 interface is up; those up: " + (known.empty() ? "none" : known));
+}
+
+void check_hosts(const std::vector<std::string>& hosts) {
+  std::string problems;
+  for (const std::string& host : hosts)
+    if (const std::string why = why_unknown(host); !why.empty())
+      problems += (problems.empty() ? "" : "; ") + host + ": " + why;
+  if (!problems.empty()) throw ConfigError("dds.peers: unknown host: " + problems);
+}
+
+std::string cyclone_xml(const DdsConfig& config, const NetworkInterface& interface) {
+  std::ostringstream xml;
+  xml << "<CycloneDDS><Domain id='any'>";
+  write_general(xml, config, interface);
+  write_discovery(xml, config, interface);
+  write_internal(xml, config);
+  xml << "</Domain></CycloneDDS>";
+  return xml.str();
+}
 
 DdsDomain::DdsDomain(const DdsConfig& config)
     : config_(checked(config)), interface_(choose_interface(config_)) {

@@ -3,7 +3,6 @@
 #include <cmath>
 
 namespace km {
-
 namespace {
 
 dds_duration_t nanoseconds_of(double seconds) {

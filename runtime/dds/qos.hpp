@@ -2,9 +2,29 @@
 
 #include "runtime/dds/dds_config.hpp"
 #include "runtime/dds/entity.hpp"
-#include "runtime/dds/topic_kind.hpp"
 
 namespace km {
+
+/// What a topic between robots is for; decides its quality of service (see make_topic_qos()).
+///
+/// All kinds keep the last sample of each key, so a writer never blocks on an unreachable robot.
+enum class TopicKind {
+  kEvent,    ///< Every sample arrives, also at robots that join later. One key value per sample.
+  kState,    ///< Reliable, newest sample of each key wins, also for robots that join later.
+  kRequest,  ///< As kEvent, but forgotten after dds.lease_s. One key value per sample.
+  kStatus,   ///< Newest wins, may be lost, and carries the liveliness of the robot.
+};
+
+/// What its bytes are counted under: the split of the Kimera-Multi paper.
+enum class TrafficCategory {
+  kPlaceRecognition,
+  kGeometricVerification,
+  kPoseGraphOptimization,
+  kOther
+};
+
+/// "place_recognition", "geometric_verification", "pgo", "other".
+const char* to_string(TrafficCategory category);
 
 /// Quality of service of a reader and of a writer of a topic of this kind. Samples of the own
 /// participant are not delivered.

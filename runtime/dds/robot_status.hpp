@@ -1,9 +1,18 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <map>
+#include <mutex>
 #include <string>
+#include <vector>
 
 #include "modules/core/ids.hpp"
+#include "runtime/dds/codec.hpp"
+#include "runtime/node.hpp"
+#include "runtime/periodic.hpp"
+#include "runtime/topic.hpp"
+#include "status.h"
 
 namespace km {
 
@@ -28,5 +37,46 @@ struct RobotStatus {
 
 /// As far as anybody asks.
 inline constexpr std::uint8_t kManyLinks = 255;
+
+template <>
+struct Codec<RobotStatus> {
+  using Wire = km_wire_RobotStatus;
+  static constexpr const char* kTopic = "robot_status";
+  static constexpr std::uint16_t kVersion = 1;
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_RobotStatus_desc; }
+
+  struct Encoded {
+    Wire wire{};
+  };
+  static Encoded encode(const RobotStatus& status);
+  static Decoded<RobotStatus> decode(const Wire& wire);
+};
+
+/// Channels of the status node; they must outlive it.
+struct RobotStatusTopics {
+  Out<RobotStatus> own;
+  In<RobotStatus> peers;
+};
+
+/// Publishes this robot's status twice a second and keeps the latest of each peer. Both topics
+/// cross as kStatus: they carry the presence of the robots.
+class RobotStatusNode final : public Node {
+ public:
+  /// `provider` is called on this node's thread.
+  RobotStatusNode(std::function<RobotStatus()> provider, const RobotStatusTopics& topics);
+
+  /// Latest of each robot heard of, ascending by id. Thread-safe.
+  [[nodiscard]] std::vector<RobotStatus> peers() const;
+
+  std::string_view name() const override { return "robot_status"; }
+  void start() override { periodic_.start(); }
+  void stop() noexcept override { periodic_.stop(); }
+  std::exception_ptr error() const override { return periodic_.error(); }
+
+ private:
+  mutable std::mutex mutex_;  // guards latest_
+  std::map<RobotId, RobotStatus> latest_;
+  Periodic periodic_;  // last member: stops first
+};
 
 }  // namespace km

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "modules/core/ids.hpp"
-#include "runtime/dds/topic_kind.hpp"
+#include "runtime/dds/qos.hpp"
 
 namespace km {
 

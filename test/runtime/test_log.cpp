@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "runtime/log.hpp"
-#include "runtime/status_line.hpp"
 #include "test/support/captured_log.hpp"
 
 namespace km {

@@ -41,41 +41,41 @@ class ToyNode final : public Node {
   Worker<bool> worker_;
 };
 
+struct Run {
+  const CapturedLog log = {};
+  std::vector<std::string> diary = {};
+  SignalWatch signals = {};
+  Supervisor supervisor{signals};
+};
+
 TEST_CASE("Nodes are started in order and stopped in order, sources first", "[supervisor]") {
-  std::vector<std::string> diary;
-  SignalWatch signals;
-  {
-    Supervisor supervisor(signals);
-    supervisor.emplace<ToyNode>("camera", diary);
-    supervisor.emplace<ToyNode>("odometry", diary);
-    int polls = 0;
-    const RunResult result = supervisor.run([&] { return ++polls == 3; }, 0.001);
-    CHECK_FALSE(result.failure.has_value());
-    CHECK_FALSE(result.interrupted);
-    CHECK(diary == std::vector<std::string>{"start camera", "start odometry", "stop camera",
-                                            "stop odometry"});
-  }
+  Run run;
+  auto& [log, diary, signals, supervisor] = run;
+  supervisor.emplace<ToyNode>("camera", diary);
+  supervisor.emplace<ToyNode>("odometry", diary);
+  int polls = 0;
+  const RunResult result = supervisor.run([&] { return ++polls == 3; }, 0.001);
+  CHECK_FALSE(result.failure.has_value());
+  CHECK_FALSE(result.interrupted);
+  CHECK(diary ==
+        std::vector<std::string>{"start camera", "start odometry", "stop camera", "stop odometry"});
 }
 
 TEST_CASE("A failed node ends the run with its name and its message", "[supervisor]") {
-  const CapturedLog captured;
-  std::vector<std::string> diary;
-  SignalWatch signals;
-  Supervisor supervisor(signals);
+  Run run;
+  auto& [log, diary, signals, supervisor] = run;
   supervisor.emplace<ToyNode>("camera", diary);
   supervisor.emplace<ToyNode>("odometry", diary).post(true);
   const RunResult result = supervisor.run([] { return false; }, 0.001);
   REQUIRE(result.failure.has_value());
   CHECK(result.failure->node == "odometry");
   CHECK(result.failure->message == "the reason");
-  CHECK_THAT(captured.text(), Catch::Matchers::Contains("odometry failed: the reason"));
+  CHECK_THAT(log.text(), Catch::Matchers::Contains("odometry failed: the reason"));
 }
 
 TEST_CASE("A node that fails while it finishes its work is still reported", "[supervisor]") {
-  const CapturedLog captured;
-  std::vector<std::string> diary;
-  SignalWatch signals;
-  Supervisor supervisor(signals);
+  Run run;
+  auto& [log, diary, signals, supervisor] = run;
   ToyNode& node = supervisor.emplace<ToyNode>("odometry", diary);
   const RunResult result = supervisor.run([&] {
     node.post(true);
@@ -85,19 +85,16 @@ TEST_CASE("A node that fails while it finishes its work is still reported", "[su
 }
 
 TEST_CASE("Two nodes of one name are refused", "[supervisor]") {
-  std::vector<std::string> diary;
-  SignalWatch signals;
-  Supervisor supervisor(signals);
+  Run run;
+  auto& [log, diary, signals, supervisor] = run;
   supervisor.emplace<ToyNode>("camera", diary);
   CHECK_THROWS_AS(supervisor.emplace<ToyNode>("camera", diary), std::invalid_argument);
 }
 
 TEST_CASE("The first signal ends the run in order", "[supervisor]") {
   const int signal = GENERATE(SIGINT, SIGTERM);
-  const CapturedLog captured;
-  std::vector<std::string> diary;
-  SignalWatch signals;
-  Supervisor supervisor(signals);
+  Run run;
+  auto& [log, diary, signals, supervisor] = run;
   supervisor.emplace<ToyNode>("camera", diary);
   bool sent = false;
   const RunResult result = supervisor.run([&] {

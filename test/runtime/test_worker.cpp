@@ -1,12 +1,17 @@
 #include <pthread.h>
-
 #include <array>
 #include <catch2/catch.hpp>
+#include <future>
+#include <memory>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <type_traits>
 #include <vector>
 
+#include "runtime/bounded_queue.hpp"
+#include "runtime/latest.hpp"
+#include "runtime/thread.hpp"
 #include "runtime/topic.hpp"
 #include "runtime/worker.hpp"
 
@@ -79,6 +84,117 @@ TEST_CASE("What is published through one handle of a topic is heard through anot
   out.publish(7);
   out.publish(std::make_shared<const int>(8));
   CHECK(heard == std::vector<int>{7, 8});
+}
+
+TEST_CASE("A queue hands out what was put in, in order, also after it is closed", "[queue]") {
+  BoundedQueue<int> queue(3, Overflow::kBlock);
+  for (int i = 0; i < 3; ++i) CHECK(queue.push(i));
+  queue.close();
+  CHECK_FALSE(queue.push(3));
+  for (int i = 0; i < 3; ++i) CHECK(queue.pop() == i);
+  CHECK(queue.pop() == std::nullopt);
+}
+
+TEST_CASE("A full queue that drops keeps the newest and counts the others", "[queue]") {
+  BoundedQueue<int> queue(2, Overflow::kDropOldest);
+  for (int i = 0; i < 5; ++i) queue.push(i);
+  CHECK(queue.load().size == 2);
+  CHECK(queue.load().high_water == 2);
+  CHECK(queue.load().dropped == 3);
+  CHECK(queue.pop() == 3);
+  CHECK(queue.pop() == 4);
+  CHECK(queue.load().size == 0);
+}
+
+TEST_CASE("A full queue that blocks loses nothing between two threads", "[queue]") {
+  constexpr int kCount = 10000;
+  BoundedQueue<int> queue(4, Overflow::kBlock);
+  std::thread producer([&] {
+    for (int i = 0; i < kCount; ++i) queue.push(i);
+    queue.close();
+  });
+  int expected = 0;
+  bool in_order = true;
+  while (const auto value = queue.pop()) in_order &= *value == expected++;
+  producer.join();
+  CHECK(in_order);
+  CHECK(expected == kCount);
+  CHECK(queue.load().high_water <= 4);
+  CHECK(queue.load().dropped == 0);
+}
+
+TEST_CASE("Closing a queue releases whoever waits on it", "[queue]") {
+  BoundedQueue<int> empty(1, Overflow::kBlock);
+  BoundedQueue<int> full(1, Overflow::kBlock);
+  full.push(0);
+  auto popped = std::async(std::launch::async, [&] { return empty.pop(); });
+  auto pushed = std::async(std::launch::async, [&] { return full.push(1); });
+  empty.close();
+  full.close();
+  CHECK(popped.get() == std::nullopt);
+  CHECK_FALSE(pushed.get());
+}
+
+TEST_CASE("A queue without room is refused", "[queue]") {
+  CHECK_THROWS_AS(BoundedQueue<int>(0, Overflow::kBlock), std::invalid_argument);
+}
+
+TEST_CASE("Of what was put the newest is taken, once", "[runtime]") {
+  Latest<int> latest;
+  CHECK(latest.take() == nullptr);
+  const auto old = std::make_shared<const int>(1);
+  latest.put(old);
+  latest.put(std::make_shared<const int>(2));
+  CHECK(old.use_count() == 1);  // nothing is held that is not wanted any more
+  const auto taken = latest.take();
+  REQUIRE(taken != nullptr);
+  CHECK(*taken == 2);
+  CHECK(latest.take() == nullptr);
+}
+
+TEST_CASE("After the end nothing is put, and what was there can be taken", "[runtime]") {
+  Latest<int> latest;
+  latest.put(std::make_shared<const int>(1));
+  latest.close();
+  latest.put(std::make_shared<const int>(2));
+  CHECK(*latest.take() == 1);
+  CHECK(latest.take() == nullptr);
+}
+
+TEST_CASE("A taker sees ever newer values while others are put, and the last", "[runtime]") {
+  constexpr int kLast = 10000;
+  Latest<int> latest;
+  std::thread putter([&] {
+    for (int i = 1; i <= kLast; ++i) latest.put(std::make_shared<const int>(i));
+  });
+  int seen = 0;
+  bool ascending = true;
+  while (seen < kLast)
+    if (const auto value = latest.take()) {
+      ascending = ascending && *value > seen;
+      seen = *value;
+    }
+  putter.join();
+  CHECK(ascending);
+}
+
+int niceness() {
+  return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid()));
+}
+
+TEST_CASE("Background work lowers the priority of its own thread only", "[runtime]") {
+  const int ordinary = niceness();
+  int before = 0, during = 0;
+  std::thread thread([&] {
+    before = niceness();
+    work_in_background();
+    work_in_background();
+    during = niceness();
+  });
+  thread.join();
+  CHECK(before == ordinary);
+  CHECK(during >= ordinary + (ordinary < 10 ? 1 : 0));  // 19 is the lowest there is
+  CHECK(niceness() == ordinary);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
@@ -14,7 +15,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/core/text_rows.hpp"
-#include "modules/sensors/depth_file.hpp"
+#include "modules/sensors/image_file.hpp"
 #include "modules/sensors/text_file.hpp"
 
 namespace km {
@@ -45,6 +46,9 @@ class RecordedKitchen {
 
   [[nodiscard]] const StereoRig& rig() const { return rig_; }
   [[nodiscard]] std::size_t frame_count() const { return frames_.size(); }
+
+  /// Leaves out so many frames.
+  void skip(std::size_t count) { next_frame_ = std::min(next_frame_ + count, frames_.size()); }
 
   /// The next frame in order of time, or nullopt at the end.
   [[nodiscard]] std::optional<PosedFrame> next() {

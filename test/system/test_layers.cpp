@@ -35,7 +35,7 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
 };
 
 // Files whose job is a format on disk that is YAML: the calibration of EuRoC recordings.
-const std::set<std::string> kReadsYaml = {"modules/sensors/sensor_yaml.cpp"};
+const std::set<std::string> kReadsYaml = {"modules/sensors/euroc_rig.cpp"};
 
 std::vector<std::string> includes_of(const fs::path& file) {
   static const std::regex pattern(R"(^\s*#\s*include\s*[<"]([^>"]+)[>"])");

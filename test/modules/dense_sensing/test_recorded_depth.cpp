@@ -1,9 +1,8 @@
 #include <catch2/catch.hpp>
 
 #include "depth_check.hpp"
-#include "modules/sensors/euroc_reader.hpp"
 #include "modules/sensors/euroc_rig.hpp"
-#include "modules/sensors/stereo_pairs.hpp"
+#include "modules/sensors/frame_files.hpp"
 #include "test/support/shared_data.hpp"
 
 namespace km {
@@ -13,7 +12,17 @@ namespace {
 constexpr double kMaxMedian_px = 0.35;
 constexpr double kMinShare = 0.75;  // of the corners with dense depth
 
-void check(const DepthDifferences& differences) {
+// Of every so many-th pair.
+void check(const std::vector<StereoPairFile>& pairs, const StereoRig& rig, std::size_t every,
+           const StereoDepthConfig& config) {
+  StereoDepth stereo(rig, config);
+  DepthDifferences differences;
+  for (std::size_t i = 0; i < pairs.size(); i += every) {
+    const StereoPairResult pair = load_stereo_pair(pairs[i], rig);
+    REQUIRE(pair.status == ImageStatus::kOk);
+    add_differences(stereo.compute(pair.frame.left, pair.frame.right), stereo, rig,
+                    triangulated_corners(pair.frame, rig), differences);
+  }
   CAPTURE(differences.corners, differences.px.size());
   REQUIRE(differences.corners > 300);
   CHECK(static_cast<double>(differences.px.size()) >
@@ -24,34 +33,18 @@ void check(const DepthDifferences& differences) {
 TEST_CASE("Dense depth agrees with triangulated corners on MH_01", "[stereo_depth][recorded]") {
   const auto folder = shared_data("euroc/MH_01_easy");
   if (!folder) return;
-  EurocReader reader(*folder, {.from_s = 0.0, .to_s = 15.0});
-  const StereoRig& rig = reader.rig().stereo;
-  StereoDepth stereo(rig, {.downscale = GENERATE(1, 2)});
-  DepthDifferences differences;
-  for (int i = 0; auto packet = reader.next(); ++i) {
-    if (i % 30 != 0) continue;
-    const StereoFrame& frame = *packet->frame;
-    add_differences(stereo.compute(frame.left, frame.right), stereo, rig,
-                    triangulated_corners(frame, rig), differences);
-  }
-  check(differences);
+  ReaderReport report;
+  auto pairs = list_euroc_pairs(*folder / "mav0", 0.001, report);
+  pairs.resize(300);  // 15 s
+  check(pairs, read_euroc_rig(*folder / "mav0").stereo, 30, {.downscale = GENERATE(1, 2)});
 }
 
 TEST_CASE("Dense depth agrees with triangulated corners on V1_01", "[stereo_depth][recorded]") {
   const auto folder = shared_data("euroc/V1_01_easy");
   if (!folder) return;
-  const StereoRig rig = read_euroc_rig(*folder / "mav0").stereo;
   ReaderReport report;
-  const auto files = list_keyframe_pairs(*folder / "keyframes", report);
-  StereoDepth stereo(rig, {});
-  DepthDifferences differences;
-  for (std::size_t i = 0; i < files.size(); i += 10) {
-    const StereoPairResult pair = load_stereo_pair(files[i], rig);
-    REQUIRE(pair.status == ImageStatus::kOk);
-    add_differences(stereo.compute(pair.frame.left, pair.frame.right), stereo, rig,
-                    triangulated_corners(pair.frame, rig), differences);
-  }
-  check(differences);
+  check(list_keyframe_pairs(*folder / "keyframes", report), read_euroc_rig(*folder / "mav0").stereo,
+        10, {});
 }
 
 }  // namespace

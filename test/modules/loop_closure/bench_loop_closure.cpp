@@ -7,7 +7,7 @@
 #include <numbers>
 #include <string>
 
-#include "modules/loop_closure/guided_matching.hpp"
+#include "modules/evaluation/statistics.hpp"
 #include "modules/loop_closure/matching.hpp"
 #include "modules/loop_closure/verifier.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
@@ -58,13 +58,6 @@ PairResult verify(const Verifier& verifier, const RecordedKeyframe& from,
   result.error_deg = xi.head<3>().norm() * kDegrees;
   result.chi2 = xi.dot(result.verification.covariance.inverse() * xi);
   return result;
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  const auto i = static_cast<std::size_t>(share * static_cast<double>(values.size()));
-  return values[std::min(i, values.size() - 1)];
 }
 
 void print_table(const std::string& title, const std::vector<PairResult>& pairs) {

@@ -7,12 +7,8 @@ namespace km {
 namespace {
 
 StereoRig small_rig() {
-  PinholeCamera camera;
-  camera.width = 320;
-  camera.height = 240;
-  camera.fx = camera.fy = 200.0;
-  camera.cx = 160.0;
-  camera.cy = 120.0;
+  PinholeCamera camera{
+      .width = 320, .height = 240, .fx = 200.0, .fy = 200.0, .cx = 160.0, .cy = 120.0};
   return rgbd_rig(camera, 0.1);
 }
 

@@ -1,7 +1,8 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
 
-#include "modules/loop_closure/keyframe_cache.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
+#include "modules/loop_closure/request_economy.hpp"
 
 namespace km {
 namespace {
@@ -98,6 +99,109 @@ TEST_CASE("the cache forgets what was used longest ago", "[keyframe_cache]") {
   CHECK(cache.get({7, 2}));
   cache.put(keyframe(2));  // again: nothing is pushed out
   CHECK(cache.get({7, 0}));
+}
+
+using Verdict = RequestEconomy::Verdict;
+
+constexpr RobotId kSelf = 1;
+constexpr RobotId kPeer = 2;
+
+LoopCandidate candidate(KeyframeIndex query, KeyframeIndex own, int support = 1,
+                        RobotId peer = kPeer) {
+  return {{peer, query}, {kSelf, own}, 0.8, support};
+}
+
+// Asks for `query`, which then leads to a closure with `own`.
+void succeed(RequestEconomy& economy, KeyframeIndex query, KeyframeIndex own) {
+  REQUIRE(economy.judge(candidate(query, own)) == Verdict::kAsk);
+  economy.link({{kSelf, own}, {kPeer, query}});
+  economy.conclude({kPeer, query}, true);
+}
+
+TEST_CASE("Around a closure nothing is asked for, farther with every success",
+          "[request_economy]") {
+  LoopClosureConfig config;
+  config.max_link_separation = 3;
+  config.attempt_separation = 0;
+  RequestEconomy economy(config);
+  for (KeyframeIndex reach = 1; reach <= 5; ++reach) {
+    const KeyframeIndex query = 100 * reach;
+    succeed(economy, query, 50);
+    const KeyframeIndex covered = std::min<KeyframeIndex>(reach, 3);
+    for (const int sign : {-1, 1}) {
+      const auto beside = [&](KeyframeIndex d) {
+        return query + static_cast<KeyframeIndex>(sign) * d;
+      };
+      CHECK(economy.judge(candidate(beside(covered), 50)) == Verdict::kLinked);
+      CHECK(economy.judge(candidate(query, 50 + static_cast<KeyframeIndex>(sign) * covered)) ==
+            Verdict::kLinked);
+      CHECK(economy.judge(candidate(beside(covered + 1), 50)) == Verdict::kAsk);
+      CHECK(economy.judge(candidate(
+                query, 50 + static_cast<KeyframeIndex>(sign) * (covered + 1))) == Verdict::kAsk);
+    }
+  }
+  CHECK(economy.judge(candidate(100, 50, 1, kPeer + 1)) == Verdict::kAsk);  // another robot
+}
+
+TEST_CASE("What was asked for is not asked for again beside it", "[request_economy]") {
+  LoopClosureConfig config;
+  config.attempt_separation = 2;
+  RequestEconomy economy(config);
+  REQUIRE(economy.judge(candidate(10, 20)) == Verdict::kAsk);
+  CHECK(economy.judge(candidate(12, 18)) == Verdict::kAsk);  // nothing is linked yet
+  for (const KeyframeIndex query : {100U, 200U}) {
+    economy.link({{kSelf, query}, {kPeer, query}});
+    REQUIRE(economy.judge(candidate(query, 300)) == Verdict::kAsk);
+    economy.conclude({kPeer, query}, true);
+  }
+  CHECK(economy.judge(candidate(12, 19)) == Verdict::kTried);
+  CHECK(economy.judge(candidate(15, 20)) == Verdict::kAsk);
+  CHECK(economy.judge(candidate(10, 30)) == Verdict::kAsk);  // another place
+  CHECK(economy.judge(candidate(0, 0)) == Verdict::kAsk);
+}
+
+TEST_CASE("A kind that fails is asked for ever less, and no other with it", "[request_economy]") {
+  LoopClosureConfig config;
+  config.attempt_separation = 0;
+  config.failure_patience = 1.0;
+  RequestEconomy economy(config);
+  int asked = 0;
+  for (KeyframeIndex query = 0; query < 500; ++query) {
+    const Verdict verdict = economy.judge(candidate(query, 7, 2));
+    CHECK((verdict == Verdict::kAsk || verdict == Verdict::kVain));
+    if (verdict != Verdict::kAsk) continue;
+    ++asked;
+    economy.conclude({kPeer, query}, false);
+  }
+  // Four are forgiven; then n are passed over after n failures: n (n + 1) / 2 queries for n
+  // requests.
+  CHECK(asked == 4 + 31);
+  CHECK(economy.judge(candidate(500, 7, 5)) == Verdict::kAsk);
+  CHECK(economy.judge(candidate(501, 7, 9)) == Verdict::kAsk);  // as with a support of 5
+}
+
+TEST_CASE("The candidates of one query count once", "[request_economy]") {
+  LoopClosureConfig config;
+  config.attempt_separation = 0;
+  RequestEconomy economy(config);
+  for (KeyframeIndex query = 0; query < 6; ++query) {
+    while (economy.judge(candidate(query, 7)) != Verdict::kAsk) ++query;
+    economy.conclude({kPeer, query}, false);
+  }
+  for (KeyframeIndex own = 0; own < 10; ++own)
+    CHECK(economy.judge(candidate(100, 10 * own)) == Verdict::kVain);
+}
+
+TEST_CASE("With all bounds at 0 everything is asked for", "[request_economy]") {
+  LoopClosureConfig config;
+  config.max_link_separation = config.attempt_separation = 0;
+  config.failure_patience = 0.0;
+  RequestEconomy economy(config);
+  succeed(economy, 1, 1);
+  for (KeyframeIndex query = 2; query < 20; ++query) {
+    CHECK(economy.judge(candidate(query, 1)) == Verdict::kAsk);
+    economy.conclude({kPeer, query}, false);
+  }
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "modules/loop_closure/loop_closure_codec.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/spoilt_message.hpp"
 
 namespace km {
 namespace {
@@ -33,13 +34,6 @@ KeyframeReply random_reply(std::mt19937& rng, int points) {
     features.descriptors.push_back(descriptor);
   }
   return reply;
-}
-
-template <typename T>
-typename Codec<T>::Encoded encoded_by(RobotId writer, const T& message) {
-  auto encoded = Codec<T>::encode(message);
-  encoded.wire.header.robot = writer;
-  return encoded;
 }
 
 TEST_CASE("A keyframe survives the wire to a hundredth of a pixel", "[codec]") {
@@ -96,41 +90,30 @@ TEST_CASE("A keyframe without points, or not found, survives the wire", "[codec]
 
 TEST_CASE("Hostile replies are refused with a reason", "[codec]") {
   std::mt19937 rng(7);
-  auto encoded = encoded_by(kOwner, random_reply(rng, 20));
-  km_wire_KeyframeReply& wire = encoded.wire;
-  SECTION("another robot's keyframe") {
-    wire.header.robot = 3;
-  }
-  SECTION("odometry of another keyframe") {
-    wire.odometry.keyframe.index = 8;
-  }
-  SECTION("a quaternion that is none") {
-    wire.odometry.T_odom_kf.q[0] = 4.0;
-  }
-  SECTION("a position that is not a number") {
-    wire.T_body_cam.t[1] = std::nan("");
-  }
-  SECTION("a covariance with a negative variance") {
-    wire.odometry.covariance.upper[0] = -1.0;
-  }
-  SECTION("an infinite step") {
-    wire.bearing_step = std::numeric_limits<float>::infinity();
-  }
-  SECTION("a negative step") {
-    wire.inverse_depth_step = -1e-3F;
-  }
-  SECTION("a focal length that is not a number") {
-    wire.focal_px = std::nanf("");
-  }
-  SECTION("more points than any image has") {
-    wire.keypoints._length = 1U << 30U;
-  }
-  SECTION("points without a buffer") {
-    wire.keypoints._buffer = nullptr;
-  }
-  const auto decoded = Codec<KeyframeReply>::decode(wire);
-  CHECK_FALSE(decoded.value.has_value());
-  CHECK(decoded.refusal != nullptr);
+  const KeyframeReply reply = random_reply(rng, 20);
+  const char* const no_pose = "odometry is not a pose with a covariance";
+  check_refusals<KeyframeReply>(
+      [&] { return encoded_by(kOwner, reply); },
+      {{"another robot's keyframe", "a keyframe of another robot than the writer",
+        [](auto& m) { m.wire.header.robot = 3; }},
+       {"odometry of another keyframe", "odometry of another keyframe",
+        [](auto& m) { m.wire.odometry.keyframe.index = 8; }},
+       {"a quaternion that is none", no_pose,
+        [](auto& m) { m.wire.odometry.T_odom_kf.q[0] = 4.0; }},
+       {"a negative variance", no_pose,
+        [](auto& m) { m.wire.odometry.covariance.upper[0] = -1.0; }},
+       {"a position that is not a number", "the camera's place is not a pose",
+        [](auto& m) { m.wire.T_body_cam.t[1] = std::nan(""); }},
+       {"an infinite step", "bearings out of range",
+        [](auto& m) { m.wire.bearing_step = std::numeric_limits<float>::infinity(); }},
+       {"a negative step", "depths out of range",
+        [](auto& m) { m.wire.inverse_depth_step = -1e-3F; }},
+       {"a focal length that is not a number", "focal length out of range",
+        [](auto& m) { m.wire.focal_px = std::nanf(""); }},
+       {"more points than any image has", "keypoints are missing or too many",
+        [](auto& m) { m.wire.keypoints._length = 1U << 30U; }},
+       {"points without a buffer", "keypoints are missing or too many",
+        [](auto& m) { m.wire.keypoints._buffer = nullptr; }}});
 }
 
 TEST_CASE("A closure survives the wire exactly", "[codec]") {
@@ -155,24 +138,20 @@ TEST_CASE("Hostile closures and requests are refused with a reason", "[codec]") 
   std::mt19937 rng(9);
   const Closure closure{.from = {{kOwner, 1}, random_pose(rng), Matrix6::Identity()},
                         .to = {{9, 5}, random_pose(rng), Matrix6::Identity()}};
-  auto encoded = encoded_by(kOwner, closure);
-  SECTION("written by another robot") {
-    encoded.wire.header.robot = 9;
-  }
-  SECTION("from a keyframe to itself") {
-    encoded.wire.to = encoded.wire.from;
-    encoded.wire.to_odometry = encoded.wire.from_odometry;
-  }
-  SECTION("odometry of another keyframe") {
-    encoded.wire.to.index = 6;
-  }
-  SECTION("a similarity that is not a number") {
-    encoded.wire.similarity = std::nanf("");
-  }
-  SECTION("absurdly many inliers") {
-    encoded.wire.inliers = ~0U;
-  }
-  CHECK(Codec<Closure>::decode(encoded.wire).refusal != nullptr);
+  check_refusals<Closure>(
+      [&] { return encoded_by(kOwner, closure); },
+      {{"written by another robot", "it starts from another robot than the writer",
+        [](auto& m) { m.wire.header.robot = 9; }},
+       {"from a keyframe to itself", "a closure from a keyframe to itself",
+        [](auto& m) {
+          m.wire.to = m.wire.from;
+          m.wire.to_odometry = m.wire.from_odometry;
+        }},
+       {"odometry of another keyframe", "odometry of another keyframe",
+        [](auto& m) { m.wire.to.index = 6; }},
+       {"a similarity that is not a number", "similarity out of range",
+        [](auto& m) { m.wire.similarity = std::nanf(""); }},
+       {"absurdly many inliers", "too many inliers", [](auto& m) { m.wire.inliers = ~0U; }}});
 
   auto request = encoded_by<KeyframeRequest>(kOwner, {kOwner, 1, {9, 5}, 17});
   const auto decoded = Codec<KeyframeRequest>::decode(request.wire).value;

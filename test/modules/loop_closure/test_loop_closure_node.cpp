@@ -85,6 +85,18 @@ struct Scene {
   Keyframe own, peer;
 };
 
+// Both robots with the keyframes of a scene, before one of them knows of a candidate.
+struct Meeting {
+  explicit Meeting(const Scene& two_views) : scene(two_views) {
+    robot.give(scene.own);
+    peer.give(scene.peer);
+  }
+  explicit Meeting(unsigned seed) : Meeting(Scene(seed)) {}
+
+  Scene scene;
+  Robot robot{kSelf}, peer{kPeer};
+};
+
 std::vector<ClosureStage> stages_of(const std::vector<ClosureOutcome>& reports) {
   std::vector<ClosureStage> stages;
   for (const ClosureOutcome& report : reports) stages.push_back(report.stage);
@@ -95,10 +107,8 @@ using enum ClosureStage;
 using Stages = std::vector<ClosureStage>;
 
 TEST_CASE("a candidate becomes a closure by one request and one reply", "[loop_closure_node]") {
-  const Scene scene(1);
-  Robot robot(kSelf), peer(kPeer);
-  robot.give(scene.own);
-  peer.give(scene.peer);
+  Meeting meeting(1);
+  auto& [scene, robot, peer] = meeting;
   robot.give(scene.candidate());
   REQUIRE(robot.requests.size() == 1);
   CHECK(robot.requests[0].to == kPeer);
@@ -119,10 +129,8 @@ TEST_CASE("a candidate becomes a closure by one request and one reply", "[loop_c
 
 TEST_CASE("a candidate seen twice is verified once, and a keyframe fetched once",
           "[loop_closure_node]") {
-  const Scene scene(2);
-  Robot robot(kSelf), peer(kPeer);
-  robot.give(scene.own);
-  peer.give(scene.peer);
+  Meeting meeting(2);
+  auto& [scene, robot, peer] = meeting;
   robot.give(scene.candidate());
   robot.give(scene.candidate());
   deliver(robot, peer);
@@ -140,10 +148,8 @@ TEST_CASE("a candidate seen twice is verified once, and a keyframe fetched once"
 TEST_CASE("a lost request or reply is made up for after the time-out", "[loop_closure_node]") {
   const bool lose_reply = GENERATE(false, true);
   CAPTURE(lose_reply);
-  const Scene scene(3);
-  Robot robot(kSelf), peer(kPeer);
-  robot.give(scene.own);
-  peer.give(scene.peer);
+  Meeting meeting(3);
+  auto& [scene, robot, peer] = meeting;
   robot.tick(100.0);
   robot.give(scene.candidate());
   REQUIRE(robot.requests.size() == 1);
@@ -160,10 +166,8 @@ TEST_CASE("a lost request or reply is made up for after the time-out", "[loop_cl
 }
 
 TEST_CASE("both answers of a repeated request give one closure", "[loop_closure_node]") {
-  const Scene scene(4);
-  Robot robot(kSelf), peer(kPeer);
-  robot.give(scene.own);
-  peer.give(scene.peer);
+  Meeting meeting(4);
+  auto& [scene, robot, peer] = meeting;
   robot.give(scene.candidate());
   robot.tick(50.0);
   REQUIRE(robot.requests.size() == 2);
@@ -246,10 +250,8 @@ TEST_CASE("how many points are sent goes by the words that both images have",
 }
 
 TEST_CASE("a peer that returns is asked at once for what it owes", "[loop_closure_node]") {
-  const Scene scene(5);
-  Robot robot(kSelf), peer(kPeer);
-  robot.give(scene.own);
-  peer.give(scene.peer);
+  Meeting meeting(5);
+  auto& [scene, robot, peer] = meeting;
   robot.give(scene.candidate());
   for (int t = 0; t < 60; ++t) robot.tick(t);  // nobody there
   robot.requests.clear();
@@ -280,11 +282,10 @@ TEST_CASE("a keyframe its owner does not have yet is asked for again", "[loop_cl
 }
 
 TEST_CASE("a candidate that fails verification says why", "[loop_closure_node]") {
-  Scene scene(7);
-  for (OrbDescriptor& descriptor : scene.peer.features.descriptors) descriptor = {};
-  Robot robot(kSelf), peer(kPeer);
-  robot.give(scene.own);
-  peer.give(scene.peer);
+  Scene views(7);
+  for (OrbDescriptor& descriptor : views.peer.features.descriptors) descriptor = {};
+  Meeting meeting(views);
+  auto& [scene, robot, peer] = meeting;
   robot.give(scene.candidate());
   deliver(robot, peer);
   CHECK(robot.closures.empty());
@@ -330,11 +331,10 @@ TEST_CASE("an old keyframe of the robot itself keeps a part of its keypoints",
 }
 
 TEST_CASE("a measured closure needs only the odometry of the other end", "[loop_closure_node]") {
-  Scene scene(9);
-  scene.own.features = scene.peer.features = {};
-  Robot robot(kSelf), peer(kPeer);
-  robot.give(scene.own);
-  peer.give(scene.peer);
+  Scene views(9);
+  views.own.features = views.peer.features = {};
+  Meeting meeting(views);
+  auto& [scene, robot, peer] = meeting;
   std::mt19937 rng(1);
   const RelativePose measured{scene.own.odometry.id, scene.peer.odometry.id, random_pose(rng),
                               random_covariance(rng, 0.1)};

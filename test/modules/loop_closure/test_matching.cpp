@@ -2,7 +2,6 @@
 #include <bit>
 #include <catch2/catch.hpp>
 
-#include "modules/loop_closure/guided_matching.hpp"
 #include "modules/loop_closure/matching.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
 

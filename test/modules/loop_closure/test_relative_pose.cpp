@@ -6,6 +6,7 @@
 
 #include "modules/loop_closure/relative_pose.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
+#include "test/support/numeric_jacobian.hpp"
 
 namespace km {
 namespace {
@@ -91,16 +92,10 @@ TEST_CASE("the transfer Jacobian is the derivative of the error", "[relative_pos
   const ImagePair pair = image_pairs(keyframes, {}).front();
   const SE3 T_a_b = camera_pose(keyframes);
   const auto J = transfer_jacobian(T_a_b.inverse(), pair.a.m);
-  constexpr double kStep = 1e-6;
-  for (int c = 0; c < 6; ++c) {
-    const Vector6 xi = kStep * Vector6::Unit(c);
-    const SE3 plus = T_a_b * se3_exp(xi);
-    const SE3 minus = T_a_b * se3_exp(-xi);
-    const Eigen::Vector3d numeric = (transfer_error(plus.inverse(), pair.a, pair.b).r -
-                                     transfer_error(minus.inverse(), pair.a, pair.b).r) /
-                                    (2.0 * kStep);
-    CHECK((J.col(c) - numeric).norm() < 1e-7);  // central differences: step squared
-  }
+  const auto numeric = numeric_jacobian<6>([&](const Vector6& xi) {
+    return transfer_error((T_a_b * se3_exp(xi)).inverse(), pair.a, pair.b).r;
+  });
+  CHECK((J - numeric).colwise().norm().maxCoeff() < 1e-7);  // central differences: step squared
 }
 
 TEST_CASE("refinement reaches the truth of points without noise", "[relative_pose]") {
@@ -227,6 +222,49 @@ TEST_CASE("a pose held by two points loses its information with them", "[relativ
   const Eigen::SelfAdjointEigenSolver<Matrix6> whole(fit->information);
   const Eigen::SelfAdjointEigenSolver<Matrix6> rest(left);
   CHECK(rest.eigenvalues()(0) < 1e-6 * whole.eigenvalues()(0));
+}
+
+// A number that most of the data agree on.
+struct ConstantProblem {
+  static constexpr std::size_t kSampleSize = 1;
+  std::vector<double> data;
+
+  std::size_t size() const { return data.size(); }
+  std::size_t drawable() const { return data.size(); }
+  std::optional<double> solve(std::span<const std::size_t> sample) const { return data[sample[0]]; }
+  double error(double model, std::size_t i) const {
+    return (data[i] - model) * (data[i] - model);  // inlier within 1
+  }
+  std::optional<double> polish(double, std::span<const std::size_t> inliers) const {
+    double sum = 0.0;
+    for (const std::size_t i : inliers) sum += data[i] / static_cast<double>(inliers.size());
+    return sum;
+  }
+};
+
+TEST_CASE("RANSAC returns the model of the largest agreement", "[ransac]") {
+  const ConstantProblem problem{{5.0, 5.2, 4.8, 5.1, 4.9, 40.0, -3.0, 17.0, 17.3}};
+  const auto seed = GENERATE(range(1U, 11U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const RansacResult<double> result = ransac<double>(problem, {0.999999, 1000}, rng);
+  REQUIRE(result.model);
+  CHECK(*result.model == Approx(5.0));
+  CHECK(result.inliers == std::vector<std::size_t>{0, 1, 2, 3, 4});
+  CHECK(result.cost == Approx(0.1 + 4.0));  // squares of the inliers, 1 for each outlier
+}
+
+TEST_CASE("RANSAC stops as soon as its confidence allows", "[ransac]") {
+  const ConstantProblem problem{std::vector<double>(20, 3.0)};
+  std::mt19937 rng(1);
+  CHECK(ransac<double>(problem, {0.99, 1000}, rng).iterations == 1);
+}
+
+TEST_CASE("RANSAC without data has no model", "[ransac]") {
+  std::mt19937 rng(1);
+  const RansacResult<double> result = ransac<double>(ConstantProblem{}, {}, rng);
+  CHECK_FALSE(result.model);
+  CHECK(result.iterations == 0);
 }
 
 }  // namespace

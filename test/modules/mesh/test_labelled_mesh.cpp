@@ -1,8 +1,12 @@
 #include <catch2/catch.hpp>
-
 #include <cmath>
+#include <filesystem>
+#include <string>
 
 #include "modules/mesh/labelled_mesh.hpp"
+#include "modules/mesh/ply_file.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {
@@ -50,6 +54,86 @@ TEST_CASE("Vertices take the colour of their class, black outside the palette") 
   mesh.colour_by(LabelPalette({{5, "road", {10, 20, 30}}}));
   CHECK(mesh.colors[0] == LabelledMesh::Color{0, 0, 0});
   CHECK(mesh.colors[1] == LabelledMesh::Color{10, 20, 30});
+}
+
+using Catch::Matchers::Contains;
+
+std::filesystem::path write_text(const TemporaryFolder& folder, const std::string& text) {
+  return folder.write("mesh.ply", text);
+}
+
+const std::string kAsciiHeader =
+    "ply\nformat ascii 1.0\ncomment made by hand\nelement vertex 3\nproperty float x\n"
+    "property double y\nproperty float z\nproperty int label\nelement face 1\n"
+    "property list uchar int vertex_indices\nend_header\n";
+
+TEST_CASE("A mesh is read back as it was written") {
+  LabelledMesh mesh;
+  mesh.vertices = {{0, 0.1F, -3e-7F}, {1e6F, 0, 0}, {0, 1, 0}, {1, 1, 1}};
+  mesh.labels = {0, 255, 7, 1};
+  mesh.colors = {{0, 1, 2}, {255, 254, 253}, {9, 9, 9}, {0, 0, 0}};
+  mesh.faces = {{0, 1, 2}, {1, 3, 2}};
+  if (GENERATE(false, true)) mesh = LabelledMesh{};
+  const TemporaryFolder folder;
+  write_ply(folder.path() / "a.ply", mesh);
+  const LabelledMesh read = read_ply(folder.path() / "a.ply");
+  CHECK(read.vertices == mesh.vertices);
+  CHECK(read.labels == mesh.labels);
+  CHECK(read.colors == mesh.colors);
+  CHECK(read.faces == mesh.faces);
+}
+
+TEST_CASE("The three encodings of one recorded mesh read alike") {
+  const auto folder = shared_data("meshes");
+  if (!folder) return;
+  const LabelledMesh little = read_ply(*folder / "platonic_shelf.ply");
+  const LabelledMesh ascii = read_ply(*folder / "platonic_shelf_ascii.ply");
+  const LabelledMesh big = read_ply(*folder / "platonic_shelf_big_endian.ply");
+  REQUIRE(little.faces.size() > 10);
+  CHECK(little.faces == ascii.faces);
+  CHECK(little.vertices == big.vertices);
+  CHECK(little.faces == big.faces);
+  const LabelledMesh cube = read_ply(*folder / "cube.ply");
+  CHECK(cube.vertices.size() == 8);
+  CHECK(cube.colors.size() == 8);
+}
+
+TEST_CASE("Text with mixed types is read; polygons become fans") {
+  const TemporaryFolder folder;
+  std::string text = kAsciiHeader + "0 0 0 4\n1 0 0 4\n1 1 0 9\n3 0 1 2\n";
+  CHECK(read_ply(write_text(folder, text)).labels == std::vector<LabelId>{4, 4, 9});
+  text.replace(text.find("vertex 3"), 8, "vertex 4");
+  text.replace(text.find("3 0 1 2"), 7, "0 1 0 9\n4 0 1 2 3");
+  const LabelledMesh fan = read_ply(write_text(folder, text));
+  CHECK(fan.faces == std::vector<LabelledMesh::Face>{{0, 1, 2}, {0, 2, 3}});
+}
+
+TEST_CASE("What cannot be a mesh is refused with the file and the reason") {
+  const TemporaryFolder folder;
+  const auto refuses = [&](const std::string& text, const std::string& why) {
+    const auto file = write_text(folder, text);
+    CHECK_THROWS_WITH(read_ply(file), Contains("mesh.ply: ") && Contains(why));
+  };
+  refuses("", "end_header");
+  refuses("solid stl\n", "not a PLY file");
+  refuses("ply\nformat ascii 2.0\nelement vertex many\n", "line 3: bad element");
+  refuses("ply\nelement vertex 0\nproperty float x\nend_header\n", "format");
+  refuses("ply\nformat ascii 1.0\nelement void 99999999999\nend_header\n", "without properties");
+  refuses(kAsciiHeader + "0 0 0 4\n1 0 0 4\n", "ends before");
+  refuses(kAsciiHeader + "0 0 0 4\n1 nan 0 4\n1 1 0 9\n3 0 1 2\n", "vertex 1 is not finite");
+  refuses(kAsciiHeader + "0 0 0 4\n1 0 0 300\n1 1 0 9\n3 0 1 2\n", "label 300");
+  refuses(kAsciiHeader + "0 0 0 4\n1 0 0 4\n1 1 0 9\n3 0 1 3\n", "names vertex 3");
+  refuses(kAsciiHeader + "0 0 0 4\n1 0 0 4\n1 1 0 9\n2 0 1\n", "fewer than 3");
+  refuses(kAsciiHeader + "0 0 0 4\n1 0 0 4\n1 1 0 9\n-3 0 1\n", "list of -3");
+  CHECK_THROWS_WITH(read_ply(folder.path() / "none.ply"), Contains("cannot be opened"));
+}
+
+TEST_CASE("A mesh that cannot be written leaves nothing behind") {
+  const TemporaryFolder folder;
+  CHECK_THROWS_AS(write_ply(folder.path() / "none" / "a.ply", {}), MeshFileError);
+  std::filesystem::create_directory(folder.path() / "taken.ply");
+  CHECK_THROWS_AS(write_ply(folder.path() / "taken.ply", {}), MeshFileError);
+  CHECK_FALSE(std::filesystem::exists(folder.path() / "taken.ply.part"));
 }
 
 }  // namespace

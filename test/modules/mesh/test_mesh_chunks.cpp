@@ -6,8 +6,11 @@
 #include <set>
 #include <stdexcept>
 #include <tuple>
+#include <vector>
 
+#include "modules/mesh/chunk_schedule.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
+#include "modules/mesh/team_mesh.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
 
 namespace km {
@@ -205,6 +208,166 @@ TEST_CASE("A mesh that cannot be sent is refused, a face that is too long left o
     CHECK_THAT(refusal(mesh, {.cell_m = 2.0, .step_m = 0.0}), Contains("cells of 2"));
     CHECK_THAT(refusal(mesh, {.cell_m = 1e6, .step_m = 0.001}), Contains("cells of 1000000"));
   }
+}
+
+MeshChunk chunk(std::int32_t cell, std::uint16_t height = 0) {
+  return {.key = {.robot = 1, .cell = {cell, 0, 0}},
+          .offsets = {{0, 0, height}, {1, 0, 0}, {0, 1, 0}},
+          .labels = {},
+          .faces = {{0, 1, 2}}};
+}
+
+// Cells in the order in which they are sent, until nothing is left.
+std::vector<std::int32_t> sent_cells(ChunkSchedule& schedule) {
+  std::vector<std::int32_t> cells;
+  while (const auto next = schedule.next()) cells.push_back(next->key.cell[0]);
+  return cells;
+}
+
+using Cells = std::vector<std::int32_t>;
+
+TEST_CASE("Only what changed is sent again", "[mesh]") {
+  ChunkSchedule schedule(0.0);
+  schedule.update({chunk(0), chunk(1), chunk(2)});
+  CHECK(schedule.waiting() == 3);
+  CHECK(sent_cells(schedule) == Cells{0, 1, 2});
+  schedule.update({chunk(0), chunk(1, 7), chunk(2), chunk(3)});
+  CHECK(sent_cells(schedule) == Cells{3, 1});
+  schedule.update({chunk(0), chunk(1, 7), chunk(2), chunk(3)});
+  CHECK(sent_cells(schedule).empty());
+}
+
+TEST_CASE("Moves below the threshold are sent when they have added up", "[mesh]") {
+  ChunkSchedule schedule(0.010);  // chunks have steps of 1 mm
+  schedule.update({chunk(0)});
+  CHECK(sent_cells(schedule) == Cells{0});
+  schedule.update({chunk(0, 6)});
+  CHECK(sent_cells(schedule).empty());
+  schedule.update({chunk(0, 12)});
+  CHECK(sent_cells(schedule) == Cells{0});
+}
+
+TEST_CASE("The newest state of a chunk is sent, once", "[mesh]") {
+  ChunkSchedule schedule(0.0);
+  schedule.update({chunk(0, 1)});
+  schedule.update({chunk(0, 2)});
+  schedule.update({chunk(0, 3)});
+  const auto sent = schedule.next();
+  REQUIRE(sent);
+  CHECK(sent->offsets[0][2] == 3);
+  CHECK_FALSE(schedule.next());
+  schedule.update({chunk(0, 4)});
+  schedule.update({chunk(0, 3)});  // and back before its turn
+  CHECK_FALSE(schedule.next());
+}
+
+TEST_CASE("A cell that vanished is sent empty, once, and may return", "[mesh]") {
+  ChunkSchedule schedule(0.0);
+  schedule.update({chunk(0), chunk(1)});
+  CHECK(sent_cells(schedule) == Cells{0, 1});
+  schedule.update({chunk(1)});
+  const auto gone = schedule.next();
+  REQUIRE(gone);
+  CHECK(gone->key == chunk(0).key);
+  CHECK(gone->empty());
+  CHECK(gone->offsets.empty());
+  schedule.update({chunk(1)});
+  CHECK_FALSE(schedule.next());
+  schedule.update({chunk(0), chunk(1)});
+  CHECK(sent_cells(schedule) == Cells{0});
+}
+
+TEST_CASE("A cell that vanishes before it was sent is never sent", "[mesh]") {
+  ChunkSchedule schedule(0.0);
+  schedule.update({chunk(0), chunk(1)});
+  schedule.update({chunk(1)});
+  CHECK(sent_cells(schedule) == Cells{1});
+}
+
+TEST_CASE("Every chunk has its turn although all change faster than they can be sent", "[mesh]") {
+  ChunkSchedule schedule(0.0);
+  Cells sent;
+  for (std::uint16_t version = 1; version <= 10; ++version) {
+    std::vector<MeshChunk> all;
+    for (std::int32_t cell = 0; cell < 5; ++cell) all.push_back(chunk(cell, version));
+    schedule.update(std::move(all));
+    for (int i = 0; i < 2; ++i) sent.push_back(schedule.next().value().key.cell[0]);
+  }
+  for (std::int32_t cell = 0; cell < 5; ++cell) CHECK(std::ranges::count(sent, cell) == 4);
+}
+
+std::vector<MeshChunk> chunks_of(RobotId robot, std::uint64_t boot, std::uint32_t side = 60,
+                                 RobotId anchor = 0) {
+  std::vector<MeshChunk> chunks = split_mesh(wavy_sheet(side, 0.1), robot, anchor, {}).chunks;
+  for (MeshChunk& chunk : chunks) chunk.boot = boot;
+  return chunks;
+}
+
+void add_all(TeamMesh& team, const std::vector<MeshChunk>& chunks) {
+  for (const MeshChunk& chunk : chunks) REQUIRE(team.add(chunk) == ChunkVerdict::kTaken);
+}
+
+TEST_CASE("The team's mesh has the newest chunk of each robot and cell", "[mesh]") {
+  TeamMesh team;
+  CHECK(team.snapshot().empty());
+  add_all(team, chunks_of(5, 1));
+  add_all(team, chunks_of(2, 1, 40));
+  std::vector<RobotMesh> snapshot = team.snapshot();
+  REQUIRE(snapshot.size() == 2);
+  CHECK(snapshot[0].robot == 2);
+  CHECK(snapshot[1].robot == 5);
+  CHECK(snapshot[1].mesh.vertices.size() == 61 * 61);
+  CHECK(snapshot[1].mesh.faces.size() == 2 * 60 * 60);
+
+  MeshChunk chunk = chunks_of(5, 1).front();
+  const std::size_t faces = chunk.faces.size();
+  chunk.faces.resize(1);
+  CHECK(team.add(chunk) == ChunkVerdict::kTaken);
+  CHECK(team.snapshot()[1].mesh.faces.size() == 2 * 60 * 60 - faces + 1);
+  CHECK(team.add(MeshChunk{.key = chunk.key, .boot = 1}) == ChunkVerdict::kTaken);  // no more
+  snapshot = team.snapshot();
+  CHECK(snapshot[1].mesh.faces.size() == 2 * 60 * 60 - faces);
+  CHECK(snapshot[1].chunks + 1 == chunks_of(5, 1).size());
+}
+
+TEST_CASE("A robot that restarts begins its mesh anew", "[mesh]") {
+  TeamMesh team;
+  add_all(team, chunks_of(5, 77));
+  const std::vector<MeshChunk> fresh = chunks_of(5, 78, 10);
+  add_all(team, fresh);
+  CHECK(team.snapshot()[0].mesh.vertices.size() == 11 * 11);
+  CHECK(team.add(chunks_of(5, 77).front()) == ChunkVerdict::kEarlierBoot);
+  CHECK(team.snapshot()[0].mesh.vertices.size() == 11 * 11);
+}
+
+TEST_CASE("Chunks in the frame of an earlier anchor are left out until they come anew", "[mesh]") {
+  TeamMesh team;
+  const std::vector<MeshChunk> before = chunks_of(5, 1, 60, 5), after = chunks_of(5, 1, 60, 0);
+  add_all(team, before);
+  add_all(team, {after.front()});
+  RobotMesh mesh = team.snapshot()[0];
+  CHECK(mesh.anchor == 0);
+  CHECK(mesh.chunks == 1);
+  CHECK(mesh.outdated_chunks == before.size() - 1);
+  CHECK(mesh.mesh.faces.size() == after.front().faces.size());
+  add_all(team, after);
+  mesh = team.snapshot()[0];
+  CHECK(mesh.outdated_chunks == 0);
+  CHECK(mesh.mesh.vertices.size() == 61 * 61);
+}
+
+TEST_CASE("A robot cannot send more than there is room for", "[mesh]") {
+  MeshChunk chunk = chunks_of(5, 1, 10).front();
+  TeamMesh team(10 * wire_bytes(chunk) + 1);
+  for (std::int32_t i = 0; i < 10; ++i) {
+    chunk.key.cell[0] = i;
+    REQUIRE(team.add(chunk) == ChunkVerdict::kTaken);
+  }
+  chunk.key.cell[0] = -1;
+  CHECK(team.add(chunk) == ChunkVerdict::kNoRoom);
+  chunk.key.cell[0] = 0;
+  CHECK(team.add(chunk) == ChunkVerdict::kTaken);  // in place of the one before
+  CHECK(team.add(chunks_of(6, 1, 10).front()) == ChunkVerdict::kTaken);
 }
 
 }  // namespace

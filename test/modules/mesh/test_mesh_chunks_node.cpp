@@ -1,13 +1,15 @@
 #include <catch2/catch.hpp>
+#include <limits>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/mesh_chunks_node.hpp"
 #include "modules/mesh/mesh_codec.hpp"
-#include "modules/mesh/team_mesh_node.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
+#include "test/support/spoilt_message.hpp"
 
 namespace km {
 namespace {
@@ -171,6 +173,85 @@ TEST_CASE("A robot's mesh arrives at its peers in chunks, also at those that joi
   a.reset();
   REQUIRE(b.basis.hears(PeerEventKind::kLeft, 3));
   CHECK(b.receives(3, *less));  // kept
+}
+
+MeshChunk some_chunk() {
+  return split_mesh(wavy_sheet(20, 0.1), 700, 3, {}).chunks.at(1);
+}
+
+// As it arrives: with the writer's header.
+Codec<MeshChunk>::Encoded received(const MeshChunk& chunk) {
+  auto encoded = encoded_by(chunk.key.robot, chunk);
+  encoded.wire.header.boot = 12345;
+  return encoded;
+}
+
+TEST_CASE("A mesh chunk survives the wire", "[codec]") {
+  MeshChunk chunk = some_chunk();
+  SECTION("with labels") {}
+  SECTION("without labels") {
+    chunk.labels.clear();
+  }
+  SECTION("empty: no more") {
+    chunk = {.key = chunk.key};
+  }
+  SECTION("far away") {
+    chunk.origin = {-(1 << 30), 1 << 30, 0};
+  }
+  const auto encoded = received(chunk);
+  const Decoded<MeshChunk> decoded = Codec<MeshChunk>::decode(encoded.wire);
+  REQUIRE(decoded.value);
+  chunk.boot = 12345;
+  CHECK(*decoded.value == chunk);
+}
+
+TEST_CASE("The largest chunk survives the wire", "[codec]") {
+  const MeshPieces pieces = split_mesh(wavy_sheet(180, 0.01), 1, 1, {});
+  std::size_t largest = 0;
+  for (const MeshChunk& chunk : pieces.chunks) {
+    largest = std::max(largest, wire_bytes(chunk));
+    CHECK(Codec<MeshChunk>::decode(received(chunk).wire).value);
+  }
+  CHECK(largest > kMaxChunkBytes - 50);
+}
+
+TEST_CASE("A mesh chunk that cannot be is refused", "[codec]") {
+  const MeshChunk chunk = some_chunk();
+  const char* const missing = "elements are missing or too many";
+  const char* const no_triples = "offsets or faces are not triples";
+  const char* const far = "positions are not finite or too far away";
+  check_refusals<MeshChunk>(
+      [&] { return received(chunk); },
+      {{"of another robot", "the mesh of another robot than the writer",
+        [](auto& m) { m.wire.header.robot = 4; }},
+       {"offsets not there", missing, [](auto& m) { m.wire.offsets._buffer = nullptr; }},
+       {"labels not there", missing, [](auto& m) { m.wire.labels._buffer = nullptr; }},
+       {"faces not there", missing, [](auto& m) { m.wire.faces._buffer = nullptr; }},
+       {"offsets without end", missing, [](auto& m) { m.wire.offsets._length = 0xffffffffU; }},
+       {"labels without end", missing, [](auto& m) { m.wire.labels._length = 0xffffffffU; }},
+       {"faces without end", missing, [](auto& m) { m.wire.faces._length = 0xffffffffU; }},
+       {"half a vertex", no_triples, [](auto& m) { --m.wire.offsets._length; }},
+       {"half a face", no_triples, [](auto& m) { --m.wire.faces._length; }},
+       {"a label too few", "labels do not fit the vertices",
+        [](auto& m) { --m.wire.labels._length; }},
+       {"too large", "a chunk that is too large",
+        [&](auto& m) {
+          MeshChunk large = chunk;
+          large.faces.resize(6000, {0, 1, 2});
+          m = received(large);
+        }},
+       {"a face outside", "a face names a vertex which does not exist",
+        [&](auto& m) { m.faces.back() = static_cast<std::uint16_t>(chunk.offsets.size()); }},
+       {"vertices for nothing", "vertices without faces",
+        [](auto& m) { m.wire.faces._length = 0; }},
+       {"steps that are no number", far,
+        [](auto& m) { m.wire.step_m = std::numeric_limits<float>::quiet_NaN(); }},
+       {"no steps", far, [](auto& m) { m.wire.step_m = 0.0F; }},
+       {"endless steps", far,
+        [](auto& m) { m.wire.step_m = std::numeric_limits<float>::infinity(); }},
+       {"steps of light years", far, [](auto& m) { m.wire.step_m = 1e16F; }},
+       {"an origin at the end of all numbers", far,
+        [](auto& m) { m.wire.origin.y = std::numeric_limits<std::int32_t>::min(); }}});
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "modules/core/geometry.hpp"
@@ -18,6 +20,9 @@ struct SheetSize {
   double step_m = 0.25;
   double keyframe_step_m = 0.5;
 };
+
+/// 8 m by 2 m.
+inline constexpr SheetSize kSheet{.columns = 32, .rows = 8, .step_m = 0.25, .keyframe_step_m = 0.5};
 
 inline std::size_t keyframe_count(const SheetSize& size) {
   const double length_m = static_cast<double>(size.columns) * size.step_m;
@@ -66,6 +71,27 @@ inline SE3 bend(const SE3& T, double radius_m) {
   const Eigen::Vector3d center(0.0, T.translation().y(), radius_m);
   const Eigen::Vector3d spoke(0.0, 0.0, T.translation().z() - radius_m);
   return make_pose(R * T.linear(), center + R * spoke);
+}
+
+inline std::vector<SE3> bent(const std::vector<SE3>& poses, double radius_m) {
+  std::vector<SE3> result;
+  for (const SE3& pose : poses) result.push_back(bend(pose, radius_m));
+  return result;
+}
+
+inline std::vector<SE3> moved(const SE3& T, const std::vector<SE3>& poses) {
+  std::vector<SE3> result;
+  for (const SE3& pose : poses) result.push_back(T * pose);
+  return result;
+}
+
+/// Of the vertices of two meshes that have equally many [m].
+inline double largest_distance_m(const LabelledMesh& a, const LabelledMesh& b) {
+  if (a.vertices.size() != b.vertices.size()) return std::numeric_limits<double>::infinity();
+  double largest = 0.0;
+  for (std::size_t v = 0; v < a.vertices.size(); ++v)
+    largest = std::max(largest, static_cast<double>((a.vertices[v] - b.vertices[v]).norm()));
+  return largest;
 }
 
 }  // namespace km

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "modules/mesh_deformation/decimation.hpp"
-#include "modules/mesh_deformation/edge_collapse.hpp"
 #include "test/modules/mesh_deformation/corridor.hpp"
 
 namespace km {

@@ -18,28 +18,6 @@ using Catch::Matchers::Contains;
 
 constexpr double kSame = 1e-6;  // [m]: a few roundings of floats below 10 m
 
-const SheetSize kSheet{.columns = 32, .rows = 8, .step_m = 0.25, .keyframe_step_m = 0.5};
-
-double largest_distance(const LabelledMesh& a, const LabelledMesh& b) {
-  REQUIRE(a.vertices.size() == b.vertices.size());
-  double largest = 0.0;
-  for (std::size_t v = 0; v < a.vertices.size(); ++v)
-    largest = std::max(largest, static_cast<double>((a.vertices[v] - b.vertices[v]).norm()));
-  return largest;
-}
-
-std::vector<SE3> moved(const std::vector<SE3>& poses, const SE3& T) {
-  std::vector<SE3> result;
-  for (const SE3& pose : poses) result.push_back(T * pose);
-  return result;
-}
-
-std::vector<SE3> bent(const std::vector<SE3>& poses, double radius_m) {
-  std::vector<SE3> result;
-  for (const SE3& pose : poses) result.push_back(bend(pose, radius_m));
-  return result;
-}
-
 std::string refusal(const MapMesh& map, const std::vector<SE3>& odometry,
                     const std::vector<SE3>& optimised) {
   LocalMeshOptimizer optimizer;
@@ -61,7 +39,7 @@ TEST_CASE("Poses that did not change leave the mesh as it is", "[mesh_deformatio
   CHECK(result.report.status == DeformationStatus::kConverged);
   CHECK(result.report.nodes > 20);
   CHECK(result.report.unbound_vertices == 0);
-  CHECK(largest_distance(result.mesh, map.mesh) < kSame);
+  CHECK(largest_distance_m(result.mesh, map.mesh) < kSame);
   CHECK(result.mesh.faces == map.mesh.faces);
   CHECK(result.mesh.labels == map.mesh.labels);
 }
@@ -74,7 +52,7 @@ TEST_CASE("Keyframes that move rigidly move the mesh rigidly", "[mesh_deformatio
   const MapMesh map = sheet(kSheet);
   const std::vector<SE3> keyframes = keyframes_above(kSheet);
   LocalMeshOptimizer optimizer;
-  const DeformedMesh result = optimizer.optimize(map, keyframes, moved(keyframes, T_world_odom));
+  const DeformedMesh result = optimizer.optimize(map, keyframes, moved(T_world_odom, keyframes));
   double largest = 0.0;
   for (std::size_t v = 0; v < map.mesh.vertices.size(); ++v) {
     const Eigen::Vector3d expected = T_world_odom * map.mesh.vertices[v].cast<double>();
@@ -130,7 +108,7 @@ TEST_CASE("A warm start ends where a cold one does", "[mesh_deformation]") {
     CHECK(warm.report.warm == (radius_m != 60.0));
     CHECK_FALSE(cold.report.warm);
     CHECK(warm.report.status == DeformationStatus::kConverged);
-    CHECK(largest_distance(warm.mesh, cold.mesh) < same_m);
+    CHECK(largest_distance_m(warm.mesh, cold.mesh) < same_m);
   }
 }
 
@@ -150,7 +128,7 @@ TEST_CASE("A mesh that grows extends the graph", "[mesh_deformation]") {
     LocalMeshOptimizer fresh;
     const DeformedMesh anew = fresh.optimize(map, keyframes, corrected);
     // Other nodes, the same surface: as near as either is to the truth (see the bent corridor).
-    CHECK(largest_distance(result.mesh, anew.mesh) < 0.035);
+    CHECK(largest_distance_m(result.mesh, anew.mesh) < 0.035);
   }
 }
 
@@ -173,7 +151,7 @@ TEST_CASE("Vertices that vanish and others that move keep the rest in place",
   map.mesh.vertices[5] += Eigen::Vector3f(0, 0, 0.01F);
   const DeformedMesh result = optimizer.optimize(map, keyframes, keyframes);
   CHECK(result.report.nodes == nodes);
-  CHECK(largest_distance(result.mesh, map.mesh) < kSame);
+  CHECK(largest_distance_m(result.mesh, map.mesh) < kSame);
 }
 
 TEST_CASE("Keyframes without an optimised pose follow the last that has one",
@@ -182,12 +160,12 @@ TEST_CASE("Keyframes without an optimised pose follow the last that has one",
   const SE3 T_world_odom = random_pose(rng, 1.0);
   const MapMesh map = sheet(kSheet);
   const std::vector<SE3> keyframes = keyframes_above(kSheet);
-  std::vector<SE3> optimised = moved(keyframes, T_world_odom);
+  std::vector<SE3> optimised = moved(T_world_odom, keyframes);
   LocalMeshOptimizer complete;
   const DeformedMesh expected = complete.optimize(map, keyframes, optimised);
   optimised.resize(3);
   LocalMeshOptimizer early;
-  CHECK(largest_distance(early.optimize(map, keyframes, optimised).mesh, expected.mesh) <
+  CHECK(largest_distance_m(early.optimize(map, keyframes, optimised).mesh, expected.mesh) <
         2 * kSame);
 }
 
@@ -213,56 +191,30 @@ TEST_CASE("An empty mesh is deformed to an empty mesh", "[mesh_deformation]") {
 }
 
 TEST_CASE("Input that cannot be used is refused by name", "[mesh_deformation]") {
-  MapMesh map = sheet(kSheet);
-  std::vector<SE3> keyframes = keyframes_above(kSheet);
-  std::vector<SE3> optimised = keyframes;
-  SECTION("an optimised pose that is not finite") {
-    optimised[3].translation().y() = std::numeric_limits<double>::quiet_NaN();
-    CHECK_THAT(refusal(map, keyframes, optimised), Contains("optimised pose of keyframe 3"));
-  }
-  SECTION("odometry that is not rigid") {
-    keyframes[2].linear() *= 1.01;
-    CHECK_THAT(refusal(map, keyframes, optimised), Contains("odometry pose of keyframe 2"));
-  }
-  SECTION("a reflection") {
-    keyframes[2].linear() *= -1.0;
-    CHECK_THAT(refusal(map, keyframes, optimised), Contains("odometry pose of keyframe 2"));
-  }
-  SECTION("more optimised poses than keyframes") {
-    optimised.push_back(SE3::Identity());
-    CHECK_THAT(refusal(map, keyframes, optimised), Contains("optimised poses for"));
-  }
-  SECTION("no optimised poses") {
-    CHECK_THAT(refusal(map, keyframes, {}), Contains("0 optimised poses"));
-  }
-  SECTION("a vertex that is not finite") {
-    map.mesh.vertices[4].x() = std::numeric_limits<float>::quiet_NaN();
-    CHECK_THAT(refusal(map, keyframes, optimised), Contains("vertex 4"));
-  }
-  SECTION("a vertex far outside the world") {
-    map.mesh.vertices[4].x() = 1e30F;
-    CHECK_THAT(refusal(map, keyframes, optimised), Contains("vertex 4"));
-  }
-  SECTION("a vertex seen by a keyframe that does not exist") {
-    map.seen_by[5][1] = 1000;
-    CHECK_THAT(refusal(map, keyframes, optimised), Contains("vertex 5 was seen by keyframes"));
-  }
-  SECTION("a vertex last seen before it was first seen") {
-    map.seen_by[5] = {3, 2};
-    CHECK_THAT(refusal(map, keyframes, optimised), Contains("vertex 5 was seen by keyframes"));
-  }
-  SECTION("vertices without a time of sight") {
-    map.seen_by.pop_back();
-    CHECK_THAT(refusal(map, keyframes, optimised), Contains("seen_by has"));
-  }
-  SECTION("a face that names a vertex which does not exist") {
-    map.mesh.faces[1][2] = 1U << 30U;
-    CHECK_THAT(refusal(map, keyframes, optimised), Contains("face 1 names vertex"));
-  }
-  SECTION("ids that do not ascend") {
-    std::swap(map.ids[1], map.ids[2]);
-    CHECK_THAT(refusal(map, keyframes, optimised), Contains("ids do not ascend at vertex 2"));
-  }
+  struct Input {
+    MapMesh map = sheet(kSheet);
+    std::vector<SE3> keyframes = keyframes_above(kSheet), optimised = keyframes;
+  };
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  const auto check_refusal = [](const char* reason, const auto& spoil) {
+    Input input;
+    spoil(input);
+    CHECK_THAT(refusal(input.map, input.keyframes, input.optimised), Contains(reason));
+  };
+  check_refusal("optimised pose of keyframe 3",
+                [](Input& in) { in.optimised[3].translation().y() = double{kNan}; });
+  check_refusal("odometry pose of keyframe 2", [](Input& in) { in.keyframes[2].linear() *= 1.01; });
+  check_refusal("odometry pose of keyframe 2", [](Input& in) { in.keyframes[2].linear() *= -1.0; });
+  check_refusal("optimised poses for", [](Input& in) { in.optimised.push_back(SE3::Identity()); });
+  check_refusal("0 optimised poses", [](Input& in) { in.optimised.clear(); });
+  check_refusal("vertex 4", [](Input& in) { in.map.mesh.vertices[4].x() = kNan; });
+  check_refusal("vertex 4", [](Input& in) { in.map.mesh.vertices[4].x() = 1e30F; });
+  check_refusal("vertex 5 was seen by keyframes", [](Input& in) { in.map.seen_by[5][1] = 1000; });
+  check_refusal("vertex 5 was seen by keyframes", [](Input& in) { in.map.seen_by[5] = {3, 2}; });
+  check_refusal("seen_by has", [](Input& in) { in.map.seen_by.pop_back(); });
+  check_refusal("face 1 names vertex", [](Input& in) { in.map.mesh.faces[1][2] = 1U << 30U; });
+  check_refusal("ids do not ascend at vertex 2",
+                [](Input& in) { std::swap(in.map.ids[1], in.map.ids[2]); });
 }
 
 TEST_CASE("A refused call leaves the optimizer as it was", "[mesh_deformation]") {

@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "modules/core/lie.hpp"
+#include "modules/mesh_deformation/keyframe_motion.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/mesh_deformation/mesh_node.hpp"
 #include "test/modules/mesh_deformation/corridor.hpp"
@@ -12,7 +14,6 @@
 namespace km {
 namespace {
 
-const SheetSize kSheet{.columns = 32, .rows = 8, .step_m = 0.25, .keyframe_step_m = 0.5};
 constexpr double kSame_m = 1e-5;  // a few roundings of floats below 20 m
 
 struct Corridor {
@@ -22,21 +23,9 @@ struct Corridor {
   std::uint64_t version = 1;
 
   [[nodiscard]] CorrectionInput input() const { return {map, version, T_odom_kf, T_world_kf}; }
-  void bend_to(double radius_m) {
-    for (std::size_t i = 0; i < T_odom_kf.size(); ++i) T_world_kf[i] = bend(T_odom_kf[i], radius_m);
-  }
-  void move(const SE3& T) {
-    for (SE3& pose : T_world_kf) pose = T * pose;
-  }
+  void bend_to(double radius_m) { T_world_kf = bent(T_odom_kf, radius_m); }
+  void move(const SE3& T) { T_world_kf = moved(T, T_world_kf); }
 };
-
-double largest_distance_m(const LabelledMesh& a, const LabelledMesh& b) {
-  REQUIRE(a.vertices.size() == b.vertices.size());
-  double largest = 0.0;
-  for (std::size_t v = 0; v < a.vertices.size(); ++v)
-    largest = std::max(largest, static_cast<double>((a.vertices[v] - b.vertices[v]).norm()));
-  return largest;
-}
 
 TEST_CASE("A mesh is corrected once, then only for a reason", "[mesh_deformation]") {
   Corridor corridor;
@@ -88,15 +77,15 @@ TEST_CASE("A mesh whose keyframes all move alike is moved as a whole", "[mesh_de
   REQUIRE(first);
   for (int i = 0; i < 3; ++i) {  // again and again: from the last optimisation, without drift
     corridor.move(random_pose(rng, 2.0));
-    const auto moved = corrector.correct(corridor.input());
-    REQUIRE(moved);
-    CHECK_FALSE(moved->deformed);
-    CHECK(moved->report.nodes == first->report.nodes);
-    CHECK(moved->mesh.faces == corridor.map.mesh.faces);
-    CHECK(moved->mesh.labels == corridor.map.mesh.labels);
+    const auto again = corrector.correct(corridor.input());
+    REQUIRE(again);
+    CHECK_FALSE(again->deformed);
+    CHECK(again->report.nodes == first->report.nodes);
+    CHECK(again->mesh.faces == corridor.map.mesh.faces);
+    CHECK(again->mesh.labels == corridor.map.mesh.labels);
     LocalMeshOptimizer fresh;
     const DeformedMesh anew = fresh.optimize(corridor.map, corridor.T_odom_kf, corridor.T_world_kf);
-    CHECK(largest_distance_m(moved->mesh, anew.mesh) < kSame_m);
+    CHECK(largest_distance_m(again->mesh, anew.mesh) < kSame_m);
     CHECK_FALSE(corrector.correct(corridor.input()));
   }
   SECTION("then one of them bends: what was optimised before is what counts") {
@@ -194,11 +183,11 @@ TEST_CASE("Of two visits that coincide once they are corrected, the newer stays"
       CHECK(first->superseded.vertices[v].heir == v + count);
     }
     for (SE3& pose : visits.T_world_kf) pose.translation().y() += 1.0;
-    const auto moved = corrector.correct(visits.input());
-    REQUIRE(moved);
-    CHECK_FALSE(moved->deformed);
-    CHECK(moved->mesh.faces == first->mesh.faces);
-    CHECK(moved->superseded.vertices.empty());
+    const auto again = corrector.correct(visits.input());
+    REQUIRE(again);
+    CHECK_FALSE(again->deformed);
+    CHECK(again->mesh.faces == first->mesh.faces);
+    CHECK(again->superseded.vertices.empty());
   }
   SECTION("as odometry has them, both stay") {
     visits.T_world_kf = visits.T_odom_kf;
@@ -255,6 +244,96 @@ TEST_CASE("The deformation graph does not grow in a place seen again and again",
     ++visits.version;
   }
   CHECK(most_nodes <= 2 * nodes_at_first);
+}
+
+constexpr MotionScale kScale{.translation_m = 0.01, .rotation_rad = 0.005};
+constexpr double kRounding = 1e-9;  // in units of the scale, for poses within 10 m
+
+std::vector<SE3> random_poses(std::mt19937& rng, std::size_t count) {
+  std::vector<SE3> poses;
+  for (std::size_t i = 0; i < count; ++i) poses.push_back(random_pose(rng));
+  return poses;
+}
+
+TEST_CASE("A motion of all keyframes together is no bending", "[mesh_deformation]") {
+  const auto count = GENERATE(1U, 2U, 30U);
+  const auto seed = GENERATE(range(0U, 5U));
+  CAPTURE(count, seed);
+  std::mt19937 rng(seed);
+  const std::vector<SE3> before = random_poses(rng, count);
+  const SE3 T = random_pose(rng);
+  const KeyframeMotion motion = keyframe_motion(before, moved(T, before), kScale);
+  CHECK(motion.T_after_before.isApprox(T, 1e-9));
+  CHECK(motion.bending < kRounding);
+  CHECK(largest_difference(before, T, motion.T_after_before, kScale) < kRounding);
+}
+
+TEST_CASE("One keyframe that moves against many others is found", "[mesh_deformation]") {
+  const auto seed = GENERATE(range(0U, 5U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  constexpr std::size_t kCount = 1000;
+  const std::vector<SE3> before = random_poses(rng, kCount);
+  std::vector<SE3> after = moved(random_pose(rng), before);
+  // The others' motion takes on a share of about 1 / kCount of the odd one's.
+  SECTION("by three times the scale of translation") {
+    after[7].translation() += Eigen::Vector3d(0.0, 0.03, 0.0);
+    CHECK(keyframe_motion(before, after, kScale).bending == Approx(3.0).epsilon(0.02));
+  }
+  SECTION("by three times the scale of rotation") {
+    after[7].linear() *= so3_exp({0.0, 0.0, 0.015});
+    CHECK(keyframe_motion(before, after, kScale).bending == Approx(3.0).epsilon(0.02));
+  }
+}
+
+TEST_CASE("The common motion weighs rotations against translations", "[mesh_deformation]") {
+  // Two keyframes 2 m apart on x. Their positions turn by +a about z, their axes by -a. Per the
+  // sum of squares, (1 m * sin)^2 / translation^2 for each position against sin^2 / rotation^2.
+  const double a = 0.01;
+  const std::vector<SE3> before = {make_pose(Eigen::Matrix3d::Identity(), {1, 0, 0}),
+                                   make_pose(Eigen::Matrix3d::Identity(), {-1, 0, 0})};
+  const Eigen::Matrix3d R = so3_exp({0, 0, a});
+  const std::vector<SE3> after = {make_pose(R.transpose(), R * Eigen::Vector3d(1, 0, 0)),
+                                  make_pose(R.transpose(), R * Eigen::Vector3d(-1, 0, 0))};
+  const double w_t = 1.0 / (0.01 * 0.01);
+  const double w_r = 1.0 / (0.005 * 0.005);
+  const KeyframeMotion motion = keyframe_motion(before, after, kScale);
+  const double angle = so3_log(motion.T_after_before.linear()).z();
+  CHECK(angle == Approx(a * (w_t - w_r) / (w_t + w_r)).epsilon(1e-3));
+}
+
+TEST_CASE("Solutions are compared over the keyframes both have", "[mesh_deformation]") {
+  std::mt19937 rng(1);
+  const std::vector<SE3> before = random_poses(rng, 5);
+  std::vector<SE3> after = before;
+  after.push_back(random_pose(rng));
+  CHECK(keyframe_motion(before, after, kScale).bending < kRounding);
+  CHECK(keyframe_motion({}, after, kScale).bending == 0.0);
+}
+
+TEST_CASE("Two motions differ by what they differ at the pose they move apart most",
+          "[mesh_deformation]") {
+  const std::vector<SE3> poses = {SE3::Identity(),
+                                  make_pose(Eigen::Matrix3d::Identity(), {20.0, 0.0, 0.0})};
+  const SE3 turn = make_pose(so3_exp({0.0, 0.0, 0.002}), Eigen::Vector3d::Zero());
+  const SE3 shift = make_pose(Eigen::Matrix3d::Identity(), {0.0, 0.02, 0.0});
+  CHECK(largest_difference(poses, SE3::Identity(), turn, kScale) == Approx(4.0).epsilon(1e-3));
+  CHECK(largest_difference({poses.data(), 1}, turn, SE3::Identity(), kScale) == Approx(0.4));
+  CHECK(largest_difference(poses, shift, SE3::Identity(), kScale) == Approx(2.0));
+}
+
+TEST_CASE("Keyframes without an optimised pose follow odometry from the last that has one",
+          "[mesh_deformation]") {
+  std::mt19937 rng(2);
+  const std::vector<SE3> odometry = random_poses(rng, 4);
+  const SE3 T_world_odom = random_pose(rng);
+  std::vector<SE3> optimised = moved(T_world_odom, odometry);
+  const std::vector<SE3> expected = optimised;
+  optimised.resize(2);
+  const std::vector<SE3> all = complete(odometry, optimised);
+  REQUIRE(all.size() == 4);
+  for (std::size_t i = 0; i < 4; ++i) CHECK(all[i].isApprox(expected[i], 1e-12));
+  CHECK(complete({}, {}).empty());
 }
 
 }  // namespace

@@ -1,7 +1,5 @@
 #include <catch2/catch.hpp>
-#include <condition_variable>
 #include <memory>
-#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -10,23 +8,14 @@
 #include "runtime/clock.hpp"
 #include "test/modules/mesh_deformation/corridor.hpp"
 #include "test/support/captured_log.hpp"
-#include "test/support/patience.hpp"
+#include "test/support/inbox.hpp"
 
 namespace km {
 namespace {
 
 constexpr RobotId kSelf = 4;
-const SheetSize kSheet{.columns = 32, .rows = 8, .step_m = 0.25, .keyframe_step_m = 0.5};
-
 // A robot's mapper, odometry and pose graph, as far as this node sees them.
 struct Robot {
-  Robot() {
-    optimized.subscribe([this](const auto& message) {
-      const std::lock_guard lock(mutex);
-      results.push_back(*message);
-      changed.notify_all();
-    });
-  }
   MeshDeformationTopics topics() {
     return {.maps = maps,
             .keyframes = keyframes,
@@ -40,24 +29,17 @@ struct Robot {
         KeyframeOdometry{.id = {kSelf, static_cast<KeyframeIndex>(i)}, .T_odom_kf = T_odom_kf[i]});
   }
   [[nodiscard]] std::shared_ptr<const Trajectory> solution(double radius_m) const {
-    Trajectory result{.robot = kSelf, .anchor = 2, .T_world_kf = {}};
-    for (const SE3& pose : T_odom_kf) result.T_world_kf.push_back(bend(pose, radius_m));
-    return std::make_shared<const Trajectory>(std::move(result));
+    return std::make_shared<const Trajectory>(
+        Trajectory{.robot = kSelf, .anchor = 2, .T_world_kf = bent(T_odom_kf, radius_m)});
   }
-  std::size_t wait_for(std::size_t count) {
-    std::unique_lock lock(mutex);
-    changed.wait_for(lock, kPatience, [&] { return results.size() >= count; });
-    return results.size();
-  }
+  [[nodiscard]] std::vector<OptimizedMesh> results() { return inbox.messages(); }
 
   Topic<MapMesh> maps;
   Topic<KeyframeOdometry> keyframes;
   Topic<Trajectory> trajectory;
   Topic<OptimizedMesh> optimized;
   Topic<SupersededSurface> superseded;
-  std::mutex mutex;
-  std::condition_variable changed;
-  std::vector<OptimizedMesh> results;
+  Inbox<OptimizedMesh> inbox{optimized};
   std::vector<SE3> T_odom_kf = keyframes_above(kSheet);
   std::shared_ptr<const MapMesh> map = std::make_shared<const MapMesh>(sheet(kSheet));
 };
@@ -71,6 +53,12 @@ MeshDeformationConfig every_two_seconds() {
 // Where the last vertex belongs when the corridor is bent.
 double last_vertex_x(double radius_m) {
   return bend(make_pose(Eigen::Matrix3d::Identity(), {8.0, 2.0, 0.0}), radius_m).translation().x();
+}
+
+// Hands over the map with all its keyframes.
+void show_map(const Robot& robot, MeshDeformationNode& node) {
+  for (std::size_t i = 0; i < robot.T_odom_kf.size(); ++i) node.step(robot.keyframe(i), 0.0);
+  node.step(robot.map, 0.0);
 }
 
 const MeshDeformationNode::Input kTick = MeshDeformationNode::Tick();
@@ -92,15 +80,14 @@ TEST_CASE("The mesh deformation node publishes what the optimizer makes of map a
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
   Hours hours(node);
-  for (std::size_t i = 0; i < robot.T_odom_kf.size(); ++i) node.step(robot.keyframe(i), 0.0);
-  node.step(robot.map, 0.0);
+  show_map(robot, node);
   hours.tick();
-  CHECK(robot.results.empty());  // no trajectory yet
+  CHECK(robot.results().empty());  // no trajectory yet
   node.step(robot.solution(20.0), 0.0);
-  CHECK(robot.results.empty());
+  CHECK(robot.results().empty());
   hours.tick();
-  REQUIRE(robot.results.size() == 1);
-  const OptimizedMesh& result = robot.results.front();
+  REQUIRE(robot.results().size() == 1);
+  const OptimizedMesh result = robot.results().front();
   CHECK(result.robot == kSelf);
   CHECK(result.anchor == 2);
   CHECK(result.deformed);
@@ -114,28 +101,27 @@ TEST_CASE("The mesh deformation node publishes what the optimizer makes of map a
   hours.tick();
   node.step(robot.solution(20.0), 0.0);
   hours.tick();
-  CHECK(robot.results.size() == 1);  // nothing moved
+  CHECK(robot.results().size() == 1);  // nothing moved
   node.step(robot.solution(30.0), 0.0);
   node.step(robot.solution(40.0), 0.0);
   hours.tick();
-  REQUIRE(robot.results.size() == 2);  // the newest trajectory only
-  CHECK(robot.results[1].mesh.vertices.back().x() == Approx(last_vertex_x(40.0)).margin(0.05));
+  REQUIRE(robot.results().size() == 2);  // the newest trajectory only
+  CHECK(robot.results()[1].mesh.vertices.back().x() == Approx(last_vertex_x(40.0)).margin(0.05));
 }
 
 TEST_CASE("A correction waits until the last one is a period old", "[node]") {
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
-  for (std::size_t i = 0; i < robot.T_odom_kf.size(); ++i) node.step(robot.keyframe(i), 0.0);
-  node.step(robot.map, 0.0);
+  show_map(robot, node);
   node.step(robot.solution(20.0), 0.0);
   const double start_s = steady_now_s();
   node.step(kTick, start_s);
-  REQUIRE(robot.results.size() == 1);
+  REQUIRE(robot.results().size() == 1);
   node.step(robot.solution(10.0), start_s);
   node.step(kTick, start_s + 1.99);
-  CHECK(robot.results.size() == 1);
+  CHECK(robot.results().size() == 1);
   node.step(kTick, steady_now_s() + 2.0);
-  CHECK(robot.results.size() == 2);
+  CHECK(robot.results().size() == 2);
 }
 
 TEST_CASE("A map that overtakes its keyframes waits for them", "[node]") {
@@ -146,30 +132,28 @@ TEST_CASE("A map that overtakes its keyframes waits for them", "[node]") {
   node.step(robot.solution(20.0), 0.0);  // of more keyframes than are known
   for (std::size_t i = 0; i + 1 < robot.T_odom_kf.size(); ++i) node.step(robot.keyframe(i), 0.0);
   hours.tick();
-  CHECK(robot.results.empty());
+  CHECK(robot.results().empty());
   node.step(robot.keyframe(robot.T_odom_kf.size() - 1), 0.0);
   hours.tick();
-  CHECK(robot.results.size() == 1);
+  CHECK(robot.results().size() == 1);
 }
 
 TEST_CASE("A trajectory that is behind is completed by odometry", "[node]") {
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
   Hours hours(node);
-  for (std::size_t i = 0; i < robot.T_odom_kf.size(); ++i) node.step(robot.keyframe(i), 0.0);
-  node.step(robot.map, 0.0);
+  show_map(robot, node);
   Trajectory behind = *robot.solution(20.0);
   behind.T_world_kf.resize(5);
   node.step(std::make_shared<const Trajectory>(behind), 0.0);
   hours.tick();
-  CHECK(robot.results.size() == 1);
+  CHECK(robot.results().size() == 1);
 }
 
 TEST_CASE("At the end the mesh is corrected afresh, and never after", "[node]") {
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
-  for (std::size_t i = 0; i < robot.T_odom_kf.size(); ++i) node.step(robot.keyframe(i), 0.0);
-  node.step(robot.map, 0.0);
+  show_map(robot, node);
   node.step(robot.solution(20.0), 0.0);
   const double now_s = steady_now_s();
   node.step(kTick, now_s);
@@ -177,13 +161,13 @@ TEST_CASE("At the end the mesh is corrected afresh, and never after", "[node]") 
   last.T_world_kf[3].translation().z() += 0.001;  // below the threshold, before the time
   node.step(std::make_shared<const Trajectory>(last), now_s);
   node.step(kEnd, now_s);
-  REQUIRE(robot.results.size() == 2);
+  REQUIRE(robot.results().size() == 2);
   LocalMeshOptimizer optimizer;
   const auto expected = optimizer.optimize(*robot.map, robot.T_odom_kf, last.T_world_kf);
-  CHECK(robot.results[1].mesh.vertices == expected.mesh.vertices);
+  CHECK(robot.results()[1].mesh.vertices == expected.mesh.vertices);
   node.step(robot.solution(10.0), now_s);
   node.step(kEnd, now_s + 3600.0);
-  CHECK(robot.results.size() == 2);
+  CHECK(robot.results().size() == 2);
 }
 
 TEST_CASE("A last map that cannot be corrected is told", "[node]") {
@@ -194,7 +178,7 @@ TEST_CASE("A last map that cannot be corrected is told", "[node]") {
   const CapturedLog log;
   node.step(kEnd, 0.0);
   CHECK_THAT(log.text(), Catch::Matchers::Contains("the last map is not corrected"));
-  CHECK(robot.results.empty());
+  CHECK(robot.results().empty());
 }
 
 TEST_CASE("The mesh deformation node refuses a gap between keyframes", "[node]") {
@@ -214,14 +198,15 @@ TEST_CASE("The mesh deformation node works as a thread", "[node]") {
     robot.keyframes.publish(robot.keyframe(i));
   robot.maps.publish(robot.map);
   robot.trajectory.publish(robot.solution(20.0));
-  REQUIRE(robot.wait_for(1) >= 1);
+  REQUIRE_FALSE(robot.inbox.wait_for(1).empty());
   robot.trajectory.publish(robot.solution(10.0));
   node.finish();
   robot.trajectory.publish(robot.solution(15.0));  // too late
   node.stop();
   CHECK(node.error() == nullptr);
-  REQUIRE(robot.results.size() >= 2);  // the last, and maybe one in time before
-  CHECK(robot.results.back().mesh.vertices.back().x() == Approx(last_vertex_x(10.0)).margin(0.05));
+  REQUIRE(robot.results().size() >= 2);  // the last, and maybe one in time before
+  CHECK(robot.results().back().mesh.vertices.back().x() ==
+        Approx(last_vertex_x(10.0)).margin(0.05));
 }
 
 }  // namespace

@@ -1,43 +1,25 @@
-#include <catch2/catch.hpp>
-
 #include <algorithm>
+#include <catch2/catch.hpp>
 #include <limits>
-#include <mutex>
 #include <random>
 #include <vector>
 
+#include "modules/outlier_rejection/outlier_rejection_codec.hpp"
 #include "modules/outlier_rejection/pcm_node.hpp"
 #include "test/modules/outlier_rejection/chain.hpp"
 #include "test/support/captured_log.hpp"
+#include "test/support/inbox.hpp"
+#include "test/support/spoilt_message.hpp"
 
 namespace km {
 namespace {
-
-// Collects what a topic publishes; usable from any thread.
-class Recorder {
- public:
-  explicit Recorder(In<InlierSet> topic) {
-    topic.subscribe([this](const auto& message) {
-      const std::lock_guard lock(mutex_);
-      sets_.push_back(*message);
-    });
-  }
-  std::vector<InlierSet> sets() const {
-    const std::lock_guard lock(mutex_);
-    return sets_;
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::vector<InlierSet> sets_;
-};
 
 struct Team {
   std::mt19937 rng{1};
   Topic<Closure> closures;
   Topic<PeerEvent> peer_events;
   Topic<InlierSet> inlier_sets;
-  Recorder recorder{inlier_sets};
+  Inbox<InlierSet> sets{inlier_sets};
 
   PcmTopics topics() {
     return {.closures = closures, .peer_events = peer_events, .inlier_sets = inlier_sets};
@@ -79,7 +61,7 @@ TEST_CASE("The PCM node publishes sets that grew, with rising versions", "[node]
   node.step(closures[0]);
   node.step(closures[1]);
   node.publish_changes(0.0);
-  CHECK(team.recorder.sets().empty());  // below min_inliers
+  CHECK(team.sets.messages().empty());  // below min_inliers
   node.step(closures[2]);
   node.publish_changes(0.0);
   node.publish_changes(0.0);  // nothing new
@@ -89,7 +71,7 @@ TEST_CASE("The PCM node publishes sets that grew, with rising versions", "[node]
   node.step(closures[4]);
   node.publish_changes(0.0);
 
-  const auto sets = team.recorder.sets();
+  const auto sets = team.sets.messages();
   REQUIRE(sets.size() == 2);
   CHECK(sets[0].closures.size() == 3);
   CHECK(sets[1].closures.size() == 5);
@@ -109,7 +91,7 @@ TEST_CASE("The PCM node decides for the pairs in which it is the lower, and for 
     for (const Closure& closure : team.agreeing(a, b, 4)) node.step(closure);
   node.publish_changes(0.0);
 
-  const auto sets = team.recorder.sets();
+  const auto sets = team.sets.messages();
   REQUIRE(sets.size() == 2);
   CHECK((sets[0].a == 4 && sets[0].b == 4));
   CHECK((sets[1].a == 4 && sets[1].b == 9));
@@ -122,8 +104,8 @@ TEST_CASE("The PCM node survives closures that cannot be weighed", "[node]") {
   closures[1].T_from_to.translation().x() = std::numeric_limits<double>::quiet_NaN();
   for (const Closure& closure : closures) node.step(closure);
   node.publish_changes(0.0);
-  REQUIRE(team.recorder.sets().size() == 1);
-  CHECK(team.recorder.sets()[0].closures.size() == 3);
+  REQUIRE(team.sets.messages().size() == 1);
+  CHECK(team.sets.messages()[0].closures.size() == 3);
 }
 
 TEST_CASE("The PCM node says that a search was cut short, and how much may be missing", "[node]") {
@@ -152,7 +134,7 @@ TEST_CASE("The PCM node's thread handles what was published before it stops", "[
   for (const Closure& closure : team.agreeing(0, 1, 40)) team.closures.publish(closure);
   node.stop();  // drains the queue, then publishes the last set
   CHECK(node.error() == nullptr);
-  const auto sets = team.recorder.sets();
+  const auto sets = team.sets.messages();
   REQUIRE_FALSE(sets.empty());
   CHECK(sets.back().closures.size() == 40);
   CHECK(sets.size() == sets.back().version);
@@ -167,18 +149,18 @@ TEST_CASE("All closures of two robots are published once independent ones agree"
   node.step(closures[1]);
   node.step(reversed(closures[0]));
   node.publish_changes(0.0);
-  CHECK(team.recorder.sets().empty());
+  CHECK(team.sets.messages().empty());
   node.step(closures[9]);
   node.publish_changes(1.0);
   node.publish_changes(100.0);  // nothing new
-  REQUIRE(team.recorder.sets().size() == 1);
-  CHECK(team.recorder.sets()[0].closures.size() == 3);
+  REQUIRE(team.sets.messages().size() == 1);
+  CHECK(team.sets.messages()[0].closures.size() == 3);
   node.step(closures[10]);
   node.publish_changes(100.0);
-  REQUIRE(team.recorder.sets().size() == 2);
-  CHECK(team.recorder.sets()[1].closures.size() == 4);
-  CHECK(std::ranges::is_sorted(team.recorder.sets()[1].closures));
-  CHECK(team.recorder.sets()[0].version < team.recorder.sets()[1].version);
+  REQUIRE(team.sets.messages().size() == 2);
+  CHECK(team.sets.messages()[1].closures.size() == 4);
+  CHECK(std::ranges::is_sorted(team.sets.messages()[1].closures));
+  CHECK(team.sets.messages()[0].version < team.sets.messages()[1].version);
 }
 
 TEST_CASE("Robots joined by one place wait for a second one, and it is said", "[node]") {
@@ -192,16 +174,16 @@ TEST_CASE("Robots joined by one place wait for a second one, and it is said", "[
   node.publish_changes(1000.0);
   node.step(closures[1]);
   node.publish_changes(1029.9);
-  CHECK(team.recorder.sets().empty());
+  CHECK(team.sets.messages().empty());
   CHECK(log.text().empty());
   node.publish_changes(1030.0);
-  REQUIRE(team.recorder.sets().size() == 1);
-  CHECK(team.recorder.sets()[0].closures.size() == 2);
+  REQUIRE(team.sets.messages().size() == 1);
+  CHECK(team.sets.messages()[0].closures.size() == 2);
   CHECK_THAT(log.text(), Catch::Contains("robots 2 5: joined by one place only"));
   node.step(closures[2]);
   node.publish_changes(1031.0);  // the wait is over for good
-  REQUIRE(team.recorder.sets().size() == 2);
-  CHECK(team.recorder.sets()[1].closures.size() == 3);
+  REQUIRE(team.sets.messages().size() == 2);
+  CHECK(team.sets.messages()[1].closures.size() == 3);
 }
 
 TEST_CASE("At the end of all runs nobody waits for a witness", "[node]") {
@@ -210,10 +192,10 @@ TEST_CASE("At the end of all runs nobody waits for a witness", "[node]") {
   const CapturedLog log;
   node.step(team.agreeing(2, 5, 1)[0]);
   node.publish_changes(10.0);
-  CHECK(team.recorder.sets().empty());
+  CHECK(team.sets.messages().empty());
   node.expect_no_more();
   node.publish_changes(12.0);
-  CHECK(team.recorder.sets().size() == 1);
+  CHECK(team.sets.messages().size() == 1);
   CHECK_THAT(log.text(), Catch::Contains("none other has agreed in 2 s"));
 }
 
@@ -222,8 +204,8 @@ TEST_CASE("Closures inside the robot need no witness", "[node]") {
   PcmNode node(PcmConfig{}, 4, team.topics());
   node.step(team.agreeing_inside(4, 4)[0]);
   node.publish_changes(0.0);
-  REQUIRE(team.recorder.sets().size() == 1);
-  CHECK(team.recorder.sets()[0].closures.size() == 1);
+  REQUIRE(team.sets.messages().size() == 1);
+  CHECK(team.sets.messages()[0].closures.size() == 1);
 }
 
 TEST_CASE("Of a peer that has restarted the closures are forgotten", "[node]") {
@@ -239,11 +221,59 @@ TEST_CASE("Of a peer that has restarted the closures are forgotten", "[node]") {
   node.step(after[3]);
   node.step(after[17]);
   node.publish_changes(0.5);
-  const auto sets = team.recorder.sets();
+  const auto sets = team.sets.messages();
   REQUIRE(sets.size() == 2);
   CHECK(sets[0].closures.size() == 20);
   CHECK(sets[1].closures.size() == 2);
   CHECK(sets[0].version < sets[1].version);
+}
+
+const InlierSet kSet{.a = 3,
+                     .b = 700,
+                     .version = 12,
+                     .closures = {{{3, 0}, {700, 9}}, {{3, 5}, {700, 1}}, {{3, 5}, {700, 4}}}};
+
+TEST_CASE("An inlier set survives the wire", "[codec]") {
+  const auto encoded = encoded_by(kSet.a, kSet);
+  const Decoded<InlierSet> decoded = Codec<InlierSet>::decode(encoded.wire);
+  REQUIRE(decoded.value);
+  CHECK(decoded.value->a == kSet.a);
+  CHECK(decoded.value->b == kSet.b);
+  CHECK(decoded.value->version == kSet.version);
+  CHECK(decoded.value->closures == kSet.closures);
+}
+
+TEST_CASE("An empty set and one inside a robot survive the wire", "[codec]") {
+  InlierSet set{.a = 5, .b = 5, .version = 1, .closures = {}};
+  CHECK(Codec<InlierSet>::decode(encoded_by(set.a, set).wire).value);
+  set.closures = {{{5, 2}, {5, 9}}};
+  CHECK(Codec<InlierSet>::decode(encoded_by(set.a, set).wire).value);
+}
+
+TEST_CASE("An inlier set that cannot be is refused", "[codec]") {
+  check_refusals<InlierSet>(
+      [] { return encoded_by(kSet.a, kSet); },
+      {{"descending pair", "the pair is not in ascending order",
+        [](auto& m) { std::swap(m.wire.a, m.wire.b); }},
+       {"written by the higher robot", "decided by another robot than the lower",
+        [](auto& m) { m.wire.header.robot = 700; }},
+       {"of a third robot", "a closure of another pair",
+        [](auto& m) { m.closures[1].to.robot = 4; }},
+       {"inside one of two robots", "a closure of another pair",
+        [](auto& m) { m.closures[0].to.robot = 3; }},
+       {"repeated", "closures are not ascending", [](auto& m) { m.closures[1] = m.closures[0]; }},
+       {"descending closures", "closures are not ascending",
+        [](auto& m) { std::swap(m.closures[0], m.closures[2]); }},
+       {"a second name of a closure", "a closure is named by its higher end first",
+        [](auto& m) { std::swap(m.closures[1].from, m.closures[1].to); }},
+       {"claimed without being there", "closures are missing or too many",
+        [](auto& m) { m.wire.closures._buffer = nullptr; }},
+       {"a length without end", "closures are missing or too many",
+        [](auto& m) { m.wire.closures._length = 0xffffffffU; }}});
+  const InlierSet inside{.a = 5, .b = 5, .version = 1, .closures = {{{5, 2}, {5, 9}}}};
+  check_refusals<InlierSet>([&] { return encoded_by(5, inside); },
+                            {{"a keyframe with itself", "a closure from a keyframe to itself",
+                              [](auto& m) { m.closures[0].from.index = 9; }}});
 }
 
 }  // namespace

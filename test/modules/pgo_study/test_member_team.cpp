@@ -18,7 +18,7 @@
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/rounding.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
-#include "test/support/overheard_member.hpp"
+#include "test/support/eavesdropper.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"
 

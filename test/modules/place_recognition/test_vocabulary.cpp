@@ -1,20 +1,27 @@
-#include <catch2/catch.hpp>
-
 #include <algorithm>
 #include <bit>
+#include <catch2/catch.hpp>
 #include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <numeric>
-#include <random>
 #include <set>
+#include <string>
 
 #include "modules/place_recognition/vocabulary.hpp"
+#include "modules/place_recognition/vocabulary_file.hpp"
 #include "modules/place_recognition/vocabulary_training.hpp"
 #include "test/modules/place_recognition/synthetic_orb.hpp"
-
-using Catch::Matchers::Contains;
+#include "test/support/command.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {
+
+using Catch::Matchers::Contains;
 
 using Images = std::vector<std::vector<OrbDescriptor>>;
 
@@ -189,6 +196,171 @@ TEST_CASE("What is no vocabulary is refused with the reason", "[place_recognitio
   bad.centers.resize(3);
   bad.idf.resize(2);
   check_refused("node 2 has no parent");
+}
+
+VocabularyData small_vocabulary() {
+  SyntheticOrb world(2, 1);
+  return train_vocabulary(world.images(5, 40, 5), {.branching = 4, .depth = 2});
+}
+
+void overwrite(std::string& bytes, std::size_t offset, std::uint32_t value) {
+  std::memcpy(bytes.data() + offset, &value, sizeof(value));
+}
+
+TEST_CASE("A vocabulary survives its file, identity and scores included", "[place_recognition]") {
+  const VocabularyData data = small_vocabulary();
+  const Vocabulary before(data);
+  const TemporaryFolder folder;
+  save_vocabulary(data, folder.path() / "v.kmvoc");
+  const Vocabulary after = load_vocabulary(folder.path() / "v.kmvoc");
+  CHECK(after.data() == data);
+  CHECK(after.id() == before.id());
+  SyntheticOrb world(2, 1);
+  const auto image = world.image(100, 8);
+  CHECK(after.transform(image) == before.transform(image));
+}
+
+TEST_CASE("Vocabularies that differ in anything have different ids", "[place_recognition]") {
+  const VocabularyData data = small_vocabulary();
+  VocabularyData other = data;
+  other.idf[3] += 0.5F;
+  CHECK(fingerprint(other) != fingerprint(data));
+  other = data;
+  other.centers[2][31] ^= 1U;
+  CHECK(fingerprint(other) != fingerprint(data));
+  other = data;
+  ++other.depth;
+  CHECK(fingerprint(other) != fingerprint(data));
+  CHECK(fingerprint_text(0x0123456789ABCDEF) == "0123456789abcdef");
+}
+
+TEST_CASE("A truncated or overlong vocabulary is refused at every length", "[place_recognition]") {
+  const std::string bytes = serialize(small_vocabulary());
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    CHECK_THROWS_AS(deserialize(bytes.substr(0, size), "cut"), std::runtime_error);
+  CHECK_THROWS_WITH(deserialize(bytes.substr(0, 39), "cut"),
+                    Contains("vocabulary cut, offset 39: ends inside the header"));
+  CHECK_THROWS_WITH(deserialize(bytes + 'x', "long"),
+                    Contains("the header promises " + std::to_string(bytes.size())));
+}
+
+TEST_CASE("A vocabulary with any byte changed is refused", "[place_recognition]") {
+  const std::string bytes = serialize(small_vocabulary());
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    if (28 <= i && i < 32) continue;  // reserved
+    CAPTURE(i);
+    std::string damaged = bytes;
+    damaged[i] = static_cast<char>(damaged[i] ^ 0x04);
+    CHECK_THROWS_AS(deserialize(damaged, "damaged"), std::runtime_error);
+  }
+}
+
+TEST_CASE("A refusal names the file, the offset and what is wrong there", "[place_recognition]") {
+  const std::string good = serialize(small_vocabulary());
+  std::string bytes = good;
+  bytes[0] = 'X';
+  CHECK_THROWS_WITH(deserialize(bytes, "a/b"), Contains("vocabulary a/b, offset 0: not a"));
+  bytes = good;
+  overwrite(bytes, 8, 7);
+  CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("offset 8: format version 7, known is 1"));
+  bytes = good;
+  overwrite(bytes, 12, 256);
+  CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("offset 12: branching 256"));
+  bytes = good;
+  overwrite(bytes, 16, 0xFFFFFFFF);
+  CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("offset 16: depth 4294967295"));
+  bytes = good;
+  overwrite(bytes, 20, 0xFFFFFFFF);  // would be 137 GB: refused before anything is allocated
+  CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("offset 20: 4294967295 nodes"));
+  bytes = good;
+  overwrite(bytes, 20, 1U << 26U);
+  CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("but the header promises"));
+  bytes = good;
+  bytes.back() = static_cast<char>(bytes.back() ^ 1);
+  CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("offset 32: the checksum"));
+}
+
+TEST_CASE("A malformed tree is refused although its checksum fits", "[place_recognition]") {
+  VocabularyData data = small_vocabulary();
+  data.children[0] = 5;
+  CHECK_THROWS_WITH(deserialize(serialize(data), "forged"),
+                    Contains("offset 40: node 0 has 5 children, branching is 4"));
+}
+
+TEST_CASE("A file that is not there is named", "[place_recognition]") {
+  CHECK_THROWS_WITH(load_vocabulary("/nowhere/at.all"), Contains("/nowhere/at.all"));
+  CHECK_THROWS_WITH(load_vocabulary("config"), Contains("cannot be read"));  // a folder
+  CHECK_THROWS_WITH(save_vocabulary(small_vocabulary(), "/nowhere/at.all"),
+                    Contains("cannot be written"));
+}
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMaxShippedBytes = 1'500'000;
+
+CommandResult run_tool(const std::string& arguments) {
+  return run_command(std::string(KM_BIN_DIR) + "/kimera_multi_vocabulary " + arguments);
+}
+
+TEST_CASE("The shipped vocabulary loads, is the documented one, and is small",
+          "[place_recognition]") {
+  const fs::path file = "config/vocabulary/indoor.kmvoc";
+  const Vocabulary vocabulary = load_vocabulary(file);
+  std::ifstream readme("config/vocabulary/README.md");
+  const std::string text(std::istreambuf_iterator<char>(readme), {});
+  CHECK_THAT(text, Contains(fingerprint_text(vocabulary.id())));
+  CHECK(fs::file_size(file) < kMaxShippedBytes);
+  SyntheticOrb world(2, 1);
+  const auto image = world.image(100, 5);
+  CHECK(score(vocabulary.transform(image), vocabulary.transform(image)) ==
+        Approx(1.0).margin(1e-5));
+}
+
+// checks.md L5 on real images, through the tool.
+TEST_CASE("The tool trains on real images and tells the two places apart", "[place_recognition]") {
+  const auto images = shared_data("kimera_vio_lcd");
+  if (!images) return;
+  const TemporaryFolder folder;
+  const auto left = [&](int i) {
+    return (*images / ("left_img_" + std::to_string(i) + ".png")).string();
+  };
+  const std::string vocabulary = (folder.path() / "v.kmvoc").string();
+  const CommandResult trained = run_tool("train -k 9 -L 3 -o " + vocabulary + " " + left(0) + " " +
+                                         left(1) + " " + left(2) + " " + left(3));
+  INFO(trained.output);
+  REQUIRE(trained.exit_code == 0);
+  CHECK_THAT(trained.output, Contains("of 4 images"));
+
+  const auto score_of = [&](int i, int k) {
+    const fs::path json = folder.path() / "score.json";
+    const CommandResult run = run_tool("inspect " + vocabulary + " --pair " + left(i) + " " +
+                                       left(k) + " --json " + json.string());
+    REQUIRE(run.exit_code == 0);
+    const std::string text = folder.read("score.json");
+    const std::string key = "\"pair_score\": ";
+    return std::stod(text.substr(text.find(key) + key.size()));
+  };
+  CHECK(score_of(2, 2) == Approx(1.0).margin(1e-5));
+  // 0, 1 and 2, 3 are pairs of one place each.
+  CHECK(score_of(0, 1) > score_of(0, 2));
+  CHECK(score_of(2, 3) > score_of(1, 3));
+}
+
+TEST_CASE("The tool names what it cannot use and fails", "[place_recognition]") {
+  const TemporaryFolder folder;
+  const auto check_fails = [&](const std::string& arguments, const char* reason) {
+    const CommandResult run = run_tool(arguments);
+    CHECK(run.exit_code != 0);
+    CHECK_THAT(run.output, Contains(reason));
+  };
+  const std::string at = folder.path().string();
+  check_fails("train -o " + at + "/v /nowhere", "/nowhere does not exist");
+  check_fails("train -o " + at + "/v " + at, "holds no image");
+  folder.write("broken.png", "no image");
+  check_fails("train -o " + at + "/v " + at, "broken.png cannot be decoded");
+  check_fails("train -k 1 -o " + at + "/v " + at + "/broken.png", "branching = 1 is outside");
+  check_fails("inspect config/vocabulary/README.md", "not a vocabulary");
+  check_fails("", "subcommand is required");
 }
 
 }  // namespace

@@ -7,8 +7,9 @@
 #include <opencv2/core/utility.hpp>
 #include <vector>
 
+#include "modules/evaluation/statistics.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
-#include "test/modules/semantic_mapping/box_room.hpp"
+#include "test/modules/semantic_mapping/wall_scene.hpp"
 
 // Speed and accuracy of the mapper in the box room: 40 frames of 640 x 480, as other programs were
 // measured with. Times of one thread are CPU time of the process, of two wall time.
@@ -49,11 +50,6 @@ double now_ms(int threads) {
   if (threads == 1) return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
   const auto now = std::chrono::steady_clock::now().time_since_epoch();
   return std::chrono::duration<double, std::milli>(now).count();
-}
-
-double quantile(std::vector<double> values, double q) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
 }
 
 const std::vector<DepthAndLabels>& frames() {

@@ -1,9 +1,13 @@
+#include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <map>
 #include <random>
 #include <tuple>
 
 #include "modules/semantic_mapping/block_map.hpp"
+#include "modules/semantic_mapping/voxel_labels.hpp"
 
 namespace km {
 namespace {
@@ -42,6 +46,117 @@ TEST_CASE("Blocks beyond the map's reach are not there", "[semantic_mapping]") {
   CHECK(map.find({last, -BlockMap::kReach, 0}) != nullptr);
   CHECK(map.find({last + 1, 0, 0}) == nullptr);
   CHECK(map.find({-BlockMap::kReach - 1, 0, 0}) == nullptr);
+}
+
+constexpr unsigned kOne = VoxelLabels::kVotesPerWeight;  // votes of weight 1
+
+TEST_CASE("One observation of confidence 0.8 among five labels has the posterior 0.8",
+          "[semantic_mapping]") {
+  const LabelModel model{5, 0.8};
+  VoxelLabels labels;
+  for (LabelId label = 1; label <= 5; ++label)
+    CHECK(labels.probability(label, model) == Approx(0.2));
+  labels.observe(2, kOne);
+  CHECK(labels.best() == 2);
+  CHECK(labels.probability(2, model) == Approx(0.8));
+  for (const LabelId other : std::array<LabelId, 4>{1, 3, 4, 5})
+    CHECK(labels.probability(other, model) == Approx(0.05));
+}
+
+TEST_CASE("The posterior is the product of the likelihoods", "[semantic_mapping]") {
+  // Label 2 twice, label 4 once: 0.8^2 0.05, 0.05^2 0.8, and 0.05^3 for the three others.
+  const LabelModel model{5, 0.8};
+  VoxelLabels labels;
+  labels.observe(2, kOne);
+  labels.observe(4, kOne);
+  labels.observe(2, kOne);
+  const double two = 0.8 * 0.8 * 0.05, four = 0.05 * 0.05 * 0.8, other = 0.05 * 0.05 * 0.05;
+  const double sum = two + four + 3.0 * other;
+  CHECK(labels.probability(2, model) == Approx(two / sum));
+  CHECK(labels.probability(4, model) == Approx(four / sum));
+  CHECK(labels.probability(1, model) == Approx(other / sum));
+}
+
+TEST_CASE("An observation of weight w counts as its likelihood to the power of w",
+          "[semantic_mapping]") {
+  const LabelModel model{3, 0.6};  // others 0.2
+  VoxelLabels labels;
+  labels.observe(1, VoxelLabels::votes_of(0.25F));
+  const double one = std::pow(0.6, 0.25), other = std::pow(0.2, 0.25);
+  CHECK(labels.probability(1, model) == Approx(one / (one + 2.0 * other)));
+  CHECK(VoxelLabels::votes_of(1.0F) == kOne);
+  CHECK(VoxelLabels::votes_of(0.0F) == 1);
+}
+
+TEST_CASE("Four labels are counted exactly, in any order", "[semantic_mapping]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  std::uniform_int_distribution<int> draw(1, 4);
+  VoxelLabels labels;
+  double counts[5] = {};
+  for (int i = 0; i < 60; ++i) {
+    const int label = draw(rng);
+    counts[label] += 1.0;
+    labels.observe(static_cast<LabelId>(label), kOne);
+  }
+  double most = 0.0;
+  for (int label = 1; label <= 4; ++label) {
+    CHECK(labels.weight_of(static_cast<LabelId>(label)) == counts[label]);
+    most = std::max(most, counts[label]);
+  }
+  CHECK(counts[labels.best()] == most);
+}
+
+TEST_CASE("A label with more than a fifth of the votes is not lost to many others",
+          "[semantic_mapping]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  std::uniform_int_distribution<int> other(2, 200);
+  VoxelLabels labels;
+  for (int i = 0; i < 90; ++i)
+    labels.observe(i % 3 == 0 ? LabelId{1} : static_cast<LabelId>(other(rng)), 1);
+  CHECK(labels.best() == 1);
+}
+
+TEST_CASE("Old votes fade", "[semantic_mapping]") {
+  VoxelLabels labels;
+  for (int i = 0; i < 1000; ++i) labels.observe(1, kOne);
+  CHECK(labels.weight_of(1) <= 255.0 / kOne);
+  for (int i = 0; i < 40; ++i) labels.observe(2, kOne);
+  CHECK(labels.best() == 2);
+}
+
+TEST_CASE("A single class is certain", "[semantic_mapping]") {
+  VoxelLabels labels;
+  labels.observe(1, kOne);
+  CHECK(labels.probability(1, {1, 0.8}) == 1.0);
+}
+
+TEST_CASE("Votes of two places add up", "[semantic_mapping]") {
+  VoxelLabels a, b;
+  a.observe(1, 8);
+  a.observe(2, 3);
+  b.observe(2, 7);
+  b.observe(3, 1);
+  a.add(b);
+  CHECK(a.best() == 2);
+  CHECK(a.weight_of(1) == 8.0 / kOne);
+  CHECK(a.weight_of(2) == 10.0 / kOne);
+  CHECK(a.weight_of(3) == 1.0 / kOne);
+  a.add(VoxelLabels());
+  CHECK(a.weight_of(2) == 10.0 / kOne);
+
+  SECTION("beyond what is counted both sides fade alike") {
+    VoxelLabels full, other;
+    for (int i = 0; i < 25; ++i) full.observe(5, 8);   // 200
+    for (int i = 0; i < 20; ++i) other.observe(5, 8);  // 160
+    for (int i = 0; i < 10; ++i) other.observe(6, 8);  // 80
+    full.add(other);
+    CHECK(full.weight_of(5) == 180.0 / kOne);
+    CHECK(full.weight_of(6) == 40.0 / kOne);
+  }
 }
 
 }  // namespace

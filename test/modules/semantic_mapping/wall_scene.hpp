@@ -3,12 +3,117 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <numbers>
+#include <vector>
 
+#include "modules/core/camera.hpp"
+#include "modules/core/frame.hpp"
+#include "modules/core/geometry.hpp"
+#include "modules/core/label_palette.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
-#include "test/modules/semantic_mapping/box_room.hpp"
 
 namespace km {
+
+/// A room of 10 x 8 x 3 m, seen from inside by an ideal depth camera that goes in a circle.
+struct BoxRoom {
+  static inline const Eigen::Vector3d kLow{-5.0, -4.0, 0.0};
+  static inline const Eigen::Vector3d kHigh{5.0, 4.0, 3.0};
+
+  /// Labels 1 to 6: walls at low and high x, low and high y, floor, ceiling.
+  static LabelPalette palette() {
+    return LabelPalette({{1, "west", {255, 0, 0}},
+                         {2, "east", {0, 255, 0}},
+                         {3, "south", {0, 0, 255}},
+                         {4, "north", {255, 255, 0}},
+                         {5, "floor", {120, 120, 120}},
+                         {6, "ceiling", {200, 200, 200}}});
+  }
+
+  static PinholeCamera camera() {
+    PinholeCamera camera{
+        .width = 640, .height = 480, .fx = 525.0, .fy = 525.0, .cx = 319.5, .cy = 239.5};
+    return camera;
+  }
+
+  /// On a circle of radius 2 m at height 1.5 m, 100 poses a turn; the optical axis is the outward
+  /// normal turned left by 45 degrees.
+  static SE3 T_room_cam(int frame) {
+    const double angle = 2.0 * std::numbers::pi * frame / 100.0;
+    const double heading = angle + std::numbers::pi / 4.0;
+    Eigen::Matrix3d R;
+    R.col(2) << std::cos(heading), std::sin(heading), 0.0;
+    R.col(1) << 0.0, 0.0, -1.0;
+    R.col(0) = R.col(1).cross(R.col(2));
+    return make_pose(R, {2.0 * std::cos(angle), 2.0 * std::sin(angle), 1.5});
+  }
+
+  /// Distance of a point from the nearest of the six planes [m].
+  static double distance(const Eigen::Vector3d& p) {
+    return std::min((p - kLow).cwiseAbs().minCoeff(), (kHigh - p).cwiseAbs().minCoeff());
+  }
+
+  /// Label of the nearest plane.
+  static LabelId label_at(const Eigen::Vector3d& p) {
+    LabelId best = 0;
+    double least = std::numeric_limits<double>::max();
+    for (int axis = 0; axis < 3; ++axis)
+      for (int side = 0; side < 2; ++side) {
+        const double d = std::abs(p[axis] - (side == 0 ? kLow : kHigh)[axis]);
+        if (d >= least) continue;
+        least = d;
+        best = static_cast<LabelId>(2 * axis + side + 1);
+      }
+    return best;
+  }
+};
+
+/// What a camera sees of a scene.
+struct DepthAndLabels {
+  DepthImage depth;
+  LabelImage labels;
+};
+
+/// Images of `camera` (distortion included), where `cast(origin, direction, label)` gives the
+/// length along `direction` to the first surface, or infinity, and sets its label. Directions have
+/// length 1 along the optical axis, so that lengths are depths.
+template <typename Cast>
+DepthAndLabels render(const PinholeCamera& camera, const SE3& T_world_cam, const Cast& cast) {
+  DepthAndLabels images;
+  images.depth = {camera.width, camera.height, {}};
+  images.labels = {camera.width, camera.height, {}};
+  for (int v = 0; v < camera.height; ++v)
+    for (int u = 0; u < camera.width; ++u) {
+      const auto bearing = camera.unproject(Eigen::Vector2d(u, v));
+      LabelId label = 0;
+      const double depth =
+          bearing ? cast(T_world_cam.translation(),
+                         Eigen::Vector3d(T_world_cam.linear() * bearing->homogeneous()), label)
+                  : std::numeric_limits<double>::infinity();
+      const bool seen = depth < 65.0;
+      images.depth.millimetres.push_back(
+          seen ? static_cast<std::uint16_t>(std::lround(1000.0 * depth)) : std::uint16_t{0});
+      images.labels.ids.push_back(seen ? label : LabelId{0});
+    }
+  return images;
+}
+
+/// The walls of the room from inside, for render().
+inline double cast_room(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                        LabelId& label) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (direction[axis] == 0.0) continue;
+    const bool high = direction[axis] > 0.0;
+    const double wall = (high ? BoxRoom::kHigh : BoxRoom::kLow)[axis];
+    const double length = (wall - origin[axis]) / direction[axis];
+    if (length >= nearest) continue;
+    nearest = length;
+    label = static_cast<LabelId>(2 * axis + (high ? 1 : 0) + 1);
+  }
+  return nearest;
+}
 
 /// A quarter of the benchmark's camera: 160 x 120.
 inline PinholeCamera small_camera() {

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <filesystem>
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
-#include <random>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "modules/sensors/euroc_reader.hpp"
+#include "test/support/temporary_folder.hpp"
 
 namespace km {
 
@@ -21,8 +23,6 @@ class EurocFolder {
   static constexpr int kImuSamples = 501;
 
   explicit EurocFolder(const std::string& extension = ".png") {
-    std::random_device device;  // only the folder's name depends on it
-    root_ = std::filesystem::temp_directory_path() / ("km_euroc_" + std::to_string(device()));
     for (const char* camera : {"cam0", "cam1"}) {
       std::string list = "#timestamp [ns],filename\n";
       for (int i = 0; i < kPairs; ++i) {
@@ -37,27 +37,19 @@ class EurocFolder {
     write("imu0/sensor.yaml", imu_yaml());
     write("imu0/data.csv", imu_csv());
   }
-  ~EurocFolder() { std::filesystem::remove_all(root_); }
-  EurocFolder(const EurocFolder&) = delete;
-  EurocFolder& operator=(const EurocFolder&) = delete;
 
   static std::int64_t image_stamp(int i) { return kFirstImage + i * kImagePeriod; }
 
-  const std::filesystem::path& root() const { return root_; }
-  std::filesystem::path mav0() const { return root_ / "mav0"; }
+  const std::filesystem::path& root() const { return folder_.path(); }
+  std::filesystem::path mav0() const { return root() / "mav0"; }
   std::filesystem::path image(const std::string& camera, int i) const {
     return mav0() / camera / "data" / (std::to_string(image_stamp(i)) + ".png");
   }
 
   void write(const std::string& relative, const std::string& text) const {
-    const std::filesystem::path file = mav0() / relative;
-    std::filesystem::create_directories(file.parent_path());
-    std::ofstream(file, std::ios::binary) << text;
+    folder_.write("mav0/" + relative, text);
   }
-  std::string read(const std::string& relative) const {
-    std::ifstream stream(mav0() / relative, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
+  std::string read(const std::string& relative) const { return folder_.read("mav0/" + relative); }
   /// Replaces the first `from` of a file; the file must contain it.
   void replace(const std::string& relative, const std::string& from, const std::string& to) const {
     std::string text = read(relative);
@@ -65,8 +57,7 @@ class EurocFolder {
     write(relative, text);
   }
   void write_image(const std::string& relative, int width, int height, int grey) const {
-    std::filesystem::create_directories((mav0() / relative).parent_path());
-    cv::imwrite((mav0() / relative).string(), cv::Mat(height, width, CV_8UC1, cv::Scalar(grey)));
+    write_pixels(relative, cv::Mat(height, width, CV_8UC1, cv::Scalar(grey)));
   }
 
   /// Writes depth0 with an image every `every` frames, all at `depth` units, a scale of 1 mm.
@@ -144,7 +135,27 @@ class EurocFolder {
     write(sensor + "/data.csv", list);
   }
 
-  std::filesystem::path root_;
+  TemporaryFolder folder_;
 };
+
+/// What is left to read.
+inline std::vector<SensorPacket> packets_of(EurocReader& reader) {
+  std::vector<SensorPacket> packets;
+  while (auto packet = reader.next()) packets.push_back(std::move(*packet));
+  return packets;
+}
+
+/// A recording read to its end.
+struct Outcome {
+  std::vector<SensorPacket> packets;
+  ReaderReport report;
+};
+
+inline Outcome read(const EurocFolder& folder, const EurocOptions& options = {}) {
+  EurocReader reader(folder.root(), options);
+  Outcome outcome{packets_of(reader), {}};
+  outcome.report = reader.report();
+  return outcome;
+}
 
 }  // namespace km

@@ -12,10 +12,9 @@
 #include <sstream>
 #include <string>
 
-#include "dense_stereo.hpp"
 #include "modules/core/lie.hpp"
-#include "odometry_errors.hpp"
-#include "odometry_run.hpp"
+#include "modules/evaluation/statistics.hpp"
+#include "recorded_odometry.hpp"
 
 namespace km {
 namespace {
@@ -35,12 +34,6 @@ struct Overrides {
     used[name] = true;
   }
 };
-
-double percentile(std::vector<double> values, double share) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-}
 
 OdometryErrors errors_since(const OdometryRun& run, double seconds) {
   std::size_t first = 0;
@@ -108,9 +101,8 @@ void print_piece(const char* name, const OdometryRun& run, std::size_t images) {
       "%d restarts %d\n",
       name, run.states.size(), images, 1e3 * all.ate_m, 1e3 * all.max_m, 1e3 * all.rpe_m,
       all.rpe_deg, all.tilt_deg, all.scale, 1e3 * late.ate_m, 1e3 * late.rpe_m, late.rpe_deg,
-      late.tilt_deg, percentile(cpu, 0.5), percentile(cpu, 0.95), percentile(run.cpu_ms, 1.0),
-      percentile(iterations, 0.5), percentile(landmarks, 0.5), keyframes,
-      run.statistics.starts - 1);
+      late.tilt_deg, quantile(cpu, 0.5), quantile(cpu, 0.95), quantile(run.cpu_ms, 1.0),
+      quantile(iterations, 0.5), quantile(landmarks, 0.5), keyframes, run.statistics.starts - 1);
 }
 
 Recording with_black_images(Recording recording, double from_s, double to_s) {
@@ -197,9 +189,9 @@ int run(int argc, char** argv) {
   std::printf(
       "\n21 starts: lost %d, ATE median %.1f p90 %.1f max %.1f mm; from +2 s %.1f %.1f %.1f; "
       "RPE %.3f max %.3f deg; tilt %.2f max %.2f deg\n",
-      lost, percentile(ate, 0.5), percentile(ate, 0.9), percentile(ate, 1.0), percentile(late, 0.5),
-      percentile(late, 0.9), percentile(late, 1.0), percentile(rotation, 0.5),
-      percentile(rotation, 1.0), percentile(tilt, 0.5), percentile(tilt, 1.0));
+      lost, quantile(ate, 0.5), quantile(ate, 0.9), quantile(ate, 1.0), quantile(late, 0.5),
+      quantile(late, 0.9), quantile(late, 1.0), quantile(rotation, 0.5), quantile(rotation, 1.0),
+      quantile(tilt, 0.5), quantile(tilt, 1.0));
   return 0;
 }
 

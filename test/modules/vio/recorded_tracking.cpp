@@ -4,51 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
-#include <fstream>
 #include <map>
 #include <numbers>
-#include <sstream>
-#include <stdexcept>
-#include <string>
 
 #include "modules/core/lie.hpp"
+#include "modules/evaluation/association.hpp"
+#include "modules/evaluation/trajectory_file.hpp"
 #include "modules/sensors/euroc_reader.hpp"
-#include "modules/vio/stereo_motion.hpp"
-#include "modules/vio/two_point_ransac.hpp"
+#include "modules/vio/track_motion.hpp"
 
 namespace km {
 namespace {
-
-struct StampedPose {
-  Stamp stamp;
-  SE3 T;
-};
-
-std::vector<StampedPose> read_tum(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  std::vector<StampedPose> result;
-  for (std::string line; std::getline(file, line);) {
-    if (line.empty() || line[0] == '#') continue;
-    std::istringstream row(line);
-    long double t = 0;
-    Eigen::Vector3d p;
-    Eigen::Quaterniond q;
-    row >> t >> p.x() >> p.y() >> p.z() >> q.x() >> q.y() >> q.z() >> q.w();
-    result.push_back({static_cast<Stamp>(t * 1e9L), make_pose(q.normalized().matrix(), p)});
-  }
-  return result;
-}
-
-SE3 pose_at(const std::vector<StampedPose>& poses, Stamp stamp) {
-  const auto after =
-      std::lower_bound(poses.begin(), poses.end(), stamp,
-                       [](const StampedPose& pose, Stamp value) { return pose.stamp < value; });
-  if (after == poses.begin() || after == poses.end()) throw std::runtime_error("no true pose");
-  const StampedPose& a = *(after - 1);
-  const StampedPose& b = *after;
-  const double share = seconds_between(a.stamp, stamp) / seconds_between(a.stamp, b.stamp);
-  return a.T * se3_exp(share * se3_log(a.T.inverse() * b.T));
-}
 
 // Trapezoidal rule over the samples of a packet, cut to the interval between the images.
 Eigen::Matrix3d integrate_gyro(const std::vector<ImuSample>& imu, Stamp from, Stamp to,
@@ -146,10 +112,9 @@ Recording read_recording(const std::filesystem::path& folder, double from_s, dou
   EurocReader reader(folder, options);
   Recording result;
   result.rig = reader.rig();
-  const auto truth =
-      read_tum(folder / "mav0" / "state_groundtruth_estimate0" / "groundtruth_tum.txt");
+  const auto truth = read_trajectory(folder / "mav0/state_groundtruth_estimate0");
   while (auto packet = reader.next()) {
-    result.T_world_body.push_back(pose_at(truth, packet->frame->stamp));
+    result.T_world_body.push_back(pose_at(truth, packet->frame->stamp, 0.1, 0.0).value());
     result.packets.push_back(std::move(*packet));
   }
   return result;

@@ -74,12 +74,8 @@ struct SyntheticMotion {
 
 /// Two cameras that look along the body's x axis, the image's x axis being -y of the body.
 inline SensorRig synthetic_rig() {
-  PinholeCamera camera;
-  camera.width = 752;
-  camera.height = 480;
-  camera.fx = camera.fy = 458.0;
-  camera.cx = 376.0;
-  camera.cy = 240.0;
+  PinholeCamera camera{
+      .width = 752, .height = 480, .fx = 458.0, .fy = 458.0, .cx = 376.0, .cy = 240.0};
   Eigen::Matrix3d R_body_cam;
   R_body_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   camera.T_body_cam = make_pose(R_body_cam, {0.05, 0.055, 0.0});

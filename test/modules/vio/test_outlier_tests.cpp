@@ -1,8 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include "modules/core/lie.hpp"
-#include "modules/vio/stereo_motion.hpp"
-#include "modules/vio/two_point_ransac.hpp"
+#include "modules/vio/track_motion.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {

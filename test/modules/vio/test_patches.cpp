@@ -4,9 +4,7 @@
 
 #include "modules/core/lie.hpp"
 #include "modules/images/image_view.hpp"
-#include "modules/vio/local_warp.hpp"
-#include "modules/vio/patch_alignment.hpp"
-#include "modules/vio/patch_template.hpp"
+#include "modules/vio/patches.hpp"
 #include "textured_plane.hpp"
 
 namespace km {

@@ -1,17 +1,14 @@
-#include <unistd.h>
-
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
 #include <set>
 
-#include "dense_stereo.hpp"
 #include "modules/sensors/euroc_reader.hpp"
 #include "modules/vio/vio_node.hpp"
-#include "odometry_errors.hpp"
-#include "odometry_run.hpp"
+#include "recorded_odometry.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {
@@ -94,41 +91,32 @@ TEST_CASE("MH_01_easy: a second of black images does not lose it", "[vio]") {
   CHECK(errors.max_m < 0.10);
 }
 
-// A EuRoC folder of links to the images, which lie apart from their calibration in the data.
-class LinkedFolder {
- public:
-  explicit LinkedFolder(const std::filesystem::path& recording) {
-    std::filesystem::create_directories(path_ / "mav0");
-    const auto source = std::filesystem::absolute(recording);
-    std::filesystem::create_symlink(source / "mav0/imu0", path_ / "mav0/imu0");
-    for (const std::string camera : {"cam0", "cam1"}) {
-      const auto target = path_ / "mav0" / camera;
-      std::filesystem::create_directories(target);
-      std::filesystem::create_symlink(source / "mav0" / camera / "sensor.yaml",
-                                      target / "sensor.yaml");
-      std::filesystem::create_symlink(source / "static_start" / camera, target / "data");
-      std::set<std::string> names;
-      for (const auto& file : std::filesystem::directory_iterator(target / "data"))
-        names.insert(file.path().filename());
-      std::ofstream list(target / "data.csv");
-      for (const std::string& name : names) list << name.substr(0, 19) << ',' << name << '\n';
-    }
+// Makes `folder` a EuRoC folder of links to the images, which lie apart from their calibration in
+// the data.
+void link_static_start(const std::filesystem::path& recording,
+                       const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder / "mav0");
+  const auto source = std::filesystem::absolute(recording);
+  std::filesystem::create_symlink(source / "mav0/imu0", folder / "mav0/imu0");
+  for (const std::string camera : {"cam0", "cam1"}) {
+    const auto target = folder / "mav0" / camera;
+    std::filesystem::create_directories(target);
+    std::filesystem::create_symlink(source / "mav0" / camera / "sensor.yaml",
+                                    target / "sensor.yaml");
+    std::filesystem::create_symlink(source / "static_start" / camera, target / "data");
+    std::set<std::string> names;
+    for (const auto& file : std::filesystem::directory_iterator(target / "data"))
+      names.insert(file.path().filename());
+    std::ofstream list(target / "data.csv");
+    for (const std::string& name : names) list << name.substr(0, 19) << ',' << name << '\n';
   }
-  ~LinkedFolder() { std::filesystem::remove_all(path_); }
-  LinkedFolder(const LinkedFolder&) = delete;
-  LinkedFolder& operator=(const LinkedFolder&) = delete;
-
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_ =
-      std::filesystem::temp_directory_path() / ("km_vio_rest_" + std::to_string(::getpid()));
-};
+}
 
 TEST_CASE("V1_01_easy: a start at rest, at five images a second", "[vio]") {
   const auto folder = shared_data("euroc/V1_01_easy");
   if (!folder) return;
-  const LinkedFolder links(*folder);
+  const TemporaryFolder links;
+  link_static_start(*folder, links.path());
   EurocReader reader(links.path());
   Vio vio(0, reader.rig(), TrackerConfig{}, VioConfig{});
   std::vector<OdometryState> states;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -34,17 +36,30 @@ inline double smooth_noise(double x, double y, std::uint32_t seed) {
 
 /// Two equal cameras side by side, x right, with the distortion of a wide lens.
 inline StereoRig test_rig(double baseline_m = 0.11) {
-  PinholeCamera camera;
-  camera.width = 376;
-  camera.height = 240;
-  camera.fx = camera.fy = 230.0;
-  camera.cx = 185.0;
-  camera.cy = 121.0;
+  PinholeCamera camera{
+      .width = 376, .height = 240, .fx = 230.0, .fy = 230.0, .cx = 185.0, .cy = 121.0};
   camera.distortion = {-0.28, 0.07, 2e-4, 1e-5};
   StereoRig rig;
   rig.cameras = {camera, camera};
   rig.cameras[1].T_body_cam.translation().x() = baseline_m;
   return rig;
+}
+
+/// Of every pixel, row by row. Kept for the next image of the same lens: undistortion takes most of
+/// the time of an image.
+inline const std::vector<std::optional<Eigen::Vector2d>>& bearings_of(const PinholeCamera& camera) {
+  static std::vector<std::optional<Eigen::Vector2d>> bearings;
+  static PinholeCamera last;
+  const auto lens = [](const PinholeCamera& c) {
+    return std::tie(c.width, c.height, c.fx, c.fy, c.cx, c.cy, c.distortion);
+  };
+  if (lens(camera) == lens(last)) return bearings;
+  last = camera;
+  bearings.clear();
+  for (int y = 0; y < camera.height; ++y)
+    for (int x = 0; x < camera.width; ++x)
+      bearings.push_back(camera.unproject(Eigen::Vector2d(x, y)));
+  return bearings;
 }
 
 /// A plane z = depth_m of the world with a random texture whose cells are `cell_m` wide; about
@@ -57,12 +72,8 @@ struct TexturedPlane {
   [[nodiscard]] GrayImage render(const PinholeCamera& camera, const SE3& T_world_body) const {
     GrayImage image{camera.width, camera.height, {}};
     const SE3 T_world_cam = T_world_body * camera.T_body_cam;
-    for (int y = 0; y < camera.height; ++y) {
-      for (int x = 0; x < camera.width; ++x) {
-        const auto bearing = camera.unproject(Eigen::Vector2d(x, y));
-        image.pixels.push_back(bearing ? level(T_world_cam, *bearing) : std::uint8_t{0});
-      }
-    }
+    for (const auto& bearing : bearings_of(camera))
+      image.pixels.push_back(bearing ? level(T_world_cam, *bearing) : std::uint8_t{0});
     return image;
   }
 
@@ -77,13 +88,9 @@ struct TexturedPlane {
     const PinholeCamera& camera = rig.cameras[0];
     const SE3 T_world_cam = T_world_body * camera.T_body_cam;
     DepthImage depth{camera.width, camera.height, {}};
-    for (int y = 0; y < camera.height; ++y) {
-      for (int x = 0; x < camera.width; ++x) {
-        const auto bearing = camera.unproject(Eigen::Vector2d(x, y));
-        const double z_m =
-            bearing ? (T_world_cam.inverse() * meet(T_world_cam, *bearing)).z() : 0.0;
-        depth.millimetres.push_back(static_cast<std::uint16_t>(std::lround(1e3 * z_m)));
-      }
+    for (const auto& bearing : bearings_of(camera)) {
+      const double z_m = bearing ? (T_world_cam.inverse() * meet(T_world_cam, *bearing)).z() : 0.0;
+      depth.millimetres.push_back(static_cast<std::uint16_t>(std::lround(1e3 * z_m)));
     }
     StereoFrame frame{stamp, render(camera, T_world_body), {}};
     frame.depth = std::make_shared<const DepthImage>(std::move(depth));

@@ -1,26 +1,59 @@
 #pragma once
 
 #include <unistd.h>
-
 #include <chrono>
-#include <condition_variable>
+#include <cstdint>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "ping.h"
 #include "runtime/dds/bridge.hpp"
+#include "runtime/dds/codec.hpp"
 #include "runtime/dds/qos.hpp"
 #include "runtime/dds/robot_status.hpp"
-#include "runtime/dds/robot_status_codec.hpp"
-#include "runtime/dds/robot_status_node.hpp"
-#include "test/runtime/dds/ping.hpp"
+#include "test/support/inbox.hpp"
 #include "test/support/patience.hpp"
 
 namespace km {
+
+/// A message for tests of the transport: `index` is its key.
+struct Ping {
+  std::uint16_t robot = 0;
+  std::uint32_t index = 0;
+  std::vector<std::uint8_t> payload;
+};
+
+template <>
+struct Codec<Ping> {
+  using Wire = km_wire_Ping;
+  static constexpr const char* kTopic = "pings";
+  static constexpr std::uint16_t kVersion = 1;
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_Ping_desc; }
+
+  struct Encoded {
+    Wire wire{};
+    std::vector<std::uint8_t> payload;
+  };
+  static Encoded encode(const Ping& ping) {
+    Encoded encoded;
+    encoded.payload = ping.payload;
+    encoded.wire.robot = ping.robot;
+    encoded.wire.index = ping.index;
+    borrow(encoded.wire.payload, encoded.payload);
+    return encoded;
+  }
+  /// Refuses payloads that start with 0xFF.
+  static Decoded<Ping> decode(const Wire& wire) {
+    const std::uint8_t* data = wire.payload._buffer;
+    const std::uint32_t size = wire.payload._length;
+    if (size > 0 && data[0] == 0xFF) return Decoded<Ping>::refuse("payload starts with 0xFF");
+    return Decoded<Ping>::accept({wire.robot, wire.index, {data, data + size}});
+  }
+};
 
 /// Loopback, a domain and a team of this process alone: tests that run side by side never meet.
 inline DdsConfig loopback_config() {
@@ -42,38 +75,6 @@ inline bool eventually(const std::function<bool()>& condition) {
   }
   return true;
 }
-
-/// Collects what a topic publishes; one may wait for it. Thread-safe.
-template <typename T>
-class Inbox {
- public:
-  explicit Inbox(In<T> topic) {
-    topic.subscribe([this](const std::shared_ptr<const T>& message) {
-      const std::lock_guard lock(mutex_);
-      messages_.push_back(*message);
-      changed_.notify_all();
-    });
-  }
-
-  /// Waits until there are `count` messages; all there are by then.
-  std::vector<T> wait_for(std::size_t count) {
-    return wait_until([count](const std::vector<T>& messages) { return messages.size() >= count; });
-  }
-  std::vector<T> wait_until(const std::function<bool(const std::vector<T>&)>& enough) {
-    std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, kPatience, [&] { return enough(messages_); });
-    return messages_;
-  }
-  std::vector<T> messages() {
-    const std::lock_guard lock(mutex_);
-    return messages_;
-  }
-
- private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::vector<T> messages_;
-};
 
 /// Writes pings with whatever header it is given, as a faulty or hostile program may.
 class RawPingWriter {

@@ -24,14 +24,23 @@ km_wire_Header header(const RobotIdentity& identity, std::uint32_t number) {
   return {.version = 1, .robot = identity.robot, .boot = identity.boot, .number = number};
 }
 
-TEST_CASE("What one robot publishes arrives at the other, unchanged and once", "[dds]") {
-  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  TestRobot a(domain, 3), b(domain, 60000);
-  a.start();
-  b.start();
-  REQUIRE(a.hears(PeerEventKind::kJoined, 60000));
-  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+// Two robots of one domain that know of each other.
+struct Two {
+  explicit Two(const DdsConfig& config = loopback_config())
+      : domain(std::make_shared<const DdsDomain>(config)) {
+    a.start();
+    b.start();
+    REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+    REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  }
 
+  std::shared_ptr<const DdsDomain> domain;
+  TestRobot a{domain, 3}, b{domain, 4};
+};
+
+TEST_CASE("What one robot publishes arrives at the other, unchanged and once", "[dds]") {
+  Two two;
+  auto& [domain, a, b] = two;
   const std::vector<std::uint8_t> payload(70000, 42);
   for (std::uint32_t i = 0; i < 100; ++i) a.ping(i, i == 7 ? payload : std::vector<std::uint8_t>{});
   const auto pings = b.received.wait_for(100);
@@ -44,10 +53,8 @@ TEST_CASE("What one robot publishes arrives at the other, unchanged and once", "
 }
 
 TEST_CASE("The status of each robot reaches the others", "[dds]") {
-  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  TestRobot a(domain, 3), b(domain, 4);
-  a.start();
-  b.start();
+  Two two;
+  auto& [domain, a, b] = two;
   REQUIRE(eventually([&] { return b.status.peers().size() == 1; }));
   const RobotStatus status = b.status.peers()[0];
   CHECK(status.robot == 3);
@@ -93,11 +100,8 @@ TEST_CASE("A request is forgotten once a robot that long silent would be", "[dds
 }
 
 TEST_CASE("What is sent again is dropped", "[dds]") {
-  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  TestRobot a(domain, 3), b(domain, 4);
-  a.start();
-  b.start();
-  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  Two two;
+  auto& [domain, a, b] = two;
   for (std::uint32_t i = 0; i < 20; ++i) a.ping(i);
   REQUIRE(b.received.wait_for(20).size() == 20);
 
@@ -110,11 +114,8 @@ TEST_CASE("What is sent again is dropped", "[dds]") {
 }
 
 TEST_CASE("Numbers that do not arrive are counted until they do", "[dds]") {
-  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  TestRobot a(domain, 3), b(domain, 4);
-  b.start();
-  a.start();
-  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  Two two;
+  auto& [domain, a, b] = two;
   RawPingWriter writer(a.participant.handle(), domain->config(), TopicKind::kEvent);
   for (const std::uint32_t number : {0U, 1U, 5U})
     writer.write(header(a.participant.identity(), number), {3, number, {}});

@@ -3,7 +3,6 @@
 #include <vector>
 
 #include "runtime/config_layers.hpp"
-#include "runtime/dds/cyclone_xml.hpp"
 #include "runtime/dds/participant.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 

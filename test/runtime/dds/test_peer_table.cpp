@@ -1,8 +1,15 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <random>
+#include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
+#include "runtime/dds/incoming_topic.hpp"
 #include "runtime/dds/peer_table.hpp"
+#include "runtime/dds/robot_identity.hpp"
+#include "runtime/dds/traffic.hpp"
 
 namespace km {
 namespace {
@@ -155,6 +162,142 @@ TEST_CASE("Programs that are no robots are not our business", "[peers]") {
   table.participant_gone(guid(4));
   CHECK(kinds(table).empty());
   CHECK(table.peers().empty());
+}
+
+TEST_CASE("An identity survives its user data", "[identity]") {
+  const RobotIdentity identity{65535, "Alpha 1", 7, 0x0123456789ABCDEFULL};
+  const std::string data = to_user_data(identity);
+  CHECK(data == "robot=65535;name=Alpha 1;proto=7;boot=0123456789abcdef");
+  const auto parsed = parse_user_data(data);
+  REQUIRE(parsed.value.has_value());
+  CHECK(*parsed.value == identity);
+}
+
+TEST_CASE("Keys of a later protocol are ignored", "[identity]") {
+  CHECK(parse_user_data("robot=1;name=a;proto=1;boot=1;colour=red;=;;").value.has_value());
+}
+
+TEST_CASE("User data that is not an identity is refused with the reason", "[identity]") {
+  const auto refusal = [](const std::string& data) {
+    const auto parsed = parse_user_data(data);
+    return std::string(parsed.value ? "accepted" : parsed.refusal);
+  };
+  CHECK(refusal("") == "user data lacks a field");
+  CHECK(refusal("robot=1;name=a;proto=1") == "user data lacks a field");
+  CHECK(refusal("robot=1;robot=2;name=a;proto=1;boot=1") == "user data names a field twice");
+  CHECK(refusal("robot=65536;name=a;proto=1;boot=1") == "robot id is not a 16-bit number");
+  CHECK(refusal("robot=-1;name=a;proto=1;boot=1") == "robot id is not a 16-bit number");
+  CHECK(refusal("robot=1 ;name=a;proto=1;boot=1") == "robot id is not a 16-bit number");
+  CHECK(refusal("robot=1;name=;proto=1;boot=1") == "robot name is not printable");
+  CHECK(refusal("robot=1;name=a\033[2J;proto=1;boot=1") == "robot name is not printable");
+  CHECK(refusal("robot=1;name=" + std::string(65, 'a') + ";proto=1;boot=1") ==
+        "robot name is not printable");
+  CHECK(refusal("robot=1;name=a;proto=x;boot=1") == "protocol version is not a 16-bit number");
+  CHECK(refusal("robot=1;name=a;proto=1;boot=0") == "boot id is not a nonzero 64-bit number");
+  CHECK(refusal("robot=1;name=a;proto=1;boot=10123456789abcdef") ==
+        "boot id is not a nonzero 64-bit number");
+  CHECK(refusal("robot=1;name=a;proto=1;boot=1;x=" + std::string(2000, 'x')) ==
+        "user data too long");
+}
+
+TEST_CASE("Random bytes are never taken for a robot, nor do any harm", "[identity]") {
+  const auto seed = GENERATE(range(0U, 20U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  std::uniform_int_distribution<int> byte(0, 255), length(0, 100);
+  std::uniform_int_distribution<std::size_t> position(0, 40);
+  for (int i = 0; i < 500; ++i) {
+    std::string data(static_cast<std::size_t>(length(rng)), '\0');
+    for (char& c : data) c = static_cast<char>(byte(rng));
+    CHECK_FALSE(parse_user_data(data).value.has_value());
+
+    std::string damaged = to_user_data({7, "alpha", 1, 99});
+    damaged[position(rng)] = static_cast<char>(byte(rng));
+    const auto parsed = parse_user_data(damaged);
+    CHECK((parsed.value.has_value() || parsed.refusal != nullptr));
+  }
+}
+
+TEST_CASE("A name that cannot be sent is refused at home", "[identity]") {
+  CHECK_THROWS_AS(to_user_data({1, "", 1, 1}), std::invalid_argument);
+  CHECK_THROWS_AS(to_user_data({1, "a;b", 1, 1}), std::invalid_argument);
+  CHECK_THROWS_AS(to_user_data({1, "tab\t", 1, 1}), std::invalid_argument);
+}
+
+TEST_CASE("Boot ids differ", "[identity]") {
+  CHECK(random_boot_id() != random_boot_id());
+}
+
+TEST_CASE("Duplicates and gaps agree with a set of all numbers, in any order", "[sequence]") {
+  const auto seed = GENERATE(range(0U, 50U));
+  const bool from_zero = GENERATE(true, false);
+  CAPTURE(seed, from_zero);
+  std::mt19937 rng(seed);
+  std::uniform_int_distribution<std::uint32_t> number(5, 200);
+  SequenceTracker tracker(from_zero);
+  std::set<std::uint32_t> seen;
+  for (int i = 0; i < 300; ++i) {
+    const std::uint32_t n = number(rng);
+    const bool fresh = tracker.is_new(n);
+    REQUIRE(fresh == seen.insert(n).second);
+    const std::uint32_t first = from_zero ? 0 : *seen.begin();
+    REQUIRE(tracker.missing() == *seen.rbegin() - first + 1 - seen.size());
+  }
+}
+
+TEST_CASE("A stream that skips every other number does not use up the memory", "[sequence]") {
+  constexpr std::uint32_t kCount = 10 * SequenceTracker::kMaxIntervals;
+  SequenceTracker tracker(true);
+  for (std::uint32_t i = 0; i < kCount; ++i) CHECK(tracker.is_new(2 * i + 1));
+  CHECK(tracker.missing() == kCount);
+  CHECK_FALSE(tracker.is_new(2 * kCount - 1));  // a late duplicate
+  CHECK(tracker.is_new(2 * kCount - 2));        // a late gap filled
+  CHECK(tracker.missing() == kCount - 1);
+  CHECK_FALSE(tracker.is_new(2));  // given up: better lost than twice
+}
+
+TEST_CASE("The last number there is counts like any other", "[sequence]") {
+  SequenceTracker tracker(false);
+  CHECK(tracker.is_new(0xFFFFFFFFU));
+  CHECK_FALSE(tracker.is_new(0xFFFFFFFFU));
+  CHECK(tracker.is_new(0));
+  CHECK(tracker.missing() == 0xFFFFFFFEU);
+}
+
+PeerTraffic row(Direction direction, std::optional<RobotId> peer, TrafficCount count,
+                std::uint64_t retransmitted) {
+  return {.topic = "bow",
+          .category = TrafficCategory::kPlaceRecognition,
+          .direction = direction,
+          .peer = peer,
+          .count = count,
+          .retransmitted_bytes = retransmitted};
+}
+
+TEST_CASE("Traffic is written when it changes, cumulatively", "[traffic]") {
+  std::ostringstream csv;
+  TrafficCsv writer(csv);
+  TrafficSnapshot snapshot;
+  snapshot.peers = {row(Direction::kOut, 7, {1, 100}, 0), row(Direction::kIn, 7, {0, 0}, 0)};
+  writer.append(1.0, snapshot);
+  writer.append(2.0, snapshot);
+  snapshot.peers[1].count = {2, 50};
+  snapshot.peers.push_back(row(Direction::kOut, std::nullopt, {0, 0}, 30));
+  writer.append(3.5, snapshot);
+  CHECK(csv.str() ==
+        "time_s,direction,topic,category,peer,messages,bytes,retransmitted_bytes\n"
+        "1,out,bow,place_recognition,7,1,100,0\n"
+        "3.5,in,bow,place_recognition,7,2,50,0\n"
+        "3.5,out,bow,place_recognition,*,0,0,30\n");
+}
+
+TEST_CASE("Bytes add up per direction and category", "[traffic]") {
+  TrafficSnapshot snapshot;
+  snapshot.peers = {row(Direction::kOut, 7, {1, 100}, 5), row(Direction::kOut, 8, {1, 100}, 0),
+                    row(Direction::kIn, 7, {1, 40}, 0)};
+  CHECK(snapshot.bytes(Direction::kOut, TrafficCategory::kPlaceRecognition) == 205);
+  CHECK(snapshot.bytes(Direction::kIn, TrafficCategory::kPlaceRecognition) == 40);
+  CHECK(snapshot.bytes(Direction::kOut, TrafficCategory::kOther) == 0);
 }
 
 }  // namespace

@@ -1,0 +1,56 @@
+#include "modules/sensors/dataset_reader.hpp"
+
+namespace km {
+
+const char* to_string(ReaderFault fault) {
+  switch (fault) {
+    case ReaderFault::kMalformedRow:
+      return "malformed rows";
+    case ReaderFault::kNotFinite:
+      return "inertial samples with NaN or infinity";
+    case ReaderFault::kUnorderedStamp:
+      return "stamps out of order";
+    case ReaderFault::kRepeatedStamp:
+      return "repeated stamps";
+    case ReaderFault::kLeftWithoutRight:
+      return "left images without a right one";
+    case ReaderFault::kRightWithoutLeft:
+      return "right images without a left one";
+    case ReaderFault::kMissingImage:
+      return "missing images";
+    case ReaderFault::kUnreadableImage:
+      return "unreadable images";
+    case ReaderFault::kWrongImageSize:
+      return "images of the wrong size";
+    case ReaderFault::kImuGap:
+      return "gaps between inertial samples";
+    case ReaderFault::kPairWithoutImu:
+      return "frames without inertial samples";
+    case ReaderFault::kWrongImageFormat:
+      return "images of the wrong format";
+    case ReaderFault::kImageWithoutFrame:
+      return "depth or label images without a frame";
+    case ReaderFault::kUnknownColor:
+      return "label images with colours that are not in the palette";
+  }
+  return "unknown faults";
+}
+
+void ReaderReport::add(ReaderFault fault, const std::string& example) {
+  Entry& entry = entries_[fault];
+  if (entry.count++ == 0) entry.first = example;
+}
+
+std::size_t ReaderReport::count(ReaderFault fault) const {
+  const auto entry = entries_.find(fault);
+  return entry == entries_.end() ? 0 : entry->second.count;
+}
+
+std::string to_string(const ReaderReport& report) {
+  std::string text;
+  for (const auto& [fault, entry] : report.entries())
+    text += std::to_string(entry.count) + ' ' + to_string(fault) + ", first: " + entry.first + '\n';
+  return text;
+}
+
+}  // namespace km

@@ -1,0 +1,163 @@
+#include "modules/sensors/frame_files.hpp"
+
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "modules/sensors/dataset_reader.hpp"
+#include "modules/sensors/euroc_rig.hpp"
+#include "modules/sensors/image_file.hpp"
+#include "modules/sensors/text_file.hpp"
+
+namespace km {
+namespace {
+
+struct ListedImage {
+  Stamp stamp = 0;
+  int line = 0;
+  std::filesystem::path file;
+};
+
+std::vector<ListedImage> list_images(const std::filesystem::path& camera, ReaderReport& report) {
+  std::vector<ListedImage> images;
+  const std::filesystem::path list = camera / "data.csv";
+  read_ordered_rows(list, 2, report, [&](Stamp stamp, const TextRow& row) {
+    images.push_back({stamp, row.line, camera / "data" / row.fields[1]});
+    return std::string();
+  });
+  if (images.empty()) throw DatasetError(list.string() + ": lists no image");
+  return images;
+}
+
+LabelPalette read_palette(const std::filesystem::path& file) {
+  if (!std::filesystem::exists(file)) return {};
+  try {
+    return parse_label_palette(read_file(file), file.string());
+  } catch (const std::invalid_argument& error) {
+    throw DatasetError(error.what());
+  }
+}
+
+}  // namespace
+
+std::vector<StereoPairFile> list_euroc_pairs(const std::filesystem::path& mav0, double tolerance_s,
+                                             ReaderReport& report) {
+  const auto lefts = list_images(mav0 / "cam0", report);
+  const auto rights = list_images(mav0 / "cam1", report);
+  const auto lonely = [&](ReaderFault fault, const char* camera, const ListedImage& image) {
+    report.add(fault, at_line(mav0 / camera / "data.csv", image.line) + ": " +
+                          image.file.filename().string());
+  };
+  std::vector<StereoPairFile> pairs;
+  auto left = lefts.begin();
+  auto right = rights.begin();
+  while (left != lefts.end() || right != rights.end()) {
+    const bool no_left = left == lefts.end();
+    const bool no_right = right == rights.end();
+    const double offset_s = no_left || no_right ? 0.0 : seconds_between(left->stamp, right->stamp);
+    if (no_right || offset_s > tolerance_s) {
+      lonely(ReaderFault::kLeftWithoutRight, "cam0", *left++);
+    } else if (no_left || offset_s < -tolerance_s) {
+      lonely(ReaderFault::kRightWithoutLeft, "cam1", *right++);
+    } else {
+      pairs.push_back({left->stamp, left->file, right->file, left->line, {}, {}});
+      ++left, ++right;
+    }
+  }
+  if (pairs.empty())
+    throw DatasetError(mav0.string() + ": no image of cam0 has one of cam1 within " +
+                       std::to_string(tolerance_s) + " s");
+  return pairs;
+}
+
+std::vector<StereoPairFile> list_euroc_lefts(const std::filesystem::path& mav0,
+                                             ReaderReport& report) {
+  std::vector<StereoPairFile> frames;
+  for (ListedImage& left : list_images(mav0 / "cam0", report))
+    frames.push_back({left.stamp, std::move(left.file), {}, left.line, {}, {}});
+  return frames;
+}
+
+void list_beside(const std::filesystem::path& folder, std::filesystem::path StereoPairFile::*member,
+                 double tolerance_s, std::vector<StereoPairFile>& frames, ReaderReport& report) {
+  auto frame = frames.begin();
+  for (ListedImage& image : list_images(folder, report)) {
+    while (frame != frames.end() && seconds_between(frame->stamp, image.stamp) > tolerance_s)
+      ++frame;
+    if (frame == frames.end() || seconds_between(frame->stamp, image.stamp) < -tolerance_s) {
+      report.add(ReaderFault::kImageWithoutFrame,
+                 at_line(folder / "data.csv", image.line) + ": " + image.file.filename().string());
+      continue;
+    }
+    (*frame++).*member = std::move(image.file);
+  }
+}
+
+std::vector<StereoPairFile> list_keyframe_pairs(const std::filesystem::path& folder,
+                                                ReaderReport& report) {
+  std::vector<StereoPairFile> pairs;
+  const std::filesystem::path list = folder / "pairs.csv";
+  read_ordered_rows(list, 3, report, [&](Stamp stamp, const TextRow& row) {
+    pairs.push_back({stamp, folder / row.fields[1], folder / row.fields[2], row.line, {}, {}});
+    return std::string();
+  });
+  if (pairs.empty()) throw DatasetError(list.string() + ": lists no stereo pair");
+  return pairs;
+}
+
+StereoPairResult load_stereo_pair(const StereoPairFile& files, const StereoRig& rig) {
+  StereoPairResult result;
+  result.frame.stamp = files.stamp;
+  const std::pair<const std::filesystem::path&, GrayImage&> images[] = {
+      {files.left, result.frame.left}, {files.right, result.frame.right}};
+  const std::size_t count = rig.depth_source == DepthSource::kRightImage ? 2 : 1;
+  for (std::size_t i = 0; i < count; ++i) {
+    const PinholeCamera& camera = rig.cameras[i];
+    ImageResult loaded = load_gray_image(images[i].first, camera.width, camera.height);
+    if (loaded.status != ImageStatus::kOk) return {loaded.status, std::move(loaded.problem), {}};
+    images[i].second = std::move(loaded.image);
+  }
+  return result;
+}
+
+SideImages::SideImages(const std::filesystem::path& mav0, const SensorRig& rig, bool labels)
+    : mav0_(mav0), depth_(rig.depth), labels_(labels) {
+  if (depth_) depth_scale_m_ = read_depth_scale(mav0);
+  if (labels_) palette_ = read_palette(mav0 / "label_palette.csv");
+}
+
+void SideImages::list(double tolerance_s, std::vector<StereoPairFile>& frames,
+                      ReaderReport& report) const {
+  if (depth_) list_beside(mav0_ / "depth0", &StereoPairFile::depth, tolerance_s, frames, report);
+  if (labels_) list_beside(mav0_ / "label0", &StereoPairFile::labels, tolerance_s, frames, report);
+}
+
+void SideImages::load(const StereoPairFile& files, StereoFrame& frame, ReaderReport& report) const {
+  if (!files.depth.empty()) load_depth(files.depth, frame, report);
+  if (!files.labels.empty()) load_labels(files.labels, frame, report);
+}
+
+void SideImages::load_depth(const std::filesystem::path& file, StereoFrame& frame,
+                            ReaderReport& report) const {
+  DepthResult loaded =
+      load_depth_image(file, frame.left.width, frame.left.height, depth_scale_m_, *depth_);
+  if (loaded.status == ImageStatus::kOk)
+    frame.depth = std::make_shared<const DepthImage>(std::move(loaded.image));
+  else
+    report.add(fault_of(loaded.status), loaded.problem);
+}
+
+void SideImages::load_labels(const std::filesystem::path& file, StereoFrame& frame,
+                             ReaderReport& report) const {
+  LabelResult loaded = load_label_image(file, frame.left.width, frame.left.height, palette_);
+  if (loaded.unknown_pixels > 0)
+    report.add(ReaderFault::kUnknownColor,
+               file.string() + ": " + std::to_string(loaded.unknown_pixels) + " pixels");
+  if (loaded.status == ImageStatus::kOk)
+    frame.labels = std::make_shared<const LabelImage>(std::move(loaded.image));
+  else
+    report.add(fault_of(loaded.status), loaded.problem);
+}
+
+}  // namespace km

@@ -1,0 +1,87 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/frame.hpp"
+#include "modules/core/label_palette.hpp"
+#include "modules/sensors/dataset_reader.hpp"
+#include "modules/sensors/image_file.hpp"
+
+namespace km {
+
+/// Where the images of a frame are listed and lie.
+struct StereoPairFile {
+  Stamp stamp = 0;               ///< Of the left image.
+  std::filesystem::path left;    ///< Image files.
+  std::filesystem::path right;   ///< Empty with an RGB-D rig.
+  int line = 0;                  ///< Of the left image's row in the list.
+  std::filesystem::path depth;   ///< Empty: none.
+  std::filesystem::path labels;  ///< Empty: none.
+};
+
+/// The stereo pairs of a EuRoC folder: rows `stamp [ns], file` of cam0/data.csv and cam1/data.csv,
+/// matched by stamps at most `tolerance_s` apart; ascending. Faulty rows and images without a
+/// partner are counted in `report`. Throws DatasetError if a list is missing or holds no image.
+[[nodiscard]] std::vector<StereoPairFile> list_euroc_pairs(const std::filesystem::path& mav0,
+                                                           double tolerance_s,
+                                                           ReaderReport& report);
+
+/// The left images of a EuRoC folder alone, for an RGB-D rig. Faults and errors as above.
+[[nodiscard]] std::vector<StereoPairFile> list_euroc_lefts(const std::filesystem::path& mav0,
+                                                           ReaderReport& report);
+
+/// Enters the images that `folder`/data.csv lists (depth0, label0) as the `member` of the frame
+/// whose stamp is at most `tolerance_s` away. There may be fewer of them than frames; those of no
+/// frame are counted. Throws DatasetError if the list is missing or holds no image.
+void list_beside(const std::filesystem::path& folder, std::filesystem::path StereoPairFile::*member,
+                 double tolerance_s, std::vector<StereoPairFile>& frames, ReaderReport& report);
+
+/// The stereo pairs of a folder of keyframes: rows `stamp [ns], left file, right file` of its
+/// pairs.csv; ascending. Faults and errors as above.
+[[nodiscard]] std::vector<StereoPairFile> list_keyframe_pairs(const std::filesystem::path& folder,
+                                                              ReaderReport& report);
+
+/// A stereo pair from disk, or the left image with an RGB-D rig; `status` and `problem` are those
+/// of the first image that failed. Without depth and labels.
+struct StereoPairResult {
+  ImageStatus status = ImageStatus::kOk;
+  std::string problem;
+  StereoFrame frame;
+};
+
+[[nodiscard]] StereoPairResult load_stereo_pair(const StereoPairFile& files, const StereoRig& rig);
+
+/// Depth and label images of a EuRoC folder: depth0, label0 and label_palette.csv. One that cannot
+/// be used is counted and left out: its frame comes without. Const members are thread-safe.
+class SideImages {
+ public:
+  /// Depth if `rig.depth` says so, labels if asked. Throws DatasetError for a depth_scale or a
+  /// palette that cannot be read; ids need no palette.
+  SideImages(const std::filesystem::path& mav0, const SensorRig& rig, bool labels);
+
+  /// Finds the images of `frames`; see list_beside().
+  void list(double tolerance_s, std::vector<StereoPairFile>& frames, ReaderReport& report) const;
+
+  /// Reads those of one frame.
+  void load(const StereoPairFile& files, StereoFrame& frame, ReaderReport& report) const;
+
+  /// Empty without a file, or if no labels were asked for.
+  [[nodiscard]] const LabelPalette& palette() const { return palette_; }
+
+ private:
+  void load_depth(const std::filesystem::path& file, StereoFrame& frame,
+                  ReaderReport& report) const;
+  void load_labels(const std::filesystem::path& file, StereoFrame& frame,
+                   ReaderReport& report) const;
+
+  std::filesystem::path mav0_;
+  std::optional<DepthRange> depth_;
+  bool labels_;
+  double depth_scale_m_ = 0.0;
+  LabelPalette palette_;
+};
+
+}  // namespace km

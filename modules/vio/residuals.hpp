@@ -1,0 +1,92 @@
+#pragma once
+
+#include <optional>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/geometry.hpp"
+#include "modules/core/odometry.hpp"
+#include "modules/vio/preintegration.hpp"
+
+namespace km {
+
+/// A camera of the rig as the residuals need it.
+struct ViewModel {
+  Eigen::Matrix3d R_cam_body = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d t_cam_body = Eigen::Vector3d::Zero();
+  double weight = 1.0;  ///< Focal length over pixel noise: bearing errors to standard deviations.
+};
+
+[[nodiscard]] ViewModel view_model(const PinholeCamera& camera, double noise_px);
+
+/// A linearised reprojection error in standard deviations. The pose's tangent is [rotation;
+/// translation], see retract().
+struct ReprojectionTerm {
+  Eigen::Vector2d r;
+  Eigen::Matrix<double, 2, 6> J_pose;
+  Eigen::Matrix<double, 2, 3> J_point;
+};
+
+/// Landmarks nearer than this in front of a camera have no residual [m].
+inline constexpr double kMinDepth_m = 0.05;
+
+/// weight * (pi(T_cam_body T_odom_body^-1 p_odom) - bearing) with pi(p) = [x/z, y/z]; false if the
+/// landmark is not in front of the camera.
+[[nodiscard]] bool reprojection_error(const ViewModel& view, const Eigen::Vector2d& bearing,
+                                      const SE3& T_odom_body, const Eigen::Vector3d& p_odom,
+                                      Eigen::Vector2d& r);
+
+/// The same with derivatives. They are taken at `T_linearization` while r is that of T_odom_body:
+/// first-estimate Jacobians (Huang, Mourikis, Roumeliotis, ISER 2008) if a prior holds this pose,
+/// else pass T_odom_body twice.
+[[nodiscard]] bool linearize_reprojection(const ViewModel& view, const Eigen::Vector2d& bearing,
+                                          const SE3& T_odom_body, const SE3& T_linearization,
+                                          const Eigen::Vector3d& p_odom, ReprojectionTerm& term);
+
+using Vector15 = Eigen::Matrix<double, 15, 1>;
+using Matrix15 = Eigen::Matrix<double, 15, 15>;
+
+/// The linearised inertial error between states i and j, whitened. Rows: rotation, velocity,
+/// position, gyro bias, accelerometer bias. Columns of each state: rotation, translation (see
+/// retract()), velocity, gyro bias, accelerometer bias.
+struct ImuTerm {
+  Vector15 r;
+  Matrix15 J_i;
+  Matrix15 J_j;
+};
+
+/// What of a state a prior holds, at the values it was first linearised at.
+struct FirstEstimate {
+  std::optional<SE3> pose;
+  std::optional<OdometryState> motion;  ///< Its velocity and biases.
+
+  /// `state` with these parts replaced.
+  [[nodiscard]] OdometryState applied_to(const OdometryState& state) const;
+};
+
+/// Preintegrated inertial factor between two states (Forster et al., TRO 2017, Sec. VI-D: residuals
+/// Eq. (45), their derivatives Eq. (71) to (81)) together with the random walk of both biases
+/// (Sec. VI-E, Eq. (47) and (48)).
+class ImuFactor {
+ public:
+  /// Throws std::invalid_argument if `imu` is empty or has no noise: it cannot be whitened.
+  ImuFactor(const ImuPreintegration& imu, double gravity_mps2);
+
+  [[nodiscard]] const ImuPreintegration& imu() const { return imu_; }
+
+  /// Whitened error.
+  [[nodiscard]] Vector15 error(const OdometryState& i, const OdometryState& j) const;
+
+  /// error(i, j) with derivatives taken at `lin_i`, `lin_j` (first-estimate Jacobians; pass the
+  /// states themselves otherwise).
+  [[nodiscard]] ImuTerm linearize(const OdometryState& i, const OdometryState& j,
+                                  const OdometryState& lin_i, const OdometryState& lin_j) const;
+
+ private:
+  ImuPreintegration imu_;
+  Eigen::Vector3d gravity_odom_;
+  Matrix9 sqrt_information_;
+  double gyro_walk_weight_ = 0.0;
+  double accel_walk_weight_ = 0.0;
+};
+
+}  // namespace km

@@ -1,0 +1,191 @@
+#include "modules/vio/track_motion.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "modules/core/lie.hpp"
+
+namespace km {
+namespace {
+
+constexpr int kSamples = 48;
+constexpr double kCoarseSigmas = 6.0;  // Truncation while the rotation is the gyroscope's.
+
+// Truncated quadratic cost (MSAC).
+double cost_of(std::span<const DepthPair> pairs, const SE3& T, double threshold) {
+  double cost = 0.0;
+  for (const DepthPair& pair : pairs) {
+    const double ratio = reprojection_distance(pair, T) / threshold;
+    cost += std::min(ratio * ratio, 1.0);
+  }
+  return cost;
+}
+
+// Two rows of A s = b for s = R^T t: the transferred landmark, c - rho s with c = R^T [b_prev; 1],
+// must be parallel to the current bearing.
+void add_rows(const DepthPair& pair, const Eigen::Matrix3d& R, Eigen::Matrix3d& H,
+              Eigen::Vector3d& g) {
+  const Eigen::Vector3d c = R.transpose() * pair.previous.homogeneous();
+  for (int axis = 0; axis < 2; ++axis) {
+    Eigen::Vector3d row = Eigen::Vector3d::Zero();
+    row[axis] = pair.inverse_depth;
+    row.z() = -pair.current[axis] * pair.inverse_depth;
+    H += row * row.transpose();
+    g += row * (c[axis] - pair.current[axis] * c.z());
+  }
+}
+
+// Translation that two landmarks give under a known rotation; nullopt if they are too far.
+std::optional<Eigen::Vector3d> translation_of(const DepthPair& a, const DepthPair& b,
+                                              const Eigen::Matrix3d& R) {
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d g = Eigen::Vector3d::Zero();
+  add_rows(a, R, H, g);
+  add_rows(b, R, H, g);
+  Eigen::Matrix3d inverse;
+  bool invertible = false;
+  H.computeInverseWithCheck(inverse, invertible, 1e-12);
+  if (!invertible) return std::nullopt;
+  const Eigen::Vector3d t = R * (inverse * g);
+  return t.allFinite() ? std::optional(t) : std::nullopt;
+}
+
+// One Gauss-Newton step over T * exp(xi), weights of Geman-McClure with scale `scale`.
+SE3 refined(std::span<const DepthPair> pairs, const SE3& T, double scale) {
+  Matrix6 H = Matrix6::Zero();
+  Vector6 g = Vector6::Zero();
+  for (const DepthPair& pair : pairs) {
+    const Eigen::Vector3d X = transfer(pair, T);
+    if (X.z() <= 0.0) continue;
+    const Eigen::Vector2d error = X.head<2>() / X.z() - pair.current;
+    const double w = 1.0 / (1.0 + error.squaredNorm() / (scale * scale));
+    // X = R^T (b - rho t): dX = [X]_x dphi - rho dt for T * exp([dphi; dt]).
+    Eigen::Matrix<double, 2, 3> J_X;
+    J_X << 1.0 / X.z(), 0.0, -X.x() / (X.z() * X.z()),  //
+        0.0, 1.0 / X.z(), -X.y() / (X.z() * X.z());
+    Eigen::Matrix<double, 2, 6> J;
+    J << J_X * skew(X), -pair.inverse_depth * J_X;
+    H.noalias() += w * w * J.transpose() * J;
+    g.noalias() -= w * w * J.transpose() * error;
+  }
+  // Damping for directions that no landmark sees (all far away): 1 m against one bearing.
+  H.diagonal().array() += 1e-6;
+  return T * se3_exp(H.ldlt().solve(g));
+}
+
+std::vector<bool> inliers_of(std::span<const BearingPair> pairs, const Eigen::Matrix3d& R,
+                             const Eigen::Vector3d& direction, double threshold) {
+  std::vector<bool> inlier(pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    inlier[i] = epipolar_distance(pairs[i], R, direction) < threshold;
+  }
+  return inlier;
+}
+
+// Truncated quadratic cost (MSAC): finer than counting.
+double cost_of(std::span<const BearingPair> pairs, const Eigen::Matrix3d& R,
+               const Eigen::Vector3d& direction, double threshold) {
+  double cost = 0.0;
+  for (const BearingPair& pair : pairs) {
+    const double ratio = epipolar_distance(pair, R, direction) / threshold;
+    cost += std::min(ratio * ratio, 1.0);
+  }
+  return cost;
+}
+
+// Normal of the plane that the translation must lie in; zero without parallax.
+Eigen::Vector3d plane_normal(const BearingPair& pair, const Eigen::Matrix3d& R) {
+  return pair.previous.homogeneous().cross(R * pair.current.homogeneous());
+}
+
+}  // namespace
+
+Eigen::Vector3d transfer(const DepthPair& pair, const SE3& T_previous_current) {
+  return T_previous_current.linear().transpose() *
+         (pair.previous.homogeneous() - pair.inverse_depth * T_previous_current.translation());
+}
+
+double reprojection_distance(const DepthPair& pair, const SE3& T_previous_current) {
+  const Eigen::Vector3d X = transfer(pair, T_previous_current);
+  if (X.z() <= 0.0) return std::numeric_limits<double>::infinity();
+  return (X.head<2>() / X.z() - pair.current).norm();
+}
+
+std::optional<SE3> estimate_motion(std::span<const DepthPair> pairs, const SE3& guess, double sigma,
+                                   std::mt19937& rng) {
+  if (pairs.size() < kMinMotionPairs) return std::nullopt;
+  const double coarse = kCoarseSigmas * sigma;
+  SE3 best = guess;
+  double best_cost = cost_of(pairs, guess, coarse);
+  std::uniform_int_distribution<std::size_t> any(0, pairs.size() - 1);
+  for (int sample = 0; sample < kSamples; ++sample) {
+    const std::size_t i = any(rng);
+    const std::size_t j = any(rng);
+    if (i == j) continue;
+    const std::optional<Eigen::Vector3d> t = translation_of(pairs[i], pairs[j], guess.linear());
+    if (!t) continue;
+    const SE3 T = make_pose(guess.linear(), *t);
+    const double cost = cost_of(pairs, T, coarse);
+    if (cost < best_cost) {
+      best_cost = cost;
+      best = T;
+    }
+  }
+  for (double scale = coarse; scale >= sigma; scale *= 0.7) best = refined(pairs, best, scale);
+  if (!best.matrix().allFinite()) return std::nullopt;
+  best.linear() = nearest_rotation(best.linear());
+
+  constexpr double kAgreeSigmas = 3.0;
+  const auto agreeing = std::count_if(pairs.begin(), pairs.end(), [&](const DepthPair& pair) {
+    return reprojection_distance(pair, best) < kAgreeSigmas * sigma;
+  });
+  if (2 * static_cast<std::size_t>(agreeing) < pairs.size()) return std::nullopt;
+  return best;
+}
+
+double epipolar_distance(const BearingPair& pair, const Eigen::Matrix3d& R,
+                         const Eigen::Vector3d& t) {
+  // b_prev^T [t]_x R b_cur = 0: the line in the current image is R^T (b_prev x t).
+  const Eigen::Vector3d line = R.transpose() * pair.previous.homogeneous().cross(t);
+  const double length = line.head<2>().norm();
+  if (length < 1e-12) return 0.0;
+  return std::abs(line.dot(pair.current.homogeneous())) / length;
+}
+
+TwoPointResult two_point_ransac(std::span<const BearingPair> pairs,
+                                const Eigen::Matrix3d& R_previous_current, double threshold,
+                                std::mt19937& rng) {
+  TwoPointResult result;
+  if (pairs.size() < 3) {
+    result.inlier.assign(pairs.size(), true);
+    result.inliers = static_cast<int>(pairs.size());
+    return result;
+  }
+  std::uniform_int_distribution<std::size_t> any(0, pairs.size() - 1);
+  double best = std::numeric_limits<double>::infinity();
+  for (int sample = 0; sample < kTwoPointSamples; ++sample) {
+    const std::size_t i = any(rng);
+    const std::size_t j = any(rng);
+    if (i == j) continue;
+    const Eigen::Vector3d axis = plane_normal(pairs[i], R_previous_current)
+                                     .cross(plane_normal(pairs[j], R_previous_current));
+    // Parallel planes leave the direction open; without parallax any will do.
+    const Eigen::Vector3d direction =
+        axis.norm() > 1e-15 ? Eigen::Vector3d(axis.normalized()) : Eigen::Vector3d::UnitX();
+    const double cost = cost_of(pairs, R_previous_current, direction, threshold);
+    if (cost < best) {
+      best = cost;
+      result.direction = direction;
+    }
+  }
+  result.inlier = inliers_of(pairs, R_previous_current, result.direction, threshold);
+  for (const bool inlier : result.inlier) result.inliers += inlier ? 1 : 0;
+  return result;
+}
+
+}  // namespace km

@@ -1,0 +1,71 @@
+#include "runtime/dds/robot_status.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+namespace km {
+
+const char* to_string(RobotPhase phase) {
+  switch (phase) {
+    case RobotPhase::kRunning:
+      return "running";
+    case RobotPhase::kFinished:
+      return "finished";
+    case RobotPhase::kSettled:
+      return "settled";
+    case RobotPhase::kLeaving:
+      break;
+  }
+  return "leaving";
+}
+
+Codec<RobotStatus>::Encoded Codec<RobotStatus>::encode(const RobotStatus& status) {
+  Encoded encoded;
+  Wire& wire = encoded.wire;
+  wire.robot = status.robot;
+  const std::size_t length = std::min(status.name.size(), sizeof wire.name - 1);
+  std::memcpy(wire.name, status.name.data(), length);
+  wire.phase = static_cast<km_wire_Phase>(status.phase);
+  wire.dataset_time_s = status.dataset_time_s;
+  wire.keyframes = status.keyframes;
+  wire.settled_links = status.settled_links;
+  return encoded;
+}
+
+Decoded<RobotStatus> Codec<RobotStatus>::decode(const Wire& wire) {
+  using Result = Decoded<RobotStatus>;
+  const std::size_t length = strnlen(wire.name, sizeof wire.name);
+  const std::string name(wire.name, length);
+  const auto printable = [](char c) { return c >= ' ' && c <= '~'; };
+  if (wire.robot != wire.header.robot) return Result::refuse("status of another robot");
+  if (!std::ranges::all_of(name, printable)) return Result::refuse("name is not printable");
+  if (wire.phase > km_wire_PHASE_LEAVING) return Result::refuse("unknown phase");
+  if (!std::isfinite(wire.dataset_time_s)) return Result::refuse("time is not finite");
+  const auto phase = static_cast<RobotPhase>(wire.phase);
+  return Result::accept(
+      {wire.robot, name, phase, wire.dataset_time_s, wire.keyframes, wire.settled_links});
+}
+
+RobotStatusNode::RobotStatusNode(std::function<RobotStatus()> provider,
+                                 const RobotStatusTopics& topics)
+    : periodic_(
+          std::chrono::milliseconds(500),
+          [provider = std::move(provider), own = topics.own] { own.publish(provider()); },
+          "robot_status") {
+  topics.peers.subscribe([this](const Topic<RobotStatus>::Message& status) {
+    const std::lock_guard lock(mutex_);
+    latest_[status->robot] = *status;
+  });
+}
+
+std::vector<RobotStatus> RobotStatusNode::peers() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<RobotStatus> result;
+  for (const auto& [robot, status] : latest_) result.push_back(status);
+  return result;
+}
+
+}  // namespace km

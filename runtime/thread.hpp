@@ -1,0 +1,25 @@
+#pragma once
+
+#include <pthread.h>
+#include <sys/resource.h>
+#include <unistd.h>
+#include <string>
+
+namespace km {
+
+/// Names the calling thread for debuggers and top; Linux keeps 15 characters.
+inline void name_this_thread(const std::string& name) {
+  if (!name.empty()) pthread_setname_np(pthread_self(), name.substr(0, 15).c_str());
+}
+
+/// Makes the calling thread give way to the others of this host where processors are scarce: Linux
+/// then gives it about a tenth of what a thread of ordinary priority gets. For handlers of work
+/// that may be late, so that it does not slow down what may not. Later calls do nothing.
+inline void work_in_background() {
+  constexpr int kNiceness = 10;
+  static thread_local const int outcome =
+      setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNiceness);
+  static_cast<void>(outcome);  // where it is not allowed, the thread competes as before
+}
+
+}  // namespace km

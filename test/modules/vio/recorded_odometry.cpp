@@ -1,0 +1,126 @@
+#include "recorded_odometry.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "modules/core/depth_lookup.hpp"
+#include "modules/dense_sensing/stereo_depth.hpp"
+#include "modules/evaluation/trajectory_error.hpp"
+
+namespace km {
+namespace {
+
+double thread_cpu_ms() {
+  timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
+}
+
+// Where a rectified camera sees what lies along the ray of a pixel of the left one, and how much
+// deeper that is along its axis than along the left camera's.
+struct SeenRay {
+  Eigen::Vector2d rectified_px;
+  double depth_ratio = 0.0;
+};
+
+// Of every pixel of the left camera; nullopt where its lens has no bearing.
+std::vector<std::optional<SeenRay>> seen_rays(const PinholeCamera& rectified,
+                                              const PinholeCamera& left) {
+  const SE3 T_rect_left = rectified.T_body_cam.inverse() * left.T_body_cam;
+  std::vector<std::optional<SeenRay>> rays;
+  for (int y = 0; y < left.height; ++y)
+    for (int x = 0; x < left.width; ++x) {
+      const auto bearing = left.unproject(Eigen::Vector2d(x, y));
+      auto& seen = rays.emplace_back();
+      if (!bearing) continue;
+      const Eigen::Vector3d ray = T_rect_left.linear() * bearing->homogeneous();
+      seen = SeenRay{rectified.project(ray.hnormalized()), ray.z()};
+    }
+  return rays;
+}
+
+}  // namespace
+
+OdometryRun run_odometry(const Recording& recording, std::size_t first, std::size_t last,
+                         const TrackerConfig& tracker, const VioConfig& config) {
+  Vio vio(0, recording.rig, tracker, config);
+  OdometryRun run;
+  std::map<Stamp, const SE3*> truth;
+  for (std::size_t k = first; k < last; ++k) {
+    truth[recording.packets[k].frame->stamp] = &recording.T_world_body[k];
+    const double begin = thread_cpu_ms();
+    VioResult result = vio.process(recording.packets[k]);
+    run.cpu_ms.push_back(thread_cpu_ms() - begin);
+    for (const OdometryState& state : result.states) {
+      run.states.push_back(state);
+      run.truth.push_back(*truth.at(state.stamp));
+    }
+    run.keyframes.insert(run.keyframes.end(), result.keyframes.begin(), result.keyframes.end());
+    run.results.push_back(std::move(result));
+  }
+  run.statistics = vio.statistics();
+  return run;
+}
+
+OdometryErrors odometry_errors(std::span<const OdometryState> states, std::span<const SE3> truth) {
+  std::vector<StampedPose> estimated, true_poses;
+  std::vector<PosePair> pairs;
+  double tilt = 0.0;
+  for (std::size_t k = 0; k < states.size(); ++k) {
+    const Stamp stamp = states[k].stamp;
+    const SE3& T = states[k].T_odom_body;
+    estimated.push_back({stamp, T});
+    true_poses.push_back({stamp, truth[k]});
+    pairs.push_back({stamp, truth[k], T});
+    const double cosine = T.linear().row(2).dot(truth[k].linear().row(2));
+    tilt += std::pow(std::acos(std::clamp(cosine, -1.0, 1.0)), 2);
+  }
+  const TrajectoryInput input{"", true_poses, estimated, std::nullopt};
+  const TrajectoryError error = trajectory_error({&input, 1}).joint;
+  return {
+      .ate_m = error.position_m.rmse,
+      .max_m = error.position_m.max,
+      .rpe_m = error.rpe_translation_m.rmse,
+      .rpe_deg = error.rpe_rotation_deg.rmse,
+      .tilt_deg = 180.0 / std::numbers::pi * std::sqrt(tilt / static_cast<double>(states.size())),
+      .scale = align(pairs, true).scale};
+}
+
+Recording as_rgbd(const Recording& recording, std::size_t every, std::size_t first) {
+  const StereoRig& rig = recording.rig.stereo;
+  constexpr double kMaxDepth_m = 60.0;  // with some to spare to 16 bits of millimetres
+  StereoDepth stereo(rig, {.min_depth_m = 0.4, .max_depth_m = kMaxDepth_m});
+  const auto rays = seen_rays(stereo.camera(), rig.cameras[0]);
+  const auto through_lens = [&](const DepthImage& depth) {
+    DepthImage result{rig.cameras[0].width, rig.cameras[0].height, {}};
+    for (const auto& ray : rays) {
+      const auto inverse_depth =
+          ray ? inverse_depth_at(depth, ray->rectified_px, depth_edge(rig)) : std::nullopt;
+      result.millimetres.push_back(inverse_depth ? static_cast<std::uint16_t>(std::lround(
+                                                       1e3 / (*inverse_depth * ray->depth_ratio)))
+                                                 : std::uint16_t{0});
+    }
+    return result;
+  };
+  Recording rgbd = recording;
+  rgbd.rig.stereo = rgbd_rig(rig.cameras[0], rig.baseline_m());
+  rgbd.rig.depth = DepthRange{};
+  for (std::size_t k = 0; k < rgbd.packets.size(); ++k) {
+    SensorPacket& packet = rgbd.packets[k];
+    const StereoFrame& pair = *packet.frame;
+    StereoFrame frame{pair.stamp, pair.left, {}};
+    if (k % every == first)
+      frame.depth =
+          std::make_shared<const DepthImage>(through_lens(stereo.compute(pair.left, pair.right)));
+    packet.frame = std::make_shared<const StereoFrame>(std::move(frame));
+  }
+  return rgbd;
+}
+
+}  // namespace km

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "modules/core/geometry.hpp"
+#include "modules/core/odometry.hpp"
+#include "modules/vio/vio.hpp"
+#include "recorded_tracking.hpp"
+
+namespace km {
+
+/// What Vio made of a recording.
+struct OdometryRun {
+  std::vector<OdometryState> states;
+  std::vector<SE3> truth;  ///< At the states.
+  std::vector<KeyframeOdometry> keyframes;
+  std::vector<double> cpu_ms;  ///< Of each process(), this thread.
+  std::vector<VioResult> results;
+  VioStatistics statistics;
+};
+
+/// Runs a fresh Vio over packets `first` to `last` (not included) of `recording`.
+OdometryRun run_odometry(const Recording& recording, std::size_t first, std::size_t last,
+                         const TrackerConfig& tracker, const VioConfig& config);
+
+/// Errors of a trajectory against the true poses of the same instants.
+struct OdometryErrors {
+  double ate_m = 0.0;  ///< Root mean square after SE(3) alignment.
+  double max_m = 0.0;  ///< Largest after that alignment.
+  double rpe_m = 0.0;  ///< Root mean square over pairs 1 s apart.
+  double rpe_deg = 0.0;
+  double tilt_deg = 0.0;  ///< Root mean square angle between the verticals, no alignment.
+  double scale = 1.0;     ///< That Sim(3) alignment would apply to the estimate.
+};
+
+/// `truth[k]` belongs to `states[k]`; at least three of each.
+[[nodiscard]] OdometryErrors odometry_errors(std::span<const OdometryState> states,
+                                             std::span<const SE3> truth);
+
+/// `recording` as an RGB-D camera in place of the stereo pair would have recorded it: its left
+/// images, with depth that StereoDepth makes of both, seen through the left camera's lens. The
+/// baseline stays, now virtual. Only every `every`th image has depth, from index `first` on.
+[[nodiscard]] Recording as_rgbd(const Recording& recording, std::size_t every = 1,
+                                std::size_t first = 0);
+
+}  // namespace km
