@@ -37,7 +37,7 @@ class ConfigLayers {
   [[nodiscard]] Config load() {
     known_.insert(Config::kSection);
     Config config;
-    problems_ += fill_config(sections_[Config::kSection], config);
+    fill_config(sections_[Config::kSection], Config::kSection, ConfigContext{problems_}, config);
     effective_ += (effective_.empty() ? "" : "\n") + to_yaml(config);
     return config;
   }
@@ -49,9 +49,11 @@ class ConfigLayers {
   [[nodiscard]] const std::string& effective() const { return effective_; }
 
  private:
+  void add_document(const YAML::Node& document, const std::string& origin);
+
   std::map<std::string, ConfigSection> sections_;
   std::set<std::string> known_;
-  std::string problems_;
+  ConfigProblems problems_;
   std::string effective_;
 };
 

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <array>
-#include <charconv>
-#include <cstddef>
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -11,64 +10,85 @@
 
 namespace km {
 
-/// Visitor that writes a config struct as YAML, with each field's comment and bounds beside it.
-/// What it writes can be read back and gives the same values.
-class ConfigText {
+/// A value as it is written in YAML; empty if there is none.
+template <typename T, typename Accepted>
+[[nodiscard]] std::string yaml_text(const T& value, const Accepted& accepted) {
+  if constexpr (std::is_enum_v<T>)
+    return accepted.name_of(value);
+  else if constexpr (std::is_same_v<T, bool>)
+    return value ? "true" : "false";
+  else
+    return shortest_text(value);
+}
+[[nodiscard]] std::string yaml_text(const std::string& value, AnyValue accepted);
+template <typename Accepted>
+[[nodiscard]] std::string yaml_text(const std::filesystem::path& value, const Accepted&) {
+  return value.empty() ? "" : yaml_text(value.string(), AnyValue{});
+}
+template <typename T, typename Accepted>
+[[nodiscard]] std::string yaml_text(const std::optional<T>& value, const Accepted& accepted) {
+  return value ? yaml_text(*value, accepted) : "";
+}
+template <typename T, typename Accepted>
+[[nodiscard]] std::string yaml_text(const std::vector<T>& values, const Accepted& accepted) {
+  std::string list;
+  for (const T& value : values) list += (list.empty() ? "" : ", ") + yaml_text(value, accepted);
+  return '[' + list + ']';
+}
+
+/// Visitor that writes a config struct as YAML, with each field's text and bounds beside it. What
+/// it writes of fields that have values can be read back and gives the same values.
+class ConfigText : public FieldVisitor<ConfigText> {
  public:
-  template <typename T>
-  requires std::is_arithmetic_v<T>
-  void field(const char* key, const T& value, const Bounds<std::type_identity_t<T>>& bounds,
-             const char* comment = "") {
-    if constexpr (std::is_same_v<T, bool>) return field(key, value, comment);
-    line(key, number(value), comment, number(bounds.min) + " .. " + number(bounds.max));
+  template <typename T, typename Accepted>
+  void visit(const char* key, const T& value, const Accepted& accepted, const char* text) {
+    line(key, yaml_text(value, accepted), text, accepted.text());
   }
 
-  template <typename T, std::size_t N>
-  requires std::is_enum_v<T>
-  void field(const char* key, const T& value, const Choice<std::type_identity_t<T>> (&choices)[N],
-             const char* comment = "") {
-    std::string name, names;
-    for (const auto& choice : choices) {
-      if (choice.value == value) name = choice.name;
-      names += (names.empty() ? "" : " | ") + std::string(choice.name);
+  template <typename Config>
+  void section(const char* key, Config& config, const char* text = "") {
+    line(key, "", text, "");
+    indent_ += "  ";
+    config.visit_fields(*this);
+    indent_.resize(indent_.size() - 2);
+  }
+
+  /// One element with its defaults, if the list is empty.
+  template <typename Config>
+  void sections(const char* key, std::vector<Config> list, const char* text = "") {
+    if (list.empty()) list.emplace_back();
+    line(key, "", text, "");
+    indent_ += "    ";
+    for (Config& config : list) {
+      const std::size_t begin = text_.size();
+      config.visit_fields(*this);
+      text_[begin + indent_.size() - 2] = '-';
     }
-    line(key, name, comment, names);
-  }
-
-  void field(const char* key, const bool& value, const char* comment = "") {
-    line(key, value ? "true" : "false", comment, "");
-  }
-  void field(const char* key, const std::string& value, const char* comment = "") {
-    line(key, quoted(value), comment, "");
-  }
-  void field(const char* key, const std::vector<std::string>& value, const char* comment = "") {
-    std::string list;
-    for (const std::string& entry : value) list += (list.empty() ? "" : ", ") + quoted(entry);
-    line(key, '[' + list + ']', comment, "");
+    indent_.resize(indent_.size() - 4);
   }
 
   [[nodiscard]] const std::string& text() const { return text_; }
 
  private:
-  template <typename T>
-  static std::string number(T value) {
-    std::array<char, 32> buffer{};
-    const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr;
-    return {buffer.data(), end};
-  }
-  static std::string quoted(const std::string& value);
-  void line(const char* key, const std::string& value, const std::string& comment,
+  void line(const char* key, const std::string& value, const std::string& text,
             const std::string& accepted);
 
+  std::string indent_ = "  ";
   std::string text_;
 };
 
-/// `config` as a YAML section.
+/// The fields of `config`, a line or more each.
 template <typename Config>
-[[nodiscard]] std::string to_yaml(Config config) {
+[[nodiscard]] std::string keys_of(Config config) {
   ConfigText text;
   config.visit_fields(text);
-  return std::string(Config::kSection) + ":\n" + text.text();
+  return text.text();
+}
+
+/// `config` as a YAML section.
+template <typename Config>
+[[nodiscard]] std::string to_yaml(const Config& config) {
+  return std::string(Config::kSection) + ":\n" + keys_of(config);
 }
 
 }  // namespace km

@@ -1,12 +1,17 @@
 #include "runtime/yaml_config.hpp"
 
 #include <algorithm>
-#include <limits>
+#include <cerrno>
+#include <fstream>
 #include <numeric>
-#include <sstream>
+#include <system_error>
 
 namespace km {
 namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kDataset = "${DATASET}";
 
 // Levenshtein distance, by its recurrence over the rows of the table.
 std::size_t edit_distance(const std::string& a, const std::string& b) {
@@ -30,7 +35,39 @@ std::string one_line(const YAML::Node& node) {
   return emitter.c_str();
 }
 
+std::string joined(const std::string& name, const std::string& key) {
+  return name.empty() ? key : name + '.' + key;
+}
+
+// Moves the map `quick:` over the keys beside it, or out of the way.
+void apply_quick(ConfigSection& section, const std::string& name, const ConfigContext& context) {
+  const auto quick = section.values.extract("quick");
+  if (quick.empty()) return;
+  const ConfigValue& map = quick.mapped();
+  for (const auto& [key, value] : read_section(map.node, name, map.file, context).values)
+    (*context.quick ? section.values : section.unused).insert_or_assign(key, value);
+}
+
 }  // namespace
+
+void ConfigProblems::finish() const {
+  const std::string all = unknown + others;
+  if (!all.empty()) throw ConfigError(all.substr(0, all.size() - 1));  // without the last newline
+}
+
+YAML::Node load_yaml(const fs::path& file) {
+  std::ifstream input(file);
+  if (!input)
+    throw ConfigError(file.string() + ": cannot open: " + std::generic_category().message(errno));
+  return parse_yaml({std::istreambuf_iterator<char>(input), {}}, file.string());
+}
+
+YAML::Node parse_yaml(const std::string& text, const std::string& origin) try {
+  return YAML::Load(text);
+} catch (const YAML::Exception& error) {
+  throw ConfigError(origin + ':' + std::to_string(error.mark.line + 1) +
+                    ": not YAML: " + error.msg);
+}
 
 std::string place_of(const YAML::Node& node, const std::string& file) {
   const std::string line = std::to_string(node.Mark().line + 1);
@@ -50,34 +87,88 @@ std::string suggestion(const std::string& word, const std::set<std::string>& kno
 }
 
 ConfigSection read_section(const YAML::Node& node, const std::string& name, const std::string& file,
-                           std::string& problems) {
-  ConfigSection section{place_of(node, file), {}};
+                           const ConfigContext& context) {
+  ConfigSection section{place_of(node, file), {}, {}};
+  const std::string called = name.empty() ? "the file" : name;
+  const auto problem = [&](const std::string& where, const std::string& text) {
+    context.problems.others += where + ": " + text + '\n';
+  };
   if (node.IsNull()) return section;
   if (!node.IsMap()) {
-    problems += section.where + ": section " + name + " is not a map of keys\n";
+    problem(section.where, called + " is not a map of keys and values");
     return section;
   }
   for (const auto& entry : node) {
     const std::string where = place_of(entry.first, file);
     if (!entry.first.IsScalar()) {
-      problems += where + ": a key of section " + name + " is not a word\n";
+      problem(where, "a key of " + called + " is not a word");
       continue;
     }
-    const std::string key = entry.first.Scalar();
-    const auto [earlier, fresh] = section.values.try_emplace(key, ConfigValue{entry.second, where});
-    if (!fresh)
-      problems +=
-          where + ": " + name + '.' + key + " is repeated, see " + earlier->second.where + '\n';
+    const std::string& key = entry.first.Scalar();
+    const auto [earlier, fresh] =
+        section.values.try_emplace(key, ConfigValue{entry.second, file, where});
+    if (!fresh) problem(where, joined(name, key) + " is repeated, see " + earlier->second.where);
   }
+  if (context.quick) apply_quick(section, name, context);
   return section;
 }
 
-std::string YamlFields::problems() const {
-  std::string result = problems_;
-  for (const auto& [key, value] : section_.values)
-    if (!known_.contains(key))
-      result += value.where + ": unknown key " + name_ + '.' + key + suggestion(key, known_) + '\n';
-  return result;
+std::string YamlFields::decode(const YAML::Node& node, bool& value, AnyValue /*accepted*/) {
+  return YAML::convert<bool>::decode(node, value) ? "" : "is not true or false";
+}
+
+std::string YamlFields::decode(const YAML::Node& node, std::string& value, AnyValue /*accepted*/) {
+  return YAML::convert<std::string>::decode(node, value) ? "" : "is not a text";
+}
+
+std::string YamlFields::decode(const YAML::Node& node, fs::path& value, AnyValue /*accepted*/) {
+  if (!node.IsScalar()) return "is not a path";
+  value = node.Scalar();
+  return {};
+}
+
+std::string YamlFields::decode(const YAML::Node& node, fs::path& value, Input input) const {
+  if (!node.IsScalar()) return "is not a path";
+  std::string name = node.Scalar();
+  if (const std::size_t variable = name.find(kDataset); variable != std::string::npos) {
+    if (context_.dataset.empty()) return "needs --dataset";
+    name.replace(variable, kDataset.size(), fs::absolute(context_.dataset).string());
+  }
+  value = name.empty() ? fs::path() : (context_.folder / name).lexically_normal();
+  const bool is_there = value.empty() || fs::exists(value);
+  return is_there || !input.must_exist ? "" : "is no file or folder: there is no " + value.string();
+}
+
+void YamlFields::required(std::initializer_list<const char*> keys) {
+  for (const char* key : keys) {
+    const ConfigValue* found = find(key);
+    check(found != nullptr, key, "is missing");
+    check(found == nullptr || !found->node.IsSequence() || found->node.size() > 0, key, "is empty");
+  }
+}
+
+void YamlFields::check(bool ok, const char* key, const std::string& problem,
+                       std::optional<std::size_t> element) {
+  if (ok || wrong_.contains(key)) return;
+  const ConfigValue* found = find(key);
+  if (found == nullptr)
+    add(section_.where, key, problem);
+  else if (element)
+    add(place_of(found->node[*element], found->file), key, problem);
+  else
+    add(found->where, key, "= " + one_line(found->node) + ' ' + problem);
+}
+
+void YamlFields::finish() {
+  for (const auto* values : {&section_.values, &section_.unused})
+    for (const auto& [key, value] : *values)
+      if (!known_.contains(key))
+        context_.problems.unknown +=
+            value.where + ": unknown key " + full_name(key) + suggestion(key, known_) + '\n';
+}
+
+std::string YamlFields::full_name(const std::string& key) const {
+  return joined(name_, key);
 }
 
 const ConfigValue* YamlFields::find(const char* key) {
@@ -86,15 +177,8 @@ const ConfigValue* YamlFields::find(const char* key) {
   return found == section_.values.end() ? nullptr : &found->second;
 }
 
-void YamlFields::wrong(const char* key, const ConfigValue& found, const std::string& expected) {
-  problems_ += found.where + ": " + name_ + '.' + key + " = " + one_line(found.node) + " is not " +
-               expected + '\n';
-}
-
-void YamlFields::append(const ConfigChecker& checker, const ConfigValue& found) try {
-  checker.finish();
-} catch (const ConfigError& error) {
-  problems_ += found.where + ": " + error.what();
+void YamlFields::add(const std::string& where, const char* key, const std::string& problem) {
+  context_.problems.others += where + ": " + full_name(key) + ' ' + problem + '\n';
 }
 
 }  // namespace km

@@ -2,58 +2,108 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "modules/core/config.hpp"
+
 namespace km {
 
-/// Configuration of the experiments that cannot be used. what() lists every problem with file and
-/// line.
-struct ExperimentConfigError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-/// A world, the recordings that robots make in it, and how a team is run on them.
+/// A world, the recordings that robots make in it, and how a team is run on them: a map of
+/// worlds.yaml.
 struct WorldConfig {
-  std::string name;                       ///< Of its files; known ones are compared with the paper.
-  std::string repeats = {};               ///< Name of the world this is another run of; or empty.
-  std::string recordings = {};            ///< Name of the world whose recordings it is run on.
-  std::string title;                      ///< "City".
-  std::filesystem::path simulation;       ///< Options file of kimera_multi_simulate; may be empty.
-  std::vector<std::string> simulate;      ///< More options of kimera_multi_simulate.
-  std::vector<std::string> robots;        ///< Their names, in the order of their ids.
-  bool flights = false;                   ///< The robots move as EuRoC's recordings of their names.
-  std::filesystem::path original_config;  ///< Of robots on EuRoC's own images; may be empty.
-  std::vector<std::string> team;          ///< Options of kimera_multi_team.
-  std::vector<std::string> robot;         ///< Options of every robot.
-  std::vector<std::string> picture;       ///< Options of kimera_multi_evaluate render.
-  double simulate_s = 600.0;  ///< How long simulating takes, roughly, for the time left.
-  double team_s = 300.0;      ///< Likewise the team.
+  std::string name;
+  std::string repeats = {};     ///< Name of the world this is another run of; or empty.
+  std::string recordings = {};  ///< Name of the world whose recordings it is run on.
+  std::string title;
+  std::vector<std::string> robots;
+  std::filesystem::path simulation;
+  std::vector<std::string> simulate;
+  bool flights = false;
+  std::filesystem::path original_config;
+  std::vector<std::string> team;
+  std::vector<std::string> robot;
+  unsigned runs = 1;
+  std::vector<unsigned> seeds;
+  std::vector<std::string> picture;
+  double simulate_s = 600.0;
+  double team_s = 300.0;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("title", title, "for people; default: its name");
+    visitor.field("robots", robots, "their names, in the order of their ids");
+    visitor.field("simulation", simulation, Input{}, "file of options of kimera_multi_simulate");
+    visitor.field("simulate", simulate, "more options of it, over the file's");
+    visitor.field("flights", flights,
+                  "the robots move as EuRoC's recordings of their names did, with the recorded "
+                  "inertial data; the original images are used where --euroc has them");
+    visitor.field("original_config", original_config, Input{}, "of robots on EuRoC's own images");
+    visitor.field("team", team, "options of kimera_multi_team");
+    visitor.field("robot", robot, "options of every robot");
+    visitor.field("runs", runs, {1, 99},
+                  "how often the team is run, for the spread; all but the first without a map");
+    visitor.field("seeds", seeds, {0, ~0U},
+                  "further seeds of the world: simulated and run like it, without a map");
+    visitor.field("picture", picture, "options of kimera_multi_evaluate render");
+    visitor.field("simulate_s", simulate_s, {1e-3, 1e6},
+                  "[s] how long simulating takes on two cores, roughly, for the time left");
+    visitor.field("team_s", team_s, {1e-3, 1e6}, "[s] the same of the team");
+    visitor.required({"robots"});
+  }
 };
 
-/// Clique search against the size of the graph.
+/// Clique search against the size of the graph: pcm.yaml.
 struct PcmExperiment {
-  std::string graph;  ///< g2o file, looked for in the folder of data.
+  std::string graph;
   std::size_t closures = 0;
   std::size_t outliers = 0;
   std::vector<unsigned> seeds;
-  std::vector<std::string> searches;  ///< As kimera_multi_pgo pcm names them.
-  double seed_s = 50.0;               ///< How long a seed takes, roughly, for the time left.
+  std::vector<std::string> searches;
+  double seed_s = 50.0;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("graph", graph, "g2o file, looked for in --graphs");
+    visitor.field("closures", closures, {0, 1000000}, "of the file's, drawn at random; 0: all");
+    visitor.field("outliers", outliers, {0, 1000000}, "random false ones added");
+    visitor.field("seeds", seeds, {0, ~0U},
+                  "of the random closures: a run each; the report has medians and ranges");
+    visitor.field("searches", searches, "exact, incremental, batch");
+    visitor.field("seed_s", seed_s, {1e-3, 1e6},
+                  "[s] how long a seed takes, roughly, for the time left");
+    visitor.required({"graph", "seeds", "searches"});
+    for (const std::string& search : searches)
+      visitor.check(search == "exact" || search == "incremental" || search == "batch", "searches",
+                    "has " + search + ", which is not exact, incremental or batch");
+  }
 };
 
 /// One robot without others and without a map.
 struct AloneExperiment {
-  std::string world;  ///< Whose recording it is run on; empty: there is no such experiment.
+  std::string world;
   std::string robot;
-  std::vector<std::string> arguments;  ///< Of kimera_multi_robot.
+  std::vector<std::string> arguments;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("world", world, "whose recording it is run on");
+    visitor.field("robot", robot, "of that world");
+    visitor.field("arguments", arguments, "of kimera_multi_robot");
+    visitor.required({"world", "robot"});
+  }
 };
 
 /// A column of the trajectory table.
 struct PgoMethodConfig {
-  std::string name;  ///< local, rbcd, rbcd50, dgs and centralized are compared with the paper.
+  std::string name;
   std::string title;
-  std::vector<std::string> arguments;  ///< Of kimera_multi_pgo solve.
+  std::vector<std::string> arguments;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("name", name,
+                  "local, rbcd, rbcd50, dgs and centralized are compared with the paper");
+    visitor.field("title", title, "for people; default: its name");
+    visitor.field("arguments", arguments, "of kimera_multi_pgo solve");
+    visitor.required({"name", "arguments"});
+  }
 };
 
 /// What the files in config/experiments/ say.
@@ -63,7 +113,7 @@ struct ExperimentConfig {
   /// WORLD-seed2 on those of another seed.
   std::vector<WorldConfig> worlds;
   PcmExperiment pcm;
-  AloneExperiment alone;
+  AloneExperiment alone;                       ///< Without a world: there is no such experiment.
   std::vector<std::string> trajectory_worlds;  ///< Names in `worlds`, as those below.
   std::vector<PgoMethodConfig> methods;
   std::vector<std::string> resources_worlds;
@@ -78,9 +128,11 @@ struct ExperimentConfig {
 };
 
 /// Reads worlds.yaml, pcm.yaml, trajectory.yaml, resources.yaml, mesh.yaml and semantics.yaml.
-/// With `quick` the keys below `quick:` replace those beside it. Throws ExperimentConfigError for
-/// files that are missing or no YAML, for unknown keys, wrong types, missing values, and names of
-/// worlds that are not in worlds.yaml.
+/// With `quick` the keys below `quick:` replace those beside it. Throws ConfigError with every
+/// problem of all files, by file and line; names of worlds must be in worlds.yaml.
 [[nodiscard]] ExperimentConfig read_experiments(const std::filesystem::path& folder, bool quick);
+
+/// The keys of a world, with their defaults and meaning.
+[[nodiscard]] std::string world_keys();
 
 }  // namespace km

@@ -56,6 +56,10 @@ std::vector<std::string> all_names() {
 }
 
 void define(CLI::App& app, Options& options) {
+  app.footer(
+      "Keys of a world in worlds.yaml, paths relative to it; those below quick: replace them "
+      "with --quick:\n" +
+      km::world_keys());
   app.add_option("--data", options.data,
                  "Recordings, and the results of teams on them (default: experiments_data)");
   app.add_option("--results", options.results,

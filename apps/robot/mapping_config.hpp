@@ -18,44 +18,43 @@ enum class DenseSource {
   kComputed,  ///< Stereo matching; the network of `segmentation:`.
 };
 
-/// Parameters of a robot's map that are not those of a module. Field names are the YAML keys below
-/// `mapping:`.
+/// Parameters of a robot's map that are not those of a module.
 struct MappingConfig {
   static constexpr const char* kSection = "mapping";
 
   MappingMode mode = MappingMode::kOff;
   DenseSource depth = DenseSource::kAuto;
   DenseSource labels = DenseSource::kAuto;
-
-  /// Frames a second that go into the map, by their stamps. A mapper that is too slow for it leaves
-  /// frames out; at --rate max it holds the others up instead.
   double rate_hz = 5.0;
-
-  /// Depths that are expected to be off by more than this (one standard deviation) stay out of the
-  /// map: beyond about half of semantic_mapping's truncation, surfaces come out torn. An error is
-  /// taken for a quarter of a pixel of disparity, see usable_range_m().
   double max_depth_error_m = 0.2;
-
-  /// Time between meshes: to be corrected, and written to files.
   double mesh_interval_s = 3.0;
 
   void visit_fields(auto& visitor) {
-    visitor.field("mode", mode,
-                  {{"off", MappingMode::kOff},
-                   {"metric", MappingMode::kMetric},
-                   {"semantic", MappingMode::kSemantic}});
+    visitor.field(
+        "mode", mode,
+        {{"off", MappingMode::kOff},
+         {"metric", MappingMode::kMetric},
+         {"semantic", MappingMode::kSemantic}},
+        "what is made of the images beside the trajectory: nothing, a mesh, a mesh with labels");
     visitor.field("depth", depth,
                   {{"auto", DenseSource::kAuto},
                    {"recorded", DenseSource::kRecorded},
-                   {"stereo", DenseSource::kComputed}});
+                   {"stereo", DenseSource::kComputed}},
+                  "auto: the recording's images where it has them, else computed");
     visitor.field("labels", labels,
                   {{"auto", DenseSource::kAuto},
                    {"recorded", DenseSource::kRecorded},
-                   {"network", DenseSource::kComputed}});
-    visitor.field("rate_hz", rate_hz, {0.01, 100.0}, "[1/s] frames that go into the map");
+                   {"network", DenseSource::kComputed}},
+                  "likewise; network: that of segmentation");
+    visitor.field("rate_hz", rate_hz, {0.01, 100.0},
+                  "[1/s] frames that go into the map, by their stamps; a mapper too slow for it "
+                  "leaves some out, at --rate max it holds the others up");
     visitor.field("max_depth_error_m", max_depth_error_m, {0.001, 100.0},
-                  "[m] expected of depths that go into it");
-    visitor.field("mesh_interval_s", mesh_interval_s, {0.1, 3600.0}, "[s] between meshes");
+                  "[m] standard deviation expected of depths: larger stay out; beyond half of "
+                  "semantic_mapping's truncation surfaces come out torn; an error is a quarter of "
+                  "a pixel of disparity, see usable_range_m()");
+    visitor.field("mesh_interval_s", mesh_interval_s, {0.1, 3600.0},
+                  "[s] between meshes: to be corrected, and written to files");
   }
 };
 

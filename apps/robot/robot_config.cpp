@@ -1,6 +1,7 @@
 #include "apps/robot/robot_config.hpp"
 
 #include <array>
+#include <type_traits>
 
 #include "apps/program_folder.hpp"
 #include "runtime/config_layers.hpp"
@@ -59,23 +60,9 @@ RobotConfig load_robot_config(const RobotOptions& options) {
   apply_options(options, layers);
 
   RobotConfig config;
-  config.run = layers.load<RunConfig>();
-  config.dds = layers.load<DdsConfig>();
-  config.sensors = layers.load<SensorsConfig>();
-  config.tracker = layers.load<TrackerConfig>();
-  config.vio = layers.load<VioConfig>();
-  config.keyframe_features = layers.load<KeyframeFeaturesConfig>();
-  config.place_recognition = layers.load<PlaceRecognitionConfig>();
-  config.loop_closure = layers.load<LoopClosureConfig>();
-  config.pcm = layers.load<PcmConfig>();
-  config.pose_graph = layers.load<PoseGraphConfig>();
-  config.graph_playback = layers.load<GraphPlaybackConfig>();
-  config.mapping = layers.load<MappingConfig>();
-  config.stereo_depth = layers.load<StereoDepthConfig>();
-  config.segmentation = layers.load<SegmentationConfig>();
-  config.semantic_mapping = layers.load<SemanticMappingConfig>();
-  config.mesh_deformation = layers.load<MeshDeformationConfig>();
-  config.mesh_chunks = layers.load<MeshChunksConfig>();
+  config.visit_sections([&layers](auto& section) {
+    section = layers.load<std::remove_cvref_t<decltype(section)>>();
+  });
   layers.finish();
   config.effective = layers.effective();
   return config;

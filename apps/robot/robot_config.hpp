@@ -45,6 +45,14 @@ struct RobotConfig {
   MeshChunksConfig mesh_chunks;
 
   std::string effective;  ///< As YAML: a file that gives this configuration again.
+
+  /// Calls visit(section) for every section, in the order of files.
+  void visit_sections(const auto& visit) {
+    const auto visit_all = [&](auto&... sections) { (visit(sections), ...); };
+    visit_all(run, dds, sensors, tracker, vio, keyframe_features, place_recognition, loop_closure,
+              pcm, pose_graph, graph_playback, mapping, stereo_depth, segmentation,
+              semantic_mapping, mesh_deformation, mesh_chunks);
+  }
 };
 
 /// Link profile, then --config files, then --set, then the options of the command line: what comes

@@ -19,7 +19,7 @@ constexpr const char* kAbout =
     "Examples:\n"
     "  kimera_multi_simulate --world city --robots 2 --duration 60 --output city\n"
     "  kimera_multi_simulate --world camp --rig rgbd --labels --depth-rate 5 --output camp\n"
-    "  kimera_multi_simulate --config config/simulation/city.toml --output city\n"
+    "  kimera_multi_simulate --config config/simulation/city.yaml --output city\n"
     "  kimera_multi_simulate --world vicon_room --resolution 376x240 --output small\n"
     "  kimera_multi_team --config small/team.yaml --output results/small\n\n"
     "With --trajectory and --imu the robots move as recorded flights did, and keep the recorded\n"

@@ -2,137 +2,100 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <cstdio>
+#include <memory>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <thread>
+#include <tuple>
 
-#include "apps/simulate/options_file.hpp"
-#include "modules/core/text_rows.hpp"
 #include "modules/simulation/dataset/number_text.hpp"
+#include "runtime/yaml_config.hpp"
 
 namespace km {
 namespace {
 
-constexpr double kMaxDuration_s = 24.0 * 3600.0;
+template <typename T>
+constexpr bool kIsList = false;
+template <typename T>
+constexpr bool kIsList<std::vector<T>> = true;
 
-const std::map<std::string, WorldKind> kWorlds = {
-    {"city", WorldKind::kCity}, {"camp", WorldKind::kCamp}, {"vicon_room", WorldKind::kViconRoom}};
-const std::map<std::string, CameraKind> kCameras = {{"stereo", CameraKind::kStereo},
-                                                    {"rgbd", CameraKind::kRgbd}};
-const std::map<std::string, ImageFormat> kFormats = {{"jpg", ImageFormat::kJpeg},
-                                                     {"png", ImageFormat::kPng}};
+// Visitor that makes each field an option of the command line. What is given is kept as a value of
+// the same key, as if a file said so.
+class OptionFields : public FieldVisitor<OptionFields> {
+ public:
+  OptionFields(CLI::App& app, ConfigSection& given) : app_(app), given_(given) {}
 
-// An option whose values have names; others are refused with the list of names.
-template <typename Enum>
-CLI::Option* choice(CLI::App& app, const char* name, Enum& value,
-                    const std::map<std::string, Enum>& names, const char* help) {
-  std::set<std::string> words;
-  for (const auto& entry : names) words.insert(entry.first);
-  return app
-      .add_option_function<std::string>(
-          name, [&value, &names](const std::string& word) { value = names.at(word); }, help)
-      ->check(CLI::IsMember(words));
-}
+  template <typename T, typename Accepted>
+  void visit(const char* key, const T& value, const Accepted& accepted, std::string text) {
+    const std::string name = std::string("--").append(key);
+    const auto give = [this, key](const auto& written) {
+      given_.values.insert_or_assign(key, ConfigValue{YAML::Node(written), "", "command line"});
+    };
+    if (required_.contains(key)) text += " (required)";
+    if (!accepted.text().empty()) text += "; " + accepted.text();
+    if constexpr (std::is_same_v<T, bool>)
+      app_.add_flag_function(
+          name, [give](std::int64_t count) { give(count > 0); }, text);
+    else if constexpr (kIsList<T>)
+      app_.add_option_function<std::vector<std::string>>(name, give, text);
+    else
+      app_.add_option_function<std::string>(name, give, text)
+          ->default_str(required_.contains(key) ? "" : yaml_text(value, accepted));
+  }
+  void required(std::initializer_list<const char*> keys) {
+    required_.insert(keys.begin(), keys.end());
+  }
 
-// CLI::Range lets NaN pass.
-CLI::Validator between(double min, double max) {
-  return {[min, max](const std::string& text) -> std::string {
-            const auto value = parse_double(text);
-            if (value && min <= *value && *value <= max) return {};
-            return "'" + text + "' is not a number from " + number_text(min) + " to " +
-                   number_text(max);
-          },
-          number_text(min) + " .. " + number_text(max)};
-}
+ private:
+  CLI::App& app_;
+  ConfigSection& given_;
+  std::set<std::string> required_;
+};
 
-// CLI11 reads -1 as the largest seed.
-std::string check_seed(const std::string& text) {
-  const bool digits = !text.empty() && text.size() <= 19 &&
-                      text.find_first_not_of("0123456789") == std::string::npos;
-  return digits ? std::string() : "'" + text + "' is not a whole number of at most 19 digits";
-}
-
-// "752x480"
-std::string parse_resolution(const std::string& text, SimulationOptions& options) {
+// "752x480" as width and height.
+std::optional<std::pair<int, int>> parse_resolution(const std::string& text) {
   int width = 0, height = 0, end = 0;
   const bool ok = std::sscanf(text.c_str(), "%5dx%5d%n", &width, &height, &end) == 2 &&
                   static_cast<std::size_t>(end) == text.size();
-  if (!ok || width < 16 || height < 16 || width > 8192 || height > 8192)
-    return "'" + text + "' is not WIDTHxHEIGHT with both from 16 to 8192";
-  options.width = width;
-  options.height = height;
-  return {};
+  if (!ok || std::min(width, height) < 16 || std::max(width, height) > 8192) return std::nullopt;
+  return std::pair(width, height);
 }
 
-void define_recorded_mode(CLI::App& app, SimulationOptions& options) {
-  const char* const group = "Recorded motion";
-  app.add_option("--trajectory", options.truths,
-                 "True poses of recorded flights, one file per robot: EuRoC's state CSV or TUM "
-                 "text, also gzipped; in the frame of the world")
-      ->check(CLI::ExistingFile)
-      ->group(group);
-  app.add_option("--imu", options.imus, "The recorded inertial data, one CSV per --trajectory")
-      ->check(CLI::ExistingFile)
-      ->group(group);
-  app.add_option("--names", options.names, "Names of the robots (default: the files')")
-      ->group(group);
-  app.add_option("--start", options.start_s, "First image [s since the first true pose]")
-      ->check(between(0.0, kMaxDuration_s))
-      ->group(group);
-  app.add_option("--end", options.end_s, "Last image [s], 0: the end of the flight")
-      ->check(between(0.0, kMaxDuration_s))
-      ->group(group);
-}
-
-void define_images(CLI::App& app, SimulationOptions& options) {
-  choice(app, "--rig", options.cameras, kCameras, "Cameras of each robot (default: stereo)");
-  app.add_option_function<std::string>(
-         "--resolution", [](const std::string&) {}, "Of the images [px] (default: 752x480)")
-      ->check(CLI::Validator(
-          [&options](const std::string& text) { return parse_resolution(text, options); }, "WxH"));
-  app.add_option("--rate", options.rate_hz, "Images per second")
-      ->check(between(0.1, 200.0))
-      ->capture_default_str();
-  app.add_flag("--depth", options.depth, "Also depth images of the left camera (16 bit, mm)");
-  app.add_option("--depth-rate", options.depth_rate_hz,
-                 "Depth images per second, the rate divided by a whole number (default: the rate)")
-      ->check(between(0.1, 200.0));
-  app.add_flag("--ideal-depth", options.ideal_depth, "Depth without noise and holes");
-  app.add_flag("--labels", options.labels, "Also class ids of the left camera's pixels");
-  app.add_flag("--color", options.color, "Also colour images of the left camera");
-  app.add_flag("--motion-blur", options.motion_blur, "Smear images along their motion");
-  choice(app, "--image-format", options.format, kFormats,
-         "jpg: quality 92, as recordings were stored (default), or png");
+// Over the file of options, if there is one, what the command line gave.
+void read_options(const std::string& file, const ConfigSection& given, SimulationOptions& options) {
+  ConfigProblems problems;
+  const ConfigContext context{problems};
+  ConfigSection section = given;
+  if (!file.empty()) section.values.merge(read_section(load_yaml(file), "", file, context).values);
+  fill_config(section, "", context, options);
+  problems.finish();
 }
 
 }  // namespace
 
+bool is_resolution(const std::string& text) {
+  return parse_resolution(text).has_value();
+}
+
 void define(CLI::App& app, SimulationOptions& options) {
-  app.set_config("--config", "", "File of options, see config/simulation/")
-      ->check(CLI::Validator(
-          [&app](const std::string& file) {
-            return file.empty() ? std::string() : problems_of_options_file(app, file);
-          },
-          "FILE"));
-  app.allow_config_extras(CLI::config_extras_mode::error);
-  choice(app, "--world", options.world, kWorlds, "What there is to see")->required();
-  app.add_option("--robots", options.robots, "How many robots move through it")
-      ->check(CLI::Range(1, 99))
-      ->capture_default_str();
-  app.add_option("--seed", options.seed, "Of everything random: the same seed, the same bytes")
-      ->check(CLI::Validator(check_seed, "NUMBER"))
-      ->capture_default_str();
-  app.add_option("--duration", options.duration_s, "Of the recordings [s]")
-      ->check(between(0.5, kMaxDuration_s))
-      ->capture_default_str();
-  define_images(app, options);
-  define_recorded_mode(app, options);
-  app.add_option("--output", options.output,
-                 "Folder of the recordings; one that was stopped goes on")
-      ->required();
-  app.add_option("--threads", options.threads, "That render (default: one per processor)")
-      ->check(CLI::Range(1, 256));
+  struct CommandLine {
+    explicit CommandLine(CLI::App& app) : fields(app, given) {}
+    std::string file;
+    ConfigSection given{"command line", {}, {}};
+    OptionFields fields;
+  };
+  const auto line = std::make_shared<CommandLine>(app);
+  app.add_option("--config", line->file, "File of options, see config/simulation/");
+  options.visit_fields(line->fields);
+  app.callback([line, &options] {
+    try {
+      read_options(line->file, line->given, options);
+    } catch (const ConfigError& error) {
+      throw CLI::ValidationError(error.what());
+    }
+  });
 }
 
 namespace {
@@ -180,6 +143,7 @@ void complete_names(const SimulationOptions& options) {
 }  // namespace
 
 SimulationOptions completed(SimulationOptions options) {
+  std::tie(options.width, options.height) = parse_resolution(options.resolution).value();
   if (options.is_recorded()) {
     complete_recorded(options);
   } else {
@@ -203,13 +167,8 @@ SimulationOptions completed(SimulationOptions options) {
   return options;
 }
 
-const char* name_of(WorldKind world) {
-  if (world == WorldKind::kCity) return "city";
-  return world == WorldKind::kCamp ? "camp" : "vicon_room";
-}
-
-const char* name_of(CameraKind cameras) {
-  return cameras == CameraKind::kStereo ? "stereo" : "rgbd";
+std::string name_of(WorldKind world) {
+  return Choices<WorldKind>{kWorlds}.name_of(world);
 }
 
 ParameterList parameters(const SimulationOptions& options) {
@@ -223,7 +182,7 @@ ParameterList parameters(const SimulationOptions& options) {
   } else {
     list.emplace_back("duration", number_text(options.duration_s));
   }
-  list.emplace_back("rig", name_of(options.cameras));
+  list.emplace_back("rig", Choices<CameraKind>{kCameras}.name_of(options.cameras));
   list.emplace_back("resolution",
                     std::to_string(options.width) + 'x' + std::to_string(options.height));
   list.emplace_back("rate", number_text(options.rate_hz));
@@ -235,7 +194,7 @@ ParameterList parameters(const SimulationOptions& options) {
   list.emplace_back("labels", yes(options.labels));
   list.emplace_back("color", yes(options.color));
   list.emplace_back("motion-blur", yes(options.motion_blur));
-  list.emplace_back("image-format", options.format == ImageFormat::kJpeg ? "jpg" : "png");
+  list.emplace_back("image-format", Choices<ImageFormat>{kFormats}.name_of(options.format));
   return list;
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "modules/core/config.hpp"
 #include "modules/simulation/dataset/dataset_record.hpp"
 #include "modules/simulation/dataset/image_encoding.hpp"
 
@@ -13,38 +14,81 @@ namespace km {
 
 enum class WorldKind { kCity, kCamp, kViconRoom };
 enum class CameraKind { kStereo, kRgbd };
+inline constexpr Choice<WorldKind> kWorlds[] = {
+    {"city", WorldKind::kCity}, {"camp", WorldKind::kCamp}, {"vicon_room", WorldKind::kViconRoom}};
+inline constexpr Choice<CameraKind> kCameras[] = {{"stereo", CameraKind::kStereo},
+                                                  {"rgbd", CameraKind::kRgbd}};
+inline constexpr Choice<ImageFormat> kFormats[] = {{"jpg", ImageFormat::kJpeg},
+                                                   {"png", ImageFormat::kPng}};
 
-/// What the command line of kimera_multi_simulate asks for.
+/// True for "752x480": both sides from 16 to 8192.
+[[nodiscard]] bool is_resolution(const std::string& text);
+
+/// What kimera_multi_simulate is asked for, by its command line and its file of options.
 struct SimulationOptions {
   WorldKind world = WorldKind::kCity;
   int robots = 3;
   std::uint64_t seed = 1;
-  double duration_s = 60.0;  ///< Of the images.
+  double duration_s = 60.0;
   CameraKind cameras = CameraKind::kStereo;
-  int width = 752;   ///< [px]
-  int height = 480;  ///< [px]
+  std::string resolution = "752x480";
   double rate_hz = 20.0;
-  bool depth = false;  ///< Always on with CameraKind::kRgbd.
+  bool depth = false;
   double depth_rate_hz = 0.0;
+  bool ideal_depth = false;
   bool labels = false;
   bool color = false;
-  ImageFormat format = ImageFormat::kJpeg;
-  bool ideal_depth = false;
   bool motion_blur = false;
-  std::filesystem::path output;
-  int threads = 0;
-
-  /// The recorded mode: one robot for each pair.
+  ImageFormat format = ImageFormat::kJpeg;
   std::vector<std::filesystem::path> truths;
   std::vector<std::filesystem::path> imus;
   std::vector<std::string> names;
-  double start_s = 0.0;  ///< Since the first true pose.
-  double end_s = 0.0;    ///< 0: to its end.
+  double start_s = 0.0;
+  double end_s = 0.0;
+  std::filesystem::path output;
+  int threads = 0;
+
+  int width = 752;   ///< [px], as `resolution` says.
+  int height = 480;  ///< [px]
 
   [[nodiscard]] bool is_recorded() const { return !truths.empty(); }
+
+  void visit_fields(auto& visitor) {
+    constexpr double kDay_s = 24.0 * 3600.0;
+    visitor.required({"world", "output"});
+    visitor.field("world", world, kWorlds, "What there is to see");
+    visitor.field("robots", robots, {1, 99}, "How many robots move through it");
+    visitor.field("seed", seed, {0U, 9'999'999'999'999'999'999U},
+                  "Of everything random: the same seed, the same bytes");
+    visitor.field("duration", duration_s, {0.5, kDay_s}, "Of the recordings [s]");
+    visitor.field("rig", cameras, kCameras, "Cameras of each robot");
+    visitor.field("resolution", resolution, "Of the images, WIDTHxHEIGHT [px]");
+    visitor.field("rate", rate_hz, {0.1, 200.0}, "Images per second");
+    visitor.field("depth", depth, "Also depth images of the left camera (16 bit, mm)");
+    visitor.field("depth-rate", depth_rate_hz, {0.0, 200.0},
+                  "Depth images per second, the rate divided by a whole number; 0: the rate");
+    visitor.field("ideal-depth", ideal_depth, "Depth without noise and holes");
+    visitor.field("labels", labels, "Also class ids of the left camera's pixels");
+    visitor.field("color", color, "Also colour images of the left camera");
+    visitor.field("motion-blur", motion_blur, "Smear images along their motion");
+    visitor.field("image-format", format, kFormats, "jpg: quality 92, as recordings were stored");
+    visitor.field("trajectory", truths, Input{},
+                  "Recorded motion: true poses of flights, one file per robot: EuRoC's state CSV "
+                  "or TUM text, also gzipped; in the frame of the world");
+    visitor.field("imu", imus, Input{}, "The recorded inertial data, one CSV per --trajectory");
+    visitor.field("names", names, "Names of the robots of recorded motion (default: the files')");
+    visitor.field("start", start_s, {0.0, kDay_s},
+                  "Of recorded motion: first image [s since the first true pose]");
+    visitor.field("end", end_s, {0.0, kDay_s}, "Likewise the last image [s], 0: the flight's end");
+    visitor.field("output", output, "Folder of the recordings; one that was stopped goes on");
+    visitor.field("threads", threads, {0, 256}, "That render; 0: one per processor");
+    visitor.check(is_resolution(resolution), "resolution",
+                  "is not WIDTHxHEIGHT with both from 16 to 8192");
+  }
 };
 
-/// Adds the options to a command line. Values out of bounds are refused while it is parsed.
+/// Adds the options to a command line, and --config for a file of them: a YAML map, over which the
+/// command line has the last word. What is wrong with either is refused together, by name and line.
 void define(CLI::App& app, SimulationOptions& options);
 
 /// What follows from what was given: names, the number of robots, the depth's rate. Throws
@@ -57,7 +101,6 @@ void define(CLI::App& app, SimulationOptions& options);
 /// The command that makes the same recordings, with DIR for the output.
 [[nodiscard]] std::string command_line(const SimulationOptions& options);
 
-[[nodiscard]] const char* name_of(WorldKind world);
-[[nodiscard]] const char* name_of(CameraKind cameras);
+[[nodiscard]] std::string name_of(WorldKind world);
 
 }  // namespace km

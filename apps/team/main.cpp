@@ -19,19 +19,11 @@ namespace fs = std::filesystem;
 
 constexpr const char* kAbout =
     "Runs a team of robots on this host, one process each, and compares what they estimated.\n\n"
-    "A team file lists the robots and their inputs (see config/teams/):\n"
-    "  config: ../datasets/euroc.yaml       # as for kimera_multi_robot; one or a list\n"
-    "  truth: truth.csv                     # optional; a robot may have its own\n"
-    "  robots:\n"
-    "    - {id: 0, name: a, dataset: \"${DATASET}\", from: 0.0, to: 7.5}\n"
-    "    - {id: 1, name: b, graph: b.g2o, arguments: [--set, section.key=1]}\n"
-    "Optional keys: rate, domain, output, time_limit_s, arguments, closure_truth. Paths are "
-    "relative to\nthe file.\n\n"
+    "A team file lists the robots and their inputs: see below, and config/teams/.\n\n"
     "True poses are in one world for all robots: where they are given, the tables show errors of "
     "the\n"
-    "trajectories and how many closures are true (see kimera_multi_evaluate closures --help;\n"
-    "closure_truth: {max_translation_m, max_rotation_deg, min_overlap, default_depth_m}). With "
-    "truth_mesh, a\nPLY file in that world, also how far the robots' meshes are from it.\n\n"
+    "trajectories and how many closures are true (see kimera_multi_evaluate closures --help), "
+    "with\ntruth_mesh also how far the robots' meshes are from it.\n\n"
     "Exit code: 0 if every robot ended well, 1 for input that cannot be used, 3 if a robot "
     "failed.\n"
     "Ctrl-C asks the robots to end in order and prints what there is; a second one ends them.\n\n"
@@ -52,6 +44,7 @@ struct TeamOptions {
 };
 
 void define(CLI::App& app, TeamOptions& options) {
+  app.footer("Keys of a team file, paths relative to it:\n" + km::team_file_keys());
   options.robot_binary = km::program_folder() / "kimera_multi_robot";
   app.add_option("--config", options.config, "Team file")->required();
   app.add_option("--dataset", options.dataset, "What ${DATASET} stands for in the team file");

@@ -3,54 +3,100 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "modules/core/config.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 
 namespace km {
 
-/// A team file that cannot be used. what() lists every problem with file and line.
-struct TeamFileError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-/// One robot of a team and its input: a sensor recording or a pose graph.
-struct RobotPlan {
-  RobotId id = 0;
-  std::string name;               ///< Unique; also the name of its results folder.
-  std::filesystem::path dataset;  ///< EuRoC/ASL folder; empty if `graph` is given.
-  std::filesystem::path graph;    ///< Recorded pose graph.
-  std::optional<double> from_s;   ///< Part of the recording [s since its first image].
-  std::optional<double> to_s;
-  /// File of true poses, the team's by default; empty: unknown.
-  std::filesystem::path truth;
-  std::vector<std::string> arguments;  ///< More arguments of its command line.
-};
-
-/// A team to start on this host.
-struct TeamPlan {
-  std::vector<std::filesystem::path> configs;  ///< Configuration files, as for the robot.
-  std::string rate = "1.0";                    ///< Times real time, or "max".
-  std::optional<std::uint32_t> domain;         ///< DDS domain; drawn at random if absent.
-  std::filesystem::path output;                ///< Results, one folder per robot.
-  std::optional<double> time_limit_s;          ///< The team is asked to end after this.
-  ClosureTruthOptions closure_truth;           ///< When a closure counts as true.
-  std::filesystem::path truth_mesh;            ///< PLY, in the frame of true poses; or empty.
-  std::vector<RobotPlan> robots;
-  std::vector<std::string> notes;  ///< What cannot be had, for the table.
-};
+/// True for what can name a folder of results: letters, digits, _, - and .
+[[nodiscard]] bool is_folder_name(const std::string& name);
 
 /// True for what --rate of a robot takes: a positive number, or max.
 [[nodiscard]] bool is_rate(const std::string& text);
 
-/// Reads a team file. Relative paths of inputs are relative to the file's folder, `output` to the
-/// working directory; ${DATASET} in a path stands for `dataset`. A truth may be a folder that holds
-/// the file; one that does not exist is a note. Throws TeamFileError for unknown
-/// keys, wrong types, missing inputs, ids or names used twice, and ${DATASET} without `dataset`.
+/// One robot of a team and its input: a sensor recording or a pose graph.
+struct RobotPlan {
+  RobotId id = 0;
+  std::string name;
+  std::filesystem::path dataset;
+  std::filesystem::path graph;
+  std::optional<double> from_s;
+  std::optional<double> to_s;
+  std::filesystem::path truth;
+  std::vector<std::string> arguments;
+
+  [[nodiscard]] std::string name_or_default() const {
+    return name.empty() ? "robot" + std::to_string(id) : name;
+  }
+
+  void visit_fields(auto& visitor) {
+    visitor.field("id", id, {0, 65535}, "unique in the team");
+    visitor.field("name", name, "unique, and that of its folder of results; default: robot<id>");
+    visitor.field("dataset", dataset, Input{}, "EuRoC/ASL folder; or");
+    visitor.field("graph", graph, Input{}, "recorded pose graph, g2o or CSV");
+    visitor.field("from", from_s, {0.0, 1e9}, "[s since the first image] part of the recording");
+    visitor.field("to", to_s, {0.0, 1e9}, "[s since the first image]");
+    visitor.field("truth", truth, Input{.must_exist = false},
+                  "true poses of this robot; default: the team's");
+    visitor.field("arguments", arguments, "more of its command line");
+    visitor.required({"id"});
+    visitor.check(name.empty() || is_folder_name(name), "name",
+                  "is not made of letters, digits, _, - and .");
+    visitor.check(dataset.empty() != graph.empty(), "dataset", "or else graph is needed");
+  }
+};
+
+/// A team to start on this host.
+struct TeamPlan {
+  std::vector<std::filesystem::path> configs;
+  std::string rate = "1.0";
+  std::optional<std::uint32_t> domain;
+  std::filesystem::path output;
+  std::optional<double> time_limit_s;
+  std::filesystem::path truth;
+  std::filesystem::path truth_mesh;
+  ClosureTruthOptions closure_truth;
+  std::vector<std::string> arguments;
+  std::vector<RobotPlan> robots;   ///< As read: with what the team gives them.
+  std::vector<std::string> notes;  ///< What cannot be had, for the table.
+
+  void visit_fields(auto& visitor) {
+    visitor.field("config", configs, Input{}, "one or several files, as for kimera_multi_robot");
+    visitor.field("rate", rate, "times real time, or max");
+    visitor.field("domain", domain, {0, 230}, "of DDS; default: drawn at random");
+    visitor.field("output", output,
+                  "folder of the results, relative to the working directory; default: results/ "
+                  "and this file's name");
+    visitor.field("time_limit_s", time_limit_s, {0.0, 1e9}, "[s] then the team is asked to end");
+    visitor.field("truth", truth, Input{.must_exist = false},
+                  "true poses, in one world for all robots");
+    visitor.field("truth_mesh", truth_mesh, Input{}, "PLY file in the world of the true poses");
+    visitor.section("closure_truth", closure_truth, "when a closure counts as true");
+    visitor.field("arguments", arguments, "more of the command line of every robot");
+    visitor.sections("robots", robots);
+    visitor.required({"robots"});
+    visitor.check(is_rate(rate), "rate", "is neither a positive number nor max");
+    for (std::size_t i = 0; i < robots.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j) {
+        const RobotPlan &one = robots[i], &other = robots[j];
+        visitor.check(one.id != other.id, "robots", "repeat the id " + std::to_string(one.id), i);
+        visitor.check(one.name_or_default() != other.name_or_default(), "robots",
+                      "repeat the name " + one.name_or_default(), i);
+      }
+  }
+};
+
+/// Reads a team file. Relative paths of inputs are relative to the file's folder; ${DATASET} in
+/// them stands for `dataset`. A truth may be a folder that holds the file; one that does not exist
+/// is a note. Throws ConfigError with every problem by file and line.
 [[nodiscard]] TeamPlan read_team_file(const std::filesystem::path& file,
                                       const std::filesystem::path& dataset);
+
+/// The keys of a team file, with their defaults and meaning.
+[[nodiscard]] std::string team_file_keys();
 
 }  // namespace km

@@ -30,15 +30,21 @@ struct ClosureRecord {
 
 /// When a closure counts as true.
 struct ClosureTruthOptions {
-  /// A measured pose is true if it is off by at most this [m], and
   double max_translation_m = 0.5;
-  /// by at most this angle [deg].
   double max_rotation_deg = 5.0;
-  /// Two keyframes see the same place if at least this share of either's image lies in the other's:
-  /// see view_overlap().
   double min_overlap = 0.3;
-  /// Depth of the scene for keyframes that do not know theirs [m].
   double default_depth_m = 5.0;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("max_translation_m", max_translation_m, {1e-6, 1000.0},
+                  "[m] by which a measured pose that is true is off at most");
+    visitor.field("max_rotation_deg", max_rotation_deg, {1e-6, 180.0}, "[deg] the same");
+    visitor.field("min_overlap", min_overlap, {1e-6, 1.0},
+                  "two keyframes see the same place if at least this share of either's image lies "
+                  "in the other's, see view_overlap()");
+    visitor.field("default_depth_m", default_depth_m, {1e-6, 1000.0},
+                  "[m] of the scene, for keyframes that do not know theirs");
+  }
 };
 
 /// Share of the image of a camera at `a` that one at `b` sees, 0 to 1, assumed that everything lies

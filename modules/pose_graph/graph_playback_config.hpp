@@ -4,12 +4,10 @@
 
 namespace km {
 
-/// Parameters of the playback of recorded pose graphs. Field names are the YAML keys below
-/// `graph_playback:`.
+/// Parameters of the playback of recorded pose graphs.
 struct GraphPlaybackConfig {
   static constexpr const char* kSection = "graph_playback";
 
-  /// Recorded graphs carry no time: keyframe i is stamped i / poses_per_second.
   double poses_per_second = 1.0;
 
   void visit_fields(auto& visitor) {

@@ -14,29 +14,33 @@ enum class Discovery { kMulticast, kPeers };
 struct DdsConfig {
   static constexpr const char* kSection = "dds";
 
-  int domain = 0;                     ///< Only robots of one DDS domain meet.
-  std::string team = "kimera-multi";  ///< Of those, only robots of one team.
-  std::string interface;              ///< Network interface; empty: see select_interface().
+  int domain = 0;
+  std::string team = "kimera-multi";
+  std::string interface;
   Discovery discovery = Discovery::kMulticast;
-  std::vector<std::string> peers;      ///< Addresses; this host's own need not be listed.
-  int max_participant_index = 39;      ///< Robots on this host less one, if found by address.
-  int robots_per_peer = 12;            ///< Robots looked for at each address of `peers`.
-  double lease_s = 60.0;               ///< Silence after which a robot is forgotten.
-  double spdp_interval_s = 2.0;        ///< A robot announces itself this often.
-  double liveliness_s = 2.0;           ///< Silence after which a robot counts as lost.
-  int max_message_bytes = 65500;       ///< Of one UDP datagram.
-  int fragment_bytes = 8000;           ///< Larger samples are sent in fragments of this size.
-  int max_rexmit_bytes = 1048576;      ///< Retransmitted in one go.
-  int max_init_transmit_percent = -1;  ///< First burst of a large sample; -1: unlimited.
-  double nack_delay_ms = 100.0;        ///< A receiver waits this long before it asks again.
-  int receive_buffer_bytes = 4194304;  ///< At most; the kernel may grant less.
+  std::vector<std::string> peers;
+  int max_participant_index = 39;
+  int robots_per_peer = 12;
+  double lease_s = 60.0;
+  double spdp_interval_s = 2.0;
+  double liveliness_s = 2.0;
+  int max_message_bytes = 65500;
+  int fragment_bytes = 8000;
+  int max_rexmit_bytes = 1048576;
+  int max_init_transmit_percent = -1;
+  double nack_delay_ms = 100.0;
+  int receive_buffer_bytes = 4194304;
 
   void visit_fields(auto& visitor) {
-    visitor.field("domain", domain, {0, 230}, "ports start at 7400 + 250 * domain");
+    visitor.field("domain", domain, {0, 230},
+                  "only robots of one DDS domain meet; ports start at 7400 + 250 * domain");
     visitor.field("team", team, "robots of other teams are not seen");
-    visitor.field("interface", interface, "network interface; empty: chosen, see log");
-    visitor.field("discovery", discovery,
-                  {{"multicast", Discovery::kMulticast}, {"peers", Discovery::kPeers}});
+    visitor.field("interface", interface,
+                  "network interface; empty: chosen, see log and select_interface()");
+    visitor.field(
+        "discovery", discovery,
+        {{"multicast", Discovery::kMulticast}, {"peers", Discovery::kPeers}},
+        "how robots find each other: by multicast on the link, or by a list of addresses");
     visitor.field("peers", peers,
                   "addresses (or address:port) of the other hosts; this one is always included");
     visitor.field("max_participant_index", max_participant_index, {0, 110},
@@ -44,17 +48,22 @@ struct DdsConfig {
     visitor.field("robots_per_peer", robots_per_peer, {1, 111},
                   "robots looked for at each peer; each costs 0.25 kB per 2 s on the air");
     visitor.field("lease_s", lease_s, {3.0, 3600.0},
-                  "[s] longer than ordinary outages; requests live as long");
+                  "[s] of silence after which a robot is forgotten: longer than ordinary outages; "
+                  "requests live as long");
     visitor.field("spdp_interval_s", spdp_interval_s, {0.1, 60.0}, "[s] between announcements");
     visitor.field("liveliness_s", liveliness_s, {0.2, 60.0}, "[s] of silence: lost");
-    visitor.field("max_message_bytes", max_message_bytes, {1200, 65500}, "[B] 1400 on radio");
-    visitor.field("fragment_bytes", fragment_bytes, {1000, 65000}, "[B] below max_message_bytes");
-    visitor.field("max_rexmit_bytes", max_rexmit_bytes, {1024, 1 << 26}, "[B] in one burst");
+    visitor.field("max_message_bytes", max_message_bytes, {1200, 65500},
+                  "[B] of one UDP datagram; 1400 on radio");
+    visitor.field("fragment_bytes", fragment_bytes, {1000, 65000},
+                  "[B] larger samples are sent in fragments of this; below max_message_bytes");
+    visitor.field("max_rexmit_bytes", max_rexmit_bytes, {1024, 1 << 26},
+                  "[B] retransmitted in one burst");
     visitor.field("max_init_transmit_percent", max_init_transmit_percent, {-1, 1000},
                   "first burst of a large sample, of max_rexmit_bytes; -1: unlimited");
-    visitor.field("nack_delay_ms", nack_delay_ms, {1.0, 5000.0}, "[ms]");
+    visitor.field("nack_delay_ms", nack_delay_ms, {1.0, 5000.0},
+                  "[ms] a receiver waits before it asks again");
     visitor.field("receive_buffer_bytes", receive_buffer_bytes, {65536, 1 << 28},
-                  "[B] see also net.core.rmem_max");
+                  "[B] at most; the kernel may grant less, see net.core.rmem_max");
   }
 };
 

@@ -3,32 +3,63 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <type_traits>
 
 #include "apps/robot/robot_config.hpp"
+#include "runtime/config_text.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {
 
-// The text of section `name`, from its header to the next one.
-std::string section(const std::string& yaml, const std::string& name) {
-  const auto begin = yaml.find(std::string(1, '\n').append(name).append(":\n"));
-  if (begin == std::string::npos) return {};
-  return yaml.substr(begin, yaml.find("\n\n", begin) - begin);
+// Converts to every member of an aggregate.
+struct Anything {
+  template <typename T>
+  operator T() const;  // NOLINT(google-explicit-constructor)
+};
+
+// How many members an aggregate has.
+template <typename Config, typename... Members>
+constexpr std::size_t member_count() {
+  if constexpr (requires { Config{Members{}..., Anything{}}; })
+    return member_count<Config, Members..., Anything>();
+  else
+    return sizeof...(Members);
+}
+
+struct FieldCounter : FieldVisitor<FieldCounter> {
+  std::size_t count = 0;
+  void visit(const char* key, const auto& /*value*/, const auto& /*accepted*/,
+             const std::string& text) {
+    CAPTURE(key);
+    CHECK_FALSE(text.empty());
+    ++count;
+  }
+};
+
+TEST_CASE("Every member of every section is a key, and has a text", "[robot]") {
+  RobotConfig config;
+  std::size_t sections = 0;
+  config.visit_sections([&](auto& section) {
+    using Section = std::remove_cvref_t<decltype(section)>;
+    CAPTURE(Section::kSection);
+    FieldCounter fields;
+    section.visit_fields(fields);
+    CHECK(fields.count == member_count<Section>());
+    ++sections;
+  });
+  CHECK(sections == member_count<RobotConfig>() - 1);  // beside `effective`
 }
 
 TEST_CASE("config/robot.yaml shows every key with its default", "[robot]") {
   std::ifstream stream("config/robot.yaml");
   const std::string shipped(std::istreambuf_iterator<char>(stream), {});
-  const std::string effective = std::string(1, '\n').append(load_robot_config({}).effective);
-  for (const char* name :
-       {"run", "sensors", "tracker", "vio", "keyframe_features", "place_recognition",
-        "loop_closure", "pcm", "pose_graph", "graph_playback", "mapping", "stereo_depth",
-        "segmentation", "semantic_mapping", "mesh_deformation"}) {
-    CAPTURE(name);
-    CHECK_FALSE(section(effective, name).empty());
-    CHECK(section(shipped, name) == section(effective, name));
-  }
+  RobotConfig defaults;
+  std::string expected;
+  defaults.visit_sections([&](auto& section) {
+    if (&section != static_cast<void*>(&defaults.dds)) expected += '\n' + to_yaml(section);
+  });
+  CHECK(shipped.substr(shipped.find("\n\n") + 1) == expected);
 }
 
 TEST_CASE("The effective configuration gives the same configuration again", "[robot]") {

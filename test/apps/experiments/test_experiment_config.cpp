@@ -19,7 +19,7 @@ struct SpoiledConfig {
     try {
       const auto config = read_experiments(experiments(), false);
       return {};
-    } catch (const ExperimentConfigError& error) {
+    } catch (const ConfigError& error) {
       return error.what();
     }
   }
@@ -47,26 +47,28 @@ TEST_CASE("What is wrong with the configuration is named by file, line and key",
   REQUIRE(config.problems().empty());
   config.folder.write("experiments/pcm.yaml",
                       "graph: g.g2o\nseeds: [1]\nsearches: [exact, clever]\noutlier: 3\n");
-  CHECK_THAT(config.problems(), Contains("pcm.yaml line 3: clever is not exact") &&
-                                    Contains("pcm.yaml line 4: unknown key outlier"));
+  CHECK_THAT(config.problems(),
+             Contains("pcm.yaml:3: searches = [exact, clever] has clever, which is not exact") &&
+                 Contains("pcm.yaml:4: unknown key outlier (did you mean outliers?)"));
   config.folder.write("experiments/pcm.yaml", "graph: g.g2o\nseeds: many\n");
-  CHECK_THAT(config.problems(), Contains("pcm.yaml line 2: seeds is not a list of numbers") &&
+  CHECK_THAT(config.problems(), Contains("pcm.yaml:2: seeds = many is not a whole number") &&
                                     Contains("searches is missing"));
   config.folder.write("experiments/pcm.yaml", "graph: [\n");
-  CHECK_THAT(config.problems(), Contains("pcm.yaml line 2:"));
+  CHECK_THAT(config.problems(), Contains("pcm.yaml:2: not YAML"));
 }
 
 TEST_CASE("Worlds that are not there are named", "[experiments]") {
   const SpoiledConfig config;
-  config.folder.write("experiments/mesh.yaml", "worlds: [city, moon]\n");
+  config.folder.write("experiments/mesh.yaml", "worlds: [city, moon, mars]\n");
   config.folder.write("experiments/worlds.yaml",
-                      "city: {robots: [a], simulation: ../simulation/none.toml, rate: 2}\n");
-  CHECK_THAT(config.problems(), Contains("mesh.yaml line 1: no world moon") &&
-                                    Contains("worlds.yaml line 1") && Contains("none.toml") &&
-                                    Contains("unknown key rate") &&
-                                    Contains("trajectory.yaml line 4: no world camp"));
+                      "city: {robots: [a], simulation: ../simulation/none.yaml, rate: 2}\n");
+  CHECK_THAT(config.problems(),
+             Contains("mesh.yaml:1: worlds = [city, moon, mars] has moon") &&
+                 Contains("has mars, which is not in worlds.yaml") && Contains("worlds.yaml:1") &&
+                 Contains("none.yaml") && Contains("unknown key city.rate") &&
+                 Contains("trajectory.yaml:4: worlds = [city, camp, v1, v2] has camp"));
   fs::remove(config.experiments() / "mesh.yaml");
-  CHECK_THAT(config.problems(), Contains("mesh.yaml: no such file"));
+  CHECK_THAT(config.problems(), Contains("mesh.yaml: cannot open"));
 }
 
 }  // namespace

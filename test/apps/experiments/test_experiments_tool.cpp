@@ -132,7 +132,7 @@ TEST_CASE("The tool says what is wrong or missing", "[experiments]") {
   laboratory.folder.write("graphs/polygon.g2o", "VERTEX_SE2 0 0 0\n");
   fails_with("run pcm", 3, "polygon.g2o:1");
   laboratory.folder.write("config/experiments/mesh.yaml", "wolds: [city]\n");
-  fails_with("list", 1, "mesh.yaml line 1: unknown key wolds");
+  fails_with("list", 1, "mesh.yaml:1: unknown key wolds (did you mean worlds?)");
 }
 
 }  // namespace

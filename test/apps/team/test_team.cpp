@@ -68,7 +68,8 @@ TEST_CASE("A team runs its robots, shows their lines and prints the table", "[te
 }
 
 TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
-  const Team team("[ $name = bob ] && { echo 'out of luck'; echo '  or of fuel'; } >&2 && exit 9; exit 0");
+  const Team team(
+      "[ $name = bob ] && { echo 'out of luck'; echo '  or of fuel'; } >&2 && exit 9; exit 0");
   const auto result = run_command(team.command);
   CAPTURE(result.output);
   CHECK(result.exit_code == 3);
@@ -178,7 +179,8 @@ TEST_CASE("What cannot be run is refused with code 1", "[team]") {
   CHECK(run_command(tool).exit_code == 1);
   const auto missing = run_command(tool + " --config /nowhere.yaml");
   CHECK(missing.exit_code == 1);
-  CHECK(missing.output == "kimera_multi_team: /nowhere.yaml: no such file\n");
+  CHECK(missing.output ==
+        "kimera_multi_team: /nowhere.yaml: cannot open: No such file or directory\n");
   CHECK(run_command(tool + " --help").exit_code == 0);
 }
 
