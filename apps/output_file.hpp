@@ -12,9 +12,10 @@ namespace km {
 inline void write_output(const std::filesystem::path& file, const auto& writer) {
   if (file.empty()) return;
   std::ofstream out(file);
+  const char* const problem = out ? ": writing failed, is the disk full?" : ": cannot be written";
   writer(out);
   out.close();
-  if (!out) throw std::runtime_error(file.string() + ": cannot be written");
+  if (!out) throw std::runtime_error(file.string() + problem);
 }
 
 /// Throws std::runtime_error if there is no folder to write `file` to, or if it is one (empty: none

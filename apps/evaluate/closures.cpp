@@ -1,12 +1,14 @@
-#include "apps/evaluate/closures.hpp"
-
-#include <fstream>
+#include <CLI/CLI.hpp>
+#include <filesystem>
 #include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <vector>
 
-#include "modules/core/json_writer.hpp"
-#include "modules/evaluation/closure_files.hpp"
-#include "modules/evaluation/closure_report.hpp"
+#include "apps/evaluate/commands.hpp"
+#include "apps/output_file.hpp"
+#include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/sensors/euroc_rig.hpp"
 
@@ -15,13 +17,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
+struct ClosuresCommand {
+  std::vector<std::filesystem::path> truths;   // One for all robots, or one for each.
+  std::vector<std::filesystem::path> results;  // A robot's results folder each.
+  std::filesystem::path dataset;               // EuRoC/ASL folder with the robots' left camera.
+  ClosureTruthOptions options;
+  std::filesystem::path json;  // Not written if empty.
+};
+
 fs::path mav0_of(const fs::path& dataset) {
   return fs::is_directory(dataset / "mav0") ? dataset / "mav0" : dataset;
 }
 
-}  // namespace
-
-void evaluate_closures(const ClosuresCommand& command) {
+void run(const ClosuresCommand& command) {
   if (command.truths.size() != 1 && command.truths.size() != command.results.size())
     throw std::invalid_argument("give one --truth, or as many as there are --results");
   std::vector<TrueKeyframe> keyframes;
@@ -38,11 +46,58 @@ void evaluate_closures(const ClosuresCommand& command) {
   const ClosureScores scores =
       score_closures(keyframes, closures, rig.stereo.cameras[0], command.options);
   std::cout << to_table(scores);
-  if (command.json.empty()) return;
-  std::ofstream file(command.json);
-  JsonWriter json(file);
-  write_json(json, scores);
-  if (!file.flush()) throw std::runtime_error(command.json.string() + ": cannot be written");
+  write_output(command.json, [&](std::ostream& out) { out << json_text(scores); });
+}
+
+constexpr const char* kDetails =
+    "Loop closures of a finished run against the truth, per stage: how many there are, which "
+    "share\n"
+    "is true (precision), and which share of what there was to be found it found (recall)\n\n"
+    "A candidate is true if both keyframes see the same place: --min-overlap of either's image, "
+    "at\n"
+    "the median depth that the keyframe sees, lies in the other's. A verified closure and an "
+    "inlier\n"
+    "are true if the pose measured is off by at most --max-translation and --max-rotation.\n"
+    "Recall counts pairs of keyframes of two robots that see the same place, and, as a system "
+    "needs\n"
+    "only one match per keyframe, keyframes that are part of such a pair.\n\n"
+    "Example:\n"
+    "  kimera_multi_evaluate closures --dataset MH_01_easy --truth groundtruth_tum.txt \\\n"
+    "      --results results/two/a results/two/b";
+
+void define(CLI::App& app, ClosuresCommand& command) {
+  app.add_option("--truth", command.truths,
+                 "True poses in one common world: one file for all robots or one for each")
+      ->required();
+  app.add_option("--results", command.results, "Results folders of all robots of the run")
+      ->required();
+  app.add_option("--dataset", command.dataset, "EuRoC/ASL folder: its left camera is the robots'")
+      ->required();
+  ClosureTruthOptions& options = command.options;
+  app.add_option("--max-translation", options.max_translation_m,
+                 "Error of a true pose, at most [m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--max-rotation", options.max_rotation_deg, "Error of a true pose, at most [deg]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--min-overlap", options.min_overlap, "Share of the image that is seen by both")
+      ->check(CLI::Range(0.01, 1.0))
+      ->capture_default_str();
+  app.add_option("--default-depth", options.default_depth_m,
+                 "Depth of the scene where a keyframe does not know it [m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--json", command.json, "Also write the numbers to this file, as JSON");
+}
+
+}  // namespace
+
+void add_closures(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("closures", kDetails);
+  const auto command = std::make_shared<ClosuresCommand>();
+  define(app, *command);
+  app.callback([command] { run(*command); });
 }
 
 }  // namespace km

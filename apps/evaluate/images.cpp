@@ -1,14 +1,17 @@
-#include "apps/evaluate/images.hpp"
-
-#include <unistd.h>
-
-#include <fstream>
+#include <CLI/CLI.hpp>
+#include <filesystem>
 #include <iostream>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 
-#include "modules/core/json_writer.hpp"
-#include "modules/evaluation/images/image_report.hpp"
+#include "apps/evaluate/commands.hpp"
+#include "apps/evaluate/stage_progress.hpp"
+#include "apps/output_file.hpp"
+#include "modules/evaluation/images/image_figure.hpp"
+#include "modules/evaluation/images/image_statistics.hpp"
 #include "modules/sensors/euroc_reader.hpp"
 
 namespace km {
@@ -16,36 +19,31 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A line on standard error that is rewritten; silent where nobody looks.
-class Progress {
- public:
-  Progress(std::string what, std::size_t total) : what_(std::move(what)), total_(total) {}
-  ~Progress() {
-    if (shown_) std::cerr << "\r\x1b[K" << std::flush;
-  }
-  void step() {
-    ++done_;
-    const std::size_t percent = total_ > 0 ? 100 * done_ / total_ : 100;
-    if (!shown_ || percent == percent_) return;
-    percent_ = percent;
-    std::cerr << '\r' << what_ << ": " << done_ << " of " << total_ << " stereo pairs, " << percent
-              << " %" << std::flush;
-  }
+// Part of a recording [s since its first stereo pair].
+struct RecordingWindow {
+  double from_s = 0.0;
+  double to_s = std::numeric_limits<double>::infinity();
+};
 
- private:
-  std::string what_;
-  std::size_t total_;
-  std::size_t done_ = 0;
-  std::size_t percent_ = 0;
-  bool shown_ = isatty(STDERR_FILENO) == 1;
+struct ImagesCommand {
+  std::filesystem::path dataset;  // EuRoC/ASL folder.
+  std::filesystem::path compare;  // Another one, beside it; empty: none.
+  RecordingWindow window;
+  std::optional<double> compare_from_s;  // Window of the other; by default the same.
+  std::optional<double> compare_to_s;
+  std::optional<double> still_from_s;  // Where the camera also stands still, in recordings with
+  std::optional<double> still_to_s;    // `window`; by default there is no such place.
+  ImageStatisticsOptions options;
+  std::filesystem::path json;  // Not written if empty.
 };
 
 template <typename Use>
 void for_each_pair(EurocReader& reader, const std::string& what, const Use& use) {
-  Progress progress(what, reader.pair_count());
-  while (const auto packet = reader.next()) {
+  StageProgress progress;
+  const auto total = static_cast<double>(reader.pair_count());
+  for (double done = 0.0; const auto packet = reader.next(); ++done) {
+    progress(what, done / total);
     use(*packet->frame);
-    progress.step();
   }
 }
 
@@ -97,29 +95,7 @@ std::vector<ImageFigure> figures_of_other(const ImagesCommand& command) {
   return figures_of(command.compare, window_of_other(command), still, command.options);
 }
 
-void write_file(const fs::path& file, const fs::path& dataset,
-                const std::vector<ImageFigure>& figures, const fs::path& compare,
-                const std::vector<ImageFigure>& other) {
-  std::ofstream stream(file);
-  JsonWriter json(stream);
-  json.begin_object();
-  json.field("dataset", dataset.string());
-  json.key("figures");
-  write_json(json, figures);
-  if (!compare.empty()) {
-    json.field("compared_with", compare.string());
-    json.key("compared_figures");
-    write_json(json, other);
-    json.key("comparison");
-    write_comparison(json, figures, other);
-  }
-  json.end_object();
-  if (!stream.flush()) throw std::runtime_error(file.string() + ": cannot be written");
-}
-
-}  // namespace
-
-void evaluate_images(const ImagesCommand& command) {
+void run(const ImagesCommand& command) {
   // Opened for its errors alone: they come now, not after the minutes the first one takes.
   if (!command.compare.empty()) EurocReader(command.compare, options_of(window_of_other(command)));
   const auto figures =
@@ -131,8 +107,56 @@ void evaluate_images(const ImagesCommand& command) {
     other = figures_of_other(command);
     std::cout << to_comparison(figures, other, command.dataset.string(), command.compare.string());
   }
-  if (!command.json.empty())
-    write_file(command.json, command.dataset, figures, command.compare, other);
+  write_output(command.json, [&](std::ostream& out) {
+    Json json = {{"dataset", command.dataset.string()}, {"figures", to_json(figures)}};
+    if (!command.compare.empty()) {
+      json["compared_with"] = command.compare.string();
+      json["compared_figures"] = to_json(other);
+      json["comparison"] = comparison_json(figures, other);
+    }
+    out << json_text(json);
+  });
+}
+
+constexpr const char* kDetails =
+    "What the images of a recording are like: corners, how long they can be tracked, how well "
+    "they\n"
+    "are found in the other camera, gradients, grey levels, exposure, blur and noise\n\n"
+    "Tracking depends on motion most of all: compare two recordings by the rows \"flow A-B px\",\n"
+    "frames of like median flow. Rows that differ by more than 25 % are marked. Noise over time\n"
+    "needs the camera to stand still for a second; --still-from and --still-to say where.\n\n"
+    "Examples:\n"
+    "  kimera_multi_evaluate images --dataset MH_01_easy --to 15 --still-from 21 --still-to 25.5\n"
+    "  kimera_multi_evaluate images --dataset V1_01_easy --compare simulated --compare-from 5";
+
+void define(CLI::App& app, ImagesCommand& command) {
+  app.add_option("--dataset", command.dataset, "EuRoC/ASL folder with stereo images")->required();
+  app.add_option("--compare", command.compare, "Another one: its figures beside, and the ratios");
+  app.add_option("--from", command.window.from_s,
+                 "Look from here on [s since the first stereo pair]")
+      ->capture_default_str();
+  app.add_option("--to", command.window.to_s, "Look up to here [s]; default: the end");
+  app.add_option("--compare-from", command.compare_from_s,
+                 "Look at the other from here on [s]; default: the window of --from and --to");
+  app.add_option("--compare-to", command.compare_to_s,
+                 "Look at the other up to here [s]; default: the end if --compare-from is given");
+  app.add_option("--still-from", command.still_from_s,
+                 "Also look for standing still from here on [s]");
+  app.add_option("--still-to", command.still_to_s, "Also look for standing still up to here [s]");
+  app.add_option("--stride", command.options.stride,
+                 "Match ORB and stereo, and start KLT tracks, at every so many pairs")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--json", command.json, "Also write the figures to this file, as JSON");
+}
+
+}  // namespace
+
+void add_images(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("images", kDetails);
+  const auto command = std::make_shared<ImagesCommand>();
+  define(app, *command);
+  app.callback([command] { run(*command); });
 }
 
 }  // namespace km

@@ -1,16 +1,21 @@
-#include "apps/evaluate/render.hpp"
-
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 #include <iostream>
+#include <limits>
+#include <memory>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
+#include <string>
 #include <utility>
+#include <vector>
 
-#include "apps/evaluate/label_palette_file.hpp"
-#include "apps/evaluate/named_files.hpp"
-#include "apps/evaluate/placement.hpp"
-#include "modules/evaluation/mesh/mesh_checks.hpp"
+#include "apps/evaluate/commands.hpp"
+#include "apps/evaluate/inputs.hpp"
+#include "apps/output_file.hpp"
+#include "modules/evaluation/mesh/mesh_error.hpp"
+#include "modules/evaluation/picture/mesh_picture.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/mesh/ply_file.hpp"
 
@@ -18,6 +23,20 @@ namespace km {
 namespace {
 
 namespace fs = std::filesystem;
+
+struct RenderCommand {
+  std::vector<std::filesystem::path> meshes;        // PLY.
+  std::vector<std::filesystem::path> trajectories;  // TUM or EuRoC CSV, in the meshes' frame.
+  std::vector<std::filesystem::path> references;    // Of the first trajectories, in the frame to
+                                                    // draw in; by default the meshes'.
+  std::vector<std::string> views = {"top"};         // See parse_view().
+  std::string color = "auto";                       // auto, label, own, shade, robot.
+  std::string size = "1600x1200";
+  double above_m = std::numeric_limits<double>::infinity();
+  bool both_sides = false;
+  std::filesystem::path palette;  // By default the one beside the first mesh.
+  std::filesystem::path output;   // PNG; of several views the second is NAME_2.png.
+};
 
 constexpr int kMinSide_px = 64;
 constexpr int kMaxSide_px = 8192;
@@ -49,16 +68,6 @@ PictureColor color_of(const std::string& name, const std::vector<LabelledMesh>& 
   return all_have(meshes, &LabelledMesh::colors) ? PictureColor::kOwn : PictureColor::kShade;
 }
 
-LabelPalette palette_of(const RenderCommand& command, const std::vector<LabelledMesh>& meshes) {
-  const fs::path file =
-      command.palette.empty() ? palette_beside(command.meshes.front()) : command.palette;
-  if (file.empty()) return {};
-  const LabelPalette palette = read_label_palette(file);
-  for (std::size_t i = 0; i < meshes.size(); ++i)
-    check_labels(meshes[i], command.meshes[i].string(), palette, file.string());
-  return palette;
-}
-
 PictureLine line_of(const fs::path& file, const SE3& T_picture_mesh) {
   PictureLine line{short_name(file), {}};
   for (const StampedPose& pose : read_trajectory(file))
@@ -83,12 +92,13 @@ fs::path numbered(const fs::path& file, std::size_t view) {
 void write_png(const fs::path& file, const cv::Mat3b& picture) {
   std::vector<std::uint8_t> bytes;
   if (!cv::imencode(".png", picture, bytes)) throw std::runtime_error("PNG cannot be encoded");
-  write_file(file, {bytes.begin(), bytes.end()});
+  write_output(file, [&](std::ostream& out) {
+    out.write(reinterpret_cast<const char*>(bytes.data()),
+              static_cast<std::streamsize>(bytes.size()));
+  });
 }
 
-}  // namespace
-
-void render_meshes(const RenderCommand& command) {
+void run(const RenderCommand& command) {
   const auto [width, height] = size_of(command.size);
   if (command.output.extension() != ".png")
     throw std::invalid_argument(command.output.string() + ": pictures are PNG, named *.png");
@@ -103,7 +113,10 @@ void render_meshes(const RenderCommand& command) {
   }
   Eigen::AlignedBox3d extent = extent_of(all);
   scene.meshes = meshes;
-  scene.palette = palette_of(command, meshes);
+  std::vector<MeshInput> inputs;
+  for (std::size_t i = 0; i < meshes.size(); ++i)
+    inputs.push_back({command.meshes[i].string(), meshes[i]});
+  scene.palette = read_palette(command.palette, command.meshes.front(), inputs);
   for (const fs::path& file : command.trajectories)
     for (const Eigen::Vector3d& point :
          scene.lines.emplace_back(line_of(file, T_picture_mesh)).points)
@@ -116,6 +129,59 @@ void render_meshes(const RenderCommand& command) {
     write_png(numbered(command.output, i), draw_meshes(scene, view, options));
     std::cout << numbered(command.output, i).string() << '\n';
   }
+}
+
+constexpr const char* kDetails =
+    "Shaded picture of meshes, without a display: colours of labels with a legend, a scale bar,\n"
+    "and trajectories on top\n\n"
+    "Faces are seen from the side they were mapped from: from above one looks into rooms. Views:\n"
+    "  top, front, oblique     parallel, fill the picture\n"
+    "  x,y,z,yaw,pitch         perspective from there [m, deg]: yaw 90 looks along y, pitch -30 "
+    "down\n"
+    "  x,y,z,qx,qy,qz,qw       likewise, a camera's pose (its z forward, y down)\n"
+    "Write --view=-1,... for one that begins with a minus sign.\n\n"
+    "A team's frame is the odometry frame of the robot with the lowest id, so upright. "
+    "--reference\n"
+    "turns the map to lie in another frame.\n\n"
+    "Examples:\n"
+    "  kimera_multi_evaluate render --mesh mesh.ply --trajectory optimized.tum \\\n"
+    "      --reference odometry.tum --output map.png\n"
+    "  kimera_multi_evaluate render --mesh a.ply b.ply --color robot --view oblique --output "
+    "team.png\n"
+    "  kimera_multi_evaluate render --mesh room/world.ply --view=-2,1,1.7,20,-10 --output "
+    "inside.png";
+
+void define(CLI::App& app, RenderCommand& command) {
+  app.add_option("--mesh", command.meshes, "Meshes (PLY) in one frame")->required();
+  app.add_option("--output", command.output, "PNG; of several views the second is NAME_2.png")
+      ->required();
+  app.add_option("--view", command.views, "Where from, see above; several: a picture each")
+      ->capture_default_str();
+  app.add_option("--trajectory", command.trajectories, "Poses drawn on top (TUM or EuRoC CSV)");
+  app.add_option("--reference", command.references,
+                 "Poses of the first trajectories in the frame to draw in: the truth puts the map "
+                 "into the world, the first robot's odometry.tum stands it upright");
+  app.add_option(
+         "--color", command.color,
+         "Of the label, the vertices' own, none, or one per mesh; auto: labels if there are")
+      ->check(CLI::IsMember({"auto", "label", "own", "shade", "robot"}))
+      ->capture_default_str();
+  app.add_option("--size", command.size, "WIDTHxHEIGHT without the legend [px]")
+      ->capture_default_str();
+  app.add_option("--cut", command.above_m, "Leave out all above this height [m]");
+  app.add_flag("--both-sides", command.both_sides, "Also draw faces that are seen from behind");
+  app.add_option(
+      "--palette", command.palette,
+      "Names and colours of the labels (CSV); default: label_palette.csv beside the mesh");
+}
+
+}  // namespace
+
+void add_render(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("render", kDetails);
+  const auto command = std::make_shared<RenderCommand>();
+  define(app, *command);
+  app.callback([command] { run(*command); });
 }
 
 }  // namespace km

@@ -1,19 +1,33 @@
-#include "apps/evaluate/trajectory.hpp"
-
+#include <CLI/CLI.hpp>
 #include <cmath>
 #include <deque>
+#include <filesystem>
 #include <iostream>
-#include <sstream>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <vector>
 
-#include "apps/evaluate/named_files.hpp"
-#include "modules/core/json_writer.hpp"
+#include "apps/evaluate/commands.hpp"
+#include "apps/evaluate/inputs.hpp"
+#include "apps/output_file.hpp"
+#include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/evaluation/trajectory_plot.hpp"
 #include "modules/evaluation/trajectory_report.hpp"
 
 namespace km {
 namespace {
+
+struct TrajectoryCommand {
+  std::vector<std::filesystem::path> truths;     // One for all estimates, or one for each.
+  std::vector<std::filesystem::path> estimates;  // TUM or EuRoC CSV.
+  double from_s = -std::numeric_limits<double>::infinity();
+  double to_s = std::numeric_limits<double>::infinity();
+  TrajectoryErrorOptions options;
+  std::filesystem::path json;  // Not written if empty.
+  std::filesystem::path plot;  // Not written if empty.
+};
 
 constexpr double kAbsoluteFrom_s = 1e6;  // larger times are stamps, not seconds since the start
 
@@ -30,9 +44,7 @@ TimeWindow window_of(const TrajectoryCommand& command, const std::vector<Stamped
   return window;
 }
 
-}  // namespace
-
-void evaluate_trajectories(const TrajectoryCommand& command) {
+void run(const TrajectoryCommand& command) {
   if (command.truths.size() != 1 && command.truths.size() != command.estimates.size())
     throw std::invalid_argument("give one --truth, or as many as there are --estimate");
   std::vector<std::vector<StampedPose>> truths;
@@ -49,13 +61,54 @@ void evaluate_trajectories(const TrajectoryCommand& command) {
   const TeamError team = trajectory_error(inputs, command.options);
   std::cout << to_table(team);
   if (command.options.with_scale) std::cout << "scale " << team.alignment.scale << '\n';
-  if (!command.json.empty()) {
-    std::ostringstream text;
-    JsonWriter json(text);
-    write_json(json, team);
-    write_file(command.json, text.str());
-  }
-  if (!command.plot.empty()) write_file(command.plot, plot_from_above(inputs, team));
+  write_output(command.json, [&](std::ostream& out) { out << json_text(team); });
+  write_output(command.plot, [&](std::ostream& out) { out << plot_from_above(inputs, team); });
+}
+
+constexpr const char* kDetails =
+    "Errors of estimated trajectories against the truth\n\n"
+    "All estimates are moved by ONE rigid transform (Umeyama) to fit the truth, so several robots\n"
+    "are judged in their common frame. Files are TUM text (t[s] p q x y z w) or EuRoC CSV\n"
+    "(t[ns], p, q w x y z); the denser of truth and estimate is interpolated at the stamps of the\n"
+    "other. Printed per estimate and for the team:\n"
+    "  position error  distance to the truth at each pair [m]: the absolute trajectory error\n"
+    "  rotation        angle to the truth after the same alignment [deg]\n"
+    "  relative        error of the motion over --delta seconds [m, deg]\n"
+    "  covered         share of the truth's time (or of --from to --to) that has poses\n\n"
+    "Examples:\n"
+    "  kimera_multi_evaluate trajectory --truth groundtruth_tum.txt --estimate odometry.tum\n"
+    "  kimera_multi_evaluate trajectory --truth data.csv \\\n"
+    "      --estimate robot0/optimized.tum robot1/optimized.tum --json team.json --plot team.svg\n"
+    "  kimera_multi_evaluate trajectory --truth a.csv --truth b.csv --estimate a.tum b.tum";
+
+void define(CLI::App& app, TrajectoryCommand& command) {
+  app.add_option("--truth", command.truths,
+                 "True poses: one file for all estimates or one for each")
+      ->required();
+  app.add_option("--estimate", command.estimates, "Estimated poses, one file per robot")
+      ->required();
+  app.add_flag("--sim3", command.options.with_scale, "Align by a similarity: the scale is free");
+  app.add_option("--from", command.from_s,
+                 "Judge from here on [s since the truth's first pose; above 1e6: a stamp]");
+  app.add_option("--to", command.to_s, "Judge up to here, as --from");
+  app.add_option("--delta", command.options.rpe_delta_s, "Time of the relative error [s]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--coverage-gap", command.options.max_coverage_gap_s,
+                 "Poses further apart leave the time between uncovered [s]")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--json", command.json, "Also write the numbers to this file, as JSON");
+  app.add_option("--plot", command.plot, "Also draw truth and estimates from above, as SVG");
+}
+
+}  // namespace
+
+void add_trajectory(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("trajectory", kDetails);
+  const auto command = std::make_shared<TrajectoryCommand>();
+  define(app, *command);
+  app.callback([command] { run(*command); });
 }
 
 }  // namespace km

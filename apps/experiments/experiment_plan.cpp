@@ -1,14 +1,251 @@
 #include "apps/experiments/experiment_plan.hpp"
 
+#include <yaml-cpp/yaml.h>
 #include <algorithm>
+#include <fstream>
 
-#include "apps/experiments/recorded_flight_files.hpp"
-#include "apps/experiments/world_steps.hpp"
+#include "apps/experiments/step_record.hpp"
+#include "modules/core/text_rows.hpp"
 
 namespace km {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr int kDepth = 3;
+
+std::vector<fs::path> entries_named(const fs::path& place, const std::string& name) {
+  std::vector<fs::path> found;
+  std::error_code error;
+  fs::recursive_directory_iterator walk(place, fs::directory_options::skip_permission_denied,
+                                        error);
+  for (; !error && walk != fs::recursive_directory_iterator(); walk.increment(error)) {
+    const std::string entry = walk->path().filename().string();
+    if (entry.starts_with(name)) found.push_back(walk->path());
+    // Inside a recording there are only its thousands of images.
+    if (walk.depth() + 1 >= kDepth || entry == "mav0" || entry.starts_with(name))
+      walk.disable_recursion_pending();
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+// Time between the first and the last image of the left camera for which there is a file [s].
+double recorded_s(const fs::path& folder) {
+  const fs::path camera = folder / "mav0/cam0";
+  std::error_code error;
+  std::int64_t first = 0, last = 0;
+  for (const auto& image : fs::directory_iterator(camera / "data", error)) {
+    const auto stamp = parse_int64(image.path().stem().string());
+    if (!stamp) continue;
+    first = first == 0 ? *stamp : std::min(first, *stamp);
+    last = std::max(last, *stamp);
+  }
+  return 1e-9 * static_cast<double>(last - first);
+}
+
+bool is_table(const std::string& name) {
+  const auto ends = [&](const char* end) { return name.ends_with(end); };
+  return ends(".csv") || ends(".csv.gz") || ends(".txt") || ends(".txt.gz");
+}
+
+void take(const fs::path& file, fs::path& place) {
+  if (place.empty() && fs::is_regular_file(file)) place = file;
+}
+
+// True if EuRoC's own images are there of all robots.
+bool has_original_images(const WorldConfig& world, const ExperimentPaths& paths) {
+  return world.flights && !paths.euroc.empty() &&
+         std::all_of(world.robots.begin(), world.robots.end(), [&](const std::string& robot) {
+           return !find_recorded_flight(paths.euroc, robot).folder.empty();
+         });
+}
+
+void append(std::vector<std::string>& list, const std::vector<std::string>& more) {
+  list.insert(list.end(), more.begin(), more.end());
+}
+
+std::string simulate_step_name(const WorldConfig& world) {
+  return "simulate-" + world.recordings;
+}
+
+std::string team_step_name(const WorldConfig& world) {
+  return "team-" + world.name;
+}
+
+// The simulator notes whether it came to its end.
+bool is_complete(const fs::path& simulation_json) try {
+  return fs::is_regular_file(simulation_json) &&
+         YAML::LoadFile(simulation_json.string())["complete"].as<bool>(false);
+} catch (const YAML::Exception&) {
+  return false;
+}
+
+// Options that make the robots move as recorded; what is not there is noted in the step.
+void add_flights(const WorldConfig& world, const ExperimentPaths& paths, Step& step) {
+  std::vector<std::string> truths, imus;
+  for (const std::string& robot : world.robots) {
+    const RecordedFlightFiles flight = find_recorded_flight(paths.euroc, robot);
+    if (flight.truth.empty() || flight.imu.empty()) {
+      step.missing = "no true poses and inertial data of " + robot +
+                     (paths.euroc.empty() ? std::string() : " in " + paths.euroc.string()) +
+                     "; --euroc says where EuRoC's recordings are";
+      return;
+    }
+    truths.push_back(flight.truth.string());
+    imus.push_back(flight.imu.string());
+    step.inputs.insert(step.inputs.end(), {flight.truth, flight.imu});
+  }
+  const auto add = [&](const char* option, const std::vector<std::string>& values) {
+    step.command.emplace_back(option);
+    append(step.command, values);
+  };
+  add("--trajectory", truths);
+  add("--imu", imus);
+  add("--names", world.robots);
+}
+
+Step simulate_step(const WorldConfig& world, const ExperimentPaths& paths) {
+  const WorldFiles files = world_files(world, paths);
+  const fs::path made = files.recordings / "simulation.json";
+  Step step{.name = simulate_step_name(world),
+            .title = "recordings, " + world.title,
+            .command = {(paths.programs / "kimera_multi_simulate").string()},
+            .outputs = {made, files.team_file},
+            .adoptable = is_complete(made),
+            .expected_s = world.simulate_s};
+  if (!world.simulation.empty()) {
+    append(step.command, {"--config", world.simulation.string()});
+    step.inputs.push_back(world.simulation);
+  }
+  append(step.command, world.simulate);
+  if (world.flights) add_flights(world, paths, step);
+  append(step.command, {"--output", files.recordings.string()});
+  return step;
+}
+
+// A team on EuRoC's own folders. They have no labels, and no true mesh to compare with.
+std::string original_team_file(const WorldConfig& world, const ExperimentPaths& paths) {
+  YAML::Emitter out;
+  out << YAML::BeginMap;
+  if (!world.original_config.empty())
+    out << YAML::Key << "config" << YAML::Value << fs::absolute(world.original_config).string();
+  out << YAML::Key << "arguments" << YAML::Value << YAML::Flow
+      << std::vector<std::string>{"--set", "mapping.mode=metric"} << YAML::Key << "robots"
+      << YAML::Value << YAML::BeginSeq;
+  for (std::size_t i = 0; i < world.robots.size(); ++i) {
+    const RecordedFlightFiles flight = find_recorded_flight(paths.euroc, world.robots[i]);
+    out << YAML::BeginMap << YAML::Key << "id" << YAML::Value << i << YAML::Key << "name"
+        << YAML::Value << world.robots[i] << YAML::Key << "dataset" << YAML::Value
+        << fs::absolute(flight.folder).string() << YAML::Key << "truth" << YAML::Value
+        << fs::absolute(flight.truth).string() << YAML::EndMap;
+  }
+  out << YAML::EndSeq << YAML::EndMap;
+  return std::string(out.c_str()) + '\n';
+}
+
+std::vector<fs::path> of_robots(const WorldConfig& world, const fs::path& run, const char* file) {
+  std::vector<fs::path> paths;
+  for (const std::string& robot : world.robots) paths.push_back(run / robot / file);
+  return paths;
+}
+
+// Of each robot; nothing if they are not known of all.
+std::vector<fs::path> true_poses(const WorldConfig& world, const WorldFiles& files,
+                                 const ExperimentPaths& paths) {
+  if (!files.original)
+    return of_robots(world, files.recordings, "mav0/state_groundtruth_estimate0/data.csv");
+  std::vector<fs::path> truths;
+  for (const std::string& robot : world.robots) {
+    truths.push_back(find_recorded_flight(paths.euroc, robot).truth);
+    if (truths.back().empty()) return {};
+  }
+  return truths;
+}
+
+bool all_exist(const std::vector<fs::path>& files) {
+  return std::all_of(files.begin(), files.end(), [](const fs::path& f) { return fs::exists(f); });
+}
+
+// A run that was made elsewhere is not repeated: its tables are.
+bool made_elsewhere(const Step& step, const std::vector<fs::path>& summaries,
+                    const ExperimentPaths& paths) {
+  if (!all_exist(summaries)) return false;
+  const auto record = read_record(paths.results, step.name);
+  return !record || std::count(record->command.begin(), record->command.end(), "--report") > 0;
+}
+
+Step team_step(const WorldConfig& world, const ExperimentPaths& paths) {
+  const WorldFiles files = world_files(world, paths);
+  const std::vector<fs::path> summaries = of_robots(world, files.run, "summary.json");
+  Step step{.name = team_step_name(world),
+            .title = "team, " + world.title,
+            .command = {(paths.programs / "kimera_multi_team").string(), "--config",
+                        files.team_file.string(), "--output", files.run.string(), "--json",
+                        files.team_json.string()},
+            .outputs = {files.team_json},
+            .expected_s = world.team_s};
+  step.outputs.insert(step.outputs.end(), summaries.begin(), summaries.end());
+  if (files.original)
+    step.writes = {{files.team_file, original_team_file(world, paths)}};
+  else
+    step.needs = {simulate_step_name(world)};
+  if (made_elsewhere(step, summaries, paths)) {
+    step.title = "tables of the team's run, " + world.title;
+    step.command.emplace_back("--report");
+    step.expected_s = 60.0;
+    for (const char* file :
+         {"summary.json", "pose_graph.g2o", "optimized.tum", "mesh.ply", "mesh_optimized.ply"})
+      for (const fs::path& path : of_robots(world, files.run, file)) step.inputs.push_back(path);
+    return step;
+  }
+  if (!files.original) step.inputs = {files.recordings / "simulation.json", files.team_file};
+  append(step.command, world.team);
+  if (!world.robot.empty()) step.command.emplace_back("--");
+  append(step.command, world.robot);
+  return step;
+}
+
+// Recordings of a world, unless they are another's or EuRoC's own, and the team's run on them.
+std::vector<Step> world_steps(const WorldConfig& world, const ExperimentPaths& paths) {
+  std::vector<Step> steps;
+  const bool has_own = world.recordings == world.name;  // else the world that it repeats makes them
+  if (has_own && !has_original_images(world, paths)) steps.push_back(simulate_step(world, paths));
+  steps.push_back(team_step(world, paths));
+  return steps;
+}
+
+// Pictures of the team's meshes before and after the correction.
+std::vector<Step> picture_steps(const WorldConfig& world, const ExperimentPaths& paths) {
+  const WorldFiles files = world_files(world, paths);
+  const std::vector<fs::path> truths = true_poses(world, files, paths);
+  std::vector<Step> steps;
+  for (const bool corrected : {false, true}) {
+    const fs::path picture = picture_file(world, corrected, paths);
+    Step step{.name = picture.stem().string(),
+              .title = std::string("picture ") + (corrected ? "after" : "before") +
+                       " correction, " + world.title,
+              .command = {(paths.programs / "kimera_multi_evaluate").string(), "render", "--mesh"},
+              .outputs = {picture},
+              .needs = {team_step_name(world)},
+              .expected_s = 10.0};
+    const auto meshes = of_robots(world, files.run, corrected ? "mesh_optimized.ply" : "mesh.ply");
+    const auto trajectories = of_robots(world, files.run, "optimized.tum");
+    for (const fs::path& mesh : meshes) step.command.push_back(mesh.string());
+    step.command.emplace_back("--trajectory");
+    for (const fs::path& trajectory : trajectories) step.command.push_back(trajectory.string());
+    step.inputs = meshes;
+    step.inputs.insert(step.inputs.end(), trajectories.begin(), trajectories.end());
+    if (!truths.empty()) {  // they stand the map upright
+      step.command.emplace_back("--reference");
+      for (const fs::path& truth : truths) step.command.push_back(truth.string());
+    }
+    append(step.command, world.picture);
+    append(step.command, {"--output", picture.string()});
+    steps.push_back(std::move(step));
+  }
+  return steps;
+}
 
 std::vector<Step> pcm_steps(const PcmExperiment& pcm, const ExperimentPaths& paths) {
   const fs::path graph = paths.graphs / pcm.graph;
@@ -91,6 +328,24 @@ void append_steps(std::vector<Step>& steps, std::vector<Step> more) {
 }
 
 }  // namespace
+
+RecordedFlightFiles find_recorded_flight(const fs::path& place, const std::string& name,
+                                         double least_s) {
+  RecordedFlightFiles files;
+  if (place.empty()) return files;
+  const std::vector<fs::path> entries = entries_named(place, name);
+  for (const fs::path& entry : entries) {
+    if (!fs::is_directory(entry / "mav0")) continue;
+    if (files.folder.empty() && recorded_s(entry) >= least_s) files.folder = entry;
+    take(entry / "mav0/state_groundtruth_estimate0/data.csv", files.truth);
+    take(entry / "mav0/imu0/data.csv", files.imu);
+  }
+  for (const fs::path& entry : entries) {
+    const std::string text = entry.filename().string();
+    if (is_table(text)) take(entry, text.find("imu") == text.npos ? files.truth : files.imu);
+  }
+  return files;
+}
 
 WorldFiles world_files(const WorldConfig& world, const ExperimentPaths& paths) {
   WorldFiles files;

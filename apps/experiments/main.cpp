@@ -9,7 +9,7 @@
 #include "apps/experiments/run_steps.hpp"
 #include "apps/experiments/step_record.hpp"
 #include "apps/program_folder.hpp"
-#include "apps/team/text_table.hpp"
+#include "modules/core/text_table.hpp"
 
 namespace {
 

@@ -1,7 +1,10 @@
-#include "apps/experiments/bar_chart.hpp"
+#include <array>
+#include <cmath>
+
 #include "apps/experiments/paper_results.hpp"
-#include "apps/experiments/report_sections.hpp"
-#include "apps/team/text_table.hpp"
+#include "apps/experiments/report.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/evaluation/plot.hpp"
 
 namespace km {
 namespace {
@@ -65,16 +68,16 @@ ReportTable error_table(const std::vector<ReportInput::World>& worlds) {
   return table;
 }
 
-BarChart error_chart(const ReportInput::World& world) {
-  BarChart chart{.title = world.config->title,
-                 .y_label = "mesh error [cm]",
-                 .groups = {},
-                 .series = {{"before", {}}, {"after correction", {}}},
-                 .decimals = 1};
-  for (const NamedMesh& mesh : meshes_of(*world.results)) {
-    chart.groups.push_back(mesh.name);
-    chart.series[0].values.push_back(centimetres(mesh.mesh.before.seen_error_m));
-    chart.series[1].values.push_back(centimetres(mesh.mesh.after.seen_error_m));
+Plot error_chart(const ReportInput::World& world) {
+  constexpr auto kBars = PlotSeries::Style::kBars;
+  Plot chart{.title = world.config->title,
+             .y_label = "mesh error [cm]",
+             .series = {{"before", {}, PlotSeries::kGrey, kBars}, {"after", {}, 0, kBars}}};
+  for (const auto& [name, mesh] : meshes_of(*world.results)) {
+    const auto x = static_cast<double>(chart.groups.size());
+    chart.groups.push_back(name);
+    chart.series[0].points.push_back({x, 100.0 * mesh.before.seen_error_m.value_or(NAN)});
+    chart.series[1].points.push_back({x, 100.0 * mesh.after.seen_error_m.value_or(NAN)});
   }
   return chart;
 }
@@ -84,7 +87,7 @@ ReportFigures charts(const std::vector<ReportInput::World>& worlds) {
   for (const auto& world : worlds)
     row.figures.push_back({.name = "mesh-error-" + world.config->name,
                            .caption = world.config->title + ": without what no robot saw.",
-                           .svg = draw_bars(error_chart(world))});
+                           .svg = draw_plots(std::array{error_chart(world)})});
   return row;
 }
 
@@ -158,16 +161,16 @@ std::optional<ReportSection> mesh_section(ReportInput& input) {
   const auto worlds = with_meshes(all);  // EuRoC's own images have no true mesh
   ReportFigures drawn = pictures(input, all);
   if (worlds.empty() && drawn.figures.empty()) return std::nullopt;
-  ReportSection section{.id = "mesh", .title = "Meshes", .blocks = {}};
-  section.blocks.emplace_back(ReportParagraph{
+  ReportSection section{.id = "mesh", .title = "Meshes"};
+  section.add(ReportParagraph{
       "Each robot's mesh as its odometry built it, moved as a whole into the team's frame, and the "
       "same mesh after local mesh optimisation bent it to the team's solution; and all robots' "
       "meshes together. The paper shows its errors as bars without numbers."});
   if (!worlds.empty()) {
-    section.blocks.emplace_back(charts(worlds));
-    section.blocks.emplace_back(error_table(worlds));
+    section.add(charts(worlds));
+    section.add(error_table(worlds));
   }
-  if (!drawn.figures.empty()) section.blocks.emplace_back(std::move(drawn));
+  if (!drawn.figures.empty()) section.add(std::move(drawn));
   for (const auto& world : worlds) {
     const auto& [before, after] = world.results->mesh;
     add_target(input, world, "error of the merged mesh", centimetres(before.error_m),
@@ -182,12 +185,12 @@ std::optional<ReportSection> semantics_section(ReportInput& input) {
   auto worlds = with_meshes(input.worlds(input.config().semantics_worlds));
   std::erase_if(worlds, [](const auto& world) { return !has_labels(world); });
   if (worlds.empty()) return std::nullopt;
-  ReportSection section{.id = "semantics", .title = "Labels", .blocks = {}};
-  section.blocks.emplace_back(ReportParagraph{
+  ReportSection section{.id = "semantics", .title = "Labels"};
+  section.add(ReportParagraph{
       "Labels come from the simulator's images of classes, as in the paper; each vertex of the "
       "mesh has the most likely one of what all its views said. The paper has no truth for the "
       "Vicon rooms; ours are rendered, so there is one."});
-  section.blocks.emplace_back(labels_table(worlds));
+  section.add(labels_table(worlds));
   for (const auto& world : worlds) {
     const auto& [before, after] = world.results->mesh;
     add_target(input, world, "right labels of the merged mesh", before.labels_percent,

@@ -6,6 +6,15 @@
 
 namespace km {
 
+/// Table II of one world. Keypoints and images: of a centralised system.
+struct PaperResources {
+  int poses, edges;
+  double place_recognition_mb, verification_mb, pgo_mb, total_mb;
+  double images_mb, keypoints_mb;
+  int rbcd_rounds;
+  double rbcd_s, rbcd50_s, se_sync_s;
+};
+
 /// What Chang, Tian, How and Carlone, "Kimera-Multi: a System for Distributed Multi-Robot
 /// Metric-Semantic Simultaneous Localization and Mapping", ICRA 2021, report of one world.
 struct PaperWorld {
@@ -13,12 +22,7 @@ struct PaperWorld {
   /// Table I, in the order local PGO, RBCD, RBCD stopped after 50 rounds, DGS, SE-Sync.
   std::array<double, 5> ate_m;
   std::array<double, 5> cost;
-  /// Table II.
-  int poses, edges;
-  double place_recognition_mb, verification_mb, pgo_mb, total_mb;
-  double images_mb, keypoints_mb;
-  int rbcd_rounds;
-  double rbcd_s, rbcd50_s, se_sync_s;
+  PaperResources resources;
 };
 
 /// Table III: right labels before and after the correction of the mesh [%], of robots 0 to 2 and

@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <map>
+#include <nlohmann/json.hpp>
 
-#include "apps/experiments/json_numbers.hpp"
-#include "apps/experiments/report_sections.hpp"
-#include "apps/experiments/spread.hpp"
-#include "apps/team/text_table.hpp"
-#include "modules/evaluation/curve_plot.hpp"
+#include "apps/experiments/report.hpp"
+#include "modules/core/json.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/evaluation/plot.hpp"
 #include "modules/evaluation/statistics.hpp"
 
 namespace km {
@@ -36,22 +36,16 @@ struct SearchRun {
 struct Search {
   std::string name;
   std::vector<SearchRun> runs;
-
-  Spread over_runs(const auto& value) const {
-    std::vector<double> values;
-    for (const SearchRun& run : runs) values.push_back(value(run));
-    return spread_of(std::move(values));
-  }
 };
 
 void add_runs(const std::filesystem::path& file, std::vector<Search>& searches) {
-  const YAML::Node root = read_json(file);
-  const auto add = [&](const YAML::Node& node) {
-    const auto name = node["search"].as<std::string>("?");
+  const Json root = read_json(file);
+  const auto add = [&](const Json& node) {
+    const std::string name = node.value("search", "?");
     SearchRun run;
-    for (const YAML::Node& addition : node["additions"]) {
-      run.search_s.push_back(number_at(addition, "search_s").value_or(0.0));
-      run.clique.push_back(number_at(addition, "clique").value_or(0.0));
+    for (const Json& addition : node.value("additions", Json::array())) {
+      run.search_s.push_back(number_at(addition, "/search_s").value_or(0.0));
+      run.clique.push_back(number_at(addition, "/clique").value_or(0.0));
     }
     if (run.clique.empty()) return;
     auto search = std::find_if(searches.begin(), searches.end(),
@@ -59,8 +53,8 @@ void add_runs(const std::filesystem::path& file, std::vector<Search>& searches) 
     if (search == searches.end()) search = searches.insert(search, Search{name, {}});
     search->runs.push_back(std::move(run));
   };
-  if (root.IsMap()) return add(root);
-  for (const YAML::Node& run : root) add(run);
+  if (root.is_object()) return add(root);
+  for (const Json& run : root) add(run);
 }
 
 // Vertices that all runs came to.
@@ -88,15 +82,16 @@ ReportTable table_of(const std::vector<Search>& searches) {
     std::vector<ReportCell> row{{std::to_string(size)}};
     for (const Search& search : searches)
       row.push_back(
-          spread_cell(search.over_runs([&](auto& run) { return run.recent_ms(size); }), 3));
+          spread_cell(spread_over(search.runs, [&](auto& run) { return run.recent_ms(size); }), 3));
     for (const Search& search : searches)
-      row.push_back(
-          spread_cell(search.over_runs([&](auto& run) { return run.clique[size - 1]; }), 0));
+      row.push_back(spread_cell(
+          spread_over(search.runs, [&](auto& run) { return run.clique[size - 1]; }), 0));
     table.rows.push_back(std::move(row));
   }
   std::vector<ReportCell> row{{"all additions, in sum"}};
   for (const Search& search : searches)
-    row.push_back(spread_cell(search.over_runs([](auto& run) { return 1e3 * run.sum_s(); }), 1));
+    row.push_back(
+        spread_cell(spread_over(search.runs, [](auto& run) { return 1e3 * run.sum_s(); }), 1));
   row.resize(table.columns.size());
   table.rows.push_back(std::move(row));
   table.note = "Times: processor time of one thread, median of the last " +
@@ -108,32 +103,27 @@ ReportTable table_of(const std::vector<Search>& searches) {
 
 // Lines are medians over the seeds, faint points the lowest and highest.
 void add_curves(const Search& search, std::size_t colour, std::size_t all, const auto& value,
-                CurvePanel& panel) {
+                Plot& plot) {
   constexpr std::size_t kPoints = 150;
-  Curve median{search.name, {}, colour, false}, range{"", {}, colour, true};
+  PlotSeries median{search.name, {}, colour}, range{"", {}, colour, PlotSeries::Style::kDots};
   const std::size_t step = std::max<std::size_t>(1, all / kPoints);
   for (std::size_t size = step; size <= all; size += step) {
-    const Spread spread = search.over_runs([&](auto& run) { return value(run, size); });
+    const Spread spread = spread_over(search.runs, [&](auto& run) { return value(run, size); });
     const auto x = static_cast<double>(size);
     median.points.push_back({x, spread.median});
     if (spread.count > 1)
       range.points.insert(range.points.end(), {{x, spread.lowest}, {x, spread.highest}});
   }
-  panel.curves.push_back(std::move(range));
-  panel.curves.push_back(std::move(median));
+  plot.series.push_back(std::move(range));
+  plot.series.push_back(std::move(median));
 }
 
 ReportFigure figure_of(const std::vector<Search>& searches) {
-  CurvePanel time{.title = "CPU time of one addition, median of the last 50",
-                  .x_label = "vertices",
-                  .y_label = "ms",
-                  .log_y = true,
-                  .curves = {}};
-  CurvePanel size{.title = "Size of the clique",
-                  .x_label = "vertices",
-                  .y_label = "closures",
-                  .log_y = false,
-                  .curves = {}};
+  Plot time{.title = "CPU time of one addition, median of the last 50",
+            .x_label = "vertices",
+            .y_label = "ms",
+            .log_y = true};
+  Plot size{.title = "Size of the clique", .x_label = "vertices", .y_label = "closures"};
   const std::size_t all = common_size(searches);
   for (std::size_t k = 0; k < searches.size(); ++k) {
     add_curves(
@@ -145,7 +135,7 @@ ReportFigure figure_of(const std::vector<Search>& searches) {
           .caption =
               "Time of a search and size of the clique against vertices: medians over the "
               "seeds; faint points: the lowest and highest.",
-          .svg = plot_curves(std::vector{time, size})};
+          .svg = draw_plots(std::vector{time, size})};
 }
 
 void add_targets(const std::vector<Search>& searches, ReportInput& input) {
@@ -184,15 +174,15 @@ std::optional<ReportSection> pcm_section(ReportInput& input) {
     if (input.has("pcm-" + std::to_string(seed)))
       add_runs(pcm_files(seed, input.paths()).json, searches);
   if (searches.empty()) return std::nullopt;
-  ReportSection section{.id = "pcm", .title = "Outlier rejection", .blocks = {}};
-  section.blocks.emplace_back(ReportParagraph{
+  ReportSection section{.id = "pcm", .title = "Outlier rejection"};
+  section.add(ReportParagraph{
       "Closures of the Manhattan graph and random false ones enter the consistency graph one at a "
       "time; after each the clique of closures that agree is searched anew (batch), improved from "
       "the new vertex only (incremental, as in the paper), or found exactly (exact, ours). The "
       "paper shows two plots without numbers: incremental is much faster, and its cliques are of "
       "comparable size."});
-  section.blocks.emplace_back(table_of(searches));
-  section.blocks.emplace_back(ReportFigures{{figure_of(searches)}});
+  section.add(table_of(searches));
+  section.add(ReportFigures{{figure_of(searches)}});
   add_targets(searches, input);
   return section;
 }

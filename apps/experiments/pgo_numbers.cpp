@@ -1,15 +1,16 @@
 #include <fstream>
 #include <iterator>
 #include <list>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "apps/experiments/json_numbers.hpp"
 #include "apps/experiments/world_results.hpp"
 #include "apps/team/team_file.hpp"
+#include "modules/core/json.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/evaluation/trajectory_plot.hpp"
+#include "modules/evaluation/trajectory_report.hpp"
 
 namespace km {
 namespace {
@@ -67,15 +68,17 @@ void add_error(const WorldConfig& world, const PgoFiles& files, const Experiment
 }
 
 // The first of the rounds is the start.
-void add_rounds(const YAML::Node& rounds, PgoNumbers& numbers) {
-  if (!rounds || !rounds.IsSequence() || rounds.size() == 0) return;
-  const auto cost = [&](std::size_t k) { return number_at(rounds[k], "cost").value_or(0.0); };
-  const double finished = (1.0 + PgoNumbers::kFinishedGap) * cost(rounds.size() - 1);
+void add_rounds(const Json& rounds, PgoNumbers& numbers) {
+  if (rounds.empty()) return;
+  const auto at = [&](std::size_t k, const char* key) {
+    return number_at(rounds[k], key).value_or(0.0);
+  };
+  const double finished = (1.0 + PgoNumbers::kFinishedGap) * at(rounds.size() - 1, "/cost");
   std::size_t k = 0;
-  while (k + 1 < rounds.size() && cost(k) > finished) ++k;
+  while (k + 1 < rounds.size() && at(k, "/cost") > finished) ++k;
   numbers.rounds = k;
-  numbers.bytes = number_at(rounds[k], "bytes").value_or(0.0);
-  numbers.seconds = number_at(rounds[k], "critical_path_s").value_or(0.0);
+  numbers.bytes = at(k, "/bytes");
+  numbers.seconds = at(k, "/critical_path_s");
 }
 
 }  // namespace
@@ -83,14 +86,14 @@ void add_rounds(const YAML::Node& rounds, PgoNumbers& numbers) {
 PgoNumbers read_pgo_numbers(const WorldConfig& world, const PgoMethodConfig& method,
                             const ExperimentPaths& paths) {
   const PgoFiles files = pgo_files(world, method, paths);
-  const YAML::Node root = read_json(files.json);
+  const Json root = read_json(files.json);
   const auto number = [&](const char* key) { return number_at(root, key).value_or(0.0); };
   PgoNumbers numbers;
-  numbers.poses = static_cast<std::size_t>(number("poses"));
-  numbers.edges = static_cast<std::size_t>(number("edges"));
-  numbers.cost = number("rounded_cost");
-  numbers.optimum = number("optimum");
-  add_rounds(root["rounds"], numbers);
+  numbers.poses = static_cast<std::size_t>(number("/poses"));
+  numbers.edges = static_cast<std::size_t>(number("/edges"));
+  numbers.cost = number("/rounded_cost");
+  numbers.optimum = number("/optimum");
+  add_rounds(root.value("rounds", Json::array()), numbers);
   add_error(world, files, paths, numbers);
   return numbers;
 }

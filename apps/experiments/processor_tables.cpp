@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <functional>
 
-#include "apps/team/text_table.hpp"
+#include "modules/core/text_table.hpp"
 
 namespace km {
 namespace {

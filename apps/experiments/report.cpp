@@ -1,12 +1,90 @@
 #include "apps/experiments/report.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
 
-#include "apps/experiments/report_sections.hpp"
 #include "apps/output_file.hpp"
-#include "modules/core/json_writer.hpp"
+#include "modules/core/json.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/evaluation/statistics.hpp"
 
 namespace km {
+
+Spread spread_of(std::vector<double> values) {
+  std::erase_if(values, [](double value) { return !std::isfinite(value); });
+  if (values.empty()) return {};
+  const auto [lowest, highest] = std::minmax_element(values.begin(), values.end());
+  return {.count = values.size(),
+          .median = statistics_of(values).median,
+          .lowest = *lowest,
+          .highest = *highest};
+}
+
+ReportCell spread_cell(const Spread& spread, int decimals) {
+  if (spread.count == 0) return {"-"};
+  ReportCell cell{fixed(spread.median, decimals)};
+  if (spread.count > 1)
+    cell.paper = fixed(spread.lowest, decimals) + " to " + fixed(spread.highest, decimals);
+  return cell;
+}
+
+std::string range_text(const Spread& spread, int decimals) {
+  if (spread.count < 2) return {};
+  return " (" + fixed(spread.lowest, decimals) + " to " + fixed(spread.highest, decimals) + " in " +
+         std::to_string(spread.count) + " runs)";
+}
+
+namespace {
+
+enum class Verdict { kMissed, kMet, kNotJudged };
+
+Verdict verdict_of(const Target& target) {
+  if (!target.judged) return Verdict::kNotJudged;
+  return target.met ? Verdict::kMet : Verdict::kMissed;
+}
+
+ReportTable table_of(const std::vector<Target>& targets, Verdict verdict) {
+  using Style = ReportCell::Style;
+  const Style style = verdict == Verdict::kMet      ? Style::kMet
+                      : verdict == Verdict::kMissed ? Style::kMissed
+                                                    : Style::kPlain;
+  ReportTable table{.caption = verdict == Verdict::kMet ? "Met"
+                               : verdict == Verdict::kMissed
+                                   ? "Missed"
+                                   : "Not judged: inputs of full size answer these",
+                    .columns = {"what", "where", "wanted", "measured"},
+                    .words = true};
+  for (const Target& target : targets)
+    if (verdict_of(target) == verdict)
+      table.rows.push_back({{target.what},
+                            {target.where},
+                            {target.wanted},
+                            {.text = target.measured, .style = style}});
+  return table;
+}
+
+}  // namespace
+
+ReportSection targets_section(const ReportInput& input) {
+  ReportSection section{.id = "targets", .title = "Numbers to reach"};
+  if (input.targets().empty()) {
+    section.add(ReportParagraph{"Nothing was measured yet."});
+    return section;
+  }
+  std::size_t met = 0, judged = 0;
+  for (const Target& target : input.targets()) {
+    judged += target.judged ? 1 : 0;
+    met += target.judged && target.met ? 1 : 0;
+  }
+  section.add(ReportParagraph{std::to_string(met) + " of " + std::to_string(judged) + " are met" +
+                              (met < judged ? "; those that are not come first." : ".")});
+  for (const Verdict verdict : {Verdict::kMissed, Verdict::kMet, Verdict::kNotJudged})
+    section.add(table_of(input.targets(), verdict));
+  return section;
+}
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -59,37 +137,27 @@ void write_figures(const ReportDocument& document, const fs::path& folder) {
     }
 }
 
-void write_table(JsonWriter& json, const ReportTable& table) {
-  json.begin_object();
-  json.field("caption", table.caption);
-  json.array("columns", table.columns);
-  json.key("rows");
-  json.begin_array();
+Json to_json(const ReportTable& table) {
+  Json rows = Json::array();
   for (const auto& row : table.rows) {
-    json.begin_array();
+    Json& cells = rows.emplace_back(Json::array());
     for (const ReportCell& cell : row) {
-      json.begin_object();
-      json.field("value", cell.text);
-      if (!cell.paper.empty()) json.field("paper", cell.paper);
-      json.end_object();
+      cells.push_back({{"value", cell.text}});
+      if (!cell.paper.empty()) cells.back()["paper"] = cell.paper;
     }
-    json.end_array();
   }
-  json.end_array();
-  json.end_object();
+  return {{"caption", table.caption}, {"columns", table.columns}, {"rows", std::move(rows)}};
 }
 
-void write_numbers(std::ostream& out, const ReportDocument& document) {
-  JsonWriter json(out);
-  json.begin_object();
+Json numbers_of(const ReportDocument& document) {
+  Json json = Json::object();
   for (const ReportSection& section : document.sections) {
-    json.key(section.id);
-    json.begin_array();
+    Json& tables = json[section.id] = Json::array();
     for (const ReportBlock& block : section.blocks)
-      if (const auto* const table = std::get_if<ReportTable>(&block)) write_table(json, *table);
-    json.end_array();
+      if (const auto* const table = std::get_if<ReportTable>(&block))
+        tables.push_back(to_json(*table));
   }
-  json.end_object();
+  return json;
 }
 
 }  // namespace
@@ -107,7 +175,7 @@ ReportSummary write_report(const ExperimentConfig& config, const ExperimentPaths
   write_output(summary.html, [&](std::ostream& out) { out << to_html(document); });
   write_output(summary.markdown, [&](std::ostream& out) { out << to_markdown(document); });
   write_output(paths.results / "numbers.json",
-               [&](std::ostream& out) { write_numbers(out, document); });
+               [&](std::ostream& out) { out << json_text(numbers_of(document)); });
   return summary;
 }
 

@@ -34,7 +34,7 @@ struct ReportParagraph {
   std::string text;
 };
 
-/// One picture of a row of them: SVG text or a PNG file.
+/// One picture of a row of them: SVG text with a view box, or a PNG file.
 struct ReportFigure {
   std::string name;  ///< Stem of its file beside the Markdown.
   std::string caption;
@@ -61,7 +61,10 @@ using ReportBlock = std::variant<ReportParagraph, ReportTable, ReportFigures, Re
 struct ReportSection {
   std::string id;  ///< Of its anchor.
   std::string title;
-  std::vector<ReportBlock> blocks;
+  std::vector<ReportBlock> blocks = {};
+
+  /// Appends a block, unless it is a table without rows.
+  void add(ReportBlock block);
 };
 
 struct ReportDocument {

@@ -4,7 +4,7 @@
 #include <set>
 #include <sstream>
 
-#include "apps/team/text_table.hpp"
+#include "modules/core/text_table.hpp"
 
 namespace km {
 namespace {

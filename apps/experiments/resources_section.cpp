@@ -3,9 +3,8 @@
 
 #include "apps/experiments/paper_results.hpp"
 #include "apps/experiments/processor_tables.hpp"
-#include "apps/experiments/report_sections.hpp"
-#include "apps/experiments/spread.hpp"
-#include "apps/team/text_table.hpp"
+#include "apps/experiments/report.hpp"
+#include "modules/core/text_table.hpp"
 
 namespace km {
 namespace {
@@ -25,9 +24,8 @@ struct Communication {
   }
 };
 
-// Not a number without a result: shown as "-".
-double megabytes(const PgoNumbers* numbers) {
-  return numbers == nullptr ? NAN : 1e-6 * numbers->bytes;
+double megabytes(const PgoNumbers& numbers) {
+  return 1e-6 * numbers.bytes;
 }
 
 Communication communication(ReportInput& input, const ReportInput::World& world) {
@@ -36,8 +34,8 @@ Communication communication(ReportInput& input, const ReportInput::World& world)
   mb.place_recognition = results.sent_mb("place_recognition");
   mb.verification = results.sent_mb("geometric_verification");
   mb.live_pgo = results.sent_mb("pgo");
-  mb.pgo = megabytes(input.pgo(*world.config, "rbcd"));
-  mb.best_pgo = megabytes(input.pgo(*world.config, "newton"));
+  mb.pgo = of_method(input, world, "rbcd", megabytes);
+  mb.best_pgo = of_method(input, world, "newton", megabytes);
   mb.images =
       1e-6 * kBytesPerPixel * static_cast<double>(results.image_pixels * results.keyframes());
   for (const RobotNumbers& robot : results.robots)
@@ -54,15 +52,15 @@ ReportTable communication_table(ReportInput& input, const std::vector<ReportInpu
   for (const auto& world : worlds) {
     const PaperWorld* const paper = paper_world(world.config->name);
     const Communication mb = communication(input, world);
-    const PgoNumbers* const rbcd = input.pgo(*world.config, "rbcd");
     const auto cell = [&](double ours, int decimals, auto theirs) {
-      return ReportCell{fixed(ours, decimals),
-                        paper == nullptr ? std::string() : fixed(theirs(*paper), decimals)};
+      return ReportCell{fixed(ours, decimals), paper == nullptr
+                                                   ? std::string()
+                                                   : fixed(theirs(paper->resources), decimals)};
     };
     table.rows.push_back(
         {{world.config->title},
          cell(static_cast<double>(world.results->keyframes()), 0, [](auto& p) { return p.poses; }),
-         cell(rbcd == nullptr ? NAN : static_cast<double>(rbcd->edges), 0,
+         cell(of_method(input, world, "rbcd", [](auto& pgo) { return pgo.edges; }), 0,
               [](auto& p) { return p.edges; }),
          cell(mb.place_recognition, 2, [](auto& p) { return p.place_recognition_mb; }),
          cell(mb.verification, 2, [](auto& p) { return p.verification_mb; }),
@@ -108,24 +106,24 @@ ReportTable computation_table(ReportInput& input, const std::vector<ReportInput:
                     .columns = {"world", "rounds", "[s]", "[s]", "[s]", "rounds", "[s]"}};
   for (const auto& world : worlds) {
     const PaperWorld* const paper = paper_world(world.config->name);
-    std::vector<ReportCell> row{{world.config->title}};
-    const auto seconds = [&](const char* name, double theirs) {
-      const PgoNumbers* const pgo = input.pgo(*world.config, name);
-      row.push_back({pgo == nullptr ? "-" : fixed(pgo->seconds, 3),
-                     paper == nullptr || theirs == 0.0 ? std::string() : fixed(theirs, 2)});
+    const PaperResources theirs = paper == nullptr ? PaperResources{} : paper->resources;
+    const auto rounds = [&](const char* method, int of_paper) {
+      return ReportCell{
+          fixed(of_method(input, world, method, [](auto& pgo) { return pgo.rounds; }), 0),
+          of_paper == 0 ? std::string() : std::to_string(of_paper)};
     };
-    const auto rounds = [&](const char* name, int theirs) {
-      const PgoNumbers* const pgo = input.pgo(*world.config, name);
-      row.push_back({pgo == nullptr ? "-" : std::to_string(pgo->rounds),
-                     theirs == 0 ? std::string() : std::to_string(theirs)});
+    const auto seconds = [&](const char* method, double of_paper) {
+      return ReportCell{
+          fixed(of_method(input, world, method, [](auto& pgo) { return pgo.seconds; }), 3),
+          of_paper == 0.0 ? std::string() : fixed(of_paper, 2)};
     };
-    rounds("rbcd", paper == nullptr ? 0 : paper->rbcd_rounds);
-    seconds("rbcd", paper == nullptr ? 0.0 : paper->rbcd_s);
-    seconds("rbcd50", paper == nullptr ? 0.0 : paper->rbcd50_s);
-    seconds("centralized", paper == nullptr ? 0.0 : paper->se_sync_s);
-    rounds("newton", 0);
-    seconds("newton", 0.0);
-    table.rows.push_back(std::move(row));
+    table.rows.push_back({{world.config->title},
+                          rounds("rbcd", theirs.rbcd_rounds),
+                          seconds("rbcd", theirs.rbcd_s),
+                          seconds("rbcd50", theirs.rbcd50_s),
+                          seconds("centralized", theirs.se_sync_s),
+                          rounds("newton", 0),
+                          seconds("newton", 0.0)});
   }
   table.note =
       "Seconds: processor time of the slowest robot of every round, summed, all in one "
@@ -150,9 +148,7 @@ ReportTable spread_table(ReportInput& input, const std::vector<ReportInput::Worl
     const std::vector<Communication> runs = of_all_runs(input, world);
     if (runs.size() < 2) continue;
     const auto cell = [&](const auto& value, int decimals) {
-      std::vector<double> values;
-      for (const Communication& mb : runs) values.push_back(value(mb));
-      return spread_cell(spread_of(std::move(values)), decimals);
+      return spread_cell(spread_over(runs, value), decimals);
     };
     table.rows.push_back({{world.config->title},
                           {std::to_string(runs.size())},
@@ -169,10 +165,9 @@ ReportTable spread_table(ReportInput& input, const std::vector<ReportInput::Worl
 void add_targets(ReportInput& input, const ReportInput::World& world) {
   const std::vector<Communication> runs = of_all_runs(input, world);
   const auto add = [&](const char* what, const std::string& wanted, const auto& sent) {
-    std::vector<double> percents;
-    for (const Communication& mb : runs)
-      if (mb.keypoints > 0.0) percents.push_back(mb.of_keypoints_percent(sent(mb)));
-    const Spread percent = spread_of(std::move(percents));
+    const Spread percent = spread_over(runs, [&](const Communication& mb) {
+      return mb.keypoints > 0.0 ? mb.of_keypoints_percent(sent(mb)) : NAN;
+    });
     if (percent.count == 0) return;
     input.add_target({std::string("communication over all keypoints sent, ") + what,
                       world.config->title, wanted,
@@ -191,17 +186,16 @@ std::optional<ReportSection> resources_section(ReportInput& input) {
   const auto worlds = input.worlds(input.config().resources_worlds);
   const std::optional<RobotNumbers> alone = input.alone();
   if (worlds.empty() && !alone) return std::nullopt;
-  ReportSection section{.id = "resources", .title = "Communication and computation", .blocks = {}};
-  section.blocks.emplace_back(ReportParagraph{
+  ReportSection section{.id = "resources", .title = "Communication and computation"};
+  section.add(ReportParagraph{
       "What the robots send to each other, against a centralised system that sends every keyframe "
       "to a base station, as images or as keypoints with descriptors; and what optimisation and "
       "the robots as a whole cost."});
   if (!worlds.empty()) {
-    section.blocks.emplace_back(communication_table(input, worlds));
-    section.blocks.emplace_back(live_table(input, worlds));
-    if (ReportTable table = spread_table(input, worlds); !table.rows.empty())
-      section.blocks.emplace_back(std::move(table));
-    section.blocks.emplace_back(computation_table(input, worlds));
+    section.add(communication_table(input, worlds));
+    section.add(live_table(input, worlds));
+    section.add(spread_table(input, worlds));
+    section.add(computation_table(input, worlds));
   }
   for (const auto& world : worlds) add_targets(input, world);
   add_processor_tables(input, worlds, alone, section);

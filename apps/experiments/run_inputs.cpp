@@ -1,11 +1,10 @@
 #include "apps/experiments/run_inputs.hpp"
 
-#include <yaml-cpp/yaml.h>
-
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "apps/output_file.hpp"
-#include "modules/core/json_writer.hpp"
+#include "modules/core/json.hpp"
 
 namespace km {
 namespace {
@@ -21,14 +20,14 @@ fs::path inputs_file(const fs::path& results) {
 std::optional<RunInputs> read_run_inputs(const fs::path& results) try {
   const fs::path file = inputs_file(results);
   if (!fs::is_regular_file(file)) return std::nullopt;
-  const YAML::Node root = YAML::LoadFile(file.string());  // JSON is YAML
-  const auto path = [&](const char* key) -> fs::path { return root[key].as<std::string>(); };
+  const Json json = read_json(file);
+  const auto path = [&](const char* key) -> fs::path { return json.at(key).get<std::string>(); };
   return RunInputs{.data = path("data"),
                    .graphs = path("graphs"),
                    .euroc = path("euroc"),
                    .config = path("config"),
-                   .quick = root["quick"].as<bool>()};
-} catch (const YAML::Exception&) {
+                   .quick = json.at("quick").get<bool>()};
+} catch (const std::exception&) {
   return std::nullopt;  // cut short: the next run writes it anew
 }
 
@@ -38,14 +37,11 @@ void write_run_inputs(const fs::path& results, const RunInputs& inputs) {
   };
   fs::create_directories(results);
   write_output(inputs_file(results), [&](std::ostream& out) {
-    JsonWriter json(out);
-    json.begin_object();
-    json.field("data", text(inputs.data));
-    json.field("graphs", text(inputs.graphs));
-    json.field("euroc", text(inputs.euroc));
-    json.field("config", text(inputs.config));
-    json.field("quick", inputs.quick);
-    json.end_object();
+    out << json_text({{"data", text(inputs.data)},
+                      {"graphs", text(inputs.graphs)},
+                      {"euroc", text(inputs.euroc)},
+                      {"config", text(inputs.config)},
+                      {"quick", inputs.quick}});
   });
 }
 

@@ -1,20 +1,23 @@
 #include "apps/experiments/run_steps.hpp"
 
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <ctime>
 #include <deque>
-#include <map>
+#include <iostream>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "apps/experiments/step_record.hpp"
-#include "apps/experiments/step_times.hpp"
 #include "apps/output_file.hpp"
 #include "apps/team/robot_process.hpp"
+#include "modules/core/text_table.hpp"
 #include "runtime/clock.hpp"
 
 namespace km {
@@ -22,9 +25,27 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double kQuiet_s = 2.0;  // shorter steps only show their end
+constexpr double kRedrawInterval_s = 0.2;
 constexpr int kPoll_ms = 100;
 constexpr std::size_t kLastLines = 12;
 constexpr const char* kLogHint = "\n    (all it said: ";
+
+std::string duration(double seconds) {
+  const auto s = static_cast<long>(std::lround(seconds));
+  if (s < 10) return fixed(seconds, 1) + " s";
+  if (s < 60) return std::to_string(s) + " s";
+  if (s < 3600) return std::to_string(s / 60) + " min " + std::to_string(s % 60) + " s";
+  return std::to_string(s / 3600) + " h " + std::to_string(s / 60 % 60) + " min";
+}
+
+// "about 12 min", "less than a minute".
+std::string rough_duration(double seconds) {
+  const auto minutes = static_cast<long>(std::ceil(seconds / 60.0));
+  if (minutes <= 1) return "less than a minute";
+  if (minutes < 90) return "about " + std::to_string(minutes) + " min";
+  return "about " + fixed(seconds / 3600.0, 1) + " h";
+}
 
 std::string now_text() {
   const std::time_t now = std::time(nullptr);
@@ -51,7 +72,10 @@ class StepsRun {
            SignalWatch& signals, StepDisplay& display)
       : steps_(steps), results_(results), again_(again), signals_(signals), display_(display) {
     fs::create_directories(results / "logs");
-    for (const Step& step : steps) times_.add(step.command.front(), thought_s(step));
+    std::vector<StepDisplay::Thought> thoughts;
+    for (const Step& step : steps)
+      thoughts.push_back({step.title, step.command.front(), thought_s(step)});
+    display.expect(std::move(thoughts));
   }
 
   StepsOutcome run() {
@@ -147,8 +171,7 @@ class StepsRun {
     const auto earlier = read_record(results_, step.name);
     const auto written_before = written(step);
     const double start_s = steady_now_s();
-    display_.start(index + 1, steps_.size(), step.title, times_.expected_s(index),
-                   times_.later_s(index), start_s);
+    display_.start(index, start_s);
     std::string problem;
     try {
       prepare(step, record);
@@ -161,7 +184,6 @@ class StepsRun {
     record.seconds = steady_now_s() - start_s;
     if (problem.empty()) {
       write_record(results_, record);
-      times_.note(index, record.seconds);
       ++outcome_.made;
     } else {
       // What was not touched still is what the earlier record says.
@@ -213,7 +235,6 @@ class StepsRun {
   bool again_;
   SignalWatch& signals_;
   StepDisplay& display_;
-  StepTimes times_;
   std::set<std::string> pending_;                  // steps that will be run, for the time left
   std::map<std::string, std::string> failure_of_;  // step: the one whose failure holds it up
   std::map<std::string, std::string> held_up_;     // that one: the names of those it holds up
@@ -222,6 +243,64 @@ class StepsRun {
 };
 
 }  // namespace
+
+StepDisplay StepDisplay::standard_output() {
+  winsize size{};
+  const bool known = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return {std::cout, isatty(STDOUT_FILENO) == 1, known ? size.ws_col : 80};
+}
+
+void StepDisplay::start(std::size_t index, double now_s) {
+  index_ = index;
+  start_s_ = drawn_s_ = now_s;
+}
+
+double StepDisplay::expected_s(std::size_t index) const {
+  const auto& [title, program, thought_s] = steps_.at(index);
+  const auto pace = paces_.find(program);
+  if (pace == paces_.end() || !(pace->second.thought_s > 0.0)) return thought_s;
+  return thought_s * pace->second.took_s / pace->second.thought_s;
+}
+
+std::string StepDisplay::heading() const {
+  return '[' + std::to_string(index_ + 1) + '/' + std::to_string(steps_.size()) + "] " +
+         steps_.at(index_).title;
+}
+
+std::string StepDisplay::text(const std::string& line, double now_s) const {
+  const double elapsed_s = now_s - start_s_;
+  double later_s = 0.0;
+  for (std::size_t k = index_ + 1; k < steps_.size(); ++k) later_s += expected_s(k);
+  // What takes longer than expected may end at once or late: no promise then.
+  const std::string left =
+      elapsed_s <= expected_s(index_)
+          ? rough_duration(expected_s(index_) - elapsed_s + later_s) + " left"
+          : "longer than expected" + (later_s > 0.0 ? ", then " + rough_duration(later_s) : "");
+  return heading() + ": " + duration(elapsed_s) + ", " + left +
+         (line.empty() ? std::string() : " | " + line);
+}
+
+void StepDisplay::update(const std::string& line, double now_s) {
+  if (now_s - start_s_ < kQuiet_s) return;
+  if (now_s - drawn_s_ < (terminal_ ? kRedrawInterval_s : kPlainInterval_s)) return;
+  drawn_s_ = now_s;
+  if (terminal_)
+    output_ << "\r\x1b[K"
+            << text(line, now_s).substr(0, static_cast<std::size_t>(std::max(width_, 20) - 1))
+            << std::flush;
+  else
+    output_ << text(line, now_s) << std::endl;
+}
+
+void StepDisplay::finish(const std::string& result, double now_s) {
+  output_ << (terminal_ ? "\r\x1b[K" : "") << heading() << ": " << result << " in "
+          << duration(now_s - start_s_) << std::endl;
+  if (result != "done") return;  // says nothing of how long the next ones take
+  const auto& [title, program, thought_s] = steps_.at(index_);
+  Pace& pace = paces_[program];
+  pace.took_s += now_s - start_s_;
+  pace.thought_s += thought_s;
+}
 
 StepsOutcome run_steps(const std::vector<Step>& steps, const fs::path& results, bool again,
                        SignalWatch& signals, StepDisplay& display) {

@@ -1,21 +1,25 @@
 #include "apps/experiments/step_record.hpp"
 
-#include <yaml-cpp/yaml.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "apps/output_file.hpp"
-#include "modules/core/json_writer.hpp"
+#include "modules/core/json.hpp"
 
 #include "commit.hpp"  // written by the build
 
 namespace km {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Machine, processor, cores, memory_gb, load)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StepRecord, step, fingerprint, command, started, seconds, commit,
+                                   machine)
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -116,45 +120,17 @@ std::string fingerprint_of(const Step& step) {
 }
 
 std::optional<StepRecord> read_record(const fs::path& results, const std::string& step) try {
-  const fs::path file = record_file(results, step);
-  if (!fs::is_regular_file(file)) return std::nullopt;
-  const YAML::Node root = YAML::LoadFile(file.string());
-  const YAML::Node machine = root["machine"];
-  StepRecord record;
-  record.step = root["step"].as<std::string>();
-  record.fingerprint = root["fingerprint"].as<std::string>();
-  record.command = root["command"].as<std::vector<std::string>>();
-  record.started = root["started"].as<std::string>();
-  record.seconds = root["seconds"].as<double>();
-  record.commit = root["commit"].as<std::string>();
-  record.machine = {machine["processor"].as<std::string>(), machine["cores"].as<unsigned>(),
-                    machine["memory_gb"].as<double>(), machine["load"].as<double>()};
-  return record;
-} catch (const YAML::Exception&) {
+  std::ifstream file(record_file(results, step));
+  if (!file) return std::nullopt;
+  return nlohmann::json::parse(file).get<StepRecord>();
+} catch (const nlohmann::json::exception&) {
   return std::nullopt;  // cut short by a full disk, say: the step is done again
 }
 
 void write_record(const fs::path& results, const StepRecord& record) {
   const fs::path file = record_file(results, record.step);
   fs::create_directories(file.parent_path());
-  write_output(file, [&](std::ostream& out) {
-    JsonWriter json(out);
-    json.begin_object();
-    json.field("step", record.step);
-    json.field("fingerprint", record.fingerprint);
-    json.array("command", record.command);
-    json.field("started", record.started);
-    json.field("seconds", record.seconds);
-    json.field("commit", record.commit);
-    json.key("machine");
-    json.begin_object();
-    json.field("processor", record.machine.processor);
-    json.field("cores", record.machine.cores);
-    json.field("memory_gb", record.machine.memory_gb);
-    json.field("load", record.machine.load);
-    json.end_object();
-    json.end_object();
-  });
+  write_output(file, [&](std::ostream& out) { out << json_text(nlohmann::json(record)); });
 }
 
 const char* to_string(StepState state) {

@@ -2,9 +2,8 @@
 #include <cmath>
 
 #include "apps/experiments/paper_results.hpp"
-#include "apps/experiments/report_sections.hpp"
-#include "apps/experiments/spread.hpp"
-#include "apps/team/text_table.hpp"
+#include "apps/experiments/report.hpp"
+#include "modules/core/text_table.hpp"
 
 namespace km {
 namespace {
@@ -12,6 +11,10 @@ namespace {
 constexpr double kMostRbcdGap_percent = 7.0;  // the paper's largest
 constexpr double kMostBestGap_percent = 0.01;
 constexpr double kMostDrift_percent = 0.5;
+
+double error_m(const PgoNumbers& numbers) {
+  return numbers.error_m.value_or(NAN);
+}
 
 // Rounding leaves the cost of the optimum itself a hair below or above.
 double gap_percent(const PgoNumbers& numbers) {
@@ -66,8 +69,9 @@ ReportTable half_table(ReportInput& input, const std::vector<ReportInput::World>
     std::vector<ReportCell> row{{world.config->title}};
     std::vector<double> distributed;
     for (const PgoMethodConfig& method : input.config().methods) {
-      const PgoNumbers* const pgo = input.pgo(*world.config, method);
-      const double value = pgo == nullptr ? NAN : error ? pgo->error_m.value_or(NAN) : pgo->cost;
+      const double value = of_method(input, world, method.name, [&](const PgoNumbers& pgo) {
+        return error ? error_m(pgo) : pgo.cost;
+      });
       ReportCell& cell = row.emplace_back(ReportCell{significant(value, error ? 3 : 5)});
       if (const auto column = paper_column(method.name); paper != nullptr && column)
         cell.paper = paper_text(error ? paper->ate_m[*column] : paper->cost[*column]);
@@ -100,9 +104,8 @@ ReportTable gap_table(ReportInput& input, const std::vector<ReportInput::World>&
     std::vector<ReportCell> row{{world.config->title}};
     for (const PgoMethodConfig& method : input.config().methods) {
       if (method.name == "centralized") continue;
-      const PgoNumbers* const pgo = input.pgo(*world.config, method);
-      ReportCell& cell = row.emplace_back(ReportCell{"-"});
-      if (pgo != nullptr) cell.text = significant(gap_percent(*pgo), 2);
+      ReportCell& cell = row.emplace_back(
+          ReportCell{significant(of_method(input, world, method.name, gap_percent), 2)});
       if (const auto column = paper_column(method.name); paper != nullptr && column)
         cell.paper = significant(100.0 * (paper->cost[*column] / paper->cost.back() - 1.0), 2);
     }
@@ -158,22 +161,11 @@ ReportTable spread_table(ReportInput& input, const std::vector<ReportInput::Worl
   for (const auto& world : worlds) {
     const std::vector<ReportInput::World> runs = input.runs_of(*world.config);
     if (runs.size() < 2) continue;
-    const auto over_runs = [&](const auto& value) {
-      std::vector<double> values;
-      for (const auto& run : runs) values.push_back(value(run));
-      return spread_of(std::move(values));
-    };
     const auto error = [&](const char* method) {
-      return spread_cell(over_runs([&](const auto& run) {
-                           const PgoNumbers* const pgo = input.pgo(*run.config, method);
-                           return pgo == nullptr ? NAN : pgo->error_m.value_or(NAN);
-                         }),
-                         4);
+      return spread_cell(
+          spread_over(runs, [&](auto& run) { return of_method(input, run, method, error_m); }), 4);
     };
-    const auto gap = [&](const auto& run) {
-      const PgoNumbers* const pgo = input.pgo(*run.config, "rbcd");
-      return pgo == nullptr ? NAN : gap_percent(*pgo);
-    };
+    const auto gap = [&](auto& run) { return of_method(input, run, "rbcd", gap_percent); };
     const auto odometry_m = [](const auto& run) {
       double sum_m = 0.0;
       for (const RobotNumbers& robot : run.results->robots)
@@ -187,9 +179,9 @@ ReportTable spread_table(ReportInput& input, const std::vector<ReportInput::Worl
                           error("rbcd"),
                           error("newton"),
                           error("vertical"),
-                          spread_cell(over_runs(gap), 4),
-                          spread_cell(over_runs(odometry_m), 4),
-                          spread_cell(over_runs(closures), 0)});
+                          spread_cell(spread_over(runs, gap), 4),
+                          spread_cell(spread_over(runs, odometry_m), 4),
+                          spread_cell(spread_over(runs, closures), 0)});
   }
   table.note =
       "The tables above are of the first run. Further runs are on the same recordings, or on those "
@@ -203,14 +195,9 @@ void add_optimisation_targets(ReportInput& input, const ReportInput::World& worl
   const std::vector<ReportInput::World> runs = input.runs_of(*world.config);
   const PaperWorld* const paper = paper_world(world.config->name);
   const auto add_ratio = [&](const char* method, const char* what) {
-    std::vector<double> ratios;
-    for (const auto& run : runs) {
-      const PgoNumbers* const local = input.pgo(*run.config, "local");
-      const PgoNumbers* const pgo = input.pgo(*run.config, method);
-      if (local != nullptr && pgo != nullptr && local->error_m && pgo->error_m)
-        ratios.push_back(*pgo->error_m / *local->error_m);
-    }
-    const Spread ratio = spread_of(ratios);
+    const Spread ratio = spread_over(runs, [&](auto& run) {
+      return of_method(input, run, method, error_m) / of_method(input, run, "local", error_m);
+    });
     if (ratio.count == 0 || paper == nullptr) return;
     const double wanted = paper->ate_m[1] / paper->ate_m[0];
     input.add_target({std::string("ATE of ") + what + " over that of local PGO",
@@ -220,15 +207,12 @@ void add_optimisation_targets(ReportInput& input, const ReportInput::World& worl
   add_ratio("rbcd", "RBCD");
   add_ratio("vertical", "our best, with the vertical,");
   const auto add_gap = [&](const char* method, const char* what, double most_percent) {
-    std::vector<double> percents;
-    for (const auto& run : runs)
-      if (const PgoNumbers* const pgo = input.pgo(*run.config, method))
-        percents.push_back(gap_percent(*pgo));
-    if (percents.empty()) return;
-    const double percent = *std::max_element(percents.begin(), percents.end());
+    const Spread percent =
+        spread_over(runs, [&](auto& run) { return of_method(input, run, method, gap_percent); });
+    if (percent.count == 0) return;
     input.add_target({std::string("cost of ") + what + " above the optimum", world.config->title,
-                      "at most " + paper_text(most_percent) + " %", significant(percent, 2) + " %",
-                      percent <= most_percent});
+                      "at most " + paper_text(most_percent) + " %",
+                      significant(percent.highest, 2) + " %", percent.highest <= most_percent});
   };
   add_gap("rbcd", "RBCD", kMostRbcdGap_percent);
   add_gap("newton", "our best", kMostBestGap_percent);
@@ -255,8 +239,8 @@ void add_odometry_targets(ReportInput& input, const ReportInput::World& world) {
 std::optional<ReportSection> trajectory_section(ReportInput& input) {
   const auto worlds = input.worlds(input.config().trajectory_worlds);
   if (worlds.empty()) return std::nullopt;
-  ReportSection section{.id = "trajectory", .title = "Trajectories", .blocks = {}};
-  section.blocks.emplace_back(ReportParagraph{
+  ReportSection section{.id = "trajectory", .title = "Trajectories"};
+  section.add(ReportParagraph{
       "A team runs in each world. The pose graph it ends with, its odometry and the closures it "
       "kept, is then solved from the same start by every method: local PGO joins the robots' own "
       "solutions by one closure each; RBCD, RBCD stopped after 50 rounds, DGS and our distributed "
@@ -265,14 +249,13 @@ std::optional<ReportSection> trajectory_section(ReportInput& input) {
       "graph, which is not counted; the Newton method's team finds its start itself. The running "
       "robots also know at each keyframe which way is up and let it count (“with the vertical”); "
       "the paper's methods do without."});
-  section.blocks.emplace_back(inputs_table(worlds));
-  section.blocks.emplace_back(half_table(input, worlds, true));
-  section.blocks.emplace_back(half_table(input, worlds, false));
-  section.blocks.emplace_back(gap_table(input, worlds));
-  section.blocks.emplace_back(plots(input, worlds));
-  section.blocks.emplace_back(odometry_table(worlds));
-  if (ReportTable table = spread_table(input, worlds); !table.rows.empty())
-    section.blocks.emplace_back(std::move(table));
+  section.add(inputs_table(worlds));
+  section.add(half_table(input, worlds, true));
+  section.add(half_table(input, worlds, false));
+  section.add(gap_table(input, worlds));
+  section.add(plots(input, worlds));
+  section.add(odometry_table(worlds));
+  section.add(spread_table(input, worlds));
   for (const auto& world : worlds) add_optimisation_targets(input, world);
   for (const auto& world : worlds) add_odometry_targets(input, world);
   return section;

@@ -2,10 +2,11 @@
 
 #include <fstream>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <stdexcept>
 
-#include "apps/experiments/json_numbers.hpp"
+#include "apps/robot/run_summary.hpp"
 #include "apps/team/team_file.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
@@ -19,25 +20,30 @@ std::optional<double> scaled(const std::optional<double>& value, double factor) 
   return value ? std::optional<double>(factor * *value) : std::nullopt;
 }
 
-MeshNumbers mesh_numbers(const YAML::Node& mesh) {
-  return {number_at(mesh, "truth_to_estimate.point.mean_m"),
-          number_at(mesh, "seen_truth_to_estimate.point.mean_m"),
-          scaled(number_at(mesh, "truth_to_estimate.labels.accuracy"), 100.0),
-          scaled(number_at(mesh, "seen_truth_to_estimate.labels.accuracy"), 100.0),
-          number_at(mesh, "estimate_to_truth.point.mean_m")};
+MeshNumbers mesh_numbers(const Json& mesh) {
+  return {number_at(mesh, "/truth_to_estimate/point/mean_m"),
+          number_at(mesh, "/seen_truth_to_estimate/point/mean_m"),
+          scaled(number_at(mesh, "/truth_to_estimate/labels/accuracy"), 100.0),
+          scaled(number_at(mesh, "/seen_truth_to_estimate/labels/accuracy"), 100.0),
+          number_at(mesh, "/estimate_to_truth/point/mean_m")};
 }
 
-// The entry of a list of objects that has this name.
-YAML::Node named(const YAML::Node& list, const std::string& name) {
-  if (list && list.IsSequence())
-    for (const YAML::Node& entry : list)
-      if (entry.IsMap() && entry["name"].as<std::string>("") == name) return entry;
-  return YAML::Node(YAML::NodeType::Undefined);
+// A part of the document; null if it is not there.
+Json part_of(const Json& json, const char* pointer) {
+  const Json::json_pointer at(pointer);
+  return json.contains(at) ? json.at(at) : Json();
 }
 
-MeshPair mesh_of(const YAML::Node& team, const std::string& robot) {
-  return {mesh_numbers(named(node_at(team, "meshes.robots"), robot)),
-          mesh_numbers(named(node_at(team, "optimized_meshes.robots"), robot))};
+// The entry of a list of objects that has this name; empty if there is none.
+Json named(const Json& json, const char* list, const std::string& name) {
+  for (const Json& entry : part_of(json, list))
+    if (entry.value("name", "") == name) return entry;
+  return Json::object();
+}
+
+MeshPair mesh_of(const Json& team, const std::string& robot) {
+  return {mesh_numbers(named(team, "/meshes/robots", robot)),
+          mesh_numbers(named(team, "/optimized_meshes/robots", robot))};
 }
 
 std::string text_of(const fs::path& file) {
@@ -84,31 +90,30 @@ void add_truth(const fs::path& truth, RobotNumbers& robot) {
 }
 
 // What the robot took of its host.
-void add_process(const fs::path& run, const YAML::Node& summary, RobotNumbers& robot) {
+void add_process(const fs::path& run, const RunSummary& summary, RobotNumbers& robot) {
   robot.module_s = module_seconds(run / "timing.csv");
-  robot.processor_s = number_at(summary, "process.cpu_s");
-  robot.peak_memory_mb = scaled(number_at(summary, "process.peak_memory_bytes"), 1e-6);
+  if (!(summary.process.cpu_s > 0.0)) return;  // made by an older robot, which did not say
+  robot.processor_s = summary.process.cpu_s;
+  robot.peak_memory_mb = 1e-6 * static_cast<double>(summary.process.peak_memory_bytes);
 }
 
-RobotNumbers read_robot(const YAML::Node& team, const RobotPlan& plan, const fs::path& run) {
+RobotNumbers read_robot(const Json& team, const RobotPlan& plan, const fs::path& run) {
+  const RunSummary summary = read_summary(run / plan.name / "summary.json");
   RobotNumbers robot;
   robot.name = plan.name;
   add_truth(plan.truth, robot);
-  const YAML::Node own = named(team["robots"], plan.name);
-  robot.keyframes = static_cast<std::size_t>(number_at(own, "keyframes").value_or(0.0));
-  if (const YAML::Node joined = node_at(own, "in_team_frame"); joined && joined.IsScalar())
-    robot.in_team_frame = joined.as<bool>(true);
-  robot.odometry_error_m = number_at(own, "odometry.position_m.rmse");
+  const Json own = named(team, "/robots", plan.name);
+  robot.keyframes = summary.keyframes;
+  robot.in_team_frame = own.value("in_team_frame", true);
+  robot.odometry_error_m = number_at(own, "/odometry/position_m/rmse");
   robot.optimized_error_m =
-      number_at(named(node_at(team, "optimized.robots"), plan.name), "position_m.rmse");
-  if (const YAML::Node traffic = node_at(own, "traffic"); traffic && traffic.IsMap())
-    for (const auto& entry : traffic)
-      robot.sent_bytes[entry.first.Scalar()] = entry.second.as<double>(0.0);
-  const YAML::Node summary = read_json(run / plan.name / "summary.json");
+      number_at(named(team, "/optimized/robots", plan.name), "/position_m/rmse");
+  for (const auto& [category, bytes] : summary.traffic)
+    robot.sent_bytes[category] = static_cast<double>(bytes);
   add_process(run / plan.name, summary, robot);
-  const auto keypoints = number_at(summary, "keypoints");
-  robot.keyframe_bytes = keypoints && robot.keyframes > 0
-                             ? *keypoints * kKeypointBytes / static_cast<double>(robot.keyframes)
+  robot.keyframe_bytes = summary.keypoints > 0 && robot.keyframes > 0
+                             ? static_cast<double>(summary.keypoints) * kKeypointBytes /
+                                   static_cast<double>(robot.keyframes)
                              : mean_keyframe_bytes(run / plan.name / "traffic.csv");
   robot.mesh = mesh_of(team, plan.name);
   return robot;
@@ -119,16 +124,15 @@ void describe_images(const WorldFiles& files, WorldResults& results) {
   results.image_pixels = kEuRocPixels;
   results.images = "EuRoC's images, 752x480";
   if (files.original) return;
-  const YAML::Node parameters =
-      node_at(read_json(files.recordings / "simulation.json"), "parameters");
-  if (!parameters || !parameters.IsMap()) return;
-  const auto resolution = parameters["resolution"].as<std::string>("752x480");
+  const Json parameters = part_of(read_json(files.recordings / "simulation.json"), "/parameters");
+  if (!parameters.is_object()) return;
+  const std::string resolution = parameters.value("resolution", "752x480");
   std::istringstream size(resolution);
   std::size_t width = 0, height = 0;
   char cross = 0;
   if (size >> width >> cross >> height) results.image_pixels = width * height;
-  results.images = resolution + ", " + parameters["rig"].as<std::string>("stereo") + ", seed " +
-                   parameters["seed"].as<std::string>("?");
+  results.images = resolution + ", " + parameters.value("rig", "stereo") + ", seed " +
+                   parameters.value("seed", "?");
 }
 
 }  // namespace
@@ -149,7 +153,7 @@ double WorldResults::sent_mb(const std::string& category) const {
 
 RobotNumbers read_lone_robot(const fs::path& run) {
   RobotNumbers robot;
-  add_process(run, read_json(run / "summary.json"), robot);
+  add_process(run, read_summary(run / "summary.json"), robot);
   const std::vector<StampedPose> poses = read_trajectory(run / "odometry.tum");
   if (poses.empty()) throw std::runtime_error((run / "odometry.tum").string() + ": no poses");
   robot.recorded_s = 1e-9 * static_cast<double>(poses.back().stamp - poses.front().stamp);
@@ -159,15 +163,15 @@ RobotNumbers read_lone_robot(const fs::path& run) {
 WorldResults read_world_results(const WorldConfig& world, const ExperimentPaths& paths) {
   const WorldFiles files = world_files(world, paths);
   const TeamPlan plan = read_team_file(files.team_file, {});
-  const YAML::Node team = read_json(files.team_json);
+  const Json team = read_json(files.team_json);
   WorldResults results;
   for (const RobotPlan& robot : plan.robots)
     results.robots.push_back(read_robot(team, robot, files.run));
-  results.joint_error_m = number_at(team, "optimized.joint.position_m.rmse");
-  results.mesh = {mesh_numbers(node_at(team, "meshes.merged")),
-                  mesh_numbers(node_at(team, "optimized_meshes.merged"))};
-  results.closures = number_at(team, "closures.inliers.judged");
-  results.true_closures = number_at(team, "closures.inliers.correct");
+  results.joint_error_m = number_at(team, "/optimized/joint/position_m/rmse");
+  results.mesh = {mesh_numbers(part_of(team, "/meshes/merged")),
+                  mesh_numbers(part_of(team, "/optimized_meshes/merged"))};
+  results.closures = number_at(team, "/closures/inliers/judged");
+  results.true_closures = number_at(team, "/closures/inliers/correct");
   describe_images(files, results);
   return results;
 }

@@ -1,8 +1,12 @@
 #pragma once
 
-namespace CLI {
-class App;
-}
+#include <CLI/CLI.hpp>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+
+#include "apps/output_file.hpp"
+#include "modules/pgo_study/team_graph.hpp"
 
 namespace km {
 
@@ -11,5 +15,46 @@ namespace km {
 void add_solve(CLI::App& app);
 void add_pcm(CLI::App& app);
 void add_outliers(CLI::App& app);
+
+/// Files that a subcommand writes beside its table.
+struct ReportFiles {
+  std::filesystem::path json, plot;
+
+  /// Defines --json and --plot, with what they have in them.
+  void define(CLI::App& app, const std::string& in_json, const std::string& in_plot) {
+    app.add_option("--json", json, "Also write " + in_json + " to this file, as JSON");
+    app.add_option("--plot", plot, "Also draw " + in_plot + ", as SVG");
+  }
+
+  /// As check_output_folder(), before the work.
+  void check() const {
+    check_output_folder(json);
+    check_output_folder(plot);
+  }
+
+  /// `write_json(std::ostream&)`; `draw()` makes the text of the SVG.
+  void write(const auto& write_json, const auto& draw) const {
+    write_output(json, write_json);
+    write_output(plot, [&](std::ostream& out) { out << draw(); });
+  }
+};
+
+/// The pose graph of a team, as the command line names it.
+struct GraphInput {
+  std::filesystem::path file = {};
+  std::size_t robots = 1;
+  std::string partition = "contiguous";
+
+  /// Defines FILE, --robots and --partition, which fill this: it outlives `app`.
+  void define(CLI::App& app);
+
+  /// Throws std::runtime_error if there is no such graph, and if --robots was given to `app` and is
+  /// not their number.
+  [[nodiscard]] TeamGraph read(const CLI::App& app) const;
+};
+
+/// What to say of edges that were weighed by the blocks of their information matrix alone, since it
+/// is not positive definite, as SE-Sync reads them; nothing if there are none.
+[[nodiscard]] std::string indefinite_text(std::size_t edges);
 
 }  // namespace km

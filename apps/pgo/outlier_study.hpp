@@ -12,6 +12,14 @@
 
 namespace km {
 
+/// Which edges of a graph pairwise consistency maximisation keeps: odometry, and of the closures
+/// between two robots, or inside one, the largest set that agrees pairwise, see Pcm. Closures come
+/// in the order of the edges; a second one from the same pose to the same pose is dropped. Sigmas
+/// of all edges are taken to be `noise_scale` times those of the graph.
+/// Throws std::invalid_argument if a robot's odometry is interrupted, and as Pcm does.
+[[nodiscard]] std::vector<bool> pairwise_consistent(const TeamGraph& graph, const PcmConfig& config,
+                                                    double noise_scale = 1.0);
+
 /// How false closures are kept out: not at all; by pairwise consistency; by newton; by newton on
 /// what pairwise consistency leaves. The first two end with newton --trust-all.
 inline const std::vector<std::string> kRejections = {"none", "pcm", "newton", "pcm+newton"};

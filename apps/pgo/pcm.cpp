@@ -6,11 +6,9 @@
 #include <stdexcept>
 
 #include "apps/evaluate/stage_progress.hpp"
-#include "apps/pgo/closure_input.hpp"
 #include "apps/pgo/commands.hpp"
-#include "apps/pgo/graph_input.hpp"
 #include "apps/pgo/pcm_report.hpp"
-#include "apps/pgo/report_files.hpp"
+#include "apps/pgo/pcm_run.hpp"
 
 namespace km {
 namespace {

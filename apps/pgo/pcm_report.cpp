@@ -1,14 +1,14 @@
 #include "apps/pgo/pcm_report.hpp"
 
 #include <algorithm>
-#include <limits>
+#include <nlohmann/json.hpp>
 #include <numeric>
 #include <ostream>
 #include <vector>
 
-#include "apps/team/text_table.hpp"
-#include "modules/core/json_writer.hpp"
-#include "modules/evaluation/curve_plot.hpp"
+#include "modules/core/json.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/evaluation/plot.hpp"
 #include "modules/evaluation/statistics.hpp"
 
 namespace km {
@@ -16,7 +16,6 @@ namespace {
 
 constexpr std::size_t kRows = 10;
 constexpr std::size_t kWindow = 50;  // additions that a median is over
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();  // no point, null in JSON
 
 using Additions = std::span<const PcmAddition>;
 
@@ -83,16 +82,16 @@ std::string totals_text(const PcmRun& run) {
                      : "no proof of a maximum after " + std::to_string(unproven) + " additions\n");
 }
 
-std::vector<CurvePoint> points(Additions additions, const auto& ordinate) {
-  std::vector<CurvePoint> result;
+std::vector<PlotPoint> points(Additions additions, const auto& ordinate) {
+  std::vector<PlotPoint> result;
   for (const PcmAddition& a : additions)
     result.push_back({static_cast<double>(a.vertices), static_cast<double>(ordinate(a))});
   return result;
 }
 
 // Medians over the additions around every point: single times are noise.
-std::vector<CurvePoint> running_median_ms(Additions additions, double PcmAddition::*member) {
-  std::vector<CurvePoint> result;
+std::vector<PlotPoint> running_median_ms(Additions additions, double PcmAddition::*member) {
+  std::vector<PlotPoint> result;
   for (std::size_t n = 0; n < additions.size(); n += kWindow / 5) {
     const std::size_t first = n - std::min(n, kWindow / 2);
     const Additions around = additions.subspan(first, std::min(kWindow, additions.size() - first));
@@ -113,52 +112,46 @@ std::string pcm_text(const PcmRun& run) {
 }
 
 void write_pcm_json(std::ostream& out, std::span<const PcmRun> runs) {
-  JsonWriter json(out);
-  if (runs.size() != 1) json.begin_array();
+  Json all = Json::array();
   for (const PcmRun& run : runs) {
-    json.begin_object();
-    json.field("search", run.search);
-    json.objects("additions", run.additions, [&](const PcmAddition& a) {
-      const double true_members = a.true_members ? static_cast<double>(*a.true_members) : kNone;
-      json.fields("vertices", a.vertices, "check_s", a.check_s, "search_s", a.search_s, "clique",
-                  a.clique, "true_members", true_members, "false_members",
-                  static_cast<double>(a.clique) - true_members);
-    });
-    json.end_object();
+    Json additions = Json::array();
+    for (const PcmAddition& a : run.additions)
+      additions.push_back(
+          {{"vertices", a.vertices},
+           {"check_s", a.check_s},
+           {"search_s", a.search_s},
+           {"clique", a.clique},
+           {"true_members", a.true_members ? Json(*a.true_members) : Json()},
+           {"false_members", a.true_members ? Json(a.clique - *a.true_members) : Json()}});
+    all.push_back({{"search", run.search}, {"additions", std::move(additions)}});
   }
-  if (runs.size() != 1) json.end_array();
+  out << json_text(runs.size() == 1 ? all.front() : all);
 }
 
 std::string pcm_plot(std::span<const PcmRun> runs) {
-  CurvePanel time{.title = "CPU time of one addition: each, and the median of 50",
-                  .x_label = "vertices",
-                  .y_label = "ms",
-                  .log_y = true,
-                  .curves = {}};
-  CurvePanel size{.title = "Size of the clique",
-                  .x_label = "vertices",
-                  .y_label = "closures",
-                  .log_y = false,
-                  .curves = {}};
+  Plot time{.title = "CPU time of one addition: each, and the median of 50",
+            .x_label = "vertices",
+            .y_label = "ms",
+            .log_y = true};
+  Plot size{.title = "Size of the clique", .x_label = "vertices", .y_label = "closures"};
   for (std::size_t colour = 0; colour < runs.size(); ++colour) {
     const std::string& search = runs[colour].search;
     const Additions additions(runs[colour].additions);
-    time.curves.push_back(
-        {"", points(additions, [](const auto& a) { return 1e3 * a.search_s; }), colour, true});
-    time.curves.push_back(
-        {search, running_median_ms(additions, &PcmAddition::search_s), colour, false});
-    size.curves.push_back(
-        {search, points(additions, [](const auto& a) { return a.clique; }), colour, false});
+    time.series.push_back({"", points(additions, [](const auto& a) { return 1e3 * a.search_s; }),
+                           colour, PlotSeries::Style::kDots});
+    time.series.push_back({search, running_median_ms(additions, &PcmAddition::search_s), colour});
+    size.series.push_back(
+        {search, points(additions, [](const auto& a) { return a.clique; }), colour});
   }
   const Additions first = runs.empty() ? Additions() : Additions(runs.front().additions);
   if (total(first, &PcmAddition::check_s) > 0.0)
-    time.curves.push_back({"consistency checks", running_median_ms(first, &PcmAddition::check_s),
-                           runs.size(), false});
+    time.series.push_back(
+        {"consistency checks", running_median_ms(first, &PcmAddition::check_s), runs.size()});
   if (!first.empty() && first.back().true_vertices)
-    size.curves.push_back({"true closures added",
+    size.series.push_back({"true closures added",
                            points(first, [](const auto& a) { return a.true_vertices.value_or(0); }),
-                           runs.size(), false});
-  return plot_curves(std::vector{time, size});
+                           runs.size()});
+  return draw_plots(std::vector{time, size});
 }
 
 }  // namespace km

@@ -1,13 +1,22 @@
 #include "apps/pgo/pcm_run.hpp"
 
 #include <algorithm>
+#include <istream>
+#include <iterator>
+#include <limits>
+#include <random>
+#include <span>
 #include <stdexcept>
-#include <utility>
 
-#include "apps/pgo/cpu_time.hpp"
+#include "apps/pgo/solvers.hpp"
+#include "modules/core/text_rows.hpp"
 #include "modules/outlier_rejection/cycle_test.hpp"
 #include "modules/outlier_rejection/max_clique.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
+#include "modules/outlier_rejection/random_outliers.hpp"
+#include "modules/pose_graph/g2o_io.hpp"
+#include "modules/pose_graph/recorded_graph.hpp"
+#include "modules/pose_graph/text_fields.hpp"
 
 namespace km {
 namespace {
@@ -89,6 +98,110 @@ std::string to_string(CliqueMethod method) {
   return method == CliqueMethod::kExact         ? "exact"
          : method == CliqueMethod::kIncremental ? "incremental"
                                                 : "batch";
+}
+
+namespace {
+
+constexpr std::int64_t kMaxIndex = std::numeric_limits<std::uint32_t>::max();
+constexpr std::int64_t kMostVertices = 100000;  // their adjacency is more than a gigabyte of bits
+
+std::string text_of(std::istream& in, const std::string& file) {
+  std::string text(std::istreambuf_iterator<char>(in), {});
+  if (in.bad()) throw std::runtime_error(file + ": cannot be read to its end");
+  return text;
+}
+
+std::vector<std::size_t> read_neighbours(TextFields& fields, std::size_t vertex) {
+  std::set<std::size_t> earlier;
+  while (!fields.at_end()) {
+    const std::uint64_t u = fields.integer("neighbour");
+    if (u >= vertex)
+      fields.fail("neighbour " + std::to_string(u) + " of vertex " + std::to_string(vertex) +
+                  " is not an earlier one");
+    if (!earlier.insert(u).second)
+      fields.fail("a neighbour of vertex " + std::to_string(vertex) + " is given twice");
+  }
+  return {earlier.begin(), earlier.end()};
+}
+
+}  // namespace
+
+KeyframePairs read_outlier_labels(std::istream& in, const std::string& file) {
+  const std::string text = text_of(in, file);
+  KeyframePairs pairs;
+  for (const TextRow& row : split_rows(text)) {
+    TextFields fields(row, file);
+    const auto i = static_cast<std::uint32_t>(fields.integer("keyframe", kMaxIndex));
+    const auto j = static_cast<std::uint32_t>(fields.integer("keyframe", kMaxIndex));
+    const bool outlier = fields.integer("label", 1) == 1;
+    if (!fields.at_end()) fields.fail("more fields than two keyframes and a label");
+    if (outlier) pairs.insert(std::minmax(i, j));
+  }
+  return pairs;
+}
+
+ClosureInput read_closures(const std::filesystem::path& file, const KeyframePairs& false_pairs,
+                           const ClosureChoice& selection) {
+  const G2oGraph g2o = read_g2o(file);
+  const RecordedGraph graph = make_recorded_graph(g2o.edges, file.string());
+  if (!graph.inter_closures.empty())
+    throw std::runtime_error(file.string() + ": has closures between robots, must hold one robot");
+  const std::vector<RelativePose>& closures = graph.intra_closures;
+  if (closures.empty()) throw std::runtime_error(file.string() + ": has no loop closure");
+  if (selection.keep > closures.size())
+    throw std::runtime_error(file.string() + ": has " + std::to_string(closures.size()) +
+                             " loop closures, " + std::to_string(selection.keep) +
+                             " were asked for");
+
+  const std::vector<OdometryPose> poses = odometry_poses(graph);
+  std::vector<LabelledClosure> labelled;
+  const auto add = [&](const RelativePose& edge, bool outlier) {
+    labelled.push_back({{poses.at(edge.from.index), poses.at(edge.to.index), edge.T_from_to,
+                         edge.covariance, 0, 0.0},
+                        outlier});
+  };
+  std::mt19937 rng(selection.seed);
+  std::vector<RelativePose> kept = closures;
+  if (selection.keep > 0) {
+    kept.clear();
+    std::sample(closures.begin(), closures.end(), std::back_inserter(kept), selection.keep, rng);
+  }
+  for (const RelativePose& edge : kept)
+    add(edge, false_pairs.contains(std::minmax({edge.from.index, edge.to.index})));
+  if (selection.outliers > 0)
+    for (const RelativePose& edge : random_outliers(selection.outliers,
+                                                    {.robot = graph.robot,
+                                                    .keyframes = graph.poses(),
+                                                    .planar = g2o.dimension == 2,
+                                                    .half_side_m = selection.outlier_half_side_m,
+                                                    .covariance = closures.front().covariance},
+                                                    rng))
+      add(edge, true);
+  if (selection.shuffle) std::shuffle(labelled.begin(), labelled.end(), rng);
+  return {std::move(labelled), g2o.indefinite_edges};
+}
+
+ConsistencyRows read_consistency_rows(std::istream& in, const std::string& file) {
+  const std::string text = text_of(in, file);
+  const std::vector<TextRow> table = split_rows(text);  // without the empty lines of lone vertices
+  if (table.empty() || table.front().line != 1)
+    throw std::runtime_error(file + ":1: must be the number of vertices");
+  TextFields header(table.front(), file);
+  const std::uint64_t vertices = header.integer("number of vertices", kMostVertices);
+  if (!header.at_end()) header.fail("more than the number of vertices");
+  const auto lines = static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n')) +
+                     (text.ends_with('\n') ? 0 : 1);
+  if (lines <= vertices)
+    throw std::runtime_error(file + ": ends after " + std::to_string(lines) + " lines, " +
+                             std::to_string(vertices) + " vertices need one each and the first");
+  ConsistencyRows rows(vertices);
+  for (const TextRow& row : std::span(table).subspan(1)) {
+    const auto v = static_cast<std::size_t>(row.line) - 2;
+    TextFields fields(row, file);
+    if (v >= vertices) fields.fail("more lines than vertices");
+    rows[v] = read_neighbours(fields, v);
+  }
+  return rows;
 }
 
 }  // namespace km

@@ -7,8 +7,6 @@
 #include <stdexcept>
 
 #include "apps/pgo/commands.hpp"
-#include "apps/pgo/graph_input.hpp"
-#include "apps/pgo/report_files.hpp"
 #include "apps/pgo/solve_report.hpp"
 #include "modules/core/precision.hpp"
 #include "modules/pose_graph/g2o_io.hpp"

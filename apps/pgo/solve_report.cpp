@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <ostream>
 #include <sstream>
 
-#include "apps/pgo/graph_input.hpp"
-#include "apps/team/text_table.hpp"
-#include "modules/core/json_writer.hpp"
-#include "modules/evaluation/curve_plot.hpp"
+#include "apps/pgo/commands.hpp"
+#include "modules/core/json.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/evaluation/plot.hpp"
 
 namespace km {
 namespace {
@@ -143,34 +144,42 @@ std::string solution_text(const TeamGraph& graph, const Solution& solution) {
 }
 
 void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution) {
-  JsonWriter json(out);
-  json.begin_object();
-  json.fields("poses", graph.poses(), "edges", graph.edges.size(), "verticals",
-              graph.verticals.size(), "indefinite_edges", graph.indefinite_edges, "robots",
-              graph.robots(), "method", solution.method);
-  json.objects("rounds", solution.run.rounds, [&](const TeamRound& round) {
-    json.fields("cost", round.cost, "gradient_norm", round.gradient_norm, "bytes", round.work.bytes,
-                "critical_path_s", round.work.critical_path_s, "total_cpu_s",
-                round.work.total_cpu_s);
-  });
-  json.field("start_cpu_s", solution.start_s);
+  Json rounds = Json::array();
+  for (const TeamRound& round : solution.run.rounds)
+    rounds.push_back({{"cost", round.cost},
+                      {"gradient_norm", round.gradient_norm},
+                      {"bytes", round.work.bytes},
+                      {"critical_path_s", round.work.critical_path_s},
+                      {"total_cpu_s", round.work.total_cpu_s}});
+  Json json = {{"poses", graph.poses()},
+               {"edges", graph.edges.size()},
+               {"verticals", graph.verticals.size()},
+               {"indefinite_edges", graph.indefinite_edges},
+               {"robots", graph.robots()},
+               {"method", solution.method},
+               {"rounds", std::move(rounds)},
+               {"start_cpu_s", solution.start_s}};
   if (const auto& judged = solution.judgement) {
-    json.fields("rounded_cost", judged->rounded_cost, "relative_gap",
-                judged->certificate.relative_gap, "lambda_bound", judged->certificate.lambda_bound,
-                "certified", judged->certificate.certified, "rank", judged->rank, "optimum",
-                judged->optimum);
-    if (judged->certificate.lambda_min) json.field("lambda_min", *judged->certificate.lambda_min);
+    const Certificate& certificate = judged->certificate;
+    json.update({{"rounded_cost", judged->rounded_cost},
+                 {"relative_gap", certificate.relative_gap},
+                 {"lambda_bound", certificate.lambda_bound},
+                 {"certified", certificate.certified},
+                 {"rank", judged->rank},
+                 {"optimum", judged->optimum}});
+    if (certificate.lambda_min) json["lambda_min"] = *certificate.lambda_min;
   }
   if (const auto& decision = solution.run.decision) {
-    json.fields("noise_scale", decision->noise_scale, "barc", decision->threshold, "most_sent",
-                decision->most_sent, "most_received", decision->most_received, "decided",
-                decision->decided);
-    std::vector<std::size_t> kept;
+    json.update({{"noise_scale", decision->noise_scale},
+                 {"barc", decision->threshold},
+                 {"most_sent", decision->most_sent},
+                 {"most_received", decision->most_received},
+                 {"decided", decision->decided},
+                 {"kept", Json::array()}});
     for (std::size_t k = 0; k < decision->kept.size(); ++k)
-      if (decision->kept[k]) kept.push_back(k);
-    json.array("kept", kept);
+      if (decision->kept[k]) json["kept"].push_back(k);
   }
-  json.end_object();
+  out << json_text(json);
 }
 
 std::string gap_plot(const Solution& solution) {
@@ -180,17 +189,18 @@ std::string gap_plot(const Solution& solution) {
     return gap(solution, round) < floor;
   });
   const auto panel = [&](const char* label, const auto& abscissa) {
-    Curve curve{.name = "", .points = {}, .marks = rounds.size() <= kMostMarks};
+    PlotSeries curve;
+    if (rounds.size() <= kMostMarks) curve.style = PlotSeries::Style::kMarkedLine;
     for (std::size_t k = 0; k < rounds.size(); ++k)
       curve.points.push_back({abscissa(k), std::max(floor, gap(solution, rounds[k]))});
-    return CurvePanel{.title = solution.method + ": gap to the optimum" +
-                               (clipped ? " (none: at the bottom)" : ""),
-                      .x_label = label,
-                      .y_label = "(F - F*) / F*",
-                      .log_y = true,
-                      .curves = {std::move(curve)}};
+    return Plot{.title = solution.method + ": gap to the optimum" +
+                         (clipped ? " (none: at the bottom)" : ""),
+                .x_label = label,
+                .y_label = "(F - F*) / F*",
+                .log_y = true,
+                .series = {std::move(curve)}};
   };
-  return plot_curves(std::vector{
+  return draw_plots(std::vector{
       panel("rounds", [](std::size_t k) { return static_cast<double>(k); }),
       panel("sent by all robots [MB]",
             [&](std::size_t k) { return 1e-6 * static_cast<double>(rounds[k].work.bytes); }),

@@ -3,7 +3,7 @@
 #include <iosfwd>
 #include <string>
 
-#include "apps/pgo/solution.hpp"
+#include "apps/pgo/solvers.hpp"
 
 namespace km {
 
@@ -14,10 +14,9 @@ namespace km {
 
 /// {"poses", "edges", "verticals", "robots", "method", "rounds": [{"cost", "gradient_norm",
 /// "bytes", "critical_path_s", "total_cpu_s"}], "start_cpu_s", and "rounded_cost", "lambda_min",
-/// "certified", "rank", "optimum", or of a method that rejects "barc", "scale", "scaled_barc",
-/// "updates", "isolated", "decided", "kept": [indices of edges]}. rounds[0] is the start; bytes and
-/// times are sums up to the round. The threshold is barc sigmas of closures, or scaled_barc = scale
-/// barc sigmas of the graph.
+/// "certified", "rank", "optimum", of newton also "noise_scale", "barc" [sigma of the graph],
+/// "most_sent", "most_received", "decided", "kept": [indices of edges]}. rounds[0] is the start;
+/// bytes and times are sums up to the round.
 void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution);
 
 /// SVG: the relative gap to the optimum against rounds, bytes and critical-path time, on a

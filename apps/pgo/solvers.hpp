@@ -1,14 +1,23 @@
 #pragma once
 
+#include <ctime>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "modules/pgo_study/certificate.hpp"
 #include "modules/pgo_study/member_team.hpp"
 #include "modules/pgo_study/team_solver.hpp"
 #include "modules/pgo_study/team_verification.hpp"
 
 namespace km {
+
+/// CPU time of the calling thread [s].
+[[nodiscard]] inline double thread_cpu_s() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
 
 /// A method by its name, and what it takes. kMethods has the names.
 struct SolverOptions {
@@ -59,5 +68,31 @@ struct SolverRun {
 
 /// Measures CPU time of the calling thread.
 [[nodiscard]] TeamMeter cpu_meter();
+
+/// What poses are worth, as one computer that has the whole graph sees it.
+struct Judgement {
+  double rounded_cost = 0.0;
+  double optimum = 0.0;  ///< The certified one, or as given; the least cost known if none is.
+  bool optimum_certified = false;  ///< Or given.
+  Certificate certificate = {};
+  Eigen::Index rank = 0;  ///< Numerical, of the rotations; 3 (2 in the plane): no relaxation left.
+};
+
+/// What one method did to one graph.
+struct Solution {
+  std::string method;    ///< SolverOptions::name().
+  double start_s = 0.0;  ///< CPU time of the chordal initialisation.
+  SolverRun run = {};
+  /// Rounded, in the frame of the first pose; z up with verticals.
+  std::vector<SE3> T_world_kf = {};
+  /// nullopt of a method that rejects: before it has decided there is no optimum to compare with.
+  std::optional<Judgement> judgement = {};
+};
+
+/// Runs a method from the chordal initialisation, which is computed centrally and not counted, and
+/// is levelled by verticals as a whole; what rejects starts from odometry. The optimum is computed
+/// if not given. Throws as run_solver() does.
+[[nodiscard]] Solution solve(const TeamGraph& graph, const SolverOptions& options,
+                             std::optional<double> optimum, const TeamMeter& meter);
 
 }  // namespace km

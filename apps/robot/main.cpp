@@ -1,8 +1,12 @@
+#include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <exception>
-#include <fstream>
 #include <iostream>
+#include <limits>
 #include <opencv2/core.hpp>
+#include <sstream>
 
+#include "apps/robot/robot_config.hpp"
 #include "apps/robot/run.hpp"
 #include "runtime/log.hpp"
 
@@ -10,14 +14,120 @@
 #include <malloc.h>
 #endif
 
+namespace km {
 namespace {
 
-constexpr int kBadInput = 1;
+constexpr int kBadInput = 1, kBadCommandLine = 2;
 
-km::log::Level level_of(const std::string& name) {
-  if (name == "error") return km::log::Level::kError;
-  if (name == "warn") return km::log::Level::kWarn;
-  return name == "debug" ? km::log::Level::kDebug : km::log::Level::kInfo;
+constexpr const char* kFooter = R"(
+Examples
+  One robot on a whole recording, in real time:
+    kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --dataset MH_01_easy --output results/a
+  Two robots on two hosts of one network (any ids, they find each other):
+    hostA$ kimera_multi_robot --config config/datasets/euroc.yaml --robot 7  --name alice --dataset A --output results/a
+    hostB$ kimera_multi_robot --config config/datasets/euroc.yaml --robot 12 --name bob   --dataset B --output results/b
+  Where multicast is not allowed:   --peers 10.0.0.2,10.0.0.3 --interface wlan0 --link wifi
+  The back-end alone, on a recorded pose graph:
+    kimera_multi_robot --config config/datasets/tunnels.yaml --robot 3 --graph robot3.csv --rate max --output results/3
+
+Files written to --output: odometry.tum, optimized.tum, pose_graph.g2o, keyframes.csv, loop_closures.csv,
+optimizer.csv, traffic.csv, process.csv, timing.csv, config.yaml, summary.json; with mapping.mode on also mesh.ply,
+mesh_optimized.ply and label_palette.csv.
+Ctrl-C ends the run in order with everything written; a second Ctrl-C ends it at once.
+Exit codes: 0 done; 1 bad input or configuration, or a recording that gave no pose; 2 bad command line;
+3 a module failed while running, or another robot claimed this robot's id.)";
+
+double parse_rate(const std::string& text) {
+  if (text == "max") return std::numeric_limits<double>::infinity();
+  char* end = nullptr;
+  const double rate = std::strtod(text.c_str(), &end);
+  if (end == text.c_str() || *end != '\0' || !(rate > 0.0))
+    throw CLI::ValidationError("--rate", text + " is neither a positive number nor max");
+  return rate;
+}
+
+void print_config(const RobotOptions& options) {
+  try {
+    std::cout << load_robot_config(options).effective;
+  } catch (const ConfigError& error) {
+    throw CLI::ValidationError("--print-config", error.what());
+  }
+  throw CLI::Success();
+}
+
+void add_input(CLI::App& app, RobotOptions& options) {
+  auto* group = app.add_option_group("Input", "What the robot perceives");
+  group
+      ->add_option("--dataset", options.dataset,
+                   "EuRoC/ASL folder: cam0, cam1 (or depth0), imu0, or mav0/")
+      ->check(CLI::ExistingDirectory);
+  group->add_option("--graph", options.graph, "Recorded pose graph of one robot (.g2o or .csv)")
+      ->check(CLI::ExistingFile);
+  group->require_option(1);
+  app.add_option("--from", options.from_s, "Start of the part to play [s since the first image]");
+  app.add_option("--to", options.to_s, "End of the part to play [s since the first image]");
+  app.add_option_function<std::string>(
+         "--rate", [&options](const std::string& text) { options.rate = parse_rate(text); },
+         "Speed of playing: 1.0 real time, 2 twice as fast, max as fast as it can")
+      ->default_str("1.0");
+}
+
+// Before the dataset is opened, in the words of the command line.
+void check_window(const RobotOptions& options) {
+  if (!options.from_s || !options.to_s || *options.from_s < *options.to_s) return;
+  std::ostringstream message;
+  message << "--from " << *options.from_s << " s is not before --to " << *options.to_s << " s";
+  throw CLI::ValidationError(message.str());
+}
+
+void add_network(CLI::App& app, RobotOptions& options) {
+  app.add_option("--domain", options.domain, "DDS domain: robots of one team use the same")
+      ->check(CLI::Range(0, 230));
+  app.add_option("--link", options.link, "Link profile: wired, wifi, intermittent, or a file");
+  app.add_option("--peers", options.peers, "Addresses of the other hosts, where multicast is off")
+      ->delimiter(',');
+  app.add_option("--interface", options.interface_name, "Network interface, e.g. wlan0");
+}
+
+// Exits the process for --help and mistakes, after telling.
+RobotOptions parse_options(int argc, char** argv) {
+  RobotOptions options;
+  CLI::App app{"One robot of the team: odometry, place recognition, and the team's pose graph."};
+  app.footer(kFooter);
+  app.add_option("--config", options.configs, "Configuration files; later ones override earlier")
+      ->check(CLI::ExistingFile);
+  app.add_option("--set", options.settings, "One setting over all files: section.key=value");
+  app.add_option("--robot", options.robot,
+                 "Id of this robot, any number 0..65535, unique in the team")
+      ->required();
+  app.add_option("--name", options.name, "Name shown to people (default robot<id>)");
+  add_input(app, options);
+  add_network(app, options);
+  app.add_option("--output", options.output, "Folder of the results, made if absent")->required();
+  app.add_option("--serve-limit", options.serve_limit_s,
+                 "Longest time [s] to serve peers after the own input has ended")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  app.add_flag_callback(
+      "--print-config", [&options] { print_config(options); },
+      "Print the configuration that the options before this one make, with bounds, and exit");
+  app.add_option("--log", options.log_level, "error, warn, info or debug")
+      ->check(CLI::IsMember({"error", "warn", "info", "debug"}))
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+    check_window(options);
+  } catch (const CLI::ParseError& error) {
+    std::exit(app.exit(error) == 0 ? 0 : kBadCommandLine);
+  }
+  if (options.name.empty()) options.name = "robot" + std::to_string(options.robot);
+  return options;
+}
+
+log::Level level_of(const std::string& name) {
+  if (name == "error") return log::Level::kError;
+  if (name == "warn") return log::Level::kWarn;
+  return name == "debug" ? log::Level::kDebug : log::Level::kInfo;
 }
 
 // glibc raises the size from which it gives memory back to the system with every large block that
@@ -32,15 +142,16 @@ void give_memory_back() {
 }
 
 }  // namespace
+}  // namespace km
 
 int main(int argc, char** argv) try {
-  give_memory_back();
+  km::give_memory_back();
   const km::RobotOptions options = km::parse_options(argc, argv);
   km::SignalWatch signals;  // before any thread: they inherit the blocked signals
-  km::log::set_level(level_of(options.log_level));
+  km::log::set_level(km::level_of(options.log_level));
   cv::setNumThreads(1);  // every module has its own thread; OpenCV's pool would fight them
   return km::run_robot(options, signals);
 } catch (const std::exception& error) {
   std::cerr << "kimera_multi_robot: " << error.what() << '\n';
-  return kBadInput;
+  return km::kBadInput;
 }

@@ -33,30 +33,34 @@ void ProcessCsv::append(double time_s, const ProcessUsage& usage) {
   std::snprintf(line, sizeof line, "%.3f,%.3f,%llu\n", time_s, usage.cpu_s,
                 static_cast<unsigned long long>(usage.resident_bytes));
   output_ << line;
-  samples_.push_back({time_s, static_cast<double>(usage.resident_bytes)});
+  samples_.push_back({time_s, usage});
 }
 
-MemoryTrend ProcessCsv::memory() const {
+RunSummary::Process ProcessCsv::summary() const {
   constexpr double kLeastSpan_s = 60.0;
-  MemoryTrend trend;
-  if (samples_.empty()) return trend;
-  trend.first_bytes = static_cast<std::uint64_t>(samples_.front().bytes);
-  trend.last_bytes = static_cast<std::uint64_t>(samples_.back().bytes);
-  const double half_s = 0.5 * (samples_.front().time_s + samples_.back().time_s);
-  if (samples_.back().time_s - half_s < kLeastSpan_s) return trend;
+  if (samples_.empty()) return {};
+  const Sample &first = samples_.front(), &last = samples_.back();
+  RunSummary::Process process{.cpu_s = last.usage.cpu_s,
+                              .peak_memory_bytes = last.usage.peak_bytes,
+                              .memory_at_start_bytes = first.usage.resident_bytes,
+                              .memory_at_end_bytes = last.usage.resident_bytes,
+                              .memory_growth_bytes_per_minute = std::nullopt};
+  const double half_s = 0.5 * (first.time_s + last.time_s);
+  if (last.time_s - half_s < kLeastSpan_s) return process;
   double n = 0.0, t = 0.0, y = 0.0, tt = 0.0, ty = 0.0;
-  for (const Sample& sample : samples_) {
-    const double since_s = sample.time_s - half_s;
+  for (const auto& [time_s, usage] : samples_) {
+    const double since_s = time_s - half_s;
     if (since_s < 0.0) continue;
+    const auto bytes = static_cast<double>(usage.resident_bytes);
     n += 1.0;
     t += since_s;
-    y += sample.bytes;
+    y += bytes;
     tt += since_s * since_s;
-    ty += since_s * sample.bytes;
+    ty += since_s * bytes;
   }
   const double spread = n * tt - t * t;
-  if (spread > 0.0) trend.growth_bytes_per_minute = 60.0 * (n * ty - t * y) / spread;
-  return trend;
+  if (spread > 0.0) process.memory_growth_bytes_per_minute = 60.0 * (n * ty - t * y) / spread;
+  return process;
 }
 
 }  // namespace km

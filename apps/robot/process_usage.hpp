@@ -1,9 +1,10 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <ostream>
 #include <vector>
+
+#include "apps/robot/run_summary.hpp"
 
 namespace km {
 
@@ -17,15 +18,6 @@ struct ProcessUsage {
 /// As the kernel has it; resident_bytes is 0 where /proc cannot be read.
 [[nodiscard]] ProcessUsage process_usage();
 
-/// Memory over time in three numbers.
-struct MemoryTrend {
-  std::uint64_t first_bytes = 0;
-  std::uint64_t last_bytes = 0;
-  /// Slope of the line of least squares through the second half of the time; absent if that is less
-  /// than a minute: what is taken at the start is no growth.
-  std::optional<double> growth_bytes_per_minute;
-};
-
 /// Writes process.csv, a row for each sample: time_s, cpu_s, resident_bytes.
 class ProcessCsv {
  public:
@@ -35,12 +27,13 @@ class ProcessCsv {
   /// `time_s` ascends.
   void append(double time_s, const ProcessUsage& usage);
 
-  [[nodiscard]] MemoryTrend memory() const;
+  /// Of all samples; those of time and of the peak are the last one's.
+  [[nodiscard]] RunSummary::Process summary() const;
 
  private:
   struct Sample {
     double time_s = 0.0;
-    double bytes = 0.0;
+    ProcessUsage usage;
   };
   std::ostream& output_;
   std::vector<Sample> samples_;

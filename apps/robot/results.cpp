@@ -2,27 +2,14 @@
 
 #include <cinttypes>
 #include <cstdio>
-#include <fstream>
-#include <stdexcept>
 
-#include "modules/core/json_writer.hpp"
+#include "apps/output_file.hpp"
 #include "modules/pose_graph/g2o_io.hpp"
 
 namespace km {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::ofstream open(const fs::path& file) {
-  std::ofstream stream(file);
-  if (!stream) throw std::runtime_error(file.string() + ": cannot be written");
-  return stream;
-}
-
-void close(std::ofstream& stream, const fs::path& file) {
-  stream.close();
-  if (!stream) throw std::runtime_error(file.string() + ": writing failed, is the disk full?");
-}
 
 const char* to_string(ClosureStage stage) {
   switch (stage) {
@@ -40,13 +27,11 @@ const char* to_string(ClosureStage stage) {
   return "";
 }
 
-void write_keyframes(const fs::path& file, const RunRecord& record) {
-  std::ofstream out = open(file);
+void write_keyframes(std::ostream& out, const RunRecord& record) {
   out << "robot,keyframe,stamp_ns,median_depth_m\n";
   for (const KeyframeOdometry& keyframe : record.keyframes())
     out << keyframe.id.robot << ',' << keyframe.id.index << ',' << keyframe.stamp << ','
         << record.median_depth_m(keyframe.id.index) << '\n';
-  close(out, file);
 }
 
 // tx,ty,tz,qx,qy,qz,qw of the pose of `to` in the frame of `from`, all empty if it was not
@@ -66,8 +51,7 @@ std::string pose_fields(const RunRecord& record, const ClosureOutcome& outcome) 
   return text;
 }
 
-void write_closures(const fs::path& file, const RunRecord& record) {
-  std::ofstream out = open(file);
+void write_closures(std::ostream& out, const RunRecord& record) {
   out << "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,inliers,"
          "tx,ty,tz,qx,qy,qz,qw,reason\n";
   for (const ClosureOutcome& row : record.outcomes())
@@ -75,7 +59,6 @@ void write_closures(const fs::path& file, const RunRecord& record) {
         << row.id.to.index << ',' << row.similarity << ',' << to_string(row.stage) << ','
         << row.matches << ',' << row.inliers << ',' << pose_fields(record, row) << ",\""
         << row.reason << "\"\n";
-  close(out, file);
 }
 
 // The robot's own poses with every edge that touches them: odometry, and the inlier closures of
@@ -98,101 +81,36 @@ G2oGraph graph_of(const RunRecord& record) {
   return graph;
 }
 
-void write_rounds(const fs::path& file, const RunRecord& record) {
-  std::ofstream out = open(file);
+void write_rounds(std::ostream& out, const RunRecord& record) {
   out << "seconds,round,members,cost,gradient_norm\n";
-  for (const RunRecord::OptimizerRound& row : record.rounds())
-    out << row.seconds << ',' << row.round << ',' << row.members << ',' << row.cost << ','
+  for (const OptimizerProgress& row : record.rounds())
+    out << row.seconds << ',' << row.round << ',' << row.members.size() << ',' << row.cost << ','
         << row.gradient_norm << '\n';
-  close(out, file);
 }
 
-// Frames that went into the map, and why others did not.
-void write_map_counts(JsonWriter& json, const RunRecord& record) {
+RunSummary::Mapping map_counts(const RunRecord& record) {
   const MappingProgress map = record.mapping().value_or(MappingProgress{});
   const DenseSensingProgress sensing = record.dense_sensing().value_or(DenseSensingProgress{});
-  json.key("mapping");
-  json.begin_object();
-  json.field("frames", map.integrated);
-  json.field("skipped_wrong_size", sensing.wrong_size + map.wrong_size);
-  json.field("skipped_bad_pose", map.bad_pose);
-  json.field("skipped_too_late", map.too_late);
-  json.field("without_labels", map.unlabelled);
-  json.field("label_pixels_outside_palette", map.labels_outside + sensing.classes_outside);
-  json.field("blocks_refused", map.blocks_refused);
-  json.field("blocks", map.size.blocks);
-  json.field("vertices", map.size.vertices);
-  json.field("faces", map.size.faces);
-  json.field("superseded_faces_dropped", map.size.dropped_faces);
   const RunRecord::MeshCorrections& corrections = record.mesh_corrections();
-  json.field("corrections", corrections.deformed);
-  json.field("moves_as_a_whole", corrections.moved);
-  json.field("correction_seconds", corrections.seconds);
-  json.field("unbound_vertices", corrections.last.unbound_vertices);
-  json.end_object();
+  return {.frames = map.integrated,
+          .skipped_wrong_size = sensing.wrong_size + map.wrong_size,
+          .skipped_bad_pose = map.bad_pose,
+          .skipped_too_late = map.too_late,
+          .without_labels = map.unlabelled,
+          .label_pixels_outside_palette = map.labels_outside + sensing.classes_outside,
+          .blocks_refused = map.blocks_refused,
+          .blocks = map.size.blocks,
+          .vertices = map.size.vertices,
+          .faces = map.size.faces,
+          .superseded_faces_dropped = map.size.dropped_faces,
+          .corrections = corrections.deformed,
+          .moves_as_a_whole = corrections.moved,
+          .correction_seconds = corrections.seconds,
+          .unbound_vertices = corrections.last.unbound_vertices};
 }
 
-void write_process(JsonWriter& json, const ProcessUsage& usage, const MemoryTrend& memory) {
-  json.key("process");
-  json.begin_object();
-  json.field("cpu_s", usage.cpu_s);
-  json.field("peak_memory_bytes", usage.peak_bytes);
-  json.field("memory_at_start_bytes", memory.first_bytes);
-  json.field("memory_at_end_bytes", memory.last_bytes);
-  if (memory.growth_bytes_per_minute)
-    json.field("memory_growth_bytes_per_minute", *memory.growth_bytes_per_minute);
-  json.end_object();
-}
-
-void write_summary(const fs::path& file, const RunRecord& record, const RunSummary& summary) {
-  RunRecord::StageCounts total;
-  for (const auto& [peer, counts] : record.stages_per_peer()) {
-    total.candidates += counts.candidates;
-    total.verified += counts.verified;
-    total.inliers += counts.inliers;
-  }
-  const OptimizerProgress& progress = record.progress();
-  std::ofstream out = open(file);
-  JsonWriter json(out);
-  json.begin_object();
-  json.field("robot", record.robot());
-  json.field("name", summary.name);
-  json.field("keyframes", record.keyframes().size());
-  json.field("keypoints", record.keypoints());
-  json.field("frames", summary.frames);
-  json.field("frames_skipped", summary.frames_skipped);
-  json.key("closures");
-  json.begin_object();
-  json.field("candidates", total.candidates);
-  json.field("verified", total.verified);
-  json.field("inliers", total.inliers);
-  json.end_object();
-  json.key("pgo");
-  json.begin_object();
-  json.field("rounds", progress.round);
-  json.field("seconds", progress.seconds);
-  json.field("cost", progress.cost);
-  json.field("gradient_norm", progress.gradient_norm);
-  json.field("anchor", progress.anchor);
-  json.field("settled", progress.settled);
-  json.array("members", progress.members);
-  json.end_object();
-  if (record.dense_sensing()) write_map_counts(json, record);
-  json.key("traffic");
-  json.begin_object();
-  for (const auto& [category, bytes] : summary.traffic_bytes) json.field(category, bytes);
-  json.end_object();
-  write_process(json, summary.process, summary.memory);
-  json.field("seconds", summary.seconds);
-  json.field("exit_reason", summary.exit_reason);
-  json.end_object();
-  close(out, file);
-}
-
-}  // namespace
-
-void write_tum(const fs::path& file, std::span<const StampedPose> poses) {
-  std::ofstream out = open(file);
+// TUM: "time[s] tx ty tz qx qy qz qw", nine decimals of seconds.
+void write_poses(std::ostream& out, const std::vector<StampedPose>& poses) {
   for (const StampedPose& pose : poses) {
     const Eigen::Vector3d& t = pose.T.translation();
     const Eigen::Quaterniond q(pose.T.linear());
@@ -204,17 +122,42 @@ void write_tum(const fs::path& file, std::span<const StampedPose> poses) {
                   q.x(), q.y(), q.z(), q.w());
     out << line;
   }
-  close(out, file);
 }
 
-void write_results(const fs::path& folder, const RunRecord& record, const RunSummary& summary) {
-  write_tum(folder / "odometry.tum", record.odometry());
-  write_tum(folder / "optimized.tum", record.optimized());
+}  // namespace
+
+void write_results(const fs::path& folder, const RunRecord& record) {
+  const auto write = [&](const char* file, const auto& write_rows, const auto& rows) {
+    write_output(folder / file, [&](std::ostream& out) { write_rows(out, rows); });
+  };
+  write("odometry.tum", write_poses, record.odometry());
+  write("optimized.tum", write_poses, record.optimized());
   write_g2o(folder / "pose_graph.g2o", graph_of(record));
-  write_keyframes(folder / "keyframes.csv", record);
-  write_closures(folder / "loop_closures.csv", record);
-  write_rounds(folder / "optimizer.csv", record);
-  write_summary(folder / "summary.json", record, summary);
+  write("keyframes.csv", write_keyframes, record);
+  write("loop_closures.csv", write_closures, record);
+  write("optimizer.csv", write_rounds, record);
+}
+
+RunSummary summary_of(const RunRecord& record) {
+  RunSummary summary;
+  summary.robot = record.robot();
+  summary.keyframes = record.keyframes().size();
+  summary.keypoints = record.keypoints();
+  for (const auto& [peer, counts] : record.closures_per_peer()) {
+    summary.closures.candidates += counts.candidates;
+    summary.closures.verified += counts.verified;
+    summary.closures.inliers += counts.inliers;
+  }
+  const OptimizerProgress& progress = record.progress();
+  summary.pgo = {.rounds = progress.round,
+                 .seconds = progress.seconds,
+                 .cost = progress.cost,
+                 .gradient_norm = progress.gradient_norm,
+                 .anchor = progress.anchor,
+                 .settled = progress.settled,
+                 .members = progress.members};
+  if (record.dense_sensing()) summary.mapping = map_counts(record);
+  return summary;
 }
 
 }  // namespace km

@@ -6,13 +6,13 @@
 #include <optional>
 #include <stdexcept>
 
+#include "apps/output_file.hpp"
 #include "apps/result_files.hpp"
-#include "apps/robot/departure.hpp"
 #include "apps/robot/process_usage.hpp"
 #include "apps/robot/results.hpp"
 #include "apps/robot/run_end.hpp"
-#include "apps/robot/status_text.hpp"
 #include "apps/robot/wiring.hpp"
+#include "modules/core/text_table.hpp"
 #include "modules/mesh/ply_file.hpp"
 #include "modules/sensors/euroc_reader.hpp"
 #include "runtime/clock.hpp"
@@ -66,6 +66,83 @@ std::ofstream open_result(const fs::path& file) {
   return stream;
 }
 
+const char* to_word(PeerState state) {
+  switch (state) {
+    case PeerState::kAlive:
+      return "alive";
+    case PeerState::kLost:
+      return "lost";
+    case PeerState::kLeft:
+      return "left";
+  }
+  return "";
+}
+
+std::string peers_text(const std::vector<Peer>& peers) {
+  if (peers.empty()) return "peers: none yet";
+  std::string text = "peers:";
+  for (const Peer& peer : peers) text += ' ' + peer.identity.name + ' ' + to_word(peer.state) + ',';
+  text.pop_back();
+  return text;
+}
+
+std::string closures_text(const RunRecord& record, const std::vector<Peer>& peers) {
+  std::map<RobotId, std::string> names;
+  for (const Peer& peer : peers) names[peer.identity.robot] = peer.identity.name;
+  names[record.robot()] = "own";
+  std::string text = "closures:";
+  for (const auto& [robot, counts] : record.closures_per_peer()) {
+    const std::string& name = names[robot];
+    text += ' ' + (name.empty() ? std::to_string(robot) : name) + ' ' +
+            std::to_string(counts.candidates) + '>' + std::to_string(counts.verified) + '>' +
+            std::to_string(counts.inliers) + ',';
+  }
+  if (text.back() == ',') text.pop_back();
+  return text.back() == ':' ? text + " none yet" : text;
+}
+
+std::string optimizer_text(const OptimizerProgress& progress) {
+  return "pgo: cost " + rounded(progress.cost, 4) + ", round " + std::to_string(progress.round) +
+         ", with " + std::to_string(progress.members.empty() ? 0 : progress.members.size() - 1);
+}
+
+std::string count_text(std::size_t count) {
+  const auto value = static_cast<double>(count);
+  if (count < 1000) return std::to_string(count);
+  return count < 1'000'000 ? fixed(value * 1e-3, 0) + " k" : fixed(value * 1e-6, 2) + " M";
+}
+
+// Nothing where mapping is off.
+std::string map_text(const std::optional<MappingProgress>& mapping) {
+  if (!mapping) return "";
+  return " | map: " + std::to_string(mapping->size.blocks) + " blocks, " +
+         count_text(mapping->size.vertices) + " vertices, " + count_text(mapping->size.faces) +
+         " faces";
+}
+
+// How the robot is doing, in one line:
+//     7.4 s, 148 images, 21 keyframes | peers: bob alive | closures: own 3>2>2, bob 14>12>10
+//     | pgo: cost 12.4, round 31, with 2 | map: 812 blocks, 53 k vertices, 101 k faces
+//     | out: place 81.3 kB, verify 210.4 kB, pgo 5.0 kB, other 2.1 kB | 143 MB
+// Closures are candidates > verified > inliers with each robot, counted by who found them; last
+// comes the memory that the robot occupies.
+std::string status_text(double dataset_time_s, const RunRecord& record,
+                        const std::vector<Peer>& peers, const TrafficSnapshot& traffic,
+                        std::uint64_t resident_bytes) {
+  const auto sent = [&traffic](TrafficCategory category) {
+    return bytes_text(static_cast<double>(traffic.bytes(Direction::kOut, category)));
+  };
+  return fixed(dataset_time_s, 1) + " s, " + std::to_string(record.odometry().size()) +
+         " images, " + std::to_string(record.keyframes().size()) + " keyframes | " +
+         peers_text(peers) + " | " + closures_text(record, peers) + " | " +
+         optimizer_text(record.progress()) + map_text(record.mapping()) + " | out: place " +
+         sent(TrafficCategory::kPlaceRecognition) + ", verify " +
+         sent(TrafficCategory::kGeometricVerification) + ", pgo " +
+         sent(TrafficCategory::kPoseGraphOptimization) + ", other " +
+         sent(TrafficCategory::kOther) + " | " +
+         fixed(1e-6 * static_cast<double>(resident_bytes), 0) + " MB";
+}
+
 // What happens beside the modules while they run: phase, status line, traffic and memory over time.
 class Watch {
  public:
@@ -108,7 +185,7 @@ class Watch {
   }
 
   void finish() { write(seconds(), robot_.bridge().traffic()); }
-  [[nodiscard]] MemoryTrend memory() const { return process_csv_.memory(); }
+  [[nodiscard]] RunSummary::Process process() const { return process_csv_.summary(); }
   [[nodiscard]] double seconds() const { return steady_now_s() - start_s_; }
   [[nodiscard]] const char* reason() const { return departure_.reason(); }
 
@@ -166,8 +243,7 @@ class Watch {
   StatusLine status_line_;
 };
 
-void write_timings(const fs::path& file, const Robot& robot) {
-  std::ofstream out = open_result(file);
+void write_timings(std::ostream& out, const Robot& robot) {
   out << "module,calls,median_ms,p95_ms,max_ms,total_s\n";
   for (const Node* node : robot.nodes()) {
     const DurationHistogram timing = node->timing();
@@ -199,22 +275,14 @@ void say(const RobotOptions& options, const RunEnd& end, const Verdict& verdict)
                        << options.output.string();
 }
 
-RunSummary summarize(const RobotOptions& options, Robot& robot, double seconds,
-                     const MemoryTrend& memory, const RunEnd& end) {
-  RunSummary summary;
-  summary.name = options.name;
-  summary.seconds = seconds;
-  summary.process = process_usage();
-  summary.memory = memory;
-  summary.exit_reason = verdict_of(end).reason;
-  summary.frames = end.images.value_or(ImageCounts{}).read;
-  summary.frames_skipped = end.images.value_or(ImageCounts{}).skipped;
+std::map<std::string, std::uint64_t> sent_bytes(Robot& robot) {
   const TrafficSnapshot traffic = robot.bridge().traffic();
+  std::map<std::string, std::uint64_t> bytes;
   for (const auto category :
        {TrafficCategory::kPlaceRecognition, TrafficCategory::kGeometricVerification,
         TrafficCategory::kPoseGraphOptimization, TrafficCategory::kOther})
-    summary.traffic_bytes[to_string(category)] = traffic.bytes(Direction::kOut, category);
-  return summary;
+    bytes[to_string(category)] = traffic.bytes(Direction::kOut, category);
+  return bytes;
 }
 
 // What the others sent of their maps, as far as it arrived.
@@ -243,27 +311,37 @@ int run_robot(const RobotOptions& options, SignalWatch& signals) {
                           "their label_palette.csv";
   make_output_folder(options.output);
   remove_results(options.output);
-  open_result(options.output / "config.yaml") << config.effective;
+  const auto write = [&](const char* file, const auto& text) {
+    write_output(options.output / file, [&](std::ostream& out) { out << text; });
+  };
+  write("config.yaml", config.effective);
   if (mapping && !mapping->palette.classes().empty())
-    open_result(options.output / "label_palette.csv") << to_csv(mapping->palette);
+    write(kLabelPalette, to_csv(mapping->palette));
 
   std::optional<Watch> watch;
   watch.emplace(options, config, robot);
   const RunResult result = robot.run([&watch] { return watch->poll(); });
   watch->finish();
   const RunEnd end = end_of(options, robot, result, watch->reason());
-  const double seconds = watch->seconds();
-  const MemoryTrend memory = watch->memory();
+  const Verdict verdict = verdict_of(end);
+  RunSummary summary = robot.recorder().with_record(summary_of);
+  summary.name = options.name;
+  summary.frames = end.images.value_or(ImageCounts{}).read;
+  summary.frames_skipped = end.images.value_or(ImageCounts{}).skipped;
+  summary.traffic = sent_bytes(robot);
+  summary.process = watch->process();
+  summary.seconds = watch->seconds();
+  summary.exit_reason = verdict.reason;
   watch.reset();  // the status line ends before the last log lines
-
   robot.recorder().with_record([&](const RunRecord& record) {
-    write_results(options.output, record, summarize(options, robot, seconds, memory, end));
+    write_results(options.output, record);
+    write_summary(options.output / "summary.json", summary);
     if (robot.mesh_files() != nullptr) robot.mesh_files()->finish(record.trajectory());
   });
   if (robot.peer_meshes() != nullptr)
     write_peer_meshes(options.output / kPeerMeshes, *robot.peer_meshes());
-  write_timings(options.output / "timing.csv", robot);
-  const Verdict verdict = verdict_of(end);
+  write_output(options.output / "timing.csv",
+               [&](std::ostream& out) { write_timings(out, robot); });
   say(options, end, verdict);
   return verdict.exit_code;
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "apps/robot/options.hpp"
+#include "apps/robot/robot_config.hpp"
 #include "runtime/supervisor.hpp"
 
 namespace km {

@@ -1,5 +1,7 @@
 #include "apps/robot/run_end.hpp"
 
+#include <algorithm>
+
 namespace km {
 namespace {
 
@@ -16,7 +18,43 @@ std::string why_no_pose(const ImageCounts& images) {
          " were read but odometry did not start on them";
 }
 
+// Of a robot that has settled itself.
+std::uint8_t settled_links(std::span<const Departure::Present> peers) {
+  std::uint8_t links = kManyLinks;
+  for (const Departure::Present& peer : peers)
+    if (peer.phase != RobotPhase::kLeaving && peer.settled_links < links)
+      links = static_cast<std::uint8_t>(peer.settled_links + 1);
+  return links;
+}
+
 }  // namespace
+
+Departure::Present Departure::update(double now_s, const Inputs& inputs) {
+  if (inputs.activity != activity_) active_s_ = now_s;
+  activity_ = inputs.activity;
+  if (!inputs.input_ended) return {RobotPhase::kRunning, 0};
+  if (!ended_s_) ended_s_ = now_s;
+
+  // Half of the time quiet before saying so: the other half is for the peers to answer.
+  const bool settled = inputs.graph_settled && now_s - active_s_ >= 0.5 * settle_s_;
+  const std::uint8_t links = settled ? settled_links(inputs.present_peers) : 0;
+  const bool peers_settled = links > 1;
+  // A robot that is not heard is at most as many links away as there are such robots, and one more.
+  const bool all_settled =
+      peers_settled && links > std::min(inputs.unheard + 1, std::size_t{kManyLinks} - 1);
+  if (!all_settled) all_settled_s_.reset();
+  if (all_settled && !all_settled_s_) all_settled_s_ = now_s;
+  // Who leaves has waited for all.
+  const bool told =
+      peers_settled &&
+      std::any_of(inputs.present_peers.begin(), inputs.present_peers.end(),
+                  [](const Present& peer) { return peer.phase == RobotPhase::kLeaving; });
+  if (told || (all_settled && now_s - *all_settled_s_ >= settle_s_))
+    reason_ = "all present robots have settled";
+  else if (now_s - *ended_s_ >= serve_limit_s_)
+    reason_ = "time limit for serving peers";
+  return {settled ? RobotPhase::kSettled : RobotPhase::kFinished, links};
+}
 
 std::string to_string(const ImageCounts& images) {
   return std::to_string(images.with_pose) + " of " + std::to_string(images.listed) +

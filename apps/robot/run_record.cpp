@@ -6,6 +6,11 @@
 #include "modules/pose_graph/pose_edge.hpp"
 
 namespace km {
+namespace {
+
+constexpr std::size_t kQueueCapacity = 4096;  // far more than a module publishes in a second
+
+}  // namespace
 
 void RunRecord::add(const KeyframeOdometry& keyframe) {
   ++activity_;
@@ -49,8 +54,7 @@ void RunRecord::add(const ClosureOutcome& outcome) {
 void RunRecord::add(const OptimizerProgress& progress) {
   if (progress.round != progress_.round) {
     ++activity_;
-    rounds_.push_back({progress.seconds, progress.round, progress.members.size(), progress.cost,
-                       progress.gradient_norm});
+    rounds_.push_back(progress);
   }
   progress_ = progress;
 }
@@ -119,15 +123,25 @@ std::vector<StampedPose> RunRecord::optimized() const {
   return odometry_.empty() ? keyframes : correct_odometry(odometry_, keyframes);
 }
 
-std::map<RobotId, RunRecord::StageCounts> RunRecord::stages_per_peer() const {
-  std::map<RobotId, StageCounts> result;
+std::map<RobotId, ClosureCounts> RunRecord::closures_per_peer() const {
+  std::map<RobotId, ClosureCounts> result;
   for (const auto& [id, outcome] : outcomes_) {
-    StageCounts& counts = result[id.from.robot == robot_ ? id.to.robot : id.from.robot];
+    ClosureCounts& counts = result[id.from.robot == robot_ ? id.to.robot : id.from.robot];
     ++counts.candidates;
     counts.verified += outcome.stage >= ClosureStage::kVerified ? 1 : 0;
     counts.inliers += is_inlier(id) ? 1 : 0;
   }
   return result;
 }
+
+RecorderNode::RecorderNode(RobotId robot)
+    : record_(robot),
+      worker_(
+          kQueueCapacity, Overflow::kBlock,
+          [this](const Input& apply) {
+            const std::lock_guard lock(mutex_);
+            apply();
+          },
+          "recorder") {}
 
 }  // namespace km

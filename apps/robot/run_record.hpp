@@ -1,12 +1,18 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
+#include <exception>
+#include <functional>
 #include <map>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <set>
-#include <string>
+#include <string_view>
 #include <vector>
 
+#include "apps/robot/run_summary.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/core/stamped_pose.hpp"
@@ -15,6 +21,9 @@
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
+#include "runtime/node.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
 
 namespace km {
 
@@ -72,15 +81,8 @@ class RunRecord {
   [[nodiscard]] const std::optional<Trajectory>& trajectory() const { return trajectory_; }
   [[nodiscard]] const OptimizerProgress& progress() const { return progress_; }
 
-  /// State of the optimiser after one round.
-  struct OptimizerRound {
-    double seconds = 0.0;  ///< Time spent optimising.
-    std::uint32_t round = 0;
-    std::size_t members = 0;
-    double cost = 0.0;
-    double gradient_norm = 0.0;
-  };
-  [[nodiscard]] const std::vector<OptimizerRound>& rounds() const { return rounds_; }
+  /// State of the optimiser after each round.
+  [[nodiscard]] const std::vector<OptimizerProgress>& rounds() const { return rounds_; }
 
   /// Closures that touch this robot, with what was measured, by whichever of its ends.
   [[nodiscard]] const std::map<ClosureId, Closure>& closures() const { return closures_; }
@@ -95,13 +97,8 @@ class RunRecord {
   /// Poses in the team's frame: of every image, or of every keyframe where there are no images.
   [[nodiscard]] std::vector<StampedPose> optimized() const;
 
-  struct StageCounts {
-    int candidates = 0;
-    int verified = 0;
-    int inliers = 0;
-  };
   /// Closures with each other robot (or inside this one) that this robot found.
-  [[nodiscard]] std::map<RobotId, StageCounts> stages_per_peer() const;
+  [[nodiscard]] std::map<RobotId, ClosureCounts> closures_per_peer() const;
 
  private:
   [[nodiscard]] bool is_inlier(const ClosureId& id) const;
@@ -120,8 +117,53 @@ class RunRecord {
   std::optional<MappingProgress> mapping_;
   MeshCorrections mesh_corrections_;
   OptimizerProgress progress_;
-  std::vector<OptimizerRound> rounds_;
+  std::vector<OptimizerProgress> rounds_;
   std::uint64_t activity_ = 0;
+};
+
+/// Keeps what the other nodes publish, for the status line and the result files.
+class RecorderNode final : public Node {
+ public:
+  explicit RecorderNode(RobotId robot);
+  ~RecorderNode() override { stop(); }
+
+  /// Records everything published on `topic`, for any T that RunRecord takes.
+  template <typename T>
+  void record(Topic<T>& topic) {
+    record(In<T>(topic));
+  }
+  template <typename T>
+  void record(In<T> topic) {
+    topic.subscribe([this](const std::shared_ptr<const T>& message) {
+      worker_.post([this, message] {
+        if (!frozen_) record_.add(*message);
+      });
+    });
+  }
+
+  /// What comes from now on is not recorded: the robot leaves with what it has. Thread-safe.
+  void freeze() { frozen_ = true; }
+
+  /// Calls `read` with the record, which no other thread changes meanwhile. Thread-safe.
+  template <typename Reader>
+  auto with_record(const Reader& read) const {
+    const std::lock_guard lock(mutex_);
+    return read(record_);
+  }
+
+  std::string_view name() const override { return "recorder"; }
+  void start() override { worker_.start(); }
+  void stop() noexcept override { worker_.stop(); }
+  std::exception_ptr error() const override { return worker_.error(); }
+  DurationHistogram timing() const override { return worker_.timing(); }
+
+ private:
+  using Input = std::function<void()>;
+
+  mutable std::mutex mutex_;  // guards record_
+  RunRecord record_;
+  std::atomic<bool> frozen_ = false;
+  Worker<Input> worker_;  // last member: stops first
 };
 
 }  // namespace km

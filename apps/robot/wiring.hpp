@@ -6,11 +6,11 @@
 #include <variant>
 #include <vector>
 
-#include "apps/robot/departure.hpp"
 #include "apps/robot/mapping_plan.hpp"
 #include "apps/robot/mesh_files_node.hpp"
-#include "apps/robot/recorder_node.hpp"
 #include "apps/robot/robot_config.hpp"
+#include "apps/robot/run_end.hpp"
+#include "apps/robot/run_record.hpp"
 #include "modules/core/dense_frame.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"

@@ -1,13 +1,12 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
-#include <fstream>
 #include <iostream>
 #include <random>
 
+#include "apps/output_file.hpp"
 #include "apps/program_folder.hpp"
 #include "apps/result_files.hpp"
-#include "apps/team/finished_run.hpp"
 #include "apps/team/run_team.hpp"
 #include "apps/team/team_report.hpp"
 #include "apps/team/team_results.hpp"
@@ -117,17 +116,10 @@ int run(const TeamOptions& options) {
   const km::TeamResult team = km::collect_results(
       plan, options.report ? km::finished_runs(plan) : run_robots(options, plan));
   std::cout << to_table(team);
-  if (!options.json.empty()) {
-    std::ofstream file(options.json);
-    km::JsonWriter json(file);
-    write_json(json, team);
-    if (!file.flush()) throw std::runtime_error(options.json.string() + ": cannot be written");
-  }
+  if (!options.json.empty()) km::write_json(options.json, team);
   if (!team.plot.empty()) {
     const fs::path path = plan.output / "trajectories.svg";
-    std::ofstream file(path);
-    file << team.plot;
-    if (!file.flush()) throw std::runtime_error(path.string() + ": cannot be written");
+    km::write_output(path, [&](std::ostream& out) { out << team.plot; });
     std::cout << "\nSeen from above: " << path.string() << '\n';
   }
   if (!team.meshes.merged.empty()) {

@@ -4,41 +4,39 @@
 
 #include <algorithm>
 #include <csignal>
+#include <fstream>
 #include <memory>
-#include <sstream>
+#include <stdexcept>
 
 #include "apps/result_files.hpp"
+#include "modules/core/text_table.hpp"
 #include "runtime/clock.hpp"
 
 namespace km {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr int kPoll_ms = 100;
 constexpr double kGrace_s = 30.0;
+constexpr std::size_t kLastWords = 10;  // of a log
 
 // What robots, or those who started them elsewhere, left of an earlier run: --report would show it.
 void remove_earlier_run(const TeamPlan& plan) {
   for (const RobotPlan& robot : plan.robots) {
     const auto folder = plan.output / robot.name;
-    std::filesystem::create_directories(folder);
+    fs::create_directories(folder);
     remove_results(folder);
-    std::filesystem::remove(folder / "exit_code");
+    fs::remove(folder / "exit_code");
   }
   for (const char* file : {"trajectories.svg", "team_mesh.ply", kLabelPalette})
-    std::filesystem::remove(plan.output / file);
-}
-
-std::string number(double value) {
-  std::ostringstream text;
-  text.precision(12);
-  text << value;
-  return text.str();
+    fs::remove(plan.output / file);
 }
 
 // The processes of a team, and what has been asked of them.
 class RunningTeam {
  public:
-  RunningTeam(const std::filesystem::path& binary, const TeamPlan& plan, SignalWatch& signals,
+  RunningTeam(const fs::path& binary, const TeamPlan& plan, SignalWatch& signals,
               TeamDisplay& display)
       : plan_(plan), signals_(signals), display_(display) {
     remove_earlier_run(plan);
@@ -116,10 +114,29 @@ class RunningTeam {
   bool asked_to_end_ = false;
 };
 
+// A file that is not a number counts as absent: it may be half written.
+int exit_code(const fs::path& folder) {
+  std::ifstream file(folder / "exit_code");
+  int code = 0;
+  if (file >> code) return code;
+  return fs::is_regular_file(folder / "summary.json") ? 0 : 1;
+}
+
+std::deque<std::string> last_words(const fs::path& log) {
+  std::deque<std::string> lines;
+  std::ifstream file(log);
+  for (std::string line; std::getline(file, line);) {
+    lines.push_back(line);
+    if (lines.size() > kLastWords) lines.pop_front();
+  }
+  return lines;
+}
+
 }  // namespace
 
-std::vector<std::string> robot_command(const std::filesystem::path& binary, const TeamPlan& plan,
+std::vector<std::string> robot_command(const fs::path& binary, const TeamPlan& plan,
                                        const RobotPlan& robot) {
+  constexpr int kDigits = 12;
   std::vector<std::string> command = {binary.string()};
   const auto option = [&command](const char* name, const std::string& value) {
     command.emplace_back(name);
@@ -130,8 +147,8 @@ std::vector<std::string> robot_command(const std::filesystem::path& binary, cons
   option("--name", robot.name);
   if (!robot.dataset.empty()) option("--dataset", robot.dataset.string());
   if (!robot.graph.empty()) option("--graph", robot.graph.string());
-  if (robot.from_s) option("--from", number(*robot.from_s));
-  if (robot.to_s) option("--to", number(*robot.to_s));
+  if (robot.from_s) option("--from", rounded(*robot.from_s, kDigits));
+  if (robot.to_s) option("--to", rounded(*robot.to_s, kDigits));
   option("--rate", plan.rate);
   option("--domain", std::to_string(plan.domain.value_or(0)));
   option("--output", (plan.output / robot.name).string());
@@ -139,11 +156,22 @@ std::vector<std::string> robot_command(const std::filesystem::path& binary, cons
   return command;
 }
 
-std::vector<RobotRun> run_team(const std::filesystem::path& binary, const TeamPlan& plan,
-                               SignalWatch& signals, TeamDisplay& display) {
+std::vector<RobotRun> run_team(const fs::path& binary, const TeamPlan& plan, SignalWatch& signals,
+                               TeamDisplay& display) {
   RunningTeam team(binary, plan, signals, display);
   team.wait();
   return team.results();
+}
+
+std::vector<RobotRun> finished_runs(const TeamPlan& plan) {
+  if (!fs::is_directory(plan.output))
+    throw std::runtime_error(plan.output.string() + ": no such folder");
+  std::vector<RobotRun> runs;
+  for (const RobotPlan& robot : plan.robots) {
+    const fs::path folder = plan.output / robot.name;
+    runs.push_back({{exit_code(folder), 0}, last_words(folder / "robot.log")});
+  }
+  return runs;
 }
 
 }  // namespace km

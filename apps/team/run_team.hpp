@@ -31,4 +31,10 @@ struct RobotRun {
                                              const TeamPlan& plan, SignalWatch& signals,
                                              TeamDisplay& display);
 
+/// How the robots of a run fared that has ended elsewhere, on other hosts or in containers, from
+/// the folders they left below `plan.output`; in the order of the plan. The exit code is that in
+/// the file `exit_code`, if whoever ran the robot wrote one; else 0 for a robot that left its
+/// summary.json, and 1 for one that did not. The last words are the last lines of `robot.log`.
+[[nodiscard]] std::vector<RobotRun> finished_runs(const TeamPlan& plan);
+
 }  // namespace km

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
-#include "apps/team/text_table.hpp"
-#include "modules/evaluation/closure_report.hpp"
+#include "apps/output_file.hpp"
+#include "modules/core/text_table.hpp"
 #include "modules/evaluation/mesh/mesh_report.hpp"
 #include "modules/evaluation/trajectory_report.hpp"
 
@@ -19,30 +21,27 @@ constexpr double kManySkipped = 0.05;  // of the frames: beyond, odometry is not
 
 constexpr std::array kTraffic = {"place_recognition", "geometric_verification", "pgo", "other"};
 
-std::string ate(const TrajectoryError* error) {
-  return error != nullptr ? fixed(error->position_m.rmse, 4) : "-";
+// Absolute error, drift and share of the recording; "-" for what there is not.
+std::vector<std::string> error_cells(const TrajectoryError* error) {
+  if (error == nullptr) return {"-", "-", "-", "-"};
+  const auto mean = [](const Statistics& statistics, int decimals) {
+    return statistics.count > 0 ? fixed(statistics.mean, decimals) : "-";
+  };
+  return {fixed(error->position_m.rmse, 4), mean(error->drift_percent, 2),
+          mean(error->drift_deg_per_m, 3), fixed(100.0 * error->completeness, 1) + '%'};
 }
 
-std::string drift(const TrajectoryError* error) {
-  return error != nullptr && error->drift_percent.count > 0 ? fixed(error->drift_percent.mean, 2)
-                                                            : "-";
+void append(std::vector<std::string>& row, const std::vector<std::string>& cells) {
+  row.insert(row.end(), cells.begin(), cells.end());
 }
 
-std::string turn_drift(const TrajectoryError* error) {
-  return error != nullptr && error->drift_deg_per_m.count > 0
-             ? fixed(error->drift_deg_per_m.mean, 3)
-             : "-";
-}
-
-std::string covered(const TrajectoryError* error) {
-  return error != nullptr ? fixed(100.0 * error->completeness, 1) + '%' : "-";
-}
-
-const TrajectoryError* find(const std::optional<TeamError>& team, const std::string& name) {
-  if (!team) return nullptr;
-  const auto found = std::find_if(team->robots.begin(), team->robots.end(),
-                                  [&](const TrajectoryError& e) { return e.name == name; });
-  return found != team->robots.end() ? &*found : nullptr;
+// The robot's part of a report on trajectories or meshes.
+const auto* find(const auto& report, const std::string& name) {
+  const typename decltype(report->robots)::value_type* found = nullptr;
+  if (report)
+    for (const auto& error : report->robots)
+      if (error.name == name) found = &error;
+  return found;
 }
 
 std::string end_of(const RobotResult& robot) {
@@ -50,16 +49,13 @@ std::string end_of(const RobotResult& robot) {
   return robot.summary && !robot.summary->exit_reason.empty() ? robot.summary->exit_reason : "ok";
 }
 
-std::string count_text(std::uint64_t count) {
-  return std::to_string(count);
-}
-
 std::string run_table(const TeamResult& team) {
   Rows rows = {{"robot", "frames", "skipped", "keyframes", "end"}};
   for (const RobotResult& robot : team.robots) {
-    const RobotSummary summary = robot.summary.value_or(RobotSummary{});
-    rows.push_back({robot.plan.name, count_text(summary.frames), count_text(summary.frames_skipped),
-                    count_text(summary.keyframes), end_of(robot)});
+    const RunSummary summary = robot.summary.value_or(RunSummary{});
+    rows.push_back({robot.plan.name, std::to_string(summary.frames),
+                    std::to_string(summary.frames_skipped), std::to_string(summary.keyframes),
+                    end_of(robot)});
   }
   return align_columns(rows);
 }
@@ -90,66 +86,105 @@ std::string trajectory_table(const TeamResult& team) {
   Rows rows = {{"robot", "odometry ATE [m]", "drift [%]", "[deg/m]", "covered", "optimized ATE [m]",
                 "drift [%]", "[deg/m]", "covered"}};
   for (const RobotResult& robot : team.robots) {
-    const TrajectoryError* const odometry = robot.odometry ? &*robot.odometry : nullptr;
-    const TrajectoryError* const optimized = find(team.optimized, robot.plan.name);
-    rows.push_back({robot.plan.name, ate(odometry), drift(odometry), turn_drift(odometry),
-                    covered(odometry), ate(optimized), drift(optimized), turn_drift(optimized),
-                    covered(optimized)});
+    rows.push_back({robot.plan.name});
+    append(rows.back(), error_cells(robot.odometry ? &*robot.odometry : nullptr));
+    append(rows.back(), error_cells(find(team.optimized, robot.plan.name)));
   }
-  const TrajectoryError* const joint = team.optimized ? &team.optimized->joint : nullptr;
-  rows.push_back({"team, one frame", "", "", "", "", ate(joint), drift(joint), turn_drift(joint),
-                  covered(joint)});
+  rows.push_back({"team, one frame", "", "", "", ""});
+  append(rows.back(), error_cells(team.optimized ? &team.optimized->joint : nullptr));
   return align_columns(rows) + drift_remark(team);
 }
 
 std::string closure_table(const TeamResult& team) {
   Rows rows = {{"robot", "candidates", "verified", "inliers", "PGO rounds", "PGO time [s]",
                 "PGO cost", "anchor", "solves with"}};
-  RobotSummary sum;
+  const auto add = [&](const std::string& name, const RunSummary& summary) {
+    const ClosureCounts& closures = summary.closures;
+    rows.push_back({name, std::to_string(closures.candidates), std::to_string(closures.verified),
+                    std::to_string(closures.inliers), std::to_string(summary.pgo.rounds),
+                    fixed(summary.pgo.seconds, 2)});
+  };
+  RunSummary sum;
   for (const RobotResult& robot : team.robots) {
-    const RobotSummary s = robot.summary.value_or(RobotSummary{});
-    rows.push_back({robot.plan.name, count_text(s.closure_candidates),
-                    count_text(s.closures_verified), count_text(s.closures_inlier),
-                    count_text(s.pgo_rounds), fixed(s.pgo_seconds, 2), fixed(s.pgo_cost, 3),
-                    s.pgo_anchor ? count_text(*s.pgo_anchor) : "-",
-                    count_text(s.pgo_members.size()) + " robots"});
-    sum.closure_candidates += s.closure_candidates;
-    sum.closures_verified += s.closures_verified;
-    sum.closures_inlier += s.closures_inlier;
-    sum.pgo_rounds = std::max(sum.pgo_rounds, s.pgo_rounds);
-    sum.pgo_seconds = std::max(sum.pgo_seconds, s.pgo_seconds);
+    const RunSummary summary = robot.summary.value_or(RunSummary{});
+    const RunSummary::Optimizer& pgo = summary.pgo;
+    add(robot.plan.name, summary);
+    append(rows.back(), {fixed(pgo.cost, 3), pgo.anchor ? std::to_string(*pgo.anchor) : "-",
+                         std::to_string(pgo.members.size()) + " robots"});
+    sum.closures.candidates += summary.closures.candidates;
+    sum.closures.verified += summary.closures.verified;
+    sum.closures.inliers += summary.closures.inliers;
+    sum.pgo.rounds = std::max(sum.pgo.rounds, pgo.rounds);
+    sum.pgo.seconds = std::max(sum.pgo.seconds, pgo.seconds);
   }
-  rows.push_back({"team", count_text(sum.closure_candidates), count_text(sum.closures_verified),
-                  count_text(sum.closures_inlier), count_text(sum.pgo_rounds),
-                  fixed(sum.pgo_seconds, 2)});
+  add("team", sum);
   return align_columns(rows);
 }
 
 std::string traffic_table(const TeamResult& team) {
   Rows rows = {{"sent", "place recognition", "geometric verification", "distributed PGO", "other"}};
-  std::array<double, kTraffic.size()> sums{};
+  std::map<std::string, std::uint64_t> sums;
+  const auto add = [&](const std::string& name, std::map<std::string, std::uint64_t> bytes) {
+    rows.push_back({name});
+    for (const char* category : kTraffic)
+      rows.back().push_back(bytes_text(static_cast<double>(bytes[category])));
+  };
   for (const RobotResult& robot : team.robots) {
-    std::vector<std::string> row = {robot.plan.name};
-    for (std::size_t c = 0; c < kTraffic.size(); ++c) {
-      double bytes = 0.0;
-      if (robot.summary) {
-        const auto& traffic = robot.summary->traffic_bytes;
-        const auto entry = traffic.find(kTraffic[c]);
-        if (entry != traffic.end()) bytes = static_cast<double>(entry->second);
-      }
-      sums[c] += bytes;
-      row.push_back(bytes_text(bytes));
-    }
-    rows.push_back(std::move(row));
+    const RunSummary summary = robot.summary.value_or(RunSummary{});
+    for (const auto& [category, bytes] : summary.traffic) sums[category] += bytes;
+    add(robot.plan.name, summary.traffic);
   }
-  rows.push_back({"team"});
-  for (const double sum : sums) rows.back().push_back(bytes_text(sum));
+  add("team", sums);
   return align_columns(rows);
+}
+
+std::string right_labels(const std::optional<MeshReport>& report, const MeshError* error) {
+  if (error == nullptr || !report->has_labels) return "-";
+  return fixed(100.0 * error->seen.labels.total().accuracy(), 1) + '%';
+}
+
+std::vector<std::string> mesh_row(const std::string& name, const TeamMeshes& meshes,
+                                  const MeshError* before, const MeshError* after) {
+  const auto number = [](const MeshError* error, auto value) {
+    return error != nullptr ? fixed(value(*error), 4) : std::string("-");
+  };
+  const auto mean = [](const MeshError& error) { return error.truth.point.mean_m; };
+  const auto in_front = [](const MeshError& error) { return error.seen.point.mean_m; };
+  const MeshError* const any = after != nullptr ? after : before;
+  return {name,
+          any != nullptr ? std::to_string(any->faces) : "-",
+          any != nullptr ? fixed(100.0 * any->coverage, 1) + '%' : "-",
+          number(before, mean),
+          number(before, in_front),
+          right_labels(meshes.odometry, before),
+          number(after, mean),
+          number(after, in_front),
+          right_labels(meshes.optimized, after)};
+}
+
+// A row per robot and one for all as one; empty without comparisons.
+std::string mesh_table(const TeamMeshes& meshes) {
+  const auto& any = meshes.optimized ? meshes.optimized : meshes.odometry;
+  if (!any) return "";
+  Rows rows = {{"mesh", "faces", "covered", "odometry: error [m]", "in front", "labels",
+                "optimized: error [m]", "in front", "labels"}};
+  for (const MeshError& error : (meshes.odometry ? meshes.odometry : any)->robots)
+    rows.push_back(mesh_row(error.name, meshes, find(meshes.odometry, error.name),
+                            find(meshes.optimized, error.name)));
+  rows.push_back(mesh_row("team, one frame", meshes,
+                          meshes.odometry ? &meshes.odometry->merged : nullptr,
+                          meshes.optimized ? &meshes.optimized->merged : nullptr));
+  const MeshErrorOptions options;
+  return align_columns(rows) +
+         "Error: mean distance to the mesh from the points of the true one, " +
+         fixed(any->samples_per_m2, 0) + " a square metre, within " + fixed(options.crop_m, 1) +
+         " m of it\n(covered), after ICP of all together. In front: without those that no robot "
+         "can have seen. Labels: share of\nthese that is right.\n";
 }
 
 // Empty unless the robot was too slow for the rate.
 std::string skipped_remark(const RobotResult& robot) {
-  const RobotSummary summary = robot.summary.value_or(RobotSummary{});
+  const RunSummary summary = robot.summary.value_or(RunSummary{});
   const auto skipped = static_cast<double>(summary.frames_skipped);
   const double share = skipped / std::max(1.0, skipped + static_cast<double>(summary.frames));
   if (share <= kManySkipped) return "";
@@ -200,45 +235,17 @@ std::string failures(const TeamResult& team) {
   return text;
 }
 
-void write_summary(JsonWriter& json, const RobotSummary& summary) {
-  json.field("keyframes", summary.keyframes);
-  json.field("frames", summary.frames);
-  json.field("frames_skipped", summary.frames_skipped);
-  json.key("closures");
-  json.begin_object();
-  json.field("candidates", summary.closure_candidates);
-  json.field("verified", summary.closures_verified);
-  json.field("inliers", summary.closures_inlier);
-  json.end_object();
-  json.key("pgo");
-  json.begin_object();
-  json.field("rounds", summary.pgo_rounds);
-  json.field("seconds", summary.pgo_seconds);
-  json.field("cost", summary.pgo_cost);
-  if (summary.pgo_anchor) json.field("anchor", *summary.pgo_anchor);
-  json.array("members", summary.pgo_members);
-  json.end_object();
-  json.key("traffic");
-  json.begin_object();
-  for (const auto& [category, bytes] : summary.traffic_bytes) json.field(category, bytes);
-  json.end_object();
-  json.field("exit_reason", summary.exit_reason);
-}
-
-void write_robot(JsonWriter& json, const RobotResult& robot) {
-  json.begin_object();
-  json.field("robot", robot.plan.id);
-  json.field("name", robot.plan.name);
-  json.field("exit_code", robot.run.exit.code);
-  json.field("exit_signal", robot.run.exit.signal);
-  if (robot.summary) write_summary(json, *robot.summary);
-  if (robot.odometry) {
-    json.key("odometry");
-    write_json(json, *robot.odometry);
-  }
-  json.field("in_team_frame", robot.in_team_frame);
-  json.array("notes", robot.notes);
-  json.end_object();
+Json to_json(const RobotResult& robot) {
+  Json json = {{"robot", robot.plan.id}, {"name", robot.plan.name}};
+  if (robot.summary) json.update(*robot.summary);
+  json.update({{"robot", robot.plan.id},
+               {"name", robot.plan.name},
+               {"exit_code", robot.run.exit.code},
+               {"exit_signal", robot.run.exit.signal}});
+  if (robot.odometry) json["odometry"] = *robot.odometry;
+  json["in_team_frame"] = robot.in_team_frame;
+  json["notes"] = robot.notes;
+  return json;
 }
 
 }  // namespace
@@ -251,33 +258,23 @@ std::string to_table(const TeamResult& team) {
   std::string text =
       run_table(team) + '\n' + trajectory_table(team) + '\n' + closure_table(team) + '\n';
   if (team.closures) text += to_table(*team.closures) + '\n';
-  if (const std::string meshes = to_table(team.meshes); !meshes.empty()) text += meshes + '\n';
+  if (const std::string meshes = mesh_table(team.meshes); !meshes.empty()) text += meshes + '\n';
   text += traffic_table(team);
   return remarks.empty() ? text : text + '\n' + remarks;
 }
 
-void write_json(JsonWriter& json, const TeamResult& team) {
-  json.begin_object();
-  json.key("robots");
-  json.begin_array();
-  for (const RobotResult& robot : team.robots) write_robot(json, robot);
-  json.end_array();
-  if (team.optimized) {
-    json.key("optimized");
-    write_json(json, *team.optimized);
-  }
-  if (team.closures) {
-    json.key("closures");
-    write_json(json, *team.closures);
-  }
-  for (const auto& [key, report] : {std::pair("meshes", &team.meshes.odometry),
-                                    std::pair("optimized_meshes", &team.meshes.optimized)}) {
-    if (!*report) continue;
-    json.key(key);
-    write_json(json, **report, {});
-  }
-  json.array("notes", team.notes);
-  json.end_object();
+void to_json(Json& json, const TeamResult& team) {
+  json = {{"robots", Json::array()}};
+  for (const RobotResult& robot : team.robots) json["robots"].push_back(to_json(robot));
+  if (team.optimized) json["optimized"] = *team.optimized;
+  if (team.closures) json["closures"] = *team.closures;
+  if (team.meshes.odometry) json["meshes"] = to_json(*team.meshes.odometry, {});
+  if (team.meshes.optimized) json["optimized_meshes"] = to_json(*team.meshes.optimized, {});
+  json["notes"] = team.notes;
+}
+
+void write_json(const std::filesystem::path& file, const TeamResult& team) {
+  write_output(file, [&](std::ostream& out) { out << json_text(team); });
 }
 
 }  // namespace km

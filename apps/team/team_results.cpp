@@ -1,24 +1,70 @@
 #include "apps/team/team_results.hpp"
 
-#include <yaml-cpp/yaml.h>
-
+#include <algorithm>
 #include <exception>
-#include <stdexcept>
+#include <filesystem>
+#include <iostream>
+#include <map>
 #include <utility>
 
-#include "apps/team/team_frame.hpp"
-#include "modules/evaluation/closure_files.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/evaluation/trajectory_plot.hpp"
+#include "modules/evaluation/trajectory_report.hpp"
+#include "modules/mesh/ply_file.hpp"
 #include "modules/sensors/euroc_reader.hpp"
 
 namespace km {
 namespace {
 
-// JSON is YAML; absent keys keep the default.
-template <typename T>
-void read(const YAML::Node& map, const char* key, T& value) {
-  if (map && map.IsMap() && map[key]) value = map[key].as<T>(value);
+namespace fs = std::filesystem;
+
+// What `make` returns; nullopt if it throws, and why in the notes.
+auto attempt(std::vector<std::string>& notes, const auto& make, const std::string& what = {})
+    -> std::optional<decltype(make())> {
+  try {
+    return make();
+  } catch (const std::exception& error) {
+    notes.push_back(what + error.what());
+    return std::nullopt;
+  }
+}
+
+// By robot, in the order of the plan; those that left none are not in it.
+using Meshes = std::vector<std::pair<std::string, LabelledMesh>>;
+
+Meshes read_meshes(const TeamPlan& plan, const char* file, std::vector<std::string>& notes) {
+  Meshes meshes;
+  for (const RobotPlan& robot : plan.robots) {
+    const fs::path path = plan.output / robot.name / file;
+    if (!fs::exists(path)) continue;
+    auto mesh = attempt(notes, [&] { return read_ply(path); });
+    if (mesh && mesh->faces.empty())
+      notes.push_back(path.string() + ": the mesh is empty");
+    else if (mesh)
+      meshes.emplace_back(robot.name, std::move(*mesh));
+  }
+  return meshes;
+}
+
+// Of a city the table would else take longer than the run; kimera_multi_evaluate mesh takes more.
+constexpr std::size_t kMostSamples = 2'000'000;
+
+std::optional<MeshReport> compare(const LabelledMesh& truth, const Meshes& meshes,
+                                  const SE3& T_truth_team, std::vector<std::string>& notes) {
+  if (meshes.empty()) return std::nullopt;
+  std::vector<MeshInput> inputs;
+  for (const auto& [name, mesh] : meshes) inputs.push_back({name, mesh});
+  MeshErrorOptions options;
+  options.T_truth_estimate = T_truth_team;
+  options.max_samples = kMostSamples;
+  return attempt(
+      notes, [&] { return mesh_error(truth, inputs, options); }, "meshes are not compared: ");
+}
+
+void note_uncorrected(const Meshes& before, const Meshes& after, std::vector<std::string>& notes) {
+  std::map<std::string, int> corrected;
+  for (const auto& [name, mesh] : after) ++corrected[name];
+  for (const auto& [name, mesh] : before)
+    if (!corrected.contains(name)) notes.push_back(name + " left a mesh, but none corrected");
 }
 
 // The part of the recording the robot was given; nullopt for pose graphs.
@@ -46,29 +92,28 @@ class Trajectories {
   // The robot's `file` with its truth, if it can be judged; else why not, and nullopt. The result
   // stays valid.
   std::optional<TrajectoryInput> input(const RobotPlan& robot, const char* file,
-                                       std::vector<std::string>& notes) try {
+                                       std::vector<std::string>& notes) {
     if (robot.truth.empty()) return std::nullopt;
-    const auto& truth = read(robot.truth);
-    const auto& estimate = read(plan_.output / robot.name / file);
-    TrajectoryInput input{robot.name, truth, estimate, window_of(robot)};
-    static_cast<void>(trajectory_error({&input, 1}));  // throws if it cannot be compared
-    return input;
-  } catch (const std::exception& error) {
-    notes.emplace_back(error.what());
-    return std::nullopt;
+    return attempt(notes, [&] {
+      const auto& truth = read(robot.truth);
+      const auto& estimate = read(plan_.output / robot.name / file);
+      TrajectoryInput input{robot.name, truth, estimate, window_of(robot)};
+      static_cast<void>(trajectory_error({&input, 1}));  // throws if it cannot be compared
+      return input;
+    });
   }
 
   const std::vector<StampedPose>& truth(const RobotPlan& robot) { return read(robot.truth); }
 
  private:
-  const std::vector<StampedPose>& read(const std::filesystem::path& file) {
+  const std::vector<StampedPose>& read(const fs::path& file) {
     const auto known = read_.find(file);
     return known != read_.end() ? known->second
                                 : read_.emplace(file, read_trajectory(file)).first->second;
   }
 
   const TeamPlan& plan_;
-  std::map<std::filesystem::path, std::vector<StampedPose>> read_;
+  std::map<fs::path, std::vector<StampedPose>> read_;
 };
 
 // The closures of all robots whose truth is known against it; nullopt where there is nothing to
@@ -102,34 +147,49 @@ std::optional<ClosureScores> judge_closures(const TeamPlan& plan,
   return std::nullopt;
 }
 
+// The robot whose odometry frame the optimised poses are in: a robot that solved with no other has
+// its own.
+std::optional<RobotId> frame_of(const RobotResult& robot) {
+  if (!robot.summary) return std::nullopt;
+  const RunSummary::Optimizer& pgo = robot.summary->pgo;
+  return pgo.members.size() > 1 ? pgo.anchor : robot.plan.id;
+}
+
 }  // namespace
 
-RobotSummary read_summary(const std::filesystem::path& file) {
-  if (!std::filesystem::is_regular_file(file))
-    throw std::runtime_error(file.string() + ": no such file");
-  RobotSummary summary;
-  try {
-    const YAML::Node root = YAML::LoadFile(file.string());
-    if (!root.IsMap()) throw std::runtime_error(file.string() + ": not a JSON object");
-    read(root, "keyframes", summary.keyframes);
-    read(root, "frames", summary.frames);
-    read(root, "frames_skipped", summary.frames_skipped);
-    const YAML::Node closures = root["closures"];
-    read(closures, "candidates", summary.closure_candidates);
-    read(closures, "verified", summary.closures_verified);
-    read(closures, "inliers", summary.closures_inlier);
-    const YAML::Node pgo = root["pgo"];
-    read(pgo, "rounds", summary.pgo_rounds);
-    read(pgo, "seconds", summary.pgo_seconds);
-    read(pgo, "cost", summary.pgo_cost);
-    if (pgo && pgo.IsMap() && pgo["anchor"]) summary.pgo_anchor = pgo["anchor"].as<RobotId>();
-    read(pgo, "members", summary.pgo_members);
-    read(root, "traffic", summary.traffic_bytes);
-    read(root, "exit_reason", summary.exit_reason);
-  } catch (const YAML::Exception& error) {
-    throw std::runtime_error(file.string() + ": " + error.what());
+void find_team_frame(std::vector<RobotResult>& robots) {
+  std::map<RobotId, int> sizes;
+  for (const RobotResult& robot : robots)
+    if (const auto frame = frame_of(robot)) ++sizes[*frame];
+  // The first of equal ones is that of the lowest anchor.
+  const auto team = std::max_element(
+      sizes.begin(), sizes.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  for (RobotResult& robot : robots) {
+    const auto frame = frame_of(robot);
+    if (!frame || *frame == team->first) continue;
+    robot.in_team_frame = false;
+    robot.notes.push_back((*frame == robot.plan.id && sizes[*frame] == 1
+                               ? std::string("never joined the others")
+                               : "ended in the frame of robot " + std::to_string(*frame)) +
+                          ": left out of the optimised errors, the drawing and the team's map");
   }
-  return summary;
+}
+
+TeamMeshes collect_meshes(const TeamPlan& plan, const SE3& T_truth_team,
+                          std::vector<std::string>& notes) {
+  TeamMeshes result;
+  const Meshes before = read_meshes(plan, "mesh.ply", notes);
+  const Meshes after = read_meshes(plan, "mesh_optimized.ply", notes);
+  note_uncorrected(before, after, notes);
+  for (const auto& [name, mesh] : after) result.merged.append(mesh);
+  result.merged.transform(T_truth_team);
+  if (plan.truth_mesh.empty() || before.empty()) return result;
+  std::cerr << "comparing the meshes with " << plan.truth_mesh.string() << " ...\n";
+  if (const auto truth = attempt(notes, [&] { return read_ply(plan.truth_mesh); })) {
+    result.odometry = compare(*truth, before, T_truth_team, notes);
+    result.optimized = compare(*truth, after, T_truth_team, notes);
+  }
+  return result;
 }
 
 TeamResult collect_results(const TeamPlan& plan, std::vector<RobotRun> runs) {
@@ -137,17 +197,13 @@ TeamResult collect_results(const TeamPlan& plan, std::vector<RobotRun> runs) {
   result.notes = plan.notes;
   Trajectories trajectories(plan);
   for (std::size_t i = 0; i < plan.robots.size(); ++i) {
-    RobotResult robot;
+    RobotResult& robot = result.robots.emplace_back();
     robot.plan = plan.robots[i];
     robot.run = std::move(runs[i]);
-    try {
-      robot.summary = read_summary(plan.output / robot.plan.name / "summary.json");
-    } catch (const std::exception& error) {
-      robot.notes.emplace_back(error.what());
-    }
+    const fs::path summary = plan.output / robot.plan.name / "summary.json";
+    robot.summary = attempt(robot.notes, [&] { return read_summary(summary); });
     if (const auto input = trajectories.input(robot.plan, "odometry.tum", robot.notes))
       robot.odometry = trajectory_error({&*input, 1}).joint;
-    result.robots.push_back(std::move(robot));
   }
   find_team_frame(result.robots);
   TeamPlan joined = plan;

@@ -1,51 +1,37 @@
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/robot/run_summary.hpp"
 #include "apps/team/run_team.hpp"
 #include "apps/team/team_file.hpp"
-#include "apps/team/team_meshes.hpp"
+#include "modules/core/geometry.hpp"
 #include "modules/evaluation/closure_truth.hpp"
+#include "modules/evaluation/mesh/mesh_error.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 
 namespace km {
-
-/// What a robot wrote to summary.json; zero or empty for what it did not write.
-struct RobotSummary {
-  std::uint64_t keyframes = 0;
-  std::uint64_t frames = 0;
-  std::uint64_t frames_skipped = 0;
-  std::uint64_t closure_candidates = 0;
-  std::uint64_t closures_verified = 0;
-  std::uint64_t closures_inlier = 0;
-  std::uint64_t pgo_rounds = 0;
-  double pgo_seconds = 0.0;
-  double pgo_cost = 0.0;
-  std::optional<RobotId> pgo_anchor;
-  std::vector<RobotId> pgo_members;
-  std::map<std::string, std::uint64_t> traffic_bytes;  ///< Sent, by category.
-  std::string exit_reason;
-};
-
-/// Reads summary.json. Throws std::runtime_error naming the file if it is missing or no JSON.
-[[nodiscard]] RobotSummary read_summary(const std::filesystem::path& file);
 
 /// One robot after the run. What could not be had is absent, and `notes` say why.
 struct RobotResult {
   RobotPlan plan;
   RobotRun run;
-  std::optional<RobotSummary> summary;
+  std::optional<RunSummary> summary;
   std::optional<TrajectoryError> odometry;  ///< Aligned alone.
   bool in_team_frame = true;                ///< Its optimised poses are, see find_team_frame().
   std::vector<std::string> notes;
 
   /// True if it failed before it wrote results: why is in its last words.
   [[nodiscard]] bool left_nothing() const { return !summary && !run.exit.ok(); }
+};
+
+/// The meshes of a team after the run.
+struct TeamMeshes {
+  std::optional<MeshReport> odometry;   ///< Of mesh.ply; absent if the truth is unknown.
+  std::optional<MeshReport> optimized;  ///< Of mesh_optimized.ply, likewise.
+  LabelledMesh merged;                  ///< All mesh_optimized.ply as one, moved; may be empty.
 };
 
 /// A team after the run.
@@ -57,6 +43,17 @@ struct TeamResult {
   TeamMeshes meshes;                      ///< Of robots that made a map.
   std::vector<std::string> notes;         ///< Why something of the team is absent.
 };
+
+/// Finds the robots whose optimised poses are not in the frame that most robots ended in (of
+/// equally many, that of the lowest anchor): sets `in_team_frame` of these to false and notes why.
+/// A robot that left no summary is taken to be in it.
+void find_team_frame(std::vector<RobotResult>& robots);
+
+/// Reads the meshes that the robots left, merges them in the frame of the true poses, to which
+/// `T_truth_team` leads, and compares them with `plan.truth_mesh`: there ICP brings all together
+/// onto it, in each of the two cases. What is missing of the robots that made a map is noted.
+[[nodiscard]] TeamMeshes collect_meshes(const TeamPlan& plan, const SE3& T_truth_team,
+                                        std::vector<std::string>& notes);
 
 /// Collects the results of a run: summaries, and errors where the truth is known. Completeness is
 /// that of the part of the recording the robot was given. The true poses of all robots are in one

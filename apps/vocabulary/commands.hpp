@@ -1,9 +1,7 @@
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
+#include <CLI/CLI.hpp>
 #include <string>
-#include <vector>
 
 namespace km {
 
@@ -13,33 +11,22 @@ struct VocabularyCommand {
   std::string json;        ///< Results for programs; none if empty.
   int features = 1000;     ///< ORB features per image.
   int every = 1;           ///< Use every n-th image.
+
+  void define(CLI::App& app) {
+    app.add_option("--features", features, "ORB features per image")
+        ->check(CLI::Range(1, 100000))
+        ->capture_default_str();
+    app.add_option("--every", every, "Use every N-th image of an input")
+        ->check(CLI::Range(1, 1000000))
+        ->capture_default_str();
+    app.add_option("--json", json, "Also write the results to this file, as JSON");
+  }
 };
 
-struct TrainCommand : VocabularyCommand {
-  std::vector<std::string> images;
-  int branching = 10;
-  int depth = 5;
-  std::uint32_t seed = 1;
-};
-
-struct InspectCommand : VocabularyCommand {
-  std::vector<std::string> images;  ///< To count words in.
-  std::vector<std::string> pair;    ///< Two images to compare, or none.
-};
-
-struct EvaluateCommand : VocabularyCommand {
-  std::vector<std::string> known;    ///< Images of the robot that is asked.
-  std::vector<std::string> queries;  ///< Images of the robot that asks.
-  std::string truth;                 ///< Poses: TUM or EuRoC.
-  double max_distance_m = 2.0;
-  double max_angle_deg = 45.0;
-  double min_normalizer = 0.05;
-  std::size_t max_candidates = 1000000;  ///< Per query, the best ones.
-};
-
-/// Each prints to stdout and returns the exit code. Throw std::exception for unusable input.
-int train(const TrainCommand& command);
-int inspect(const InspectCommand& command);
-int evaluate(const EvaluateCommand& command);
+/// Add a subcommand to `app`, which runs as soon as the command line names it and prints to stdout.
+/// Unusable input throws a std::exception.
+void add_train(CLI::App& app);
+void add_inspect(CLI::App& app);
+void add_evaluate(CLI::App& app);
 
 }  // namespace km

@@ -1,19 +1,30 @@
 #include <algorithm>
-#include <fstream>
-#include <iomanip>
 #include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <span>
-#include <stdexcept>
 
+#include "apps/output_file.hpp"
 #include "apps/vocabulary/commands.hpp"
-#include "apps/vocabulary/image_list.hpp"
-#include "apps/vocabulary/orb_images.hpp"
-#include "apps/vocabulary/truth_poses.hpp"
+#include "apps/vocabulary/images.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/evaluation/association.hpp"
+#include "modules/evaluation/trajectory_file.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
 
 namespace km {
 namespace {
+
+struct EvaluateCommand : VocabularyCommand {
+  std::vector<std::string> known;    ///< Images of the robot that is asked.
+  std::vector<std::string> queries;  ///< Images of the robot that asks.
+  std::string truth;                 ///< Poses: TUM or EuRoC.
+  double max_distance_m = 2.0;
+  double max_angle_deg = 45.0;
+  double min_normalizer = 0.05;
+  std::size_t max_candidates = 1000000;  ///< Per query, the best ones.
+};
 
 constexpr double kTruthTolerance_s = 0.05;  // ground truth comes at 20 Hz or faster
 
@@ -31,7 +42,7 @@ std::vector<View> views_of(const std::vector<std::string>& inputs, const Vocabul
   const auto descriptors = orb_descriptors(images, command.features);
   std::vector<View> views;
   for (std::size_t i = 0; i < images.size(); ++i)
-    if (const auto T = pose_at(truth, stamp_of_image(images[i]), kTruthTolerance_s))
+    if (const auto T = pose_at(truth, stamp_of_image(images[i]), 0.0, kTruthTolerance_s))
       views.push_back({vocabulary.transform(descriptors[i]), *T});
   if (views.empty()) throw std::runtime_error("no image has a pose in " + command.truth);
   return views;
@@ -105,33 +116,52 @@ Row row_at(double threshold, const std::vector<Pair>& pairs, std::size_t query_c
 }
 
 void print(const std::vector<Row>& rows, std::size_t same, std::size_t all) {
-  std::cout << same << " of " << all << " pairs show the same place, seen by " << rows[0].queries
-            << " queries\nthreshold  candidates  precision  pair recall  query recall\n"
-            << std::fixed;
+  std::vector<std::vector<std::string>> table = {
+      {"threshold", "candidates", "precision", "pair recall", "query recall"}};
   for (const Row& row : rows)
-    std::cout << std::setprecision(2) << std::setw(9) << row.threshold << std::setw(12)
-              << row.candidates << std::setprecision(3) << std::setw(11) << row.precision()
-              << std::setw(13) << Row::ratio(row.correct, std::max<std::size_t>(1, same))
-              << std::setw(14) << row.query_recall() << '\n';
+    table.push_back({fixed(row.threshold, 2), std::to_string(row.candidates),
+                     fixed(row.precision(), 3),
+                     fixed(Row::ratio(row.correct, std::max<std::size_t>(1, same)), 3),
+                     fixed(row.query_recall(), 3)});
+  std::cout << same << " of " << all << " pairs show the same place, seen by " << rows[0].queries
+            << " queries\n"
+            << align_columns(table);
 }
 
-void write_json(const std::string& file, const std::vector<Row>& rows, std::size_t same) {
-  std::ofstream json(file);
-  json << "{\"pairs_of_same_place\": " << same << ", \"rows\": [";
-  for (std::size_t i = 0; i < rows.size(); ++i)
-    json << (i == 0 ? "" : ", ") << "{\"threshold\": " << rows[i].threshold
-         << ", \"candidates\": " << rows[i].candidates << ", \"correct\": " << rows[i].correct
-         << ", \"queries\": " << rows[i].queries << ", \"recognised\": " << rows[i].recognised
-         << '}';
-  json << "]}\n";
-  if (!json.flush()) throw std::runtime_error(file + " cannot be written");
+void write_json(std::ostream& out, const std::vector<Row>& rows, std::size_t same) {
+  nlohmann::ordered_json json{{"pairs_of_same_place", same}, {"rows", nlohmann::json::array()}};
+  for (const Row& row : rows)
+    json["rows"].push_back({{"threshold", row.threshold},
+                            {"candidates", row.candidates},
+                            {"correct", row.correct},
+                            {"queries", row.queries},
+                            {"recognised", row.recognised}});
+  out << json << '\n';
 }
 
-}  // namespace
+void define(CLI::App& app, EvaluateCommand& command) {
+  app.add_option("vocabulary", command.vocabulary, "Vocabulary file")->required();
+  app.add_option("--known", command.known, "IMAGES a robot has taken, named by stamp [ns]")
+      ->required();
+  app.add_option("--queries", command.queries, "IMAGES another robot sends, named by stamp [ns]")
+      ->required();
+  app.add_option("--truth", command.truth, "Poses of both: TUM text, or EuRoC .csv")->required();
+  app.add_option("--max-distance", command.max_distance_m,
+                 "Two images show the same place up to this distance [m] ...")
+      ->capture_default_str();
+  app.add_option("--max-angle", command.max_angle_deg, "... and this angle between them [deg]")
+      ->capture_default_str();
+  app.add_option("--min-normalizer", command.min_normalizer,
+                 "Least score of a query against the image before it")
+      ->capture_default_str();
+  app.add_option("--max-candidates", command.max_candidates,
+                 "Only so many candidates per query, the best ones (default: all)");
+  command.VocabularyCommand::define(app);
+}
 
-int evaluate(const EvaluateCommand& command) {
+void run(const EvaluateCommand& command) {
   const Vocabulary vocabulary = load_vocabulary(command.vocabulary);
-  const std::vector<StampedPose> truth = read_truth(command.truth);
+  const std::vector<StampedPose> truth = read_trajectory(command.truth);
   const std::vector<View> known = views_of(command.known, vocabulary, truth, command);
   const std::vector<View> queries = views_of(command.queries, vocabulary, truth, command);
   const std::vector<Pair> pairs = compare(queries, known, command);
@@ -140,8 +170,17 @@ int evaluate(const EvaluateCommand& command) {
   std::vector<Row> rows;
   for (int step = 4; step <= 20; ++step) rows.push_back(row_at(0.05 * step, pairs, queries.size()));
   print(rows, same, pairs.size());
-  if (!command.json.empty()) write_json(command.json, rows, same);
-  return 0;
+  write_output(command.json, [&](std::ostream& out) { write_json(out, rows, same); });
+}
+
+}  // namespace
+
+void add_evaluate(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand(
+      "evaluate", "Precision and recall of candidates over the similarity threshold");
+  const auto command = std::make_shared<EvaluateCommand>();
+  define(app, *command);
+  app.callback([command] { run(*command); });
 }
 
 }  // namespace km

@@ -1,19 +1,24 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <fstream>
 #include <iomanip>
 #include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
 #include <numeric>
-#include <stdexcept>
 
+#include "apps/output_file.hpp"
 #include "apps/vocabulary/commands.hpp"
-#include "apps/vocabulary/image_list.hpp"
-#include "apps/vocabulary/orb_images.hpp"
+#include "apps/vocabulary/images.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
 
 namespace km {
 namespace {
+
+struct InspectCommand : VocabularyCommand {
+  std::vector<std::string> images;  ///< To count words in.
+  std::vector<std::string> pair;    ///< Two images to compare, or none.
+};
 
 // Number of leaves at each depth.
 std::vector<std::size_t> leaves_by_depth(const VocabularyData& data) {
@@ -93,24 +98,14 @@ void print(const Usage& usage) {
   }
 }
 
-void write_json(const std::string& file, const Vocabulary& vocabulary, const Usage& usage,
-                double pair_score) {
-  std::ofstream json(file);
-  json << "{\"id\": \"" << fingerprint_text(vocabulary.id())
-       << "\", \"branching\": " << vocabulary.data().branching
-       << ", \"depth\": " << vocabulary.data().depth << ", \"words\": " << vocabulary.size()
-       << ", \"images\": " << usage.images << ", \"words_per_image\": " << usage.words_per_image
-       << ", \"effective_words\": " << usage.effective_words << ", \"pair_score\": ";
-  if (std::isfinite(pair_score))
-    json << pair_score << "}\n";
-  else
-    json << "null}\n";
-  if (!json.flush()) throw std::runtime_error(file + " cannot be written");
+void define(CLI::App& app, InspectCommand& command) {
+  app.add_option("vocabulary", command.vocabulary, "Vocabulary file")->required();
+  app.add_option("--images", command.images, "IMAGES to count words in");
+  app.add_option("--pair", command.pair, "Two images to compare")->expected(2);
+  command.VocabularyCommand::define(app);
 }
 
-}  // namespace
-
-int inspect(const InspectCommand& command) {
+void run(const InspectCommand& command) {
   const Vocabulary vocabulary = load_vocabulary(command.vocabulary);
   print(vocabulary, command.vocabulary);
   Usage usage;
@@ -127,8 +122,26 @@ int inspect(const InspectCommand& command) {
     std::cout << "Score of the pair: " << pair_score << " (1: same words, 0: none in common; "
               << v.words.size() << " and " << w.words.size() << " words)\n";
   }
-  if (!command.json.empty()) write_json(command.json, vocabulary, usage, pair_score);
-  return 0;
+  write_output(command.json, [&](std::ostream& out) {
+    out << nlohmann::ordered_json{{"id", fingerprint_text(vocabulary.id())},
+                                  {"branching", vocabulary.data().branching},
+                                  {"depth", vocabulary.data().depth},
+                                  {"words", vocabulary.size()},
+                                  {"images", usage.images},
+                                  {"words_per_image", usage.words_per_image},
+                                  {"effective_words", usage.effective_words},
+                                  {"pair_score", pair_score}}  // null if there is none
+        << '\n';
+  });
+}
+
+}  // namespace
+
+void add_inspect(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("inspect", "Check a vocabulary and show what is in it");
+  const auto command = std::make_shared<InspectCommand>();
+  define(app, *command);
+  app.callback([command] { run(*command); });
 }
 
 }  // namespace km

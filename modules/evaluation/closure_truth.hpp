@@ -2,14 +2,18 @@
 
 #include <array>
 #include <cstddef>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "modules/core/camera.hpp"
+#include "modules/core/json.hpp"
 #include "modules/core/pose_graph.hpp"
+#include "modules/core/stamped_pose.hpp"
 #include "modules/evaluation/statistics.hpp"
 
 namespace km {
@@ -96,5 +100,41 @@ struct ClosureScores {
                                            std::span<const ClosureRecord> closures,
                                            const PinholeCamera& camera,
                                            const ClosureTruthOptions& options = {});
+
+/// A robot's file about its closures that cannot be used. what() is one line that names file and
+/// line.
+struct ClosureFileError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// A keyframe as its robot recorded it.
+struct KeyframeRecord {
+  KeyframeId id;
+  Stamp stamp = 0;
+  double scene_depth_m = 0.0;  ///< Median depth of its keypoints; 0: unknown.
+};
+
+/// Reads a robot's keyframes.csv: `robot, keyframe, stamp [ns], median depth [m]` below a header.
+/// Throws ClosureFileError.
+[[nodiscard]] std::vector<KeyframeRecord> read_keyframes(const std::filesystem::path& file);
+
+/// Reads a robot's loop_closures.csv: `from_robot, from_keyframe, to_robot, to_keyframe,
+/// similarity, stage, matches, inliers, tx, ty, tz, qx, qy, qz, qw, ...` below a header; the pose
+/// [m] is empty where there is none. Throws ClosureFileError, also for a closure that is verified
+/// but has none.
+[[nodiscard]] std::vector<ClosureRecord> read_closures(const std::filesystem::path& file);
+
+/// The keyframes whose stamps lie within the true poses `truth` (ascending), with their pose there.
+[[nodiscard]] std::vector<TrueKeyframe> place_keyframes(std::span<const KeyframeRecord> keyframes,
+                                                        std::span<const StampedPose> truth);
+
+/// A table for people: a line per stage with how many closures are true, precision, recall over
+/// pairs and over keyframes, and the errors of the measured poses; below, what recall counts.
+[[nodiscard]] std::string to_table(const ClosureScores& scores);
+
+/// The same numbers as one JSON object: {true_pairs, true_frames, unjudged, candidates:
+/// {judged, correct, precision, pairs_found, pair_recall, frames_found, frame_recall,
+/// translation_error_m: {...}, rotation_error_deg: {...}}, verified: {...}, inliers: {...}}.
+void to_json(Json& json, const ClosureScores& scores);
 
 }  // namespace km

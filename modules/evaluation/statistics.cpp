@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace km {
 
@@ -24,17 +23,6 @@ Statistics statistics_of(std::vector<double> values) {
   result.median = values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
   result.max = values.back();
   return result;
-}
-
-double quantile(std::vector<double> values, double p) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const double position = std::clamp(p, 0.0, 1.0) * static_cast<double>(values.size() - 1);
-  const auto below = static_cast<std::ptrdiff_t>(position);
-  const auto middle = values.begin() + below;
-  std::nth_element(values.begin(), middle, values.end());
-  const double share = position - static_cast<double>(below);
-  if (share == 0.0) return *middle;
-  return (1.0 - share) * *middle + share * *std::min_element(middle + 1, values.end());
 }
 
 }  // namespace km

@@ -1,32 +1,30 @@
 #include "modules/evaluation/trajectory_report.hpp"
 
 #include <algorithm>
-#include <iomanip>
-#include <limits>
-#include <sstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "modules/core/text_table.hpp"
+#include "modules/evaluation/plot.hpp"
 
 namespace km {
 namespace {
 
-void write_row(std::ostream& out, int name_width, const TrajectoryError& e) {
-  const auto number = [&](int width, int decimals, double value) {
-    out << ' ' << std::setw(width) << std::setprecision(decimals) << value;
+std::vector<std::string> table_row(const TrajectoryError& e) {
+  const auto rmse = [](const Statistics& errors, int decimals) {
+    return errors.count > 0 ? fixed(errors.rmse, decimals) : "-";
   };
-  const auto rmse_or_dash = [&](int width, int decimals, const Statistics& errors) {
-    if (errors.count > 0) return number(width, decimals, errors.rmse);
-    out << ' ' << std::setw(width) << '-';
-  };
-  out << std::left << std::setw(name_width) << e.name << std::right << ' ' << std::setw(6)
-      << e.position_m.count;
-  number(9, 4, e.position_m.rmse);
-  number(8, 4, e.position_m.mean);
-  number(8, 4, e.position_m.median);
-  number(8, 4, e.position_m.max);
-  number(9, 3, e.rotation_deg.rmse);
-  rmse_or_dash(9, 4, e.rpe_translation_m);
-  rmse_or_dash(9, 3, e.rpe_rotation_deg);
-  number(8, 1, 100.0 * e.completeness);
-  out << "%\n";
+  return {e.name,
+          std::to_string(e.position_m.count),
+          fixed(e.position_m.rmse, 4),
+          fixed(e.position_m.mean, 4),
+          fixed(e.position_m.median, 4),
+          fixed(e.position_m.max, 4),
+          fixed(e.rotation_deg.rmse, 3),
+          rmse(e.rpe_translation_m, 4),
+          rmse(e.rpe_rotation_deg, 3),
+          fixed(100.0 * e.completeness, 1) + '%'};
 }
 
 bool lacks_relative(const TrajectoryError& error) {
@@ -34,74 +32,106 @@ bool lacks_relative(const TrajectoryError& error) {
 }
 
 // Null for what an empty sample does not have: zeros would be perfect scores.
-void write_statistics(JsonWriter& json, const char* name, const Statistics& statistics) {
-  const auto number = [&](const char* key, double value) {
-    json.field(key, statistics.count > 0 ? value : std::numeric_limits<double>::quiet_NaN());
-  };
-  json.key(name);
-  json.begin_object();
-  number("rmse", statistics.rmse);
-  number("mean", statistics.mean);
-  number("median", statistics.median);
-  number("max", statistics.max);
-  json.field("count", statistics.count);
-  json.end_object();
+Json to_json(const Statistics& statistics) {
+  const auto number = [&](double value) { return statistics.count > 0 ? Json(value) : Json(); };
+  return {{"rmse", number(statistics.rmse)},
+          {"mean", number(statistics.mean)},
+          {"median", number(statistics.median)},
+          {"max", number(statistics.max)},
+          {"count", statistics.count}};
 }
 
-void write_alignment(JsonWriter& json, const Alignment& alignment) {
+Json to_json(const Alignment& alignment) {
+  const Eigen::Vector3d t = alignment.T_truth_estimate.translation();
   const Eigen::Quaterniond q(alignment.T_truth_estimate.linear());
-  json.begin_object();
-  json.field("scale", alignment.scale);
-  json.array("translation_m", alignment.T_truth_estimate.translation());
-  json.array("rotation_xyzw", q.coeffs());
-  json.end_object();
+  return {{"scale", alignment.scale},
+          {"translation_m", {t.x(), t.y(), t.z()}},
+          {"rotation_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
 }
 
 }  // namespace
 
 std::string to_table(const TeamError& team) {
-  std::size_t width = 8;
-  for (const TrajectoryError& robot : team.robots) width = std::max(width, robot.name.size());
-  const int name_width = static_cast<int>(width);
-  std::ostringstream out;
-  out << std::fixed << std::setw(name_width) << ""
-      << "        ---------- position error [m] ----  rotation  relative, per delta\n"
-      << std::left << std::setw(name_width) << "estimate" << std::right
-      << "  pairs      rmse     mean   median      max rmse[deg]  rmse[m] rmse[deg]  covered\n";
-  for (const TrajectoryError& robot : team.robots) write_row(out, name_width, robot);
-  if (team.robots.size() > 1) write_row(out, name_width, team.joint);
+  std::vector<std::vector<std::string>> rows = {
+      {"", "", "position", "error [m]", "", "", "rotation", "relative,", "per delta"},
+      {"estimate", "pairs", "rmse", "mean", "median", "max", "rmse[deg]", "rmse[m]", "rmse[deg]",
+       "covered"}};
+  for (const TrajectoryError& robot : team.robots) rows.push_back(table_row(robot));
+  if (team.robots.size() > 1) rows.push_back(table_row(team.joint));
+  std::string text = align_columns(rows);
   if (std::any_of(team.robots.begin(), team.robots.end(), lacks_relative))
-    out << "-: no two compared poses lie one delta apart, so there is no relative error\n";
-  return out.str();
+    text += "-: no two compared poses lie one delta apart, so there is no relative error\n";
+  return text;
 }
 
-void write_json(JsonWriter& json, const TrajectoryError& error) {
-  json.begin_object();
-  json.field("name", error.name);
-  json.field("poses", error.poses);
-  json.field("pairs", error.position_m.count);
-  json.field("completeness", error.completeness);
-  write_statistics(json, "position_m", error.position_m);
-  write_statistics(json, "rotation_deg", error.rotation_deg);
-  write_statistics(json, "rpe_translation_m", error.rpe_translation_m);
-  write_statistics(json, "rpe_rotation_deg", error.rpe_rotation_deg);
-  json.array("segment_lengths_m", error.segment_lengths_m);
-  write_statistics(json, "drift_percent", error.drift_percent);
-  write_statistics(json, "drift_deg_per_m", error.drift_deg_per_m);
-  json.end_object();
+void to_json(Json& json, const TrajectoryError& error) {
+  json = {{"name", error.name},
+          {"poses", error.poses},
+          {"pairs", error.position_m.count},
+          {"completeness", error.completeness},
+          {"position_m", to_json(error.position_m)},
+          {"rotation_deg", to_json(error.rotation_deg)},
+          {"rpe_translation_m", to_json(error.rpe_translation_m)},
+          {"rpe_rotation_deg", to_json(error.rpe_rotation_deg)},
+          {"segment_lengths_m", error.segment_lengths_m},
+          {"drift_percent", to_json(error.drift_percent)},
+          {"drift_deg_per_m", to_json(error.drift_deg_per_m)}};
 }
 
-void write_json(JsonWriter& json, const TeamError& team) {
-  json.begin_object();
-  json.key("alignment");
-  write_alignment(json, team.alignment);
-  json.key("robots");
-  json.begin_array();
-  for (const TrajectoryError& robot : team.robots) write_json(json, robot);
-  json.end_array();
-  json.key("joint");
-  write_json(json, team.joint);
-  json.end_object();
+void to_json(Json& json, const TeamError& team) {
+  json = {{"alignment", to_json(team.alignment)}, {"robots", team.robots}, {"joint", team.joint}};
+}
+
+namespace {
+
+PlotPoint from_above(const SE3& T) {
+  return {T.translation().x(), T.translation().y()};
+}
+
+// Each truth once, over the time that its estimates cover: the rest of a long recording would only
+// make what is compared small.
+std::vector<PlotSeries> truth_series(std::span<const TrajectoryInput> inputs) {
+  struct Drawn {
+    std::span<const StampedPose> truth;
+    Stamp first, last;
+  };
+  std::map<const StampedPose*, Drawn> drawn;
+  for (const TrajectoryInput& input : inputs) {
+    if (input.truth.empty() || input.estimate.empty()) continue;
+    const Stamp first = input.estimate.front().stamp;
+    const Stamp last = input.estimate.back().stamp;
+    Drawn& entry =
+        drawn.try_emplace(input.truth.data(), Drawn{input.truth, first, last}).first->second;
+    entry.first = std::min(entry.first, first);
+    entry.last = std::max(entry.last, last);
+  }
+  std::vector<PlotSeries> all;
+  for (const auto& [key, entry] : drawn) {
+    PlotSeries& series = all.emplace_back();
+    series.name = all.size() == 1 ? "truth" : "";
+    series.colour = PlotSeries::kGrey;
+    series.width_px = 3.0;
+    for (const StampedPose& pose : entry.truth)
+      if (pose.stamp >= entry.first && pose.stamp <= entry.last)
+        series.points.push_back(from_above(pose.T));
+  }
+  return all;
+}
+
+}  // namespace
+
+std::string plot_from_above(std::span<const TrajectoryInput> inputs, const TeamError& team) {
+  Plot plot{.x_label = "x [m]", .y_label = "y [m]", .is_map = true, .series = truth_series(inputs)};
+  for (std::size_t r = 0; r < inputs.size(); ++r) {
+    PlotSeries& series = plot.series.emplace_back();
+    series.name = team.robots[r].name + ", position rmse " +
+                  rounded(team.robots[r].position_m.rmse, 3) + " m";
+    series.colour = r;
+    series.width_px = 1.2;
+    for (const StampedPose& pose : inputs[r].estimate)
+      series.points.push_back(from_above(team.alignment.apply(pose.T)));
+  }
+  return draw_plots({&plot, 1});
 }
 
 }  // namespace km

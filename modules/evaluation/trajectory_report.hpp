@@ -1,8 +1,9 @@
 #pragma once
 
+#include <span>
 #include <string>
 
-#include "modules/core/json_writer.hpp"
+#include "modules/core/json.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 
 namespace km {
@@ -12,12 +13,19 @@ namespace km {
 /// "-", with a note below the table.
 [[nodiscard]] std::string to_table(const TeamError& team);
 
-/// Writes the same numbers as one JSON object: {alignment: {scale, translation_m, rotation_xyzw},
+/// The same numbers as one JSON object: {alignment: {scale, translation_m, rotation_xyzw},
 /// robots: [{name, poses, pairs, position_m: {rmse, ...}, ...}], joint: {...}}. Statistics of
 /// nothing have count 0 and null for the rest.
-void write_json(JsonWriter& json, const TeamError& team);
+void to_json(Json& json, const TeamError& team);
 
 /// The entry of one estimate alone.
-void write_json(JsonWriter& json, const TrajectoryError& error);
+void to_json(Json& json, const TrajectoryError& error);
+
+/// An SVG document: truth (grey) and the aligned estimates (one colour each) from above, x to the
+/// right and y up in the truth's world [m], at one scale for both axes, with a legend that gives
+/// each estimate's position rmse. `team` is the result of trajectory_error() for `inputs`. Truths
+/// that are one and the same are drawn once, over the time of their estimates.
+[[nodiscard]] std::string plot_from_above(std::span<const TrajectoryInput> inputs,
+                                          const TeamError& team);
 
 }  // namespace km

@@ -24,27 +24,30 @@ TEST_CASE("Memory that is taken shows, and processor time does", "[robot]") {
 TEST_CASE("The growth of memory is that of the second half of the time", "[robot]") {
   std::ostringstream text;
   ProcessCsv csv(text);
-  CHECK_FALSE(csv.memory().growth_bytes_per_minute);
+  CHECK_FALSE(csv.summary().memory_growth_bytes_per_minute);
   const std::uint64_t per_s = GENERATE(0U, 50'000U);
   for (std::uint64_t s = 0; s <= 120; ++s)  // 2 MB a second for a minute, then less
     csv.append(static_cast<double>(s),
                {.resident_bytes =
                     100 * kMega + (s < 60 ? 2 * kMega * s : 120 * kMega + per_s * (s - 60))});
-  const MemoryTrend trend = csv.memory();
-  CHECK(trend.first_bytes == 100 * kMega);
-  CHECK(trend.last_bytes == 220 * kMega + 60 * per_s);
-  REQUIRE(trend.growth_bytes_per_minute);
-  CHECK(*trend.growth_bytes_per_minute == Approx(60.0 * static_cast<double>(per_s)).margin(1.0));
+  const RunSummary::Process process = csv.summary();
+  CHECK(process.memory_at_start_bytes == 100 * kMega);
+  CHECK(process.memory_at_end_bytes == 220 * kMega + 60 * per_s);
+  REQUIRE(process.memory_growth_bytes_per_minute);
+  CHECK(*process.memory_growth_bytes_per_minute ==
+        Approx(60.0 * static_cast<double>(per_s)).margin(1.0));
 }
 
 TEST_CASE("process.csv has a row for each sample", "[robot]") {
   std::ostringstream text;
   ProcessCsv csv(text);
   csv.append(0.5, {.cpu_s = 0.25, .resident_bytes = 12345});
-  csv.append(1.5, {.cpu_s = 1.0, .resident_bytes = 23456});
+  csv.append(1.5, {.cpu_s = 1.0, .resident_bytes = 23456, .peak_bytes = 34567});
   CHECK(text.str() == "time_s,cpu_s,resident_bytes\n0.500,0.250,12345\n1.500,1.000,23456\n");
+  CHECK(csv.summary().cpu_s == 1.0);
+  CHECK(csv.summary().peak_memory_bytes == 34567);
   for (int s = 2; s < 100; ++s) csv.append(1.0 * s, {.cpu_s = 1.0, .resident_bytes = 23456});
-  CHECK_FALSE(csv.memory().growth_bytes_per_minute);  // too short
+  CHECK_FALSE(csv.summary().memory_growth_bytes_per_minute);  // too short
 }
 
 }  // namespace

@@ -1,9 +1,114 @@
 #include <catch2/catch.hpp>
 
+#include <vector>
+
 #include "apps/robot/run_end.hpp"
 
 namespace km {
 namespace {
+
+constexpr double kSettle_s = 2.0;
+constexpr double kLimit_s = 60.0;
+constexpr Departure::Present kSettled{RobotPhase::kSettled, 1};
+
+// A robot whose input has ended and whose graph has settled.
+struct Done {
+  Departure departure{kSettle_s, kLimit_s};
+  std::vector<Departure::Present> peers;
+  Departure::Inputs inputs{.input_ended = true, .graph_settled = true};
+
+  RobotPhase phase_at(double now_s) {
+    inputs.present_peers = peers;
+    return departure.update(now_s, inputs).phase;
+  }
+  bool leaves_at(double now_s) {
+    phase_at(now_s);
+    return departure.reason() != nullptr;
+  }
+};
+
+TEST_CASE("A robot alone leaves once its graph has been quiet", "[departure]") {
+  Done robot;
+  CHECK(robot.departure.update(0.0, {.activity = 1}).phase == RobotPhase::kRunning);
+  robot.inputs.activity = 2;
+  CHECK(robot.phase_at(10.0) == RobotPhase::kFinished);
+  CHECK(robot.phase_at(11.0) == RobotPhase::kSettled);
+  CHECK(robot.departure.reason() == nullptr);
+  CHECK(robot.leaves_at(13.0));
+}
+
+TEST_CASE("A robot serves a peer that is still running, up to the limit", "[departure]") {
+  Done robot{.peers = {kSettled, {}}};
+  for (double now_s = 5.0; now_s < 5.0 + kLimit_s; now_s += 1.0)
+    CHECK_FALSE(robot.leaves_at(now_s));
+  CHECK(robot.leaves_at(5.0 + kLimit_s));
+}
+
+TEST_CASE("New work after all had settled starts the wait again", "[departure]") {
+  Done robot{.peers = {kSettled}};
+  robot.phase_at(4.0);
+  robot.inputs.activity = 1;  // a closure arrived
+  CHECK(robot.phase_at(5.5) == RobotPhase::kFinished);
+  CHECK(robot.phase_at(6.5) == RobotPhase::kSettled);
+  CHECK(robot.departure.reason() == nullptr);
+  CHECK(robot.leaves_at(8.5));
+}
+
+TEST_CASE("A settled robot goes as soon as a peer says that it leaves", "[departure]") {
+  Done robot{.peers = {kSettled, kSettled}};
+  CHECK_FALSE(robot.leaves_at(9.0));
+  robot.peers[1].phase = RobotPhase::kLeaving;
+  robot.inputs.graph_settled = false;  // not while there is work
+  CHECK_FALSE(robot.leaves_at(9.1));
+  robot.inputs.graph_settled = true;
+  CHECK(robot.leaves_at(9.2));
+}
+
+TEST_CASE("A robot whose graph never settles leaves at the limit", "[departure]") {
+  Done robot;
+  robot.inputs.graph_settled = false;
+  CHECK(robot.phase_at(0.0) == RobotPhase::kFinished);
+  CHECK(robot.departure.reason() == nullptr);
+  CHECK(robot.phase_at(kLimit_s) == RobotPhase::kFinished);
+  CHECK(robot.departure.reason() != nullptr);
+}
+
+// A chain of robots that all poll ten times a second and hear their neighbours a poll later. Robot
+// `restless` settles at `from_s` only. When each leaves [s].
+std::vector<double> departures(std::size_t count, std::size_t restless, double from_s) {
+  std::vector<Departure> robots(count, Departure(kSettle_s, kLimit_s));
+  std::vector<Departure::Present> told(count);
+  std::vector<double> left_s(count, 0.0);
+  for (int poll = 0; poll < 600; ++poll) {
+    const double now_s = 0.1 * poll;
+    const auto before = told;
+    for (std::size_t k = 0; k < count; ++k) {
+      if (left_s[k] > 0.0) continue;
+      std::vector<Departure::Present> heard;
+      for (const std::size_t other : {k - 1, k + 1})
+        if (other < count && (left_s[other] == 0.0 || now_s - left_s[other] < 1.0))
+          heard.push_back(before[other]);
+      told[k] = robots[k].update(now_s, {.input_ended = true,
+                                         .graph_settled = k != restless || now_s >= from_s,
+                                         .activity = 0,
+                                         .present_peers = heard,
+                                         .unheard = count - 1 - heard.size()});
+      if (robots[k].reason() == nullptr) continue;
+      told[k].phase = RobotPhase::kLeaving;
+      left_s[k] = now_s;
+    }
+  }
+  return left_s;
+}
+
+TEST_CASE("In a chain every robot waits for the one at the end, and then all go", "[departure]") {
+  const std::size_t restless = GENERATE(0U, 3U, 7U);
+  CAPTURE(restless);
+  for (const double s : departures(8, restless, 20.0)) {
+    CHECK(s >= 20.0);
+    CHECK(s < 20.0 + 3.0 * kSettle_s);
+  }
+}
 
 RunEnd usual_end() {
   RunEnd end;

@@ -35,7 +35,8 @@ TEST_CASE("what the optimiser rejects is no inlier, until it takes it back", "[r
   CHECK(outcomes[1].reason == "rejected: the other closures contradict it");
   CHECK(outcomes[2].reason == "inconsistent with the other closures of the robot pair");
   CHECK(record.inlier_closures().size() == 1);
-  CHECK(record.stages_per_peer().at(2).inliers == 1);
+  CHECK(record.closures_per_peer().at(2).inliers == 1);
+  CHECK(summary_of(record).closures == ClosureCounts{3, 3, 1});
 
   record.add(ClosureVerdicts{{{doubted, true}}});
   outcomes = record.outcomes();
@@ -71,10 +72,10 @@ TEST_CASE("a closure is the same from whichever end it was found", "[robot]") {
   REQUIRE(record.outcomes().size() == 1);
   CHECK(record.outcomes()[0].id == ClosureId{low, high});
   CHECK(record.outcomes()[0].stage == ClosureStage::kInlier);
-  CHECK(record.stages_per_peer().at(1).inliers == 1);
+  CHECK(record.closures_per_peer().at(1).inliers == 1);
 
   const TemporaryFolder folder;
-  write_results(folder.path(), record, {});
+  write_results(folder.path(), record);
   CHECK_THAT(folder.read("loop_closures.csv"),
              Catch::Contains("\n1,4,2,3,0,inlier,0,0,-1.000000,-2.000000,-3.000000,"));
 }

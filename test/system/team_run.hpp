@@ -1,39 +1,118 @@
 #pragma once
 
-#include <yaml-cpp/yaml.h>
-
+#include <catch2/catch.hpp>
 #include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <random>
 #include <string>
+#include <vector>
 
+#include "apps/robot/run_summary.hpp"
+#include "modules/pose_graph/g2o_io.hpp"
 #include "test/support/command.hpp"
+#include "test/support/pose_graph_problems.hpp"
+#include "test/support/split_graph.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
 
+/// A DDS domain that no other test is likely to be in.
+inline int random_domain() {
+  std::random_device device;
+  return std::uniform_int_distribution<int>(1, 230)(device);
+}
+
+/// "robot3".
+inline std::string robot_name(int robot) {
+  return "robot" + std::to_string(robot);
+}
+
 /// A finished run of kimera_multi_team: what it printed, and its --json.
 struct TeamRun {
   CommandResult result;
-  YAML::Node json;  ///< JSON is YAML.
+  Json json;
 };
 
 /// Runs a team file on `dataset` as fast as it can, in a random DDS domain (the program draws it).
 /// Results go to `folder`.
-inline TeamRun run_team_file(const std::filesystem::path& team,
-                             const std::filesystem::path& dataset, const TemporaryFolder& folder) {
-  const std::string json = (folder.path() / "team.json").string();
+inline TeamRun run_team(const std::filesystem::path& team, const std::filesystem::path& dataset,
+                        const TemporaryFolder& folder) {
+  const std::filesystem::path json = folder.path() / "team.json";
   TeamRun run;
-  run.result = run_command(std::string(KM_BIN_DIR) + "/kimera_multi_team --config " +
-                           team.string() + " --dataset " + dataset.string() +
-                           " --rate max --output " + folder.path().string() + " --json " + json +
+  run.result = run_command(std::string(KM_BIN_DIR "/kimera_multi_team --config ") + team.string() +
+                           " --dataset " + dataset.string() + " --rate max --output " +
+                           folder.path().string() + " --json " + json.string() +
                            " -- --serve-limit 1000");  // sanitizers are slow
-  if (run.result.exit_code == 0) run.json = YAML::LoadFile(json);
+  if (run.result.exit_code == 0) run.json = read_json(json);
   return run;
 }
 
-/// The same for a file of config/teams.
-inline TeamRun run_team(const std::string& team, const std::filesystem::path& dataset,
-                        const TemporaryFolder& folder) {
-  return run_team_file("config/teams/" + team, dataset, folder);
+/// Writes what `robot` has recorded, its odometry and every closure that touches it, to
+/// part<id>.g2o.
+inline void write_part(const SplitGraph& graph, RobotId robot,
+                       const std::filesystem::path& folder) {
+  G2oGraph part;
+  for (const RelativePose& e : graph.odometry)
+    if (e.from.robot == robot) part.edges.push_back(e);
+  for (const RelativePose& e : graph.closures)
+    if (e.from.robot == robot || e.to.robot == robot) part.edges.push_back(e);
+  write_g2o(folder / ("part" + std::to_string(robot) + ".g2o"), part);
+}
+
+/// The files of a team's robots as one graph, and the poses they ended with.
+struct TeamResult {
+  WholeGraph graph;
+  std::vector<SE3> poses;
+};
+
+/// Of robots 0 to `robots` - 1, whose results are in robot0, robot1, ...
+inline TeamResult read_team(const std::filesystem::path& folder, int robots) {
+  std::vector<G2oGraph> parts;
+  std::map<KeyframeId, Eigen::Index> index_of;
+  TeamResult team;
+  for (int i = 0; i < robots; ++i) {
+    parts.push_back(read_g2o(folder / robot_name(i) / "pose_graph.g2o"));
+    for (const G2oVertex& vertex : parts.back().vertices) {
+      index_of[vertex.id] = team.graph.poses++;
+      team.poses.push_back(vertex.T_world_kf);
+    }
+  }
+  for (RobotId robot = 0; robot < robots; ++robot)
+    for (const RelativePose& edge : parts[robot].edges)
+      if (edge.from.robot == robot)  // an edge between two robots is in the files of both
+        team.graph.edges.push_back(block_edge(index_of.at(edge.from), index_of.at(edge.to), edge));
+  return team;
+}
+
+/// Chordal cost, without 1/2.
+inline double cost_of(const WholeGraph& graph, const std::vector<SE3>& poses) {
+  double cost = 0.0;
+  for (const BlockEdge& edge : graph.edges) {
+    const auto block = [&](Eigen::Index i) -> Eigen::MatrixXd {
+      return poses[static_cast<std::size_t>(i)].matrix().topRows<3>();
+    };
+    cost += edge_cost(block(edge.i), block(edge.j), edge.T_i_j, edge.kappa, edge.tau);
+  }
+  return cost;
+}
+
+/// The cost that kimera_multi_pgo comes to for the edges that robots 0 to `robots` - 1 have kept,
+/// whose results are in robot0, robot1, ... of `folder`.
+inline double solved_in_one_process(const std::filesystem::path& folder, int robots) {
+  const std::filesystem::path parts = folder / "kept";
+  std::filesystem::create_directory(parts);
+  for (int k = 0; k < robots; ++k) {
+    const std::string name = robot_name(k);
+    std::filesystem::copy_file(folder / name / "pose_graph.g2o", parts / (name + ".g2o"));
+  }
+  const std::filesystem::path json = folder / "pgo.json";
+  const CommandResult result =
+      run_command(std::string(KM_BIN_DIR "/kimera_multi_pgo solve ") + parts.string() +
+                  " --method newton --trust-all --json " + json.string());
+  CAPTURE(result.output);
+  REQUIRE(result.exit_code == 0);
+  return read_json(json)["rounded_cost"].get<double>();
 }
 
 }  // namespace km

@@ -10,11 +10,12 @@
 
 // The layers of the tree, by what files include (the linker checks the rest: a pure module links
 // neither threads nor DDS nor YAML):
-//   modules/core        Eigen and the standard library
+//   modules/core        Eigen, nlohmann-json and the standard library
 //   modules/<m>         core, its own folder, and the modules listed below
 //   runtime             core
 //   modules/<m>/*_node, *_codec   its own module, core, runtime
 //   apps, test          everything
+// Everywhere: what takes seconds to compile, JSON, is no header's to include.
 
 namespace km {
 namespace {
@@ -99,6 +100,16 @@ TEST_CASE("Every include obeys the layers", "[layers]") {
       }
     }
   CHECK(files > 20);  // run from the root of the repository
+}
+
+TEST_CASE("No header of the programs includes all of JSON", "[layers]") {
+  for (const char* root : {"modules", "runtime", "apps"})
+    for (const auto& entry : fs::recursive_directory_iterator(root)) {
+      if (entry.path().extension() != ".hpp") continue;
+      CAPTURE(entry.path().string());
+      for (const std::string& header : includes_of(entry.path()))
+        CHECK(header != "nlohmann/json.hpp");
+    }
 }
 
 TEST_CASE("The layer rules refuse what they are for", "[layers]") {

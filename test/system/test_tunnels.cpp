@@ -8,7 +8,6 @@
 #include <limits>
 
 #include "test/support/shared_data.hpp"
-#include "test/system/team_result.hpp"
 #include "test/system/team_run.hpp"
 
 namespace km {
@@ -51,13 +50,13 @@ TEST_CASE("Eight processes bring the tunnels graph into one frame", "[system][sl
   const auto dataset = shared_data("multi_robot/tunnels_8robots");
   if (!dataset) return;
   const TemporaryFolder folder;
-  const TeamRun run = run_team("tunnels.yaml", *dataset, folder);
+  const TeamRun run = run_team("config/teams/tunnels.yaml", *dataset, folder);
   CAPTURE(run.result.output);
   REQUIRE(run.result.exit_code == 0);
 
   for (const auto& robot : run.json["robots"]) {
     CHECK(robot["pgo"]["members"].size() == kRobots);
-    CHECK(robot["pgo"]["anchor"].as<int>() == 0);
+    CHECK(robot["pgo"]["anchor"] == 0);
   }
   const TeamResult team = read_team(folder.path(), kRobots);
   CHECK(team.poses.size() == 1255);

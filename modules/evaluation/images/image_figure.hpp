@@ -1,7 +1,14 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
+
+#include "modules/core/json.hpp"
 
 namespace km {
 
@@ -33,5 +40,57 @@ class FigureList {
 
 /// Arithmetic mean; NaN for an empty sample.
 [[nodiscard]] double mean_of(const std::vector<double>& values);
+
+/// Ranges of a frame's median flow [px/frame] by which figures are told apart: tracking depends on
+/// the motion more than on anything else, so sequences are compared at like flow.
+inline constexpr std::array kFlowBinEdges_px = {0.0, 3.0, 6.0, 10.0, 15.0, 25.0, 60.0};
+inline constexpr std::size_t kFlowBinCount = kFlowBinEdges_px.size() - 1;
+
+/// Frames below which a bin says nothing.
+inline constexpr int kMinFramesInBin = 3;
+
+/// The bin of `flow_px`; nullopt beyond the last edge and for NaN.
+[[nodiscard]] std::optional<std::size_t> flow_bin(double flow_px);
+
+/// "flow 3-6 px".
+[[nodiscard]] std::string flow_bin_name(std::size_t bin);
+
+/// Means of one quantity per flow bin.
+class FlowBinMeans {
+ public:
+  void add(double flow_px, double value);
+  [[nodiscard]] int count(std::size_t bin) const { return counts_[bin]; }
+  /// NaN for a bin with less than kMinFramesInBin values.
+  [[nodiscard]] double mean(std::size_t bin) const;
+
+ private:
+  std::array<double, kFlowBinCount> sums_{};
+  std::array<int, kFlowBinCount> counts_{};
+};
+
+/// Rows that differ by more than this share of the reference are marked.
+inline constexpr double kMarkedDifference = 0.25;
+
+/// A table for people: one row per figure under the headings of its section; "-" for what is not to
+/// be had.
+[[nodiscard]] std::string to_table(std::span<const ImageFigure> figures);
+
+/// The same for two sequences side by side with the ratio other / reference; rows that differ by
+/// more than kMarkedDifference of the reference end with `<--`, counts of frames excepted. Figures
+/// that only one of the two has are left out. The last line counts rows compared and marked, in
+/// all and of those at like flow (one bin of the median flow).
+[[nodiscard]] std::string to_comparison(std::span<const ImageFigure> reference,
+                                        std::span<const ImageFigure> other,
+                                        const std::string& reference_name,
+                                        const std::string& other_name);
+
+/// One JSON object: {section: {name: value, ...}, ...}; null for what is not to be had.
+[[nodiscard]] Json to_json(std::span<const ImageFigure> figures);
+
+/// The comparison as one JSON object: {"rows": [{"section", "name", "reference", "other", "ratio",
+/// "differs"}, ...], "compared", "differing"}; "differs" is null for rows that are not judged:
+/// amounts, and those without a ratio.
+[[nodiscard]] Json comparison_json(std::span<const ImageFigure> reference,
+                                   std::span<const ImageFigure> other);
 
 }  // namespace km

@@ -6,7 +6,6 @@
 #include <optional>
 #include <vector>
 
-#include "modules/evaluation/images/flow_bins.hpp"
 #include "modules/evaluation/images/image_figure.hpp"
 
 namespace km {

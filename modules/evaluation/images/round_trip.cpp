@@ -4,6 +4,7 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
+#include <utility>
 
 namespace km {
 namespace {
@@ -25,23 +26,6 @@ std::vector<unsigned char> track(const KltImage& a, const KltImage& b,
   return status;
 }
 
-// The way back from `there`, started at `starts_a`.
-std::vector<RoundTrip> close(const KltImage& a, const KltImage& b,
-                             const std::vector<cv::Point2f>& points,
-                             const std::vector<cv::Point2f>& there,
-                             const std::vector<unsigned char>& there_status,
-                             std::vector<cv::Point2f> starts_a) {
-  const auto back_status = track(b, a, there, starts_a);
-  std::vector<RoundTrip> trips(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const cv::Point2f off = starts_a[i] - points[i];
-    const bool lost = there_status[i] == 0 || back_status[i] == 0;
-    trips[i] = {there[i],
-                lost ? std::numeric_limits<double>::infinity() : std::hypot(off.x, off.y)};
-  }
-  return trips;
-}
-
 }  // namespace
 
 KltImage make_klt_image(const cv::Mat& image) {
@@ -52,19 +36,22 @@ KltImage make_klt_image(const cv::Mat& image) {
 }
 
 std::vector<RoundTrip> round_trip(const KltImage& a, const KltImage& b,
-                                  const std::vector<cv::Point2f>& points) {
-  if (points.empty()) return {};
-  std::vector<cv::Point2f> there = points;
-  const auto status = track(a, b, points, there);
-  return close(a, b, points, there, status, there);
-}
-
-std::vector<RoundTrip> round_trip(const KltImage& a, const KltImage& b,
                                   const std::vector<cv::Point2f>& points,
                                   std::vector<cv::Point2f> starts_b) {
   if (points.empty()) return {};
-  const auto status = track(a, b, points, starts_b);
-  return close(a, b, points, starts_b, status, points);
+  const bool far = !starts_b.empty();
+  std::vector<cv::Point2f> there = far ? std::move(starts_b) : points;
+  const auto there_status = track(a, b, points, there);
+  std::vector<cv::Point2f> back = far ? points : there;
+  const auto back_status = track(b, a, there, back);
+  std::vector<RoundTrip> trips(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const cv::Point2f off = back[i] - points[i];
+    const bool lost = there_status[i] == 0 || back_status[i] == 0;
+    trips[i] = {there[i],
+                lost ? std::numeric_limits<double>::infinity() : std::hypot(off.x, off.y)};
+  }
+  return trips;
 }
 
 std::vector<cv::Point2f> corners_of(const cv::Mat& image) {

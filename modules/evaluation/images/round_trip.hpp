@@ -21,15 +21,11 @@ struct RoundTrip {
 };
 
 /// Tracks points from `a` to `b`, started at the old place, and from where they arrived back to
-/// `a`, started there.
-[[nodiscard]] std::vector<RoundTrip> round_trip(const KltImage& a, const KltImage& b,
-                                                const std::vector<cv::Point2f>& points);
-
-/// Tracks points from `a` to `b`, started at `starts_b`, one for each, and back to `a`, started at
-/// the points: between views that lie far apart, so that the way back is found if it is there.
+/// `a`, started there. With `starts_b`, one for each, there at these and back at the points:
+/// between views that lie far apart, so that the way back is found if it is there.
 [[nodiscard]] std::vector<RoundTrip> round_trip(const KltImage& a, const KltImage& b,
                                                 const std::vector<cv::Point2f>& points,
-                                                std::vector<cv::Point2f> starts_b);
+                                                std::vector<cv::Point2f> starts_b = {});
 
 /// Corners as all figures count them: Shi-Tomasi, quality 0.01, 15 px apart, as many as there are.
 [[nodiscard]] std::vector<cv::Point2f> corners_of(const cv::Mat& image);

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "modules/core/stamp.hpp"
-#include "modules/evaluation/images/flow_bins.hpp"
 #include "modules/evaluation/images/image_figure.hpp"
 #include "modules/evaluation/images/round_trip.hpp"
 

@@ -2,30 +2,154 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <bitset>
 #include <cmath>
-#include <iomanip>
 #include <limits>
-#include <sstream>
+#include <opencv2/core/utility.hpp>
 #include <stdexcept>
 #include <utility>
 
-#include "modules/evaluation/mesh/mesh_checks.hpp"
-#include "modules/evaluation/mesh/nearby_cells.hpp"
-#include "modules/evaluation/mesh/nearest_surface.hpp"
-#include "modules/evaluation/mesh/surface_samples.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/evaluation/statistics.hpp"
 
 namespace km {
 namespace {
 
+double share_within(const std::vector<float>& values, float limit) {
+  const auto count =
+      std::count_if(values.begin(), values.end(), [&](float value) { return value <= limit; });
+  return static_cast<double>(count) / static_cast<double>(values.size());
+}
+
+// O(n).
+DistanceSummary summary_of(std::vector<float> distances_m) {
+  DistanceSummary summary;
+  summary.count = distances_m.size();
+  if (distances_m.empty()) {
+    const double none = std::numeric_limits<double>::quiet_NaN();
+    return {0, none, none, none, none, none};
+  }
+  double sum = 0.0;
+  for (const float distance : distances_m) sum += static_cast<double>(distance);
+  summary.mean_m = sum / static_cast<double>(distances_m.size());
+  summary.within_5cm = share_within(distances_m, 0.05F);
+  summary.within_10cm = share_within(distances_m, 0.10F);
+  summary.median_m = quantile(distances_m, 0.5);
+  summary.p95_m = quantile(std::move(distances_m), 0.95);
+  return summary;
+}
+
+double ratio(std::size_t part, std::size_t whole) {
+  return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole)
+                   : std::numeric_limits<double>::quiet_NaN();
+}
+
+void check_comparable(const LabelledMesh& mesh, const std::string& name) {
+  const auto refuse = [&](const std::string& why) {
+    throw std::invalid_argument(name + ": " + why);
+  };
+  const std::string vertices = std::to_string(mesh.vertices.size());
+  if (mesh.faces.empty()) refuse("no faces, so no surface to compare");
+  for (const auto& face : mesh.faces)
+    for (const std::uint32_t corner : face)
+      if (corner >= mesh.vertices.size())
+        refuse("a face names vertex " + std::to_string(corner) + " of " + vertices);
+  if (!mesh.labels.empty() && mesh.labels.size() != mesh.vertices.size())
+    refuse(std::to_string(mesh.labels.size()) + " labels for " + vertices + " vertices");
+  const double area = surface_area(mesh);
+  if (!std::isfinite(area)) refuse("coordinates that are not finite");
+  if (!(area > 0.0)) refuse("its faces have no area");
+}
+
+void check(const MeshErrorOptions& options) {
+  const auto positive = [](double value, const char* what) {
+    if (!(value > 0.0) || !std::isfinite(value))
+      throw std::invalid_argument(std::string(what) + " must be positive, not " +
+                                  std::to_string(value));
+  };
+  positive(options.samples_per_m2, "samples per square metre");
+  positive(static_cast<double>(options.max_samples), "the largest number of samples");
+  positive(options.crop_m, "the crop distance");
+  positive(options.label_distance_m, "the distance up to which labels are judged");
+  positive(options.registration.reach_m, "the reach of registration");
+  positive(options.registration.gate_m, "the gate of registration");
+}
+
+constexpr std::size_t kChunk = 1U << 18;  // points between two reports of progress
+
+Eigen::Vector3f normal_of(const LabelledMesh& mesh, std::uint32_t face) {
+  const auto [a, b, c] = mesh.faces[face];
+  return (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
+}
+
+// A mesh with points on it; both outlive this.
+struct SampledMesh {
+  const LabelledMesh& mesh;
+  const SurfaceSamples& samples;
+
+  [[nodiscard]] LabelId label(std::size_t sample) const {
+    return mesh.face_label(samples.faces[sample]);
+  }
+};
+
+// What is nearest to each of a mesh's points on another mesh. All arrays are as long as there are
+// points.
+struct PointMatches {
+  std::vector<float> point_m;    // To the nearest sample; infinite if none is within reach.
+  std::vector<float> surface_m;  // See NearestSample::surface_m; likewise.
+  std::vector<LabelId> labels;   // Of the nearest face (NearestSample::face); 0 if none.
+
+  // Whether that face is in front of the point's: neither does the mesh end there, nor do the two
+  // face opposite ways. Else the point may lie on what the other mesh never saw: the ground below
+  // a car, the back of a wall.
+  std::vector<bool> in_front;
+
+  // Takes what `other` has where it is nearer; in front of either is in front. Both are of the
+  // same points.
+  void keep_nearer(const PointMatches& other) {
+    for (std::size_t i = 0; i < point_m.size(); ++i) {
+      point_m[i] = std::min(point_m[i], other.point_m[i]);
+      in_front[i] = in_front[i] || other.in_front[i];
+      if (other.surface_m[i] >= surface_m[i]) continue;
+      surface_m[i] = other.surface_m[i];
+      labels[i] = other.labels[i];
+    }
+  }
+};
+
+// Uses OpenCV's threads; the result does not depend on how many. `progress` is told `stage`.
+PointMatches match_points(const SampledMesh& from, const SampledMesh& to,
+                          const NearestSurface& nearest_to, double reach_m, std::string_view stage,
+                          const MeshProgress& progress) {
+  const std::size_t count = from.samples.points.size();
+  PointMatches matches;
+  matches.point_m.assign(count, std::numeric_limits<float>::infinity());
+  matches.surface_m = matches.point_m;
+  matches.labels.assign(count, 0);
+  std::vector<std::uint8_t> in_front(count, 0);  // threads may write neighbouring bytes, not bits
+  const auto match = [&](std::size_t i) {
+    const auto near = nearest_to.find(from.samples.points[i], reach_m);
+    if (!near) return;
+    matches.point_m[i] = near->distance_m;
+    matches.surface_m[i] = near->surface_m;
+    matches.labels[i] = to.mesh.face_label(near->face);
+    const Eigen::Vector3f normal = normal_of(from.mesh, from.samples.faces[i]);
+    in_front[i] = !near->past_rim && normal.dot(normal_of(to.mesh, near->face)) > 0.0F ? 1 : 0;
+  };
+  for (std::size_t start = 0; start < count; start += kChunk) {
+    if (progress) progress(stage, static_cast<double>(start) / static_cast<double>(count));
+    const auto size = static_cast<int>(std::min(kChunk, count - start));
+    cv::parallel_for_(cv::Range(0, size), [&](const cv::Range& range) {
+      for (int i = range.start; i < range.end; ++i) match(start + static_cast<std::size_t>(i));
+    });
+  }
+  matches.in_front.assign(in_front.begin(), in_front.end());
+  return matches;
+}
+
 constexpr double kRegistrationPerM2 = 250.0;  // planes need no more
 constexpr double kLargeMove_m = 0.5;
 constexpr double kLargeTurn_deg = 3.0;
-
-std::string text_of(double value, int decimals) {
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(decimals) << value;
-  return text.str();
-}
 
 class Evaluation {
  public:
@@ -75,7 +199,7 @@ class Evaluation {
       samples.push_back(sample_surface(moved_[i], per_m2, options_.seed + 1));
       if (samples.back().points.empty())
         throw std::invalid_argument(inputs_[i].name + ": too small for a single sample at " +
-                                    text_of(per_m2, 0) + " per square metre");
+                                    fixed(per_m2, 0) + " per square metre");
     }
     return samples;
   }
@@ -87,7 +211,7 @@ class Evaluation {
     SurfaceSamples truth =
         sample_surface(truth_, per_m2, options_.seed, &nearby, options_.max_samples);
     if (truth.near == 0)
-      throw std::invalid_argument("no part of the truth is within " + text_of(reach_m, 2) +
+      throw std::invalid_argument("no part of the truth is within " + fixed(reach_m, 2) +
                                   " m of the estimate: are both in one frame?");
     return truth;
   }
@@ -121,7 +245,7 @@ class Evaluation {
     const double turn_deg = angle_of(found.T_truth_estimate.linear()) * 180.0 / M_PI;
     if (report_.moved_m > kLargeMove_m || turn_deg > kLargeTurn_deg)
       report_.notes.push_back("registration moved the estimate by up to " +
-                              text_of(report_.moved_m, 2) + " m and " + text_of(turn_deg, 2) +
+                              fixed(report_.moved_m, 2) + " m and " + fixed(turn_deg, 2) +
                               " degrees: is it in the frame of the truth?");
     if (!found.converged)
       report_.notes.push_back("registration did not converge in " +
@@ -148,8 +272,8 @@ class Evaluation {
     std::size_t estimated = 0;
     for (const SurfaceSamples& samples : estimates_) estimated += samples.points.size();
     report_.notes.push_back(
-        "sampled at " + text_of(per_m2_, 0) + " points per square metre instead of " +
-        text_of(options_.samples_per_m2, 0) + ", to stay below " +
+        "sampled at " + fixed(per_m2_, 0) + " points per square metre instead of " +
+        fixed(options_.samples_per_m2, 0) + ", to stay below " +
         std::to_string(options_.max_samples) + ": " + std::to_string(estimated) +
         " estimated and " + std::to_string(true_samples_.points.size()) + " true points");
   }
@@ -279,6 +403,55 @@ class Evaluation {
 };
 
 }  // namespace
+
+double LabelScore::accuracy() const {
+  return ratio(right, points());
+}
+
+double LabelScore::accuracy_of_known() const {
+  return ratio(right, right + wrong);
+}
+
+void LabelScore::add(const LabelScore& other) {
+  right += other.right;
+  wrong += other.wrong;
+  unknown += other.unknown;
+}
+
+void LabelConfusion::add(LabelId truth, LabelId estimate) {
+  LabelScore& score = scores_[truth];
+  ++(estimate == truth ? score.right : estimate == 0 ? score.unknown : score.wrong);
+}
+
+void LabelConfusion::add(const LabelConfusion& other) {
+  for (std::size_t id = 0; id < scores_.size(); ++id) scores_[id].add(other.scores_[id]);
+}
+
+std::vector<LabelScore> LabelConfusion::by_class() const {
+  std::vector<LabelScore> scores;
+  for (std::size_t id = 1; id < scores_.size(); ++id)
+    if (scores_[id].points() > 0) {
+      scores.push_back(scores_[id]);
+      scores.back().id = static_cast<LabelId>(id);
+    }
+  return scores;
+}
+
+LabelScore LabelConfusion::total() const {
+  LabelScore total;
+  for (const LabelScore& score : by_class()) total.add(score);
+  return total;
+}
+
+void check_labels(const LabelledMesh& mesh, const std::string& name, const LabelPalette& palette,
+                  const std::string& palette_name) {
+  std::bitset<256> used;
+  for (const LabelId label : mesh.labels) used.set(label);
+  for (std::size_t id = 1; id < used.size(); ++id)
+    if (used[id] && palette.find(static_cast<LabelId>(id)) == nullptr)
+      throw std::invalid_argument(name + ": label " + std::to_string(id) + " is not in " +
+                                  palette_name);
+}
 
 MeshReport mesh_error(const LabelledMesh& truth, std::span<const MeshInput> estimates,
                       const MeshErrorOptions& options, const MeshProgress& progress) {

@@ -5,8 +5,7 @@
 #include <vector>
 
 #include "modules/core/geometry.hpp"
-#include "modules/evaluation/mesh/nearest_surface.hpp"
-#include "modules/evaluation/mesh/surface_samples.hpp"
+#include "modules/evaluation/mesh/sampled_surface.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 
 namespace km {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "modules/core/json_writer.hpp"
+#include "modules/core/json.hpp"
 #include "modules/core/label_palette.hpp"
 #include "modules/evaluation/mesh/mesh_error.hpp"
 
@@ -17,6 +17,6 @@ namespace km {
 /// surface: {...}, labels: {right, ..., classes: [...]}}, seen_truth_to_estimate: {...},
 /// estimate_to_truth: {...}}], merged: {...}, notes}. Labels
 /// are null where they are not judged, numbers of nothing too.
-void write_json(JsonWriter& json, const MeshReport& report, const LabelPalette& palette);
+[[nodiscard]] Json to_json(const MeshReport& report, const LabelPalette& palette);
 
 }  // namespace km

@@ -1,9 +1,9 @@
 #include "modules/simulation/dataset/dataset_record.hpp"
 
 #include <algorithm>
-#include <sstream>
+#include <nlohmann/json.hpp>
 
-#include "modules/core/json_writer.hpp"
+#include "modules/core/json.hpp"
 
 namespace km {
 namespace {
@@ -22,18 +22,12 @@ std::string shown(const std::string* value) {
 }  // namespace
 
 std::string to_json(const DatasetRecord& record) {
-  std::ostringstream text;
-  JsonWriter json(text);
-  json.begin_object();
-  json.field("generator", record.generator);
-  json.key("parameters");
-  json.begin_object();
-  for (const auto& [name, value] : record.parameters) json.field(name, value);
-  json.end_object();
-  json.array("finished_robots", record.finished_robots);
-  json.field("complete", record.complete);
-  json.end_object();
-  return text.str();
+  Json parameters = Json::object();
+  for (const auto& [name, value] : record.parameters) parameters[name] = value;
+  return json_text({{"generator", record.generator},
+                    {"parameters", std::move(parameters)},
+                    {"finished_robots", record.finished_robots},
+                    {"complete", record.complete}});
 }
 
 std::vector<std::string> differences(const DatasetRecord& found, const DatasetRecord& wanted) {

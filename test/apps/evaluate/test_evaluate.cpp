@@ -146,10 +146,10 @@ TEST_CASE("closures judges the folders of a run", "[evaluate]") {
   const auto result = run_command(command + a + ' ' + b);
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
-  CHECK_THAT(result.output, Catch::Contains("inliers           2       1      50.0%"));
+  CHECK_THAT(result.output, Catch::Contains("inliers          2     1      50.0%"));
   CHECK_THAT(files.folder.read("closures.json"), Catch::Contains("\"pair_recall\": 1"));
   CHECK_THAT(run_command(command + a + ' ' + b + " --max-translation 1").output,
-             Catch::Contains("inliers           2       2     100.0%"));
+             Catch::Contains("inliers          2     2     100.0%"));
   const auto missing = run_command(command + "/none");
   CHECK(missing.exit_code == 1);
   CHECK(missing.output == "kimera_multi_evaluate: /none/keyframes.csv: no such file\n");

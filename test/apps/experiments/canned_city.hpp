@@ -1,33 +1,44 @@
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "apps/experiments/report.hpp"
 #include "apps/experiments/step_record.hpp"
+#include "apps/team/team_report.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
 
-inline constexpr const char* kCannedLabels = R"("labels": {"accuracy": )";
-
-// A mesh of whom everything is said by two numbers.
-inline std::string canned_mesh(double error_m, double accuracy) {
-  std::ostringstream text;
-  text << R"({"truth_to_estimate": {"point": {"mean_m": )" << error_m << "}, " << kCannedLabels
-       << accuracy << R"(}}, "seen_truth_to_estimate": {"point": {"mean_m": )" << 0.5 * error_m
-       << "}, " << kCannedLabels << accuracy << "}}}";
-  return text.str();
+// Of `all` points with a label some are right; seen from where robots were, errors are half.
+inline MeshError canned_mesh(const std::string& name, double error_m, int right, int all) {
+  MeshError mesh;
+  mesh.name = name;
+  mesh.truth.point.mean_m = error_m;
+  mesh.seen.point.mean_m = 0.5 * error_m;
+  for (int k = 0; k < all; ++k)
+    for (LabelConfusion* labels : {&mesh.truth.labels, &mesh.seen.labels})
+      labels->add(1, k < right ? 1 : 2);
+  return mesh;
 }
 
-inline std::string canned_meshes(double error_m, double accuracy) {
-  const std::string own = canned_mesh(error_m, accuracy);
-  std::string robots;
+inline MeshReport canned_meshes(double error_m, int right, int all) {
+  MeshReport report;
+  report.has_labels = true;
   for (const char* name : {"robot0", "robot1", "robot2"})
-    robots +=
-        (robots.empty() ? "" : ", ") + std::string("{\"name\": \"") + name + "\", " + own.substr(1);
-  return "{\"robots\": [" + robots + "], \"merged\": " + own + '}';
+    report.robots.push_back(canned_mesh(name, error_m, right, all));
+  report.merged = canned_mesh("merged", error_m, right, all);
+  return report;
+}
+
+inline TrajectoryError canned_error(const std::string& name, double rmse_m) {
+  TrajectoryError error;
+  error.name = name;
+  error.position_m.count = 1;
+  error.position_m.rmse = rmse_m;
+  return error;
 }
 
 // Small results of every step in City: three robots that drive straight on, 1 m/s.
@@ -92,7 +103,8 @@ class CannedCity {
   }
 
   void write_run(const std::string& world) const {
-    std::string robots, optimized;
+    TeamResult team;
+    team.optimized.emplace().joint = canned_error("team", 0.006);
     for (int r = 0; r < 3; ++r) {
       const std::string name = "robot" + std::to_string(r);
       const std::string run = "data/" + world + "_res/" + name;
@@ -101,8 +113,13 @@ class CannedCity {
         keyframes += std::to_string(r) + ',' + std::to_string(x) + ',' + std::to_string(x + 1) +
                      "000000000,5\n";
       folder_.write(run + "/keyframes.csv", keyframes);
-      folder_.write(run + "/summary.json",
-                    R"({"process": {"cpu_s": 2.4, "peak_memory_bytes": 250000000}})");
+      RunSummary summary;
+      summary.keyframes = kKeyframes;
+      summary.traffic = {
+          {"place_recognition", 1000000}, {"geometric_verification", 2000000}, {"pgo", 9000000}};
+      summary.process.cpu_s = 2.4;
+      summary.process.peak_memory_bytes = 250000000;
+      folder_.write(run + "/summary.json", json_text(summary));
       folder_.write(run + "/traffic.csv",
                     "time_s,direction,topic,category,peer,messages,bytes,retransmitted_bytes\n"
                     "1,out,keyframe_replies,geometric_verification,1,1,30000,0\n"
@@ -110,20 +127,18 @@ class CannedCity {
       folder_.write(run + "/timing.csv",
                     "module,calls,median_ms,p95_ms,max_ms,total_s\nvio,3,1,1,1,1.2\n");
       folder_.write(run + "/pose_graph.g2o", "");
-      robots += (r == 0 ? "" : ", ") + std::string("{\"name\": \"") + name +
-                R"(", "keyframes": 4, "traffic": {"place_recognition": 1000000,
-                "geometric_verification": 2000000, "pgo": 9000000},
-                "odometry": {"position_m": {"rmse": 0.0123}}})";
-      optimized += (r == 0 ? "" : ", ") + std::string("{\"name\": \"") + name +
-                   R"(", "position_m": {"rmse": 0.0045}})";
+      RobotResult& robot = team.robots.emplace_back();
+      robot.plan.name = name;
+      robot.summary = summary;
+      robot.odometry = canned_error(name, 0.0123);
+      team.optimized->robots.push_back(canned_error(name, 0.0045));
     }
-    folder_.write(
-        "results/team-" + world + ".json",
-        "{\"robots\": [" + robots + "], \"optimized\": {\"robots\": [" + optimized +
-            "], \"joint\": {\"position_m\": {\"rmse\": 0.006}}}, \"closures\": {\"inliers\": "
-            "{\"judged\": 817, \"correct\": 816}}, \"meshes\": " +
-            canned_meshes(0.08, 0.9) + ", \"optimized_meshes\": " + canned_meshes(0.06, 0.95) +
-            '}');
+    team.closures.emplace();
+    team.closures->inliers.judged = 817;
+    team.closures->inliers.correct = 816;
+    team.meshes.odometry = canned_meshes(0.08, 9, 10);
+    team.meshes.optimized = canned_meshes(0.06, 19, 20);
+    folder_.write("results/team-" + world + ".json", json_text(team));
   }
 
   // Poses bent off the truth: local PGO the most, RBCD half of it, all others not at all.
@@ -148,8 +163,10 @@ class CannedCity {
   }
 
   void write_alone() const {
-    folder_.write("data/city_alone/summary.json",
-                  R"({"process": {"cpu_s": 0.6, "peak_memory_bytes": 120000000}})");
+    RunSummary summary;
+    summary.process.cpu_s = 0.6;
+    summary.process.peak_memory_bytes = 120000000;
+    folder_.write("data/city_alone/summary.json", json_text(summary));
     folder_.write("data/city_alone/timing.csv",
                   "module,calls,median_ms,p95_ms,max_ms,total_s\nvio,3,1,1,1,0.3\n"
                   "sensors,3,1,1,1,0.1\n");

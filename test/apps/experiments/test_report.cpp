@@ -1,8 +1,12 @@
 #include <catch2/catch.hpp>
+#include <limits>
 #include <string>
 #include <vector>
 
+#include "apps/experiments/report.hpp"
+#include "apps/experiments/report_document.hpp"
 #include "test/apps/experiments/canned_city.hpp"
+#include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {
@@ -70,25 +74,15 @@ TEST_CASE("The report has every table with our values and the paper's", "[experi
           Contains(
               "`kimera_multi_pgo solve RESULTS/graphs/city --method local --no-vertical --json ") &&
           Contains("12.5 s, load 0.5"));
-}
-
-TEST_CASE("Several runs and seeds are shown by median and range", "[experiments]") {
-  const CannedCity city;
-  (void)city.report();
-  const std::string text = city.read("report.md");
+  // Several runs and seeds by median and range.
   CHECK_THAT(text,
              Contains("| City | 3 | 0.9000 (0.8000 to 1.0000) | 0.5000 (0.5000 to 0.5000) |"));
   CHECK_THAT(text, Contains("| City | 3 | 3.00 (3.00 to 3.00) | 6.00 (6.00 to 6.00) | 27.00 "));
   CHECK_THAT(text, Contains("| 120 | 8.000 (4.000 to 12.000) | 1.000 (1.000 to 1.000) |"));
   CHECK_THAT(text, Contains("3 seeds, the worst | faster | **4.0 times as fast** |"));
-}
-
-TEST_CASE("What all solves of a run sent is judged beside the one of the paper", "[experiments]") {
-  const CannedCity city;
-  (void)city.report();
   // 36 MB over 12 keyframes of 40 kB.
   CHECK_THAT(
-      city.read("report.md"),
+      text,
       Contains("keypoints sent, one solve, as the paper counts | City | at most 38 %, aim 10 % | "
                "**2775 % (2775 to 2775 in 3 runs)** |") &&
           Contains("keypoints sent, all solves of the run | City | at most 38 % | **7500 % (7500 "
@@ -97,11 +91,9 @@ TEST_CASE("What all solves of a run sent is judged beside the one of the paper",
 
 TEST_CASE("A robot that never met the others is named", "[experiments]") {
   const CannedCity city;
-  const std::string team = city.read("team-city.json");
-  const std::string name = "\"name\": \"robot2\"";
-  std::string apart = team;
-  apart.insert(apart.find(name), "\"in_team_frame\": false, ");
-  city.write("team-city.json", apart);
+  Json team = Json::parse(city.read("team-city.json"));
+  team["robots"][2]["in_team_frame"] = false;
+  city.write("team-city.json", json_text(team));
   (void)city.report();
   CHECK_THAT(city.read("report.md"), Contains("City: robot2 never met the others;"));
 }
@@ -152,6 +144,64 @@ TEST_CASE("Without results the report says so", "[experiments]") {
   text = city.read("report.md");
   CHECK_THAT(text, !Contains("Table I:") && !Contains("Table III") && !Contains("## Meshes") &&
                        Contains("Nothing was measured yet."));
+}
+
+TEST_CASE("A spread is median, lowest and highest of what is finite", "[experiments]") {
+  const Spread spread = spread_of({3.0, 1.0, std::numeric_limits<double>::quiet_NaN(), 2.0, 10.0});
+  CHECK(spread.count == 4);
+  CHECK(spread.median == 2.5);
+  CHECK(spread.lowest == 1.0);
+  CHECK(spread.highest == 10.0);
+  CHECK(spread_of({}).count == 0);
+}
+
+TEST_CASE("A range is shown where there are several values", "[experiments]") {
+  const ReportCell several = spread_cell(spread_of({1.0, 2.0, 4.0}), 1);
+  CHECK(several.text == "2.0");
+  CHECK(several.paper == "1.0 to 4.0");
+  const ReportCell one = spread_cell(spread_of({1.0}), 2);
+  CHECK(one.text == "1.00");
+  CHECK(one.paper.empty());
+  CHECK(spread_cell({}, 2).text == "-");
+}
+
+ReportDocument document_with(ReportBlock block) {
+  ReportDocument document{.title = "T", .lead = "L", .sections = {}};
+  document.sections.push_back({.id = "s", .title = "S", .blocks = {}});
+  document.sections[0].blocks.push_back(std::move(block));
+  return document;
+}
+
+TEST_CASE("A table has groups, our values and the paper's", "[experiments]") {
+  const ReportDocument document = document_with(ReportTable{
+      .caption = "C",
+      .groups = {{"", 1}, {"g", 2}},
+      .columns = {"world", "x", "y"},
+      .rows = {{{"a|b"}, {"1", "2"}, {.text = "3", .style = ReportCell::Style::kBest}}}});
+  CHECK_THAT(to_html(document), Contains("<th class=\"group\" colspan=\"2\">g</th>") &&
+                                    Contains("<td>1<span class=\"paper\">2</span></td>") &&
+                                    Contains("<td class=\"best\">3</td>"));
+  CHECK_THAT(to_markdown(document), Contains("| world | g: x | g: y |\n| --- | ---: | ---: |\n"
+                                             "| a\\|b | 1 (2) | **3** |"));
+}
+
+TEST_CASE("Pictures are in the page itself", "[experiments]") {
+  const TemporaryFolder folder;
+  const auto png = folder.write("p.png", "\x89PNG");
+  const std::string page = to_html(
+      document_with(ReportFigures{{{.name = "a",
+                                    .caption = "drawn",
+                                    .svg = "<svg xmlns=\"x\" width=\"30\" height=\"20\"></svg>"},
+                                   {.name = "b", .caption = "taken", .png = png}}}));
+  CHECK_THAT(page, Contains("<svg xmlns=\"x\" width=\"30\" height=\"20\"></svg>") &&
+                       Contains("src=\"data:image/png;base64,iVBORw==\""));
+  CHECK_THROWS_WITH(
+      to_html(document_with(ReportFigures{{{.name = "c", .caption = "", .png = "no.png"}}})),
+      Contains("no.png"));
+}
+
+TEST_CASE("Text is escaped", "[experiments]") {
+  CHECK_THAT(to_html(document_with(ReportParagraph{"a < b & c"})), Contains("a &lt; b &amp; c"));
 }
 
 }  // namespace

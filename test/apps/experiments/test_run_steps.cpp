@@ -208,5 +208,55 @@ TEST_CASE("A record keeps how a result was made", "[experiments]") {
   CHECK_THAT(record->started, Contains("UTC"));
 }
 
+TEST_CASE("The display says which step runs and how long all will take", "[experiments]") {
+  std::ostringstream out;
+  StepDisplay display(out, false, 80);
+  display.expect(
+      {{"closures", "pgo", 20.0}, {"team, City", "team", 100.0}, {"picture", "", 600.0}});
+  display.start(1, 0.0);
+  CHECK(display.text("robot0: 12 %", 40.0) ==
+        "[2/3] team, City: 40 s, about 11 min left | robot0: 12 %");
+  CHECK(display.text("", 130.0) ==
+        "[2/3] team, City: 2 min 10 s, longer than expected, then about 10 min");
+  display.update("early", 1.0);
+  display.update("too soon", 5.0);
+  display.update("shown", StepDisplay::kPlainInterval_s);
+  display.finish("done", 124.0);
+  CHECK_THAT(out.str(), !Contains("early") && !Contains("too soon") && Contains("shown") &&
+                            Contains("[2/3] team, City: done in 2 min 4 s"));
+  display.expect({{"closures", "pgo", 20.0}});
+  display.start(0, 0.0);  // nothing after it: no promise once it takes longer than expected
+  CHECK(display.text("", 19.0) == "[1/1] closures: 19 s, less than a minute left");
+  CHECK(display.text("", 300.0) == "[1/1] closures: 5 min 0 s, longer than expected");
+}
+
+TEST_CASE("Steps are expected to take as much longer as their program has so far",
+          "[experiments]") {
+  std::ostringstream out;
+  StepDisplay display(out, false, 80);
+  display.expect({{"a", "pcm", 60.0}, {"b", "pcm", 60.0}, {"c", "pcm", 0.0}, {"d", "pgo", 120.0}});
+  const auto left_at_start = [&](std::size_t index) {
+    display.start(index, 0.0);
+    return display.text("", 0.0).substr(display.text("", 0.0).find(", ") + 2);
+  };
+  CHECK(left_at_start(0) == "about 4 min left");
+  display.finish("done", 180.0);  // three times as long as thought
+  CHECK(left_at_start(1) == "about 5 min left");
+  display.finish("FAILED", 1.0);
+  CHECK(left_at_start(2) == "about 2 min left");
+  display.expect({{"e", "none", 9000.0}});
+  CHECK(left_at_start(0) == "about 2.5 h left");
+}
+
+TEST_CASE("A terminal's line is redrawn and never wider than it", "[experiments]") {
+  std::ostringstream out;
+  StepDisplay display(out, true, 40);
+  display.expect({{"team, City", "team", 100.0}, {"last", "team", 0.0}});
+  display.start(0, 0.0);
+  display.update(std::string(200, 'x'), 3.0);
+  CHECK(out.str().starts_with("\r\x1b[K[1/2] team, City: 3.0 s"));
+  CHECK(out.str().size() == 4 + 39);
+}
+
 }  // namespace
 }  // namespace km

@@ -29,13 +29,6 @@ std::string square_g2o() {
   return text;
 }
 
-std::string text_of(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
 }  // namespace
 
 TEST_CASE("Every method runs from the command line and says what it reached", "[pgo]") {
@@ -52,7 +45,7 @@ TEST_CASE("Every method runs from the command line and says what it reached", "[
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
   CHECK_THAT(result.output, Contains("8 poses, 11 edges, 2 robots"));
-  const std::string written = text_of(json);
+  const std::string written = folder.read("out.json");
   for (const char* key :
        {"poses", "edges", "robots", "method", "rounds", "cost", "gradient_norm", "bytes",
         "critical_path_s", "total_cpu_s", "rounded_cost", "lambda_bound", "certified", "rank"})
@@ -84,7 +77,7 @@ TEST_CASE("Poses and plot are written", "[pgo]") {
     CHECK((make_pose(q.toRotationMatrix(), t).matrix() - T.matrix()).norm() < 1e-12);
   }
   CHECK((rows >> std::ws).eof());
-  CHECK_THAT(text_of(svg), Contains("<svg") && Contains("</svg>"));
+  CHECK_THAT(folder.read("gap.svg"), Contains("<svg") && Contains("</svg>"));
 }
 
 TEST_CASE("A graph without noise has no gap to report, and is certified", "[pgo]") {
@@ -96,7 +89,7 @@ TEST_CASE("A graph without noise has no gap to report, and is certified", "[pgo]
   CAPTURE(result.output);
   CHECK(result.exit_code == 0);
   CHECK_THAT(result.output, !Contains("nan") && Contains("\ncertified"));
-  CHECK_THAT(text_of(json), !Contains("nan") && Contains("\"certified\": true"));
+  CHECK_THAT(folder.read("out.json"), !Contains("nan") && Contains("\"certified\": true"));
 }
 
 TEST_CASE("The plot goes on to the last round where no gap is left", "[pgo]") {
@@ -132,7 +125,8 @@ TEST_CASE("newton decides, and says how noisy closures are", "[pgo]") {
     CAPTURE(arguments, result.output);
     CHECK(result.exit_code == 0);
     CHECK_THAT(result.output, !Contains("not decided") && Contains("as noisy as the graph says"));
-    CHECK_THAT(text_of(json), Contains("\"decided\": true") && Contains("\"noise_scale\":"));
+    CHECK_THAT(folder.read("out.json"),
+               Contains("\"decided\": true") && Contains("\"noise_scale\":"));
   }
   const CommandResult strict =
       run_command(kTool + square + " --robots 2 --barc 0.001 --json " + json.string());
@@ -232,7 +226,7 @@ TEST_CASE("Verticals of the file are used, told of, and written again", "[pgo][v
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
   CHECK_THAT(result.output, Contains("8 poses, 11 edges, 7 verticals, 2 robots"));
-  CHECK_THAT(text_of(json), Contains("\"verticals\": 7"));
+  CHECK_THAT(folder.read("out.json"), Contains("\"verticals\": 7"));
   const G2oGraph written = read_g2o(solved);
   CHECK(written.verticals.size() == 7);
   const auto worst_tilt = [](const G2oGraph& g) {
@@ -248,7 +242,7 @@ TEST_CASE("Verticals of the file are used, told of, and written again", "[pgo][v
       run_command(kTool + options + " --no-vertical --json " + json.string());
   CHECK(without.exit_code == 0);
   CHECK_THAT(without.output, Contains("8 poses, 11 edges, 2 robots"));
-  CHECK_THAT(text_of(json), Contains("\"verticals\": 0"));
+  CHECK_THAT(folder.read("out.json"), Contains("\"verticals\": 0"));
 }
 
 TEST_CASE("What does not know verticals says so, and how to leave them out", "[pgo][vertical]") {

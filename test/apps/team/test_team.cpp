@@ -2,10 +2,12 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <thread>
 
-#include "apps/team/robot_process.hpp"
+#include "apps/robot/run_summary.hpp"
+#include "apps/team/run_team.hpp"
 #include "test/support/command.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -15,6 +17,13 @@ namespace km {
 namespace {
 
 namespace fs = std::filesystem;
+
+RunSummary finished_summary() {
+  RunSummary summary;
+  summary.frames = 77;
+  summary.exit_reason = "finished";
+  return summary;
+}
 
 // Finds its name and output folder on its command line, prints a status line and leaves a summary;
 // `end` is what it does then.
@@ -26,8 +35,7 @@ std::string robot_script(const std::string& end) {
          "  shift\n"
          "done\n"
          "echo \"status of $name: $all\"\n"
-         "echo '{\"keyframes\": 5, \"frames\": 77, \"exit_reason\": \"finished\"}' > "
-         "\"$out/summary.json\"\n" +
+         "cp \"${0%robot}summary.json\" \"$out\"\n" +
          end + '\n';
 }
 
@@ -38,6 +46,7 @@ struct Team {
   explicit Team(const std::string& end) {
     const fs::path script = folder.write("robot", robot_script(end));
     fs::permissions(script, fs::perms::owner_all);
+    folder.write("summary.json", json_text(finished_summary()));
     folder.write("g.csv", "");
     const fs::path file = folder.write("team.yaml",
                                        "robots:\n"
@@ -159,6 +168,50 @@ TEST_CASE("Robots die with a team program that is killed", "[team]") {
 TEST_CASE("A time limit asks the robots to end", "[team]") {
   const Team team("trap 'exit 0' INT; while :; do sleep 0.05; done");
   CHECK(run_command(team.command + " --time-limit 0.2").exit_code == 0);
+}
+
+TEST_CASE("How a robot ended elsewhere is read from its folder", "[team]") {
+  const TemporaryFolder folder;
+  const std::string summary = json_text(finished_summary());
+  folder.write("done/summary.json", summary);
+  folder.write("told/summary.json", summary);
+  folder.write("told/exit_code", "3\n");
+  folder.write("torn/exit_code", "");
+  std::string log;
+  for (int i = 0; i < 30; ++i) log += "line " + std::to_string(i) + '\n';
+  folder.write("told/robot.log", log);
+
+  TeamPlan plan;
+  plan.output = folder.path();
+  for (const char* name : {"done", "told", "torn", "absent"})
+    plan.robots.emplace_back().name = name;
+  const auto runs = finished_runs(plan);
+  REQUIRE(runs.size() == 4);
+  CHECK(runs[0].exit.ok());
+  CHECK(runs[0].last_words.empty());
+  CHECK(runs[1].exit.code == 3);
+  REQUIRE(runs[1].last_words.size() == 10);
+  CHECK(runs[1].last_words.front() == "line 20");
+  CHECK(runs[1].last_words.back() == "line 29");
+  CHECK(runs[2].exit.code == 1);
+  CHECK(runs[3].exit.code == 1);
+}
+
+TEST_CASE("A report starts no robot and fails if one of the run did", "[team]") {
+  const Team team("exit 0");
+  const std::string command = team.command + " --report";
+  team.folder.write("out/alice/summary.json", json_text(finished_summary()));
+  const CommandResult half = run_command(command);
+  CAPTURE(half.output);
+  CHECK(half.exit_code == 3);
+  CHECK_THAT(half.output, Catch::Contains("bob failed"));
+
+  team.folder.write("out/bob/summary.json", json_text(finished_summary()));
+  const CommandResult whole = run_command(command);
+  CAPTURE(whole.output);
+  CHECK(whole.exit_code == 0);
+  CHECK_THAT(whole.output, Catch::Contains("finished") && !Catch::Contains("DDS domain") &&
+                               !Catch::Contains("status of"));
 }
 
 TEST_CASE("What cannot be run is refused with code 1", "[team]") {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "modules/core/camera.hpp"
 #include "modules/evaluation/images/image_figure.hpp"
 
 namespace km {
@@ -42,6 +43,26 @@ inline cv::Mat noisy_wall(int width, int height, double grey, double sigma, std:
   cv::Mat image;
   white_noise(width, height, sigma, random).convertTo(image, CV_8U, 1.0, grey);
   return image;
+}
+
+/// Two cameras side by side that see the same of what is infinitely far.
+inline StereoRig aligned_rig(int width, int height, double focal_px) {
+  PinholeCamera camera;
+  camera.width = width;
+  camera.height = height;
+  camera.fx = camera.fy = focal_px;
+  camera.cx = 0.5 * width;
+  camera.cy = 0.5 * height;
+  StereoRig rig;
+  rig.cameras = {camera, camera};
+  rig.cameras[1].T_body_cam.translation().x() = 0.1;
+  return rig;
+}
+
+inline std::vector<ImageFigure> figures_of(const auto& statistics) {
+  std::vector<ImageFigure> figures;
+  statistics.append_to(figures);
+  return figures;
 }
 
 /// Value of a figure; throws if there is none of this name.

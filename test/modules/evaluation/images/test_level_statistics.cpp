@@ -23,12 +23,6 @@ double noise_of(const cv::Mat& image) {
   return noise_within(image, gradient_magnitude(image), 2.0);
 }
 
-std::vector<ImageFigure> figures_of(const LevelStatistics& statistics) {
-  std::vector<ImageFigure> figures;
-  statistics.append_to(figures);
-  return figures;
-}
-
 }  // namespace
 
 TEST_CASE("The gradient of a ramp is its slope", "[image_statistics]") {

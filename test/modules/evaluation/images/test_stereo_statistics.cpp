@@ -12,25 +12,7 @@ constexpr int kHeight = 300;
 constexpr double kFocal_px = 300.0;
 constexpr double kBaseline_m = 0.1;
 constexpr Stamp kSecond = 1'000'000'000;
-
-StereoRig rig() {
-  PinholeCamera camera;
-  camera.width = kWidth;
-  camera.height = kHeight;
-  camera.fx = camera.fy = kFocal_px;
-  camera.cx = 0.5 * kWidth;
-  camera.cy = 0.5 * kHeight;
-  StereoRig result;
-  result.cameras = {camera, camera};
-  result.cameras[1].T_body_cam.translation() << kBaseline_m, 0.0, 0.0;
-  return result;
-}
-
-std::vector<ImageFigure> figures_of(const StereoStatistics& statistics) {
-  std::vector<ImageFigure> figures;
-  statistics.append_to(figures);
-  return figures;
-}
+const StereoRig kRig = aligned_rig(kWidth, kHeight, kFocal_px);
 
 }  // namespace
 
@@ -41,7 +23,7 @@ TEST_CASE("A wall parallel to the cameras is found at its depth", "[image_statis
   const cv::Mat surface = texture(kWidth + disparity_px, kHeight, 11);
   const KltImage left = make_klt_image(view_of(surface, 0, 0, kWidth, kHeight));
   const KltImage right = make_klt_image(view_of(surface, disparity_px, 0, kWidth, kHeight));
-  StereoStatistics statistics(rig());
+  StereoStatistics statistics(kRig);
   statistics.add(kSecond, left, right, corners_of(left.image));
   const auto figures = figures_of(statistics);
   // All but the corners that the right camera does not see.
@@ -60,7 +42,7 @@ TEST_CASE("A right image that is too low misses the epipolar lines", "[image_sta
   const cv::Mat surface = texture(kWidth + 10, kHeight + 3, 11);
   const KltImage left = make_klt_image(view_of(surface, 0, 0, kWidth, kHeight));
   const KltImage right = make_klt_image(view_of(surface, 10, 3, kWidth, kHeight));
-  StereoStatistics statistics(rig());
+  StereoStatistics statistics(kRig);
   statistics.add(kSecond, left, right, corners_of(left.image));
   const auto figures = figures_of(statistics);
   CHECK(figure(figures, "KLT, left to right", "pass, share of corners") > 0.9);
@@ -71,7 +53,7 @@ TEST_CASE("A right image that is too low misses the epipolar lines", "[image_sta
 
 TEST_CASE("Later views are matched at their lags only", "[image_statistics]") {
   const KltImage image = make_klt_image(texture(kWidth, kHeight, 11));
-  StereoStatistics statistics(rig());
+  StereoStatistics statistics(kRig);
   for (const double t_s : {0.0, 0.25, 0.6})
     statistics.add(kSecond + nanoseconds(t_s), image, {}, corners_of(image.image));
   const auto figures = figures_of(statistics);

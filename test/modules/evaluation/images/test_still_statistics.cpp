@@ -28,12 +28,6 @@ void add(StillStatistics& statistics, double t_s, const cv::Mat& scene, double s
   statistics.add(nanoseconds(t_s) + kSecond, klt, corners_of(klt.image));
 }
 
-std::vector<ImageFigure> figures_of(const StillStatistics& statistics) {
-  std::vector<ImageFigure> figures;
-  statistics.append_to(figures);
-  return figures;
-}
-
 }  // namespace
 
 TEST_CASE("Noise over time is recovered where the camera stands still", "[image_statistics]") {

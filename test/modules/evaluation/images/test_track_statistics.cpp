@@ -22,12 +22,6 @@ void pass_over(TrackStatistics& statistics, int frames, int step_px) {
   }
 }
 
-std::vector<ImageFigure> figures_of(const TrackStatistics& statistics) {
-  std::vector<ImageFigure> figures;
-  statistics.append_to(figures);
-  return figures;
-}
-
 }  // namespace
 
 TEST_CASE("Corners of a shifted image survive until they leave it", "[image_statistics]") {

@@ -1,11 +1,10 @@
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <opencv2/core/utility.hpp>
-#include <sstream>
 #include <vector>
 
-#include "modules/evaluation/mesh/mesh_checks.hpp"
 #include "modules/evaluation/mesh/mesh_error.hpp"
 #include "modules/evaluation/mesh/mesh_report.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
@@ -34,10 +33,7 @@ double mean_distance(double h, double density) {
 }
 
 std::string json_of(const MeshReport& report) {
-  std::ostringstream text;
-  JsonWriter json(text);
-  write_json(json, report, {});
-  return text.str();
+  return json_text(to_json(report, {}));
 }
 
 }  // namespace
@@ -114,7 +110,7 @@ TEST_CASE("Labels further than the given distance are not judged", "[mesh_error]
 TEST_CASE("Points whose true class is unknown are not judged", "[mesh_error]") {
   const MeshReport report = compare(square(2.0F, 0.0F, 4, 0), square(2.0F, 0.0F, 4, 3), in_place());
   CHECK(report.merged.truth.labels.total().points() == 0);
-  CHECK(report.merged.truth.labels.count(0, 3) == 4000);
+  CHECK(report.merged.truth.point.count == 4000);
 }
 
 TEST_CASE("True points far from the estimate are not judged", "[mesh_error]") {

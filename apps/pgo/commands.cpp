@@ -1,0 +1,42 @@
+#include "apps/pgo/commands.hpp"
+
+#include <stdexcept>
+
+#include "modules/pgo_study/team_graph_file.hpp"
+
+namespace km {
+
+void GraphInput::define(CLI::App& app) {
+  app.add_option("FILE", file,
+                 "Pose graph (*.g2o), or a folder with one file per robot, or a team's results")
+      ->required()
+      ->check(CLI::ExistingPath);
+  app.add_option("--robots", robots, "Number of robots that a single file is dealt out to")
+      ->check(CLI::Range(1, 65535));
+  app.add_option("--partition", partition,
+                 "contiguous: runs of equal length; or a file with rows \"vertex robot\"");
+}
+
+TeamGraph GraphInput::read(const CLI::App& app) const {
+  const bool folder = std::filesystem::is_directory(file);
+  const bool contiguous = partition == "contiguous";
+  if (folder && !contiguous)
+    throw std::runtime_error("--partition is for a single file, " + file.string() +
+                             " is a folder with one file per robot");
+  const TeamGraph graph = folder       ? read_team_folder(file)
+                          : contiguous ? deal_contiguously(read_g2o(file), robots, file.string())
+                                       : deal(read_g2o(file), read_partition(partition), partition);
+  if (app.count("--robots") > 0 && graph.robots() != robots)
+    throw std::runtime_error("--robots " + std::to_string(robots) + ": there are " +
+                             std::to_string(graph.robots()) + " robots in the folder or partition");
+  return graph;
+}
+
+std::string indefinite_text(std::size_t edges) {
+  if (edges == 0) return {};
+  return std::to_string(edges) +
+         " edges have an information matrix that is not positive definite: weighed by its blocks, "
+         "as SE-Sync does\n";
+}
+
+}  // namespace km

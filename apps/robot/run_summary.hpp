@@ -1,0 +1,146 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "modules/core/ids.hpp"
+#include "modules/core/json.hpp"
+
+namespace km {
+
+/// Closures by the stage they reached; each number includes the next.
+struct ClosureCounts {
+  std::uint64_t candidates = 0;
+  std::uint64_t verified = 0;
+  std::uint64_t inliers = 0;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("candidates", candidates);
+    visitor.field("verified", verified);
+    visitor.field("inliers", inliers);
+  }
+  bool operator==(const ClosureCounts&) const = default;
+};
+
+/// What a robot's run came to: summary.json, and the robot's part of a team's --json. The names in
+/// visit_fields are the keys; they are written and read in this order. An absent optional has no
+/// key; NaN is written as null.
+struct RunSummary {
+  /// Of the team's optimiser, as this robot knows it.
+  struct Optimizer {
+    std::uint64_t rounds = 0;
+    double seconds = 0.0;  ///< Of this robot's work.
+    double cost = 0.0;
+    double gradient_norm = 0.0;
+    std::optional<RobotId> anchor;  ///< Robot whose frame the poses are in.
+    bool settled = false;
+    std::vector<RobotId> members;
+
+    void visit_fields(auto& visitor) {
+      visitor.field("rounds", rounds);
+      visitor.field("seconds", seconds);
+      visitor.field("cost", cost);
+      visitor.field("gradient_norm", gradient_norm);
+      visitor.field("anchor", anchor);
+      visitor.field("settled", settled);
+      visitor.field("members", members);
+    }
+    bool operator==(const Optimizer&) const = default;
+  };
+
+  /// Frames that went into the map, why others did not, and the mesh in the end.
+  struct Mapping {
+    std::uint64_t frames = 0, skipped_wrong_size = 0, skipped_bad_pose = 0, skipped_too_late = 0;
+    std::uint64_t without_labels = 0, label_pixels_outside_palette = 0;
+    std::uint64_t blocks_refused = 0;  ///< For want of semantic_mapping.max_blocks.
+    std::uint64_t blocks = 0, vertices = 0, faces = 0, superseded_faces_dropped = 0;
+    std::uint64_t corrections = 0, moves_as_a_whole = 0;
+    double correction_seconds = 0.0;
+    std::uint64_t unbound_vertices = 0;  ///< In the last correction.
+
+    void visit_fields(auto& visitor) {
+      visitor.field("frames", frames);
+      visitor.field("skipped_wrong_size", skipped_wrong_size);
+      visitor.field("skipped_bad_pose", skipped_bad_pose);
+      visitor.field("skipped_too_late", skipped_too_late);
+      visitor.field("without_labels", without_labels);
+      visitor.field("label_pixels_outside_palette", label_pixels_outside_palette);
+      visitor.field("blocks_refused", blocks_refused);
+      visitor.field("blocks", blocks);
+      visitor.field("vertices", vertices);
+      visitor.field("faces", faces);
+      visitor.field("superseded_faces_dropped", superseded_faces_dropped);
+      visitor.field("corrections", corrections);
+      visitor.field("moves_as_a_whole", moves_as_a_whole);
+      visitor.field("correction_seconds", correction_seconds);
+      visitor.field("unbound_vertices", unbound_vertices);
+    }
+    bool operator==(const Mapping&) const = default;
+  };
+
+  /// What the process took of the machine.
+  struct Process {
+    double cpu_s = 0.0;
+    std::uint64_t peak_memory_bytes = 0;
+    std::uint64_t memory_at_start_bytes = 0;
+    std::uint64_t memory_at_end_bytes = 0;
+    /// Slope of the line of least squares through the second half of the time; absent if that is
+    /// less than a minute: what is taken at the start is no growth.
+    std::optional<double> memory_growth_bytes_per_minute;
+
+    void visit_fields(auto& visitor) {
+      visitor.field("cpu_s", cpu_s);
+      visitor.field("peak_memory_bytes", peak_memory_bytes);
+      visitor.field("memory_at_start_bytes", memory_at_start_bytes);
+      visitor.field("memory_at_end_bytes", memory_at_end_bytes);
+      visitor.field("memory_growth_bytes_per_minute", memory_growth_bytes_per_minute);
+    }
+    bool operator==(const Process&) const = default;
+  };
+
+  RobotId robot = 0;
+  std::string name;
+  std::uint64_t keyframes = 0;
+  std::uint64_t keypoints = 0;       ///< Of all keyframes.
+  std::uint64_t frames = 0;          ///< Stereo pairs played.
+  std::uint64_t frames_skipped = 0;  ///< Pairs that odometry was too slow for.
+  ClosureCounts closures;            ///< That this robot found.
+  Optimizer pgo;
+  std::optional<Mapping> mapping;                ///< Absent where mapping is off.
+  std::map<std::string, std::uint64_t> traffic;  ///< Bytes sent, by category.
+  Process process;
+  double seconds = 0.0;  ///< Wall time of the run.
+  std::string exit_reason;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("robot", robot);
+    visitor.field("name", name);
+    visitor.field("keyframes", keyframes);
+    visitor.field("keypoints", keypoints);
+    visitor.field("frames", frames);
+    visitor.field("frames_skipped", frames_skipped);
+    visitor.field("closures", closures);
+    visitor.field("pgo", pgo);
+    visitor.field("mapping", mapping);
+    visitor.field("traffic", traffic);
+    visitor.field("process", process);
+    visitor.field("seconds", seconds);
+    visitor.field("exit_reason", exit_reason);
+  }
+  bool operator==(const RunSummary&) const = default;
+};
+
+void to_json(Json& json, const RunSummary& summary);
+
+/// Throws std::runtime_error naming the file.
+void write_summary(const std::filesystem::path& file, const RunSummary& summary);
+
+/// Keys that are absent keep their default, others are ignored. Throws std::runtime_error naming
+/// the file, and the key, if it is missing, no JSON object, or has a value of another type.
+[[nodiscard]] RunSummary read_summary(const std::filesystem::path& file);
+
+}  // namespace km

@@ -1,0 +1,109 @@
+#include "apps/vocabulary/images.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cstring>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+
+#include "modules/core/text_rows.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool has_extension(const fs::path& path, std::initializer_list<const char*> extensions) {
+  std::string own = path.extension().string();
+  for (char& c : own) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return std::find(extensions.begin(), extensions.end(), own) != extensions.end();
+}
+
+bool is_image(const fs::path& path) {
+  return has_extension(path, {".png", ".jpg", ".jpeg"});
+}
+
+std::vector<fs::path> listed_in(const fs::path& list, const fs::path& folder) {
+  std::ifstream file(list, std::ios::binary);
+  const std::string text(std::istreambuf_iterator<char>(file), {});
+  std::vector<fs::path> images;
+  for (const TextRow& row : split_rows(text)) images.push_back(folder / row.fields.back());
+  return images;
+}
+
+std::vector<fs::path> images_in(const fs::path& folder) {
+  std::vector<fs::path> images;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.is_regular_file() && is_image(entry.path())) images.push_back(entry.path());
+  std::sort(images.begin(), images.end());
+  return images;
+}
+
+std::vector<fs::path> expand(const fs::path& input) {
+  if (!fs::exists(input)) throw std::runtime_error(input.string() + " does not exist");
+  if (fs::is_directory(input)) {
+    for (const fs::path& camera : {input / "mav0" / "cam0", input / "cam0"})
+      if (fs::exists(camera / "data.csv")) return listed_in(camera / "data.csv", camera / "data");
+    return images_in(input);
+  }
+  if (has_extension(input, {".txt", ".csv"})) return listed_in(input, input.parent_path());
+  return {input};
+}
+
+}  // namespace
+
+std::vector<fs::path> list_images(const std::vector<std::string>& inputs, int stride) {
+  std::vector<fs::path> images;
+  // Image files given one by one (by a shell's pattern) count as one input.
+  std::size_t single_files = 0;
+  for (const std::string& input : inputs) {
+    const std::vector<fs::path> expanded = expand(input);
+    if (expanded.empty()) throw std::runtime_error(input + " holds no image (.png, .jpg, .jpeg)");
+    const bool is_single = expanded.size() == 1 && is_image(input);
+    const std::size_t first = is_single ? single_files++ : 0;
+    for (std::size_t i = 0; i < expanded.size(); ++i)
+      if ((first + i) % static_cast<std::size_t>(stride) == 0) images.push_back(expanded[i]);
+  }
+  for (const fs::path& image : images)
+    if (!fs::is_regular_file(image))
+      throw std::runtime_error(image.string() + " does not exist or is no file");
+  return images;
+}
+
+Stamp stamp_of_image(const std::filesystem::path& image) {
+  const std::string name = image.filename().string();
+  const std::string digits = name.substr(0, name.find_first_not_of("0123456789"));
+  const std::optional<std::int64_t> stamp = parse_int64(digits);
+  if (!stamp) throw std::runtime_error(image.string() + ": the name does not start with a stamp");
+  return *stamp;
+}
+
+std::vector<OrbDescriptor> orb_descriptors(const std::filesystem::path& image, int features) {
+  const cv::Mat grey = cv::imread(image.string(), cv::IMREAD_GRAYSCALE);
+  if (grey.empty()) throw std::runtime_error(image.string() + " cannot be decoded as an image");
+  std::vector<cv::KeyPoint> keypoints;
+  cv::Mat descriptors;
+  cv::ORB::create(features)->detectAndCompute(grey, cv::noArray(), keypoints, descriptors);
+  std::vector<OrbDescriptor> result(static_cast<std::size_t>(descriptors.rows));
+  for (int i = 0; i < descriptors.rows; ++i)
+    std::memcpy(result[static_cast<std::size_t>(i)].data(), descriptors.ptr(i),
+                sizeof(OrbDescriptor));
+  return result;
+}
+
+std::vector<std::vector<OrbDescriptor>> orb_descriptors(
+    std::span<const std::filesystem::path> images, int features) {
+  std::vector<std::vector<OrbDescriptor>> result;
+  for (const auto& image : images) {
+    result.push_back(orb_descriptors(image, features));
+    if (result.size() % 50 == 0 || result.size() == images.size())
+      std::cerr << "ORB: " << result.size() << " of " << images.size() << " images\n";
+  }
+  return result;
+}
+
+}  // namespace km

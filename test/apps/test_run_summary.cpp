@@ -1,0 +1,101 @@
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "apps/robot/run_summary.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+// Gives every field, those to come too, a value of its own that is not its default.
+struct Filler {
+  int next = 1;
+
+  template <typename T>
+  void field(const char* name, std::optional<T>& value) {
+    field(name, value.emplace());
+  }
+  template <typename T>
+  void field(const char* /*name*/, T& value) {
+    const int number = next++;
+    if constexpr (requires { value.visit_fields(*this); })
+      value.visit_fields(*this);
+    else if constexpr (std::is_arithmetic_v<T>)
+      value = static_cast<T>(std::is_floating_point_v<T> ? number / 7.0 : number);
+    else if constexpr (requires { value.append("x"); })
+      value = "text \"" + std::to_string(number) + "\"\n";
+    else if constexpr (requires { value["x"]; })
+      value["x"] = std::numeric_limits<std::uint64_t>::max() - static_cast<std::uint64_t>(number);
+    else
+      value = {static_cast<RobotId>(number), 65535};
+  }
+};
+
+RunSummary full_summary() {
+  RunSummary summary;
+  Filler filler;
+  summary.visit_fields(filler);
+  return summary;
+}
+
+}  // namespace
+
+TEST_CASE("A summary with all there can be is read as it was written", "[robot][summary]") {
+  const TemporaryFolder folder;
+  const RunSummary full = full_summary();
+  CHECK(read_summary(folder.write("full.json", json_text(full))) == full);
+  CHECK(read_summary(folder.write("default.json", json_text(RunSummary{}))) == RunSummary{});
+  CHECK(read_summary(folder.write("empty.json", "{}")) == RunSummary{});
+}
+
+TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
+  const Json json = Json(full_summary()).flatten();
+  std::string keys;
+  for (const auto& [key, value] : json.items()) keys += key + ' ';
+  CHECK(keys ==
+        "/robot /name /keyframes /keypoints /frames /frames_skipped "
+        "/closures/candidates /closures/verified /closures/inliers "
+        "/pgo/rounds /pgo/seconds /pgo/cost /pgo/gradient_norm /pgo/anchor /pgo/settled "
+        "/pgo/members/0 /pgo/members/1 "
+        "/mapping/frames /mapping/skipped_wrong_size /mapping/skipped_bad_pose "
+        "/mapping/skipped_too_late /mapping/without_labels /mapping/label_pixels_outside_palette "
+        "/mapping/blocks_refused /mapping/blocks /mapping/vertices /mapping/faces "
+        "/mapping/superseded_faces_dropped /mapping/corrections /mapping/moves_as_a_whole "
+        "/mapping/correction_seconds /mapping/unbound_vertices "
+        "/traffic/x /process/cpu_s /process/peak_memory_bytes /process/memory_at_start_bytes "
+        "/process/memory_at_end_bytes /process/memory_growth_bytes_per_minute "
+        "/seconds /exit_reason ");
+  const Json least = RunSummary{};
+  CHECK_FALSE(least.contains("mapping"));  // what is absent has no key
+  CHECK_FALSE(least["pgo"].contains("anchor"));
+}
+
+TEST_CASE("A cost that is no number is null, and none again", "[robot][summary]") {
+  const TemporaryFolder folder;
+  RunSummary summary;
+  summary.pgo.cost = std::numeric_limits<double>::quiet_NaN();
+  const std::string text = json_text(summary);
+  CHECK_THAT(text, Catch::Contains("\"cost\": null"));
+  CHECK(std::isnan(read_summary(folder.write("summary.json", text)).pgo.cost));
+}
+
+TEST_CASE("A summary that is missing or broken is named, with the key", "[robot][summary]") {
+  using Catch::Contains;
+  const TemporaryFolder folder;
+  CHECK_THROWS_WITH(read_summary(folder.path() / "x.json"),
+                    Catch::EndsWith("x.json: no such file"));
+  for (const auto& [text, words] :
+       {std::pair("[1, 2", "y.json: "),
+        {"7", "y.json: not a JSON object"},
+        {R"({"closures": {"verified": "many"}})", "y.json: closures: verified: "},
+        {R"({"pgo": []})", "y.json: pgo: not a JSON object"},
+        {R"({"pgo": {"members": [1, "a"]}})", "members"}}) {
+    CAPTURE(text);
+    CHECK_THROWS_WITH(read_summary(folder.write("y.json", text)), Contains(words));
+  }
+}
+
+}  // namespace km

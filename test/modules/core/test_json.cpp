@@ -1,0 +1,25 @@
+#include "modules/core/json.hpp"
+
+#include <catch2/catch.hpp>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+namespace km {
+
+TEST_CASE("JSON text keeps keys in order and numbers exact, and is valid whatever it is given",
+          "[core]") {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const double third = 1.0 / 3.0;
+  const Json json = {{"z", std::numeric_limits<std::uint64_t>::max()},
+                     {"a \"q\"\n", third},
+                     {"none", {kNone, -std::numeric_limits<double>::infinity()}},
+                     {"torn", "\xff!"}};
+  const std::string text = json_text(json);
+  CHECK_THAT(text, Catch::StartsWith("{\n  \"z\": 18446744073709551615,\n  \"a \\\"q\\\"\\n\": ") &&
+                       Catch::Contains("[\n    null,\n    null\n  ]") && Catch::EndsWith("\n}\n"));
+  const Json again = Json::parse(text);
+  CHECK(again["a \"q\"\n"] == third);
+  CHECK(again["torn"] == "\xEF\xBF\xBD!");
+}
+
+}  // namespace km

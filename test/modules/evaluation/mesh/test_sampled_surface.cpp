@@ -1,0 +1,199 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "modules/evaluation/mesh/sampled_surface.hpp"
+#include "test/modules/evaluation/mesh/shapes.hpp"
+
+namespace km {
+namespace {
+
+TEST_CASE("Samples have the density asked for, on every part", "[mesh_error]") {
+  const std::uint32_t seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  const LabelledMesh mesh = room();  // 12 + 2 * 6 + 2 * 8 m^2
+  CHECK(surface_area(mesh) == Approx(40.0));
+  const SurfaceSamples samples = sample_surface(mesh, 1000.0, seed);
+  // The number is the area's, rounded up or down; so is that of every face.
+  CHECK(std::abs(static_cast<double>(samples.points.size()) - 40'000.0) <= 1.0);
+  std::vector<int> of_face(mesh.faces.size());
+  for (const std::uint32_t face : samples.faces) ++of_face[face];
+  LabelledMesh one = mesh;
+  for (std::size_t face = 0; face < mesh.faces.size(); ++face) {
+    one.faces = {mesh.faces[face]};
+    CHECK(std::abs(of_face[face] - 1000.0 * surface_area(one)) <= 1.0);
+  }
+}
+
+TEST_CASE("Samples are uniform within a triangle", "[mesh_error]") {
+  LabelledMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.faces = {{0, 1, 2}};
+  const SurfaceSamples samples = sample_surface(mesh, 80'000.0, 1);
+  REQUIRE(samples.points.size() == 40'000);
+  // The four triangles between the middles of the sides have a quarter each: 10000 +- 5 sigma.
+  std::array<int, 4> quarter{};
+  for (const Eigen::Vector3f& point : samples.points) {
+    REQUIRE(point.minCoeff() >= 0.0F);
+    REQUIRE(point.sum() <= 1.0F + 1e-6F);
+    const std::size_t part = point.x() > 0.5F     ? 0
+                             : point.y() > 0.5F   ? 1
+                             : point.sum() < 0.5F ? 2
+                                                  : 3;
+    ++quarter[part];
+  }
+  for (const int count : quarter) CHECK(std::abs(count - 10'000) < 5 * 87);
+}
+
+TEST_CASE("Faces smaller than a sample's share get theirs on average", "[mesh_error]") {
+  const SurfaceSamples samples = sample_surface(square(1.0F, 0.0F, 100), 1000.0, 1);  // 20000 faces
+  CHECK(std::abs(static_cast<double>(samples.points.size()) - 1000.0) <= 1.0);
+  const auto left = std::count_if(samples.points.begin(), samples.points.end(),
+                                  [](const auto& point) { return point.x() < 0.5F; });
+  CHECK(std::abs(static_cast<double>(left) - 500.0) <= 11.0);  // a row of cells is 10 samples
+}
+
+TEST_CASE("The same seed gives the same samples, another one others", "[mesh_error]") {
+  const LabelledMesh mesh = room();
+  const SurfaceSamples a = sample_surface(mesh, 100.0, 7);
+  const SurfaceSamples b = sample_surface(mesh, 100.0, 7);
+  const SurfaceSamples c = sample_surface(mesh, 100.0, 8);
+  CHECK(a.points == b.points);
+  CHECK(a.faces == b.faces);
+  CHECK(a.points != c.points);
+}
+
+TEST_CASE("Samples elsewhere are left out but counted", "[mesh_error]") {
+  const LabelledMesh mesh = square(10.0F, 0.0F, 20);
+  NearbyCells nearby(0.5);
+  const std::vector<Eigen::Vector3f> at = {{5, 5, 0}};
+  nearby.add(at);
+  const SurfaceSamples samples = sample_surface(mesh, 100.0, 1, &nearby);
+  CHECK(std::abs(static_cast<double>(samples.total) - 10'000.0) <= 1.0);
+  CHECK(samples.near == samples.points.size());
+  int within = 0;
+  for (const Eigen::Vector3f& point : samples.points) {
+    CHECK((point - at[0]).norm() < 2.0 * std::sqrt(3.0) * 0.5);
+    within += (point - at[0]).norm() <= 0.5F ? 1 : 0;
+  }
+  CHECK(std::abs(within - 25.0 * M_PI) < 5.0 * std::sqrt(25.0 * M_PI));  // all of the disc's
+  const SurfaceSamples few = sample_surface(mesh, 100.0, 1, &nearby, 20);
+  CHECK(few.points.size() == 20);
+  CHECK(few.near == samples.near);
+}
+
+TEST_CASE("Cells near points hold all that is within reach", "[mesh_error]") {
+  const float x = GENERATE(-3.0F, -0.01F, 0.49F, 1000.0F);
+  NearbyCells nearby(0.5);
+  const std::vector<Eigen::Vector3f> at = {{x, 2, 3}};
+  CHECK_FALSE(nearby.contains(at[0]));
+  nearby.add(at);
+  for (const float d : {-0.499F, 0.0F, 0.499F}) {
+    CHECK(nearby.contains({x + d, 2, 3}));
+    CHECK(nearby.contains({x, 2 + d, 3}));
+    CHECK(nearby.may_touch({Eigen::Vector3f(x + d, 2, 3), Eigen::Vector3f(x + d, 2, 3)}));
+  }
+  CHECK_FALSE(nearby.contains({x + 1.8F, 2, 3}));
+  CHECK_FALSE(nearby.may_touch({Eigen::Vector3f(x + 1, 2, 3), Eigen::Vector3f(x + 2, 3, 4)}));
+  CHECK(nearby.may_touch({Eigen::Vector3f(x - 100, -100, -100), Eigen::Vector3f(x + 100, 99, 99)}));
+  CHECK_THROWS_AS(NearbyCells(0.0), std::invalid_argument);
+}
+
+TEST_CASE("Nearest point of a triangle: inside, edges, corners, degenerate", "[mesh_error]") {
+  const Eigen::Vector3d a(0, 0, 0), b(2, 0, 0), c(0, 2, 0);
+  const auto expect = [&](const Eigen::Vector3d& point, double distance_m, int edge, int corner) {
+    const TrianglePoint found = nearest_on_triangle(point, a, b, c);
+    CHECK(found.distance_m == Approx(distance_m));
+    CHECK(found.edge == edge);
+    CHECK(found.corner == corner);
+  };
+  expect({0.5, 0.5, 0.3}, 0.3, -1, -1);
+  expect({0.5, 0.5, -0.3}, 0.3, -1, -1);
+  expect({1, -1, 0}, 1.0, 0, -1);
+  expect({1, -3, 4}, 5.0, 0, -1);
+  expect({2, 2, 0}, std::sqrt(2.0), 1, -1);
+  expect({-1, 1, 0}, 1.0, 2, -1);
+  expect({-3, -4, 0}, 5.0, -1, 0);
+  expect({5, 0, 4}, 5.0, -1, 1);
+  expect({0, 5, 4}, 5.0, -1, 2);
+  CHECK(nearest_on_triangle({0, 3, 4}, a, b, b).distance_m == Approx(5.0));
+  CHECK(nearest_on_triangle({0, 3, 4}, a, a, a).distance_m == Approx(5.0));
+}
+
+TEST_CASE("A mesh ends where an edge has one face, whether vertices are shared or not",
+          "[mesh_error]") {
+  const bool shared = GENERATE(true, false);
+  LabelledMesh mesh = square(3.0F, 0.0F, 3);
+  if (!shared) {
+    LabelledMesh soup;
+    for (const auto& face : mesh.faces) {
+      const auto first = static_cast<std::uint32_t>(soup.vertices.size());
+      for (const std::uint32_t corner : face) soup.vertices.push_back(mesh.vertices[corner]);
+      soup.faces.push_back({first, first + 1, first + 2});
+    }
+    mesh = soup;
+  }
+  const MeshRim rim(mesh);
+  int edges = 0;
+  for (std::size_t face = 0; face < mesh.faces.size(); ++face)
+    for (int k = 0; k < 3; ++k) {
+      edges += rim.has_edge(face, k) ? 1 : 0;
+      const Eigen::Vector3f& place = mesh.vertices[mesh.faces[face][static_cast<std::size_t>(k)]];
+      const bool outside = place.head<2>().minCoeff() == 0.0F || place.maxCoeff() == 3.0F;
+      CHECK(rim.has_corner(face, k) == outside);
+    }
+  CHECK(edges == 12);
+  const SurfaceSamples samples = sample_surface(mesh, 1000.0, 1);
+  const NearestSurface nearest(mesh, samples);
+  CHECK_FALSE(nearest.find({1.5F, 1.0F, 0.2F}, 1.0)->past_rim);
+  CHECK(nearest.find({3.1F, 1.0F, 0.2F}, 1.0)->past_rim);
+  CHECK(nearest.find({3.1F, 3.1F, 0.0F}, 1.0)->past_rim);
+}
+
+TEST_CASE("The nearest sample is that of brute force", "[mesh_error]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  const LabelledMesh mesh = room();
+  const SurfaceSamples samples = sample_surface(mesh, 20.0, seed);
+  const NearestSurface nearest(mesh, samples);
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> uniform(-1.0F, 5.0F);
+  for (int i = 0; i < 200; ++i) {
+    const float x = uniform(random), y = uniform(random), z = uniform(random);
+    const Eigen::Vector3f point(x, y, z);
+    float best = std::numeric_limits<float>::infinity();
+    for (const Eigen::Vector3f& sample : samples.points)
+      best = std::min(best, (sample - point).norm());
+    const auto found = nearest.find(point, 10.0);
+    REQUIRE(found);
+    CHECK(found->distance_m == Approx(best).epsilon(1e-5));
+    CHECK(found->surface_m <= found->distance_m);
+    CHECK_FALSE(nearest.find(point, 0.99 * static_cast<double>(best)));
+    CHECK(nearest.find(point, 1.01 * static_cast<double>(best)));
+  }
+}
+
+TEST_CASE("The distance to the surface has no floor from sampling", "[mesh_error]") {
+  const LabelledMesh mesh = square(2.0F, 0.0F);
+  const SurfaceSamples samples = sample_surface(mesh, 1000.0, 1);
+  const NearestSurface nearest(mesh, samples);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> uniform(0.1F, 1.9F);
+  for (int i = 0; i < 200; ++i) {
+    const float x = uniform(random), y = uniform(random);
+    const auto found = nearest.find({x, y, 0.001F}, 0.5);
+    REQUIRE(found);
+    CHECK(found->surface_m == Approx(0.001F).margin(1e-6));
+  }
+}
+
+TEST_CASE("Nothing is near no samples", "[mesh_error]") {
+  const LabelledMesh mesh;
+  const SurfaceSamples samples;
+  CHECK_FALSE(NearestSurface(mesh, samples).find({0, 0, 0}, 10.0));
+}
+
+}  // namespace
+}  // namespace km
