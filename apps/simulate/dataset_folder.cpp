@@ -10,7 +10,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "modules/simulation/dataset/whole_file.hpp"
+#include "modules/simulation/dataset/recording_files.hpp"
 
 namespace km {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "modules/core/frame.hpp"
-#include "modules/simulation/dataset/sensor_tables.hpp"
+#include "modules/simulation/dataset/recording_texts.hpp"
 
 namespace km {
 

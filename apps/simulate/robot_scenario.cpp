@@ -9,6 +9,7 @@
 #include "modules/simulation/motion/imu_simulator.hpp"
 #include "modules/simulation/motion/recorded_trajectory.hpp"
 #include "modules/simulation/motion/vehicle_trajectory.hpp"
+#include "modules/simulation/world/seeded_random.hpp"
 
 namespace km {
 namespace {
@@ -129,12 +130,8 @@ RobotScenario recorded_robot(const RecordedFlight& flight, const SimulationOptio
 
 }  // namespace
 
-// Finaliser of SplitMix64 (Steele, Lea, Flood, OOPSLA 2014): neighbours become unrelated.
 std::uint64_t derived_seed(std::uint64_t seed, std::uint64_t part) {
-  std::uint64_t x = seed + (part + 1) * 0x9E3779B97F4A7C15U;
-  x = (x ^ (x >> 30U)) * 0xBF58476D1CE4E5B9U;
-  x = (x ^ (x >> 27U)) * 0x94D049BB133111EBU;
-  return x ^ (x >> 31U);
+  return scrambled(seed + (part + 1) * 0x9E3779B97F4A7C15U);
 }
 
 std::vector<RobotScenario> simulated_robots(const World& world, const SimulationOptions& options) {

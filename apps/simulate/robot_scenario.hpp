@@ -9,8 +9,8 @@
 #include "apps/simulate/simulation_options.hpp"
 #include "modules/core/camera.hpp"
 #include "modules/core/frame.hpp"
-#include "modules/simulation/dataset/sensor_tables.hpp"
-#include "modules/simulation/motion/body_trajectory.hpp"
+#include "modules/simulation/dataset/recording_texts.hpp"
+#include "modules/simulation/motion/spline_trajectory.hpp"
 #include "modules/simulation/world/world.hpp"
 
 namespace km {

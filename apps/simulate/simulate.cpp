@@ -1,7 +1,11 @@
 #include "apps/simulate/simulate.hpp"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <charconv>
+#include <cmath>
+#include <fstream>
 #include <functional>
 #include <iostream>
 #include <memory>
@@ -11,17 +15,20 @@
 #include "apps/simulate/dataset_folder.hpp"
 #include "apps/simulate/dataset_texts.hpp"
 #include "apps/simulate/frame_workers.hpp"
-#include "apps/simulate/missing_files.hpp"
 #include "apps/simulate/recorded_flight.hpp"
-#include "apps/simulate/robot_cameras.hpp"
-#include "modules/simulation/dataset/sensor_yaml.hpp"
-#include "modules/simulation/dataset/whole_file.hpp"
-#include "modules/simulation/dataset/world_ply.hpp"
+#include "apps/simulate/robot_scenario.hpp"
+#include "modules/simulation/dataset/recording_files.hpp"
+#include "modules/simulation/dataset/recording_texts.hpp"
 #include "modules/simulation/motion/default_rig.hpp"
+#include "modules/simulation/motion/depth_sensor.hpp"
+#include "modules/simulation/rendering/renderer.hpp"
+#include "modules/simulation/rendering/sensor_effects.hpp"
 #include "runtime/clock.hpp"
 
 namespace km {
 namespace {
+
+namespace fs = std::filesystem;
 
 constexpr double kPoll_s = 0.1;
 
@@ -47,6 +54,194 @@ double frame_bytes(const SimulationOptions& options) {
   if (options.color) bytes += 1.3 * gray;
   return bytes * pixels;
 }
+
+DepthSensorOptions depth_sensor(const SensorRig& rig, bool ideal) {
+  DepthSensorOptions options = depth_options(rig);
+  options.ideal = ideal;
+  return options;
+}
+
+std::size_t depth_step(const SimulationOptions& options) {
+  if (!options.depth) return 0;
+  return static_cast<std::size_t>(std::lround(options.rate_hz / options.depth_rate_hz));
+}
+
+bool contains(const std::vector<ImageChannel>& channels, ImageChannel channel) {
+  return std::find(channels.begin(), channels.end(), channel) != channels.end();
+}
+
+RenderRequest merged(const RenderRequest& a, const RenderRequest& b) {
+  return {a.radiance || b.radiance, a.rgb || b.rgb, a.depth || b.depth, a.labels || b.labels};
+}
+
+// What a frame has, without or with a depth image.
+std::vector<ImageChannel> channels_of(const SimulationOptions& options, bool depth) {
+  std::vector<ImageChannel> channels = {ImageChannel::kLeft};
+  if (options.cameras == CameraKind::kStereo) channels.push_back(ImageChannel::kRight);
+  if (depth) channels.push_back(ImageChannel::kDepth);
+  if (options.labels) channels.push_back(ImageChannel::kLabels);
+  if (options.color) channels.push_back(ImageChannel::kColor);
+  return channels;
+}
+
+SensorEffectsConfig sensor_effects(const SimulationOptions& options) {
+  SensorEffectsConfig config;
+  config.motion_blur = options.motion_blur;
+  return config;
+}
+
+std::size_t missing_of(const std::vector<fs::path>& files) {
+  std::size_t missing = 0;
+  for (const fs::path& file : files) missing += fs::exists(file) ? 0U : 1U;
+  return missing;
+}
+
+std::size_t missing_images(const RecordingLayout& layout, ImageChannel channel) {
+  std::ifstream list(layout.list(channel));
+  if (!list) return 1;
+  std::size_t missing = 0;
+  for (std::string line; std::getline(list, line);) {
+    Stamp stamp = 0;
+    const bool is_row =
+        std::from_chars(line.data(), line.data() + line.size(), stamp).ec == std::errc();
+    if (is_row && !is_whole_image(layout.image(channel, stamp))) ++missing;
+  }
+  return missing;
+}
+
+// How many files of the recordings that `options` (completed()) made are gone, or are images cut
+// short. Images of a list that is gone itself are not counted: only the list tells of them.
+std::size_t missing_files(const SimulationOptions& options) {
+  const fs::path& folder = options.output;
+  std::size_t missing = missing_of({folder / "README.md", folder / "team.yaml",
+                                    folder / "label_palette.csv", folder / "world.ply"});
+  for (const std::string& name : options.names) {
+    const RecordingLayout layout(folder / name, options.format);
+    missing += missing_of({layout.mav0() / "label_palette.csv", layout.imu() / "data.csv",
+                           layout.imu() / "sensor.yaml", layout.truth()});
+    for (const ImageChannel channel : channels_of(options, options.depth)) {
+      missing += missing_images(layout, channel);
+      if (channel != ImageChannel::kLabels) missing += missing_of({layout.calibration(channel)});
+    }
+  }
+  return missing;
+}
+
+// The cameras of one robot: takes and stores its images, frame by frame, in any order and from
+// several threads; a frame's bytes depend on nothing but the scenario.
+class RobotCameras {
+ public:
+  // All three outlive this.
+  RobotCameras(const RobotScenario& scenario, const SimulationOptions& options,
+               const Renderer& renderer)
+      : scenario_(scenario),
+        renderer_(renderer),
+        options_(options),
+        depth_step_(depth_step(options)),
+        layout_(options.output / scenario.name, options.format),
+        left_(scenario.rig.stereo.cameras[0]),
+        right_(scenario.rig.stereo.cameras[1]),
+        meter_(shrunk(scenario.rig.stereo.cameras[0], ExposureControl::kMeterShrink)),
+        left_effects_(left_, sensor_effects(options)),
+        right_effects_(right_, sensor_effects(options)),
+        depth_sensor_(depth_sensor(scenario.rig, options.ideal_depth)) {}
+
+  [[nodiscard]] const RecordingLayout& layout() const { return layout_; }
+  [[nodiscard]] std::size_t frame_count() const { return scenario_.images.size(); }
+
+  // What frame `i` consists of.
+  [[nodiscard]] std::vector<ImageChannel> channels(std::size_t i) const {
+    return channels_of(options_, depth_step_ > 0 && i % depth_step_ == 0);
+  }
+
+  // Stamps of the frames that have this channel; empty if the recording has none.
+  [[nodiscard]] std::vector<Stamp> stamps(ImageChannel channel) const {
+    std::vector<Stamp> stamps;
+    for (std::size_t i = 0; i < frame_count(); ++i)
+      if (contains(channels(i), channel)) stamps.push_back(scenario_.images[i]);
+    return stamps;
+  }
+
+  // Light that frame `i` gets, for its exposure; cheap.
+  [[nodiscard]] RenderedView meter(std::size_t i) const {
+    return renderer_.render(meter_, scenario_.motion(scenario_.images[i]).T_world_body, {});
+  }
+
+  // The exposure of every frame, in order; before the first record().
+  void set_exposures(std::vector<Exposure> exposures) { exposures_ = std::move(exposures); }
+
+  // Renders frame `i` and writes the images that are missing. Throws RecordingError.
+  void record(std::size_t i) const {
+    const Stamp stamp = scenario_.images[i];
+    std::vector<ImageChannel> missing = channels(i);
+    std::erase_if(missing, [&](ImageChannel channel) {
+      return is_whole_image(layout_.image(channel, stamp));
+    });
+    if (missing.empty()) return;
+
+    const SE3 T_world_body = scenario_.motion(stamp).T_world_body;
+    RenderRequest request = {false, false, false, false};
+    if (contains(missing, ImageChannel::kLeft)) request = left_effects_.request(false);
+    if (contains(missing, ImageChannel::kColor))
+      request = merged(request, left_effects_.request(true));
+    request.depth |= contains(missing, ImageChannel::kDepth);
+    request.labels |= contains(missing, ImageChannel::kLabels);
+    const RenderedView left = renderer_.render(left_, T_world_body, request);
+    for (const ImageChannel channel : missing)
+      write_whole_file(layout_.image(channel, stamp), encoded(channel, i, left));
+  }
+
+ private:
+  [[nodiscard]] Shot shot(std::size_t i, ImageChannel channel) const {
+    const BodyMotion motion = scenario_.motion(scenario_.images[i]);
+    Shot shot;
+    shot.exposure = exposures_.at(i);
+    shot.body_velocity << motion.angular_velocity_body,
+        motion.T_world_body.linear().transpose() * motion.velocity_world;
+    const std::uint64_t camera =
+        derived_seed(scenario_.seed, 16 + static_cast<std::uint64_t>(channel));
+    shot.noise_seed = derived_seed(camera, static_cast<std::uint64_t>(scenario_.images[i]));
+    return shot;
+  }
+
+  [[nodiscard]] std::vector<std::uint8_t> encoded(ImageChannel channel, std::size_t i,
+                                                  const RenderedView& left) const {
+    const Shot taken = shot(i, channel);
+    switch (channel) {
+      case ImageChannel::kLeft:
+        return encode_gray(left_effects_.gray(left, taken), options_.format);
+      case ImageChannel::kRight: {
+        const SE3 T_world_body = scenario_.motion(scenario_.images[i]).T_world_body;
+        const RenderedView right =
+            renderer_.render(right_, T_world_body, right_effects_.request(false));
+        return encode_gray(right_effects_.gray(right, taken), options_.format);
+      }
+      case ImageChannel::kDepth:
+        return encode_depth(
+            left.width, left.height,
+            depth_sensor_.measure(left.depth_m, left.width, left.height, taken.noise_seed));
+      case ImageChannel::kLabels:
+        return encode_labels(left.width, left.height, left.labels);
+      case ImageChannel::kColor:
+        break;
+    }
+    const ColorImage color = left_effects_.color(left, taken);
+    return encode_color(color.width, color.height, color.pixels, options_.format);
+  }
+
+  const RobotScenario& scenario_;
+  const Renderer& renderer_;
+  const SimulationOptions& options_;
+  std::size_t depth_step_ = 0;  // frames from one depth image to the next, 0: none
+  RecordingLayout layout_;
+  PixelRays left_;
+  PixelRays right_;
+  PixelRays meter_;
+  SensorEffects left_effects_;
+  SensorEffects right_effects_;
+  DepthSensor depth_sensor_;
+  std::vector<Exposure> exposures_;
+};
 
 // One run: what the folder holds, who drives, and the cameras that fill it.
 class Simulation {

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "modules/simulation/motion/gaussian_random.hpp"
+#include "modules/simulation/world/seeded_random.hpp"
 
 namespace km {
 namespace {

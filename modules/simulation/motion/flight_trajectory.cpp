@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/simulation/motion/gaussian_random.hpp"
+#include "modules/simulation/world/seeded_random.hpp"
 
 namespace km {
 namespace {

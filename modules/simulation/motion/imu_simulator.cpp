@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "modules/simulation/motion/gaussian_random.hpp"
+#include "modules/simulation/world/seeded_random.hpp"
 
 namespace km {
 namespace {

@@ -8,7 +8,7 @@
 #include "modules/core/config.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/core/stamp.hpp"
-#include "modules/simulation/motion/body_trajectory.hpp"
+#include "modules/simulation/motion/spline_trajectory.hpp"
 
 namespace km {
 

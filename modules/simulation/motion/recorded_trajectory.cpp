@@ -7,8 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "modules/simulation/motion/spline_fit.hpp"
-
 namespace km {
 namespace {
 

@@ -45,6 +45,10 @@ struct Lanes3 {
   }
 };
 
+[[nodiscard]] inline float dot(const Lanes3& a, const Lanes3& b, std::size_t lane) {
+  return a.x[lane] * b.x[lane] + a.y[lane] * b.y[lane] + a.z[lane] * b.z[lane];
+}
+
 #if defined(__x86_64__)
 /// The kernel with all it calls, for processors with AVX2.
 template <typename Kernel>

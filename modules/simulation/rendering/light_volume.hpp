@@ -6,13 +6,15 @@
 #include <vector>
 
 #include "modules/simulation/rendering/lanes.hpp"
-#include "modules/simulation/rendering/light_bake.hpp"
 #include "modules/simulation/rendering/ray_tracer.hpp"
 #include "modules/simulation/rendering/sky.hpp"
-#include "modules/simulation/rendering/surface_table.hpp"
+#include "modules/simulation/rendering/surfaces.hpp"
 #include "modules/simulation/world/world.hpp"
 
 namespace km {
+
+/// The six axis directions: +x, -x, +y, -y, +z, -z.
+inline constexpr int kAxisDirections = 6;
 
 /// Light that comes from all around, baked once: on a lattice near the surfaces, for each of the
 /// six axis directions, what the sky and the lit surroundings give a surface that faces there, and
@@ -34,8 +36,6 @@ class LightVolume {
   /// Light at points of surfaces, `normals` towards the sides that are lit; unit length.
   void look_up(const Lanes3& points, const Lanes3& normals, Light& light) const;
 
-  [[nodiscard]] float cell_m() const { return cell_m_; }
-
  private:
   static constexpr float kLift = 0.5F;  // light is looked up this far before the surface [cells]
   // A brick holds kBrick^3 cells, so (kBrick + 1)^3 samples: the last ones are those of the next
@@ -47,11 +47,11 @@ class LightVolume {
   void lay_out(const World& world);
   [[nodiscard]] std::vector<std::uint8_t> mark(const SurfaceMesh& mesh,
                                                const SurfaceTable& surfaces);
-  void bake(const LightBake& light, const std::vector<std::uint8_t>& wanted);
+  void bake(const World& world, const RayTracer& tracer, const SurfaceTable& surfaces,
+            const Sky& sky, const std::vector<std::uint8_t>& wanted);
   [[nodiscard]] std::vector<Eigen::Vector3f> brick_corners() const;
   [[nodiscard]] Eigen::Vector3f position(const std::vector<Eigen::Vector3f>& corners,
                                          std::size_t sample) const;
-  void store(const LightBake::Sample& baked, std::size_t sample);
   void fill_from_neighbours(std::vector<std::uint8_t>& known);
   /// Where lookups fall: the lowest corner of a cell, and how far they are beyond it.
   struct Cells {

@@ -13,21 +13,21 @@ struct alignas(64) ValidLanes {
 
   explicit ValidLanes(LaneMask active) {
     for (int i = 0; i < kLanes; ++i)
-      lanes[static_cast<std::size_t>(i)] = (active >> i & 1U) != 0U ? -1 : 0;
+      lanes[static_cast<std::size_t>(i)] = has_lane(active, static_cast<std::size_t>(i)) ? -1 : 0;
   }
 };
 
-RTCIntersectContext context_for(RayKind kind) {
+RTCIntersectContext coherent() {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  if (kind == RayKind::kCoherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   return context;
 }
 
 // Embree's checks look at lanes that are not active, too: they get a ray of no length.
 void prepare(LaneMask active, RTCRay16& rays) {
   for (int i = 0; i < kLanes; ++i) {
-    if ((active >> i & 1U) != 0U) continue;
+    if (has_lane(active, static_cast<std::size_t>(i))) continue;
     rays.org_x[i] = rays.org_y[i] = rays.org_z[i] = 0.0F;
     rays.dir_x[i] = rays.dir_y[i] = 0.0F;
     rays.dir_z[i] = 1.0F;
@@ -81,21 +81,21 @@ RayTracer::RayTracer(const SurfaceMesh& mesh, const std::string& instruction_set
   require_no_error(device_.get());
 }
 
-void RayTracer::intersect(LaneMask active, RayKind kind, RayPacket& rays) const {
+void RayTracer::intersect(LaneMask active, RayPacket& rays) const {
   prepare(active, rays.ray);
   std::memset(rays.hit.primID, 0xFF, sizeof(rays.hit.primID));
   std::memset(rays.hit.geomID, 0xFF, sizeof(rays.hit.geomID));
   if (active == 0) return;
   const ValidLanes valid(active);
-  RTCIntersectContext context = context_for(kind);
+  RTCIntersectContext context = coherent();
   rtcIntersect16(valid.lanes.data(), scene_.get(), &context, &rays);
 }
 
-LaneMask RayTracer::occluded(LaneMask active, RayKind kind, RayPacket& rays) const {
+LaneMask RayTracer::occluded(LaneMask active, RayPacket& rays) const {
   if (active == 0) return 0;
   prepare(active, rays.ray);
   const ValidLanes valid(active);
-  RTCIntersectContext context = context_for(kind);
+  RTCIntersectContext context = coherent();
   rtcOccluded16(valid.lanes.data(), scene_.get(), &context, &rays.ray);
   LaneMask hit = 0;  // Embree marks them with tfar = -infinity
   for (int i = 0; i < kLanes; ++i) hit |= static_cast<LaneMask>(rays.ray.tfar[i] < 0.0F) << i;

@@ -7,12 +7,9 @@
 #include <string>
 
 #include "modules/simulation/rendering/lanes.hpp"
-#include "modules/simulation/world/surface_mesh.hpp"
+#include "modules/simulation/world/world.hpp"
 
 namespace km {
-
-/// What rays have in common: neighbours that run side by side are traced faster together.
-enum class RayKind { kCoherent, kIncoherent };
 
 /// Triangle of a ray that hit nothing.
 inline constexpr std::uint32_t kNoTriangle = RTC_INVALID_GEOMETRY_ID;
@@ -20,7 +17,8 @@ inline constexpr std::uint32_t kNoTriangle = RTC_INVALID_GEOMETRY_ID;
 /// A packet of rays with what they hit. Embree's layout.
 using RayPacket = RTCRayHit16;
 
-/// Embree's acceleration structure over a mesh. Immutable, safe to use from several threads.
+/// Embree's acceleration structure over a mesh. Immutable, safe to use from several threads. Rays
+/// of a packet are taken for neighbours that run side by side: any others are slower, not wrong.
 class RayTracer {
  public:
   /// Copies `mesh`. `instruction_set` is one of Embree's ("sse2", "avx2", ...), for tests of its
@@ -30,10 +28,10 @@ class RayTracer {
 
   /// Nearest hits of the rays in `active` between tnear and tfar: primID, u, v, and tfar shrinks to
   /// the hit. The other lanes get kNoTriangle and a ray of no length: they need not be set.
-  void intersect(LaneMask active, RayKind kind, RayPacket& rays) const;
+  void intersect(LaneMask active, RayPacket& rays) const;
 
   /// Which of the rays in `active` hit anything. The other lanes need not be set.
-  [[nodiscard]] LaneMask occluded(LaneMask active, RayKind kind, RayPacket& rays) const;
+  [[nodiscard]] LaneMask occluded(LaneMask active, RayPacket& rays) const;
 
  private:
   struct Release {

@@ -1,26 +1,98 @@
 #include "modules/simulation/rendering/sensor_effects.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <random>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 
-#include "modules/simulation/rendering/lens_blur.hpp"
-#include "modules/simulation/rendering/motion_blur.hpp"
-
 namespace km {
 namespace {
+
+// Mean grey level, as a share of saturation, of the scene under a gain.
+double mean_level(const std::vector<float>& radiance, double gain, double gamma) {
+  double sum = 0.0;
+  for (const float value : radiance)
+    sum += std::pow(std::clamp(gain * static_cast<double>(value), 0.0, 1.0), 1.0 / gamma);
+  return sum / static_cast<double>(radiance.size());
+}
+
+// A camera in a cellar, or one that looks at nothing, stops somewhere.
+constexpr double kLeastGain = 1e-3;
+constexpr double kMostGain = 1e3;
+
+// The gain that gives the target; the mean level grows with it.
+double solve_gain(const std::vector<float>& radiance, const SensorEffectsConfig& config) {
+  double low = std::log(kLeastGain);
+  double high = std::log(kMostGain);
+  constexpr int kHalvings = 30;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = 0.5 * (low + high);
+    const bool dark = mean_level(radiance, std::exp(middle), config.gamma) < config.target_level;
+    (dark ? low : high) = middle;
+  }
+  return std::exp(0.5 * (low + high));
+}
+
+// Weights of a Gaussian out to three standard deviations, 1 in the middle.
+std::vector<float> gaussian_kernel(double sigma_px) {
+  const int radius = static_cast<int>(std::ceil(3.0 * sigma_px));
+  std::vector<float> kernel;
+  for (int i = -radius; i <= radius; ++i)
+    kernel.push_back(static_cast<float>(std::exp(-0.5 * i * i / (sigma_px * sigma_px))));
+  return kernel;
+}
+
+/// `row` convolved; `padded` is scratch memory.
+template <typename Value>
+void blur_row(const std::vector<float>& kernel, const Value* row, std::size_t n,
+              std::vector<Value>& padded, Value* result) {
+  const std::size_t radius = kernel.size() / 2;
+  padded.assign(radius, row[0]);
+  padded.insert(padded.end(), row, row + n);
+  padded.insert(padded.end(), radius, row[n - 1]);
+  for (std::size_t x = 0; x < n; ++x) result[x] = kernel[0] * padded[x];
+  for (std::size_t i = 1; i < kernel.size(); ++i)
+    for (std::size_t x = 0; x < n; ++x) result[x] += kernel[i] * padded[x + i];
+}
+
+// Velocities of the camera in its own frame.
+struct CameraVelocity {
+  Eigen::Vector3f angular;
+  Eigen::Vector3f linear;
+};
+
+CameraVelocity camera_velocity(const SE3& T_body_cam, const Vector6& body_velocity) {
+  const Eigen::Vector3d omega = body_velocity.head<3>();
+  const Eigen::Vector3d at_camera = body_velocity.tail<3>() + omega.cross(T_body_cam.translation());
+  const Eigen::Matrix3d R_cam_body = T_body_cam.linear().transpose();
+  return {(R_cam_body * omega).cast<float>(), (R_cam_body * at_camera).cast<float>()};
+}
+
+template <typename Value>
+Value bilinear(const std::vector<Value>& image, int width, int height, float x, float y) {
+  x = std::clamp(x, 0.0F, static_cast<float>(width - 1));
+  y = std::clamp(y, 0.0F, static_cast<float>(height - 1));
+  const int column = std::min(static_cast<int>(x), std::max(width - 2, 0));
+  const int row = std::min(static_cast<int>(y), std::max(height - 2, 0));
+  const float fx = x - static_cast<float>(column);
+  const float fy = y - static_cast<float>(row);
+  const Value* p = image.data() + static_cast<std::ptrdiff_t>(row) * width + column;
+  const std::ptrdiff_t right = width > 1 ? 1 : 0;
+  const std::ptrdiff_t down = height > 1 ? width : 0;
+  const Value low = p[0] + fx * (p[right] - p[0]);
+  const Value high = p[down] + fx * (p[down + right] - p[down]);
+  return low + fy * (high - low);
+}
 
 constexpr int kTile = 512;  // edge of the noise tile, a power of two
 constexpr std::uint32_t kTileMask = kTile - 1;
 
 // Convolves each row of a periodic square with a Gaussian and transposes it: twice does both axes.
 std::vector<float> smoothed_transposed(const std::vector<float>& field, double sigma_px) {
-  const int radius = static_cast<int>(std::ceil(3.0 * sigma_px));
-  std::vector<float> kernel;
-  for (int i = -radius; i <= radius; ++i)
-    kernel.push_back(static_cast<float>(std::exp(-0.5 * i * i / (sigma_px * sigma_px))));
+  const std::vector<float> kernel = gaussian_kernel(sigma_px);
+  const int radius = static_cast<int>(kernel.size() / 2);
   std::vector<float> result(field.size());
   for (int y = 0; y < kTile; ++y) {
     for (int x = 0; x < kTile; ++x) {
@@ -86,6 +158,131 @@ std::mt19937 generator(std::uint64_t seed) {
 }
 
 }  // namespace
+
+ExposureControl::ExposureControl(const SensorEffectsConfig& config, double rate_hz)
+    : config_(checked(config)) {
+  if (!(rate_hz > 0.0) || !std::isfinite(rate_hz))
+    throw std::invalid_argument("ExposureControl: a rate of " + std::to_string(rate_hz) + " Hz");
+  constexpr double kConfiguredRate_hz = 20.0;
+  share_per_frame_ = 1.0 - std::pow(1.0 - config_.adaptation, kConfiguredRate_hz / rate_hz);
+}
+
+Exposure ExposureControl::next(const RenderedView& scene) {
+  if (scene.radiance.empty())
+    throw std::invalid_argument("ExposureControl: a view without radiance");
+  if (!started_) {
+    log_gain_ = std::log(solve_gain(scene.radiance, config_));
+    started_ = true;
+  } else {
+    // A step of the integrating controller that steers the mean of a linear image to its target.
+    const double level = mean_level(scene.radiance, std::exp(log_gain_), config_.gamma);
+    const double error = std::log(config_.target_level / std::max(level, 1e-3));
+    log_gain_ = std::clamp(log_gain_ + share_per_frame_ * config_.gamma * error,
+                           std::log(kLeastGain), std::log(kMostGain));
+  }
+  Exposure exposure;
+  exposure.gain = std::exp(log_gain_);
+  exposure.time_s = std::min(exposure.gain * config_.unit_exposure_s, config_.max_exposure_s);
+  return exposure;
+}
+
+template <typename Value>
+std::vector<Value> lens_blurred(const std::vector<Value>& image, int width, int height,
+                                double sigma_px) {
+  constexpr double kSharp_px = 0.1;  // the neighbours' weights round to zero
+  if (!(sigma_px > kSharp_px) || image.empty()) return image;
+  std::vector<float> kernel = gaussian_kernel(sigma_px);
+  const float sum = std::accumulate(kernel.begin(), kernel.end(), 0.0F);
+  for (float& weight : kernel) weight /= sum;
+  const auto n = static_cast<std::size_t>(width);
+  const int radius = static_cast<int>(kernel.size() / 2);
+  std::vector<Value> across(image.size());
+  std::vector<Value> padded;
+  for (std::size_t begin = 0; begin < image.size(); begin += n)
+    blur_row(kernel, image.data() + begin, n, padded, across.data() + begin);
+  std::vector<Value> result(image.size());
+  for (int y = 0; y < height; ++y) {
+    Value* const out = result.data() + static_cast<std::size_t>(y) * n;
+    for (int i = -radius; i <= radius; ++i) {
+      const auto row = static_cast<std::size_t>(std::clamp(y + i, 0, height - 1));
+      const float weight = kernel[static_cast<std::size_t>(i + radius)];
+      const Value* const in = across.data() + row * n;
+      if (i == -radius)
+        for (std::size_t x = 0; x < n; ++x) out[x] = weight * in[x];
+      else
+        for (std::size_t x = 0; x < n; ++x) out[x] += weight * in[x];
+    }
+  }
+  return result;
+}
+
+template std::vector<float> lens_blurred(const std::vector<float>&, int, int, double);
+template std::vector<Eigen::Vector3f> lens_blurred(const std::vector<Eigen::Vector3f>&, int, int,
+                                                   double);
+
+std::vector<Eigen::Vector2f> image_motion(const PixelRays& rays, const std::vector<float>& depth_m,
+                                          const Vector6& body_velocity, double time_s) {
+  const PinholeCamera& camera = rays.camera();
+  const auto [omega, v] = camera_velocity(camera.T_body_cam, body_velocity);
+  const auto time = static_cast<float>(time_s);
+  std::vector<Eigen::Vector2f> motion(depth_m.size());
+  std::size_t i = 0;
+  for (int y = 0; y < camera.height; ++y) {
+    const Eigen::Vector2f* bearing =
+        rays.bearings().data() + static_cast<std::ptrdiff_t>(y) * rays.stride();
+    for (int x = 0; x < camera.width; ++x, ++i, ++bearing) {
+      const Eigen::Vector2f& b = *bearing;
+      const float inverse_depth = depth_m[i] > 0.0F ? 1.0F / depth_m[i] : 0.0F;
+      // Motion of the point at unit depth, then of its bearing.
+      const float px = -(omega.y() - omega.z() * b.y() + v.x() * inverse_depth);
+      const float py = -(omega.z() * b.x() - omega.x() + v.y() * inverse_depth);
+      const float pz = -(omega.x() * b.y() - omega.y() * b.x() + v.z() * inverse_depth);
+      const float bx = px - b.x() * pz;
+      const float by = py - b.y() * pz;
+      // Pixels per bearing: the inverse of how the bearing changes from pixel to pixel.
+      const Eigen::Vector2f right = bearing[1] - b;
+      const Eigen::Vector2f down = bearing[rays.stride()] - b;
+      const float scale = time / (right.x() * down.y() - right.y() * down.x());
+      motion[i] = {scale * (down.y() * bx - down.x() * by),
+                   scale * (right.x() * by - right.y() * bx)};
+    }
+  }
+  return motion;
+}
+
+template <typename Value>
+std::vector<Value> blurred(const std::vector<Value>& image, int width, int height,
+                           const std::vector<Eigen::Vector2f>& motion) {
+  std::vector<Value> result(image.size());
+  std::size_t i = 0;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x, ++i) {
+      constexpr float kStill_px = 0.2F;  // blurs less than the pixel itself does
+      constexpr float kMostTaps = 64.0F;
+      const float length = motion[i].norm();
+      if (!(length > kStill_px)) {
+        result[i] = image[i];
+        continue;
+      }
+      const auto taps = static_cast<int>(std::min(std::ceil(length) + 1.0F, kMostTaps));
+      const Eigen::Vector2f step = motion[i] / static_cast<float>(taps);
+      const float first = -0.5F * static_cast<float>(taps - 1);
+      Value sum = 0.0F * image[i];
+      for (int k = 0; k < taps; ++k) {
+        const float along = first + static_cast<float>(k);
+        sum += bilinear(image, width, height, static_cast<float>(x) + along * step.x(),
+                        static_cast<float>(y) + along * step.y());
+      }
+      result[i] = sum / static_cast<float>(taps);
+    }
+  }
+  return result;
+}
+
+template std::vector<float> blurred(const std::vector<float>&, int, int,
+                                    const std::vector<Eigen::Vector2f>&);
+template std::vector<Eigen::Vector3f> blurred(const std::vector<Eigen::Vector3f>&, int, int,
+                                              const std::vector<Eigen::Vector2f>&);
 
 SensorEffects::SensorEffects(const PixelRays& rays, const SensorEffectsConfig& config)
     : config_(checked(config)),

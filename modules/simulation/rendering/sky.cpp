@@ -4,7 +4,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "modules/simulation/rendering/luminance.hpp"
+#include "modules/simulation/rendering/surfaces.hpp"
+#include "modules/simulation/world/canvas.hpp"
 
 namespace km {
 namespace {
@@ -31,7 +32,7 @@ float value_noise(float x, float y) {
   return std::lerp(low, high, smooth(y - fy));
 }
 
-float fractal_noise(float x, float y) {
+float cloud_noise(float x, float y) {
   float sum = 0.0F;
   float amplitude = 0.5F;
   for (int octave = 0; octave < 5; ++octave) {
@@ -45,11 +46,6 @@ float fractal_noise(float x, float y) {
   return sum;  // 0 to 1, mean 0.5
 }
 
-float smoothstep(float low, float high, float value) {
-  const float t = std::clamp((value - low) / (high - low), 0.0F, 1.0F);
-  return t * t * (3.0F - 2.0F * t);
-}
-
 // Share of the view that a layer of flat clouds covers, and how bright it is.
 struct Clouds {
   float cover = 0.0F;
@@ -60,11 +56,11 @@ Clouds clouds(const Eigen::Vector3f& d) {
   const float distance = 1.0F / (d.z() + 0.12F);
   const float x = 1.3F * d.x() * distance;
   const float y = 1.3F * d.y() * distance;
-  const float density = fractal_noise(x, y);
-  const float thickness = smoothstep(0.46F, 0.75F, density);
+  const float density = cloud_noise(x, y);
+  const float thickness = smooth_step(0.46F, 0.75F, density);
   Clouds result;
-  result.cover = std::min(1.0F, 1.6F * thickness) * smoothstep(0.01F, 0.1F, d.z());
-  result.brightness = 2.6F - 1.1F * smoothstep(0.5F, 0.8F, fractal_noise(x + 0.15F, y + 0.1F));
+  result.cover = std::min(1.0F, 1.6F * thickness) * smooth_step(0.01F, 0.1F, d.z());
+  result.brightness = 2.6F - 1.1F * smooth_step(0.5F, 0.8F, cloud_noise(x + 0.15F, y + 0.1F));
   return result;
 }
 

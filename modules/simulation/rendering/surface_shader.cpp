@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "modules/simulation/rendering/texture_lanes.hpp"
-
 namespace km {
 namespace {
 
@@ -41,10 +39,6 @@ float mirrored_share(float specular, float cosine) {
   const float grazing2 = grazing * grazing;
   return specular +
          (1.0F - specular) * std::min(1.0F, 2.0F * specular) * grazing2 * grazing2 * grazing;
-}
-
-float dot(const Lanes3& a, const Lanes3& b, std::size_t i) {
-  return a.x[i] * b.x[i] + a.y[i] * b.y[i] + a.z[i] * b.z[i];
 }
 
 float dot(const Lanes3& a, const Eigen::Vector3f& b, std::size_t i) {
@@ -177,14 +171,15 @@ Eigen::Vector3f color_albedo(const ShadingMaterial& material, const Taps& taps, 
   Eigen::Vector3f base = Eigen::Vector3f::Zero();
   Eigen::Vector3f detail = Eigen::Vector3f::Zero();
   // Where a sample covers a whole tile of the detail, nothing of it is left.
-  const float base_width = taps.width_m[lane] * material.base_per_m;
-  const float detail_width = taps.width_m[lane] * material.detail_per_m;
+  const float base_width = taps.width_m[lane] * material.base.per_m;
+  const float detail_width = taps.width_m[lane] * material.detail.per_m;
   const bool detailed = detail_width < 1.0F;
   Eigen::Vector2f uv(taps.first_u[lane], taps.first_v[lane]);
   const Eigen::Vector2f step(taps.step_u[lane], taps.step_v[lane]);
   for (int i = 0; i < taps.count[lane]; ++i, uv += step) {
-    base += material.base->color(uv * material.base_per_m, base_width);
-    if (detailed) detail += material.detail->color(uv * material.detail_per_m, detail_width);
+    base += material.base.texture->color(uv * material.base.per_m, base_width);
+    if (detailed)
+      detail += material.detail.texture->color(uv * material.detail.per_m, detail_width);
   }
   const float share = 1.0F / static_cast<float>(taps.count[lane]);
   const Eigen::Vector3f albedo = share * material.tint.cwiseProduct(base);
@@ -262,7 +257,7 @@ LaneMask shadowed(const RenderScene& scene, LaneMask wanted, const SurfacePoints
   LaneMask dark = 0;
   for (std::size_t i = 0; i < kLanes; ++i)
     if (facing[i] <= 0.0F && !(points.material[i]->transmission > 0.0F)) dark |= 1U << i;
-  return (dark & wanted) | scene.tracer.occluded(wanted & ~dark, RayKind::kCoherent, rays);
+  return (dark & wanted) | scene.tracer.occluded(wanted & ~dark, rays);
 }
 
 template <typename Value>

@@ -4,10 +4,8 @@
 #include <array>
 
 #include "modules/simulation/rendering/light_volume.hpp"
-#include "modules/simulation/rendering/ray_tracer.hpp"
 #include "modules/simulation/rendering/sky.hpp"
-#include "modules/simulation/rendering/surface_points.hpp"
-#include "modules/simulation/rendering/surface_table.hpp"
+#include "modules/simulation/rendering/surfaces.hpp"
 #include "modules/simulation/world/world.hpp"
 
 namespace km {

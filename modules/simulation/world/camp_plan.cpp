@@ -5,8 +5,8 @@
 #include <limits>
 #include <numbers>
 
-#include "modules/simulation/world/crossing_routes.hpp"
-#include "modules/simulation/world/lane.hpp"
+#include "modules/simulation/world/canvas.hpp"
+#include "modules/simulation/world/routes.hpp"
 #include "modules/simulation/world/seeded_random.hpp"
 
 namespace km {
@@ -25,11 +25,6 @@ constexpr float kNearCell_m = 0.5F;
 constexpr float kFarCell_m = 4.0F;
 const Vector2f kNearOrigin(-100.0F, -76.0F);
 const Vector2f kFarOrigin(-180.0F, -156.0F);
-
-float ramp(float from, float to, float x) {
-  const float t = std::clamp((x - from) / (to - from), 0.0F, 1.0F);
-  return t * t * (3.0F - 2.0F * t);
-}
 
 float distance_to_segment(const Vector2f& p, const Vector2f& a, const Vector2f& b) {
   const Vector2f ab = b - a;
@@ -75,20 +70,18 @@ void CampPlan::lay_tracks(std::uint64_t seed) {
     const float bow = random.uniform(-2.2F, 2.2F);
     const float sway = random.uniform(-1.2F, 1.2F);
     Track track;
-    for (int k = 0; k <= kPieces; ++k) {
-      const float t = static_cast<float>(k) / kPieces;
+    for (float k = 0; k <= kPieces; ++k) {
+      const float t = k / kPieces;
       const float phase = std::numbers::pi_v<float> * t;
       track.emplace_back(a + t * (b - a) +
                          (bow * std::sin(phase) + sway * std::sin(2.0F * phase)) * across);
     }
     tracks_.push_back(std::move(track));
   };
-  for (std::size_t i = 0; i + 1 < kColumns; ++i) {
+  for (std::size_t i = 0; i + 1 < kColumns; ++i)
     for (std::size_t j = 0; j < kRows; ++j) wind(crossings_[i][j], crossings_[i + 1][j]);
-  }
-  for (std::size_t i = 0; i < kColumns; ++i) {
+  for (std::size_t i = 0; i < kColumns; ++i)
     for (std::size_t j = 0; j + 1 < kRows; ++j) wind(crossings_[i][j], crossings_[i][j + 1]);
-  }
 }
 
 const Track& CampPlan::track_between(int column, int row, bool along_x) const {
@@ -124,11 +117,9 @@ Vector2f CampPlan::yard_center(int column, int row) const {
 
 float CampPlan::distance_to_track(const Vector2f& p) const {
   float least = std::numeric_limits<float>::infinity();
-  for (const Track& track : tracks_) {
-    for (std::size_t i = 0; i + 1 < track.size(); ++i) {
+  for (const Track& track : tracks_)
+    for (std::size_t i = 0; i + 1 < track.size(); ++i)
       least = std::min(least, distance_to_segment(p, track[i], track[i + 1]));
-    }
-  }
   return least;
 }
 
@@ -141,15 +132,15 @@ float CampPlan::height(float x, float y, std::uint64_t seed) const {
       1.3F * ground_noise(x, y, 46.0F, seed) + 0.35F * ground_noise(x, y, 17.0F, seed + 1);
   const float outside =
       std::max({std::abs(x) - kCampHalfX_m - 6.0F, std::abs(y) - kCampHalfY_m - 6.0F, 0.0F});
-  const float hills = ramp(0.0F, 60.0F, outside) *
+  const float hills = smooth_step(0.0F, 60.0F, outside) *
                       (9.0F + 5.0F * ground_noise(x, y, 38.0F, seed + 2) + 0.05F * outside);
   const float track = distance_to_track({x, y});
-  const float wild = ramp(kTrackHalf_m - 0.6F, kTrackHalf_m + 2.0F, track);
+  const float wild = smooth_step(kTrackHalf_m - 0.6F, kTrackHalf_m + 2.0F, track);
   const float bumps =
       0.1F * ground_noise(x, y, 3.7F, seed + 3) + 0.06F * ground_noise(x, y, 1.5F, seed + 4);
   // Worn tracks lie deeper, with ruts where the wheels of both lanes run.
   const float rut = std::abs(std::abs(track - kTrackLane_m) - 0.75F);
-  const float worn = -0.1F - 0.05F * (1.0F - ramp(0.0F, 0.45F, rut)) +
+  const float worn = -0.1F - 0.05F * (1.0F - smooth_step(0.0F, 0.45F, rut)) +
                      0.03F * ground_noise(x, y, 2.1F, seed + 5) +
                      0.015F * ground_noise(x, y, 0.9F, seed + 6);
   return waves + hills + wild * bumps + (1.0F - wild) * worn;

@@ -27,10 +27,8 @@ enum class Recipe : std::uint8_t {
   kCorrugatedMetal,  ///< (painted) Ribs along v every 0.1 m, rust runs [2 m].
   kCanvas,           ///< (painted) Tent cloth: weave, creases, seams every 1 m [2 m].
   kWoodPlanks,       ///< Boards along u, 0.125 m wide, with grain and nails [2 m].
-  kMat,              ///< (painted) Foam mats of 1 m with interlocking edges and grip pattern [2 m].
   kCarpet,           ///< (painted) Woven floor with flecks [2 m].
   kCurtain,          ///< (painted) Hanging cloth: vertical creases, weave [2 m].
-  kWallpaper,        ///< (painted) Small repeated ornament [1 m].
   kMattress,         ///< (painted) Covered foam: fine weave, creases [2 m].
   kPlayMat,          ///< Printed carpet: a toy town with roads and houses [2 m].
   kMarkerTape,  ///< Black strip along u with white marks; sixteen different strips above each other

@@ -6,16 +6,15 @@
 #include <stdexcept>
 #include <string>
 
+#include "modules/simulation/world/seeded_random.hpp"
+
 namespace km {
 namespace {
 
 /// Value in [-1, 1] of a lattice point.
 float lattice(std::int64_t i, std::int64_t j, std::uint64_t seed) {
-  std::uint64_t h = seed + 0x9E3779B97F4A7C15U * static_cast<std::uint64_t>(i) +
-                    0xC2B2AE3D27D4EB4FU * static_cast<std::uint64_t>(j);
-  h = (h ^ (h >> 30U)) * 0xBF58476D1CE4E5B9U;
-  h = (h ^ (h >> 27U)) * 0x94D049BB133111EBU;
-  h ^= h >> 31U;
+  const std::uint64_t h = scrambled(seed + 0x9E3779B97F4A7C15U * static_cast<std::uint64_t>(i) +
+                                    0xC2B2AE3D27D4EB4FU * static_cast<std::uint64_t>(j));
   return static_cast<float>(h >> 40U) * 0x1.0p-23F - 1.0F;
 }
 

@@ -1,6 +1,7 @@
 #include "modules/simulation/world/texture.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -92,6 +93,33 @@ void Texture::append_level(int n, const std::vector<Eigen::Vector3f>& rgb) {
                            grey[next_row + next] << 24);
     }
   }
+}
+
+Texture::LevelBlend Texture::blend_of(float footprint) const {
+  const float texels = footprint * static_cast<float>(1 << log_size_);
+  if (!(texels > 1.0F)) return {};
+  const auto bits = std::bit_cast<std::uint32_t>(texels);
+  const int level = static_cast<int>(bits >> 23) - 127;  // the exponent: floor(log2(texels))
+  if (level >= log_size_) return {log_size_, log_size_, 0.0F};
+  const float mantissa = std::bit_cast<float>((bits & 0x007FFFFFU) | 0x3F800000U);  // 1 to 2
+  return {level, level + 1, mantissa - 1.0F};
+}
+
+Texture::TilePoint Texture::tile_point(const Eigen::Vector2f& uv) {
+  constexpr float kTile = 4294967296.0F;  // 2^32
+  const auto wrapped = [](float tiles) {
+    return static_cast<std::uint32_t>(static_cast<std::int64_t>(tiles * kTile));
+  };
+  return {wrapped(uv.x()), wrapped(uv.y())};
+}
+
+Texture::Cell Texture::cell_of(int log_n, const TilePoint& point) {
+  const std::uint32_t half_texel = 0x80000000U >> log_n;
+  const std::uint64_t u = static_cast<std::uint64_t>(point.u - half_texel) << log_n;
+  const std::uint64_t v = static_cast<std::uint64_t>(point.v - half_texel) << log_n;
+  return {static_cast<std::uint32_t>(u >> 32), static_cast<std::uint32_t>(v >> 32),
+          static_cast<std::int32_t>(u >> 16 & 0xFFFFU),
+          static_cast<std::int32_t>(v >> 16 & 0xFFFFU)};
 }
 
 Eigen::Vector3f Texture::bilinear_color(int level, const TilePoint& point) const {

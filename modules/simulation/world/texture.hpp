@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -25,12 +24,11 @@ class Texture {
   /// result is undefined; `footprint` is the width of what one sample covers, in tiles. Between two
   /// levels the blend is linear in the footprint.
   [[nodiscard]] Eigen::Vector3f color(const Eigen::Vector2f& uv, float footprint) const;
-  /// The same of the luminance alone (Rec. 709 weights): what a grey camera sees.
-  [[nodiscard]] float luminance(const Eigen::Vector2f& uv, float footprint) const;
 
-  /// The storage behind luminance(), for lookups of many points side by side: all levels one after
-  /// the other, rows of `quads`, each a texel and its neighbours at +u, +v, +uv (lowest byte first)
-  /// in steps of `scale`. Valid as long as the texture is.
+  /// The luminance alone (Rec. 709 weights), what a grey camera sees, as it is stored for lookups
+  /// of many points side by side: all levels one after the other, rows of `quads`, each a texel and
+  /// its neighbours at +u, +v, +uv (lowest byte first) in steps of `scale`. Valid as long as the
+  /// texture is.
   struct GrayTexels {
     const std::uint32_t* quads = nullptr;
     int log_size = 0;
@@ -63,7 +61,6 @@ class Texture {
   [[nodiscard]] static TilePoint tile_point(const Eigen::Vector2f& uv);
   [[nodiscard]] LevelBlend blend_of(float footprint) const;
   [[nodiscard]] static Cell cell_of(int log_n, const TilePoint& point);
-  [[nodiscard]] float bilinear_luminance(int level, const TilePoint& point) const;
   [[nodiscard]] Eigen::Vector3f bilinear_color(int level, const TilePoint& point) const;
   void append_level(int n, const std::vector<Eigen::Vector3f>& rgb);
 
@@ -76,57 +73,5 @@ class Texture {
   std::vector<std::uint32_t> luminance_;
   std::vector<std::uint32_t> color_;
 };
-
-// The lookups are in the header because the renderer makes millions of them per image.
-
-inline Texture::LevelBlend Texture::blend_of(float footprint) const {
-  const float texels = footprint * static_cast<float>(1 << log_size_);
-  if (!(texels > 1.0F)) return {};
-  const auto bits = std::bit_cast<std::uint32_t>(texels);
-  const int level = static_cast<int>(bits >> 23) - 127;  // the exponent: floor(log2(texels))
-  if (level >= log_size_) return {log_size_, log_size_, 0.0F};
-  const float mantissa = std::bit_cast<float>((bits & 0x007FFFFFU) | 0x3F800000U);  // 1 to 2
-  return {level, level + 1, mantissa - 1.0F};
-}
-
-inline Texture::TilePoint Texture::tile_point(const Eigen::Vector2f& uv) {
-  constexpr float kTile = 4294967296.0F;  // 2^32
-  const auto wrapped = [](float tiles) {
-    return static_cast<std::uint32_t>(static_cast<std::int64_t>(tiles * kTile));
-  };
-  return {wrapped(uv.x()), wrapped(uv.y())};
-}
-
-inline Texture::Cell Texture::cell_of(int log_n, const TilePoint& point) {
-  const std::uint32_t half_texel = 0x80000000U >> log_n;
-  const std::uint64_t u = static_cast<std::uint64_t>(point.u - half_texel) << log_n;
-  const std::uint64_t v = static_cast<std::uint64_t>(point.v - half_texel) << log_n;
-  return {static_cast<std::uint32_t>(u >> 32), static_cast<std::uint32_t>(v >> 32),
-          static_cast<std::int32_t>(u >> 16 & 0xFFFFU),
-          static_cast<std::int32_t>(v >> 16 & 0xFFFFU)};
-}
-
-/// In units of 2^-16 of a step of the storage.
-inline float Texture::bilinear_luminance(int level, const TilePoint& point) const {
-  const int log_n = log_size_ - level;
-  const Cell cell = cell_of(log_n, point);
-  const std::uint32_t quad =
-      luminance_[level_begin_[static_cast<std::size_t>(level)] + (cell.row << log_n) + cell.column];
-  const auto byte = [quad](int i) { return static_cast<std::int32_t>(quad >> (8 * i) & 0xFFU); };
-  const std::int32_t low = (byte(0) << 16) + cell.x * (byte(1) - byte(0));
-  const std::int32_t high = (byte(2) << 16) + cell.x * (byte(3) - byte(2));
-  constexpr float kUnit = 1.0F / 65536.0F;
-  return static_cast<float>(low) +
-         kUnit * static_cast<float>(cell.y) * static_cast<float>(high - low);
-}
-
-inline float Texture::luminance(const Eigen::Vector2f& uv, float footprint) const {
-  constexpr float kUnit = 1.0F / 65536.0F;
-  const TilePoint point = tile_point(uv);
-  const LevelBlend blend = blend_of(footprint);
-  const float fine = bilinear_luminance(blend.fine, point);
-  const float coarse = bilinear_luminance(blend.coarse, point);
-  return kUnit * luminance_scale_ * (fine + blend.share * (coarse - fine));
-}
 
 }  // namespace km

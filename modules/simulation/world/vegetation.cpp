@@ -1,27 +1,28 @@
-#include "modules/simulation/world/vegetation.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
 
+#include "modules/simulation/world/objects.hpp"
+
 namespace km {
 namespace {
 
 using Eigen::Vector3f;
+using enum Recipe;
 
 constexpr float kTwoPi = 2.0F * std::numbers::pi_v<float>;
+
 constexpr SurfaceClass kLabel = SurfaceClass::kVegetation;
 
 MaterialId foliage(Scene& scene, SeededRandom& random) {
-  static constexpr std::array<std::array<float, 3>, 5> kTints = {{{1.0F, 1.0F, 1.0F},
-                                                                  {0.8F, 0.95F, 0.75F},
-                                                                  {1.25F, 1.15F, 0.8F},
-                                                                  {0.75F, 0.85F, 0.9F},
-                                                                  {1.15F, 1.25F, 0.95F}}};
-  const auto& [red, green, blue] = kTints[static_cast<std::size_t>(random.below(kTints.size()))];
-  return scene.paint(kLabel, Recipe::kLeaves, {red, green, blue});
+  const Vector3f tints[] = {{1.0F, 1.0F, 1.0F},
+                            {0.8F, 0.95F, 0.75F},
+                            {1.25F, 1.15F, 0.8F},
+                            {0.75F, 0.85F, 0.9F},
+                            {1.15F, 1.25F, 0.95F}};
+  return scene.paint(kLabel, kLeaves, random.pick(tints));
 }
 
 /// A limb that bends a little twice on its way; returns its end.
@@ -36,8 +37,8 @@ Vector3f add_limb(Scene& scene, const Vector3f& from, const Vector3f& along, flo
     Vector3f next = from + share * along;
     next.x() += random.uniform(-wander, wander);
     next.y() += random.uniform(-wander, wander);
-    scene.mesh.cylinder(p, next, radius + before * (end_radius - radius),
-                        radius + share * (end_radius - radius), segments, bark, false);
+    scene.cylinder(p, next, radius + before * (end_radius - radius),
+                   radius + share * (end_radius - radius), segments, bark, false);
     p = next;
   }
   return p;
@@ -46,14 +47,14 @@ Vector3f add_limb(Scene& scene, const Vector3f& from, const Vector3f& along, flo
 }  // namespace
 
 void add_tree(Scene& scene, const TreeShape& shape, SeededRandom& random) {
-  const MaterialId bark = scene.paint(kLabel, Recipe::kBark);
-  const MaterialId leaves = foliage(scene, random);
+  const auto bark = scene.paint(kLabel, kBark);
+  const auto leaves = foliage(scene, random);
   const float trunk_radius = 0.016F * shape.height_m + 0.03F;
   const float crown_bottom = shape.clear_m;
   const float crown_half = 0.5F * (shape.height_m - crown_bottom);
   const Vector3f crown(0.0F, 0.0F, crown_bottom + crown_half);
-  scene.mesh.cylinder({0, 0, -0.15F}, {0, 0, 0.25F}, 1.7F * trunk_radius, 1.05F * trunk_radius, 10,
-                      bark, false);
+  scene.cylinder({0, 0, -0.15F}, {0, 0, 0.25F}, 1.7F * trunk_radius, 1.05F * trunk_radius, 10, bark,
+                 false);
   const Vector3f fork = add_limb(scene, {0, 0, 0.2F}, {0, 0, 0.9F * crown_bottom}, trunk_radius,
                                  0.75F * trunk_radius, 10, bark, random);
   const Vector3f top = add_limb(scene, fork, {0, 0, crown_half}, 0.7F * trunk_radius,
@@ -82,16 +83,15 @@ void add_tree(Scene& scene, const TreeShape& shape, SeededRandom& random) {
     const float radius = 0.42F * shape.crown_radius_m * random.uniform(0.8F, 1.25F);
     const float flat = 0.75F * radius;
     const float z = std::max(tip.z(), crown_bottom + flat + shape.leaf_m);
-    scene.mesh.leaf_cluster({tip.x(), tip.y(), z}, {radius, radius, flat}, share, shape.leaf_m,
-                            leaves, random);
+    scene.leaf_cluster({tip.x(), tip.y(), z}, {radius, radius, flat}, share, shape.leaf_m, leaves,
+                       random);
   }
 }
 
 void add_conifer(Scene& scene, float height_m, SeededRandom& random) {
-  const MaterialId bark = scene.paint(kLabel, Recipe::kBark, {0.8F, 0.75F, 0.7F});
-  const MaterialId needles = scene.paint(kLabel, Recipe::kLeaves, {0.55F, 0.7F, 0.65F}, 0.6F);
-  MeshBuilder& mesh = scene.mesh;
-  mesh.cylinder({0, 0, -0.2F}, {0, 0, 0.95F * height_m}, 0.03F * height_m, 0.02F, 8, bark, false);
+  const auto bark = scene.paint(kLabel, kBark, {0.8F, 0.75F, 0.7F});
+  const auto needles = scene.paint(kLabel, kLeaves, {0.55F, 0.7F, 0.65F}, 0.6F);
+  scene.cylinder({0, 0, -0.2F}, {0, 0, 0.95F * height_m}, 0.03F * height_m, 0.02F, 8, bark, false);
   const int tiers = static_cast<int>(height_m / 0.42F);
   for (int tier = 0; tier < tiers; ++tier) {
     const float up = static_cast<float>(tier) / static_cast<float>(tiers);
@@ -108,48 +108,47 @@ void add_conifer(Scene& scene, float height_m, SeededRandom& random) {
       const float half = 0.24F * length + 0.08F;
       const Vector3f middle = root + 0.6F * length * out + Vector3f(0, 0, 0.06F * length);
       const Vector3f tip = root + length * out;
-      mesh.triangle(root, middle - half * side, middle, needles);
-      mesh.triangle(root, middle, middle + half * side, needles);
-      mesh.triangle(middle - half * side, tip, middle, needles);
-      mesh.triangle(middle, tip, middle + half * side, needles);
+      scene.triangle(root, middle - half * side, middle, needles);
+      scene.triangle(root, middle, middle + half * side, needles);
+      scene.triangle(middle - half * side, tip, middle, needles);
+      scene.triangle(middle, tip, middle + half * side, needles);
     }
   }
 }
 
 void add_bush(Scene& scene, float radius_m, SeededRandom& random) {
-  const MaterialId leaves = foliage(scene, random);
+  const auto leaves = foliage(scene, random);
   const int lobes = 3 + random.below(3);
   for (int i = 0; i < lobes; ++i) {
     const float angle = random.uniform(0.0F, kTwoPi);
     const float r = radius_m * random.uniform(0.5F, 0.8F);
     const float out = radius_m - r;
     const Vector3f center(out * std::cos(angle), out * std::sin(angle), 0.8F * r);
-    scene.mesh.ellipsoid(center, 0.72F * Vector3f(r, r, r), 10, leaves);
-    scene.mesh.leaf_cluster(center, {r, r, r}, static_cast<int>(110.0F + 160.0F * r * r), 0.2F,
-                            leaves, random);
+    scene.ellipsoid(center, 0.72F * Vector3f(r, r, r), 10, leaves);
+    scene.leaf_cluster(center, {r, r, r}, static_cast<int>(110.0F + 160.0F * r * r), 0.2F, leaves,
+                       random);
   }
 }
 
 void add_hedge(Scene& scene, float length_m, float depth_m, float height_m, SeededRandom& random) {
-  const MaterialId leaves = scene.paint(kLabel, Recipe::kLeaves, {0.85F, 0.95F, 0.85F});
-  MeshBuilder& mesh = scene.mesh;
-  mesh.box({0.04F, 0.06F, -0.1F}, {length_m - 0.04F, depth_m - 0.06F, height_m - 0.05F}, leaves,
-           kSidesNoBottom);
+  const auto leaves = scene.paint(kLabel, kLeaves, {0.85F, 0.95F, 0.85F});
+  scene.box({0.04F, 0.06F, -0.1F}, {length_m - 0.04F, depth_m - 0.06F, height_m - 0.05F}, leaves,
+            kSidesNoBottom);
   const int pieces = std::max(1, static_cast<int>(length_m / 0.8F));
   const float half = 0.5F * length_m / static_cast<float>(pieces);
   for (int i = 0; i < pieces; ++i) {
     const float x = (2.0F * static_cast<float>(i) + 1.0F) * half;
     for (const float y : {0.06F, depth_m - 0.06F}) {
-      mesh.leaf_cluster({x, y, 0.5F * height_m}, {1.1F * half, 0.06F, 0.52F * height_m}, 45, 0.17F,
-                        leaves, random);
+      scene.leaf_cluster({x, y, 0.5F * height_m}, {1.1F * half, 0.06F, 0.52F * height_m}, 45, 0.17F,
+                         leaves, random);
     }
-    mesh.leaf_cluster({x, 0.5F * depth_m, height_m - 0.04F}, {1.1F * half, 0.5F * depth_m, 0.05F},
-                      24, 0.17F, leaves, random);
+    scene.leaf_cluster({x, 0.5F * depth_m, height_m - 0.04F}, {1.1F * half, 0.5F * depth_m, 0.05F},
+                       24, 0.17F, leaves, random);
   }
 }
 
 void add_tuft(Scene& scene, float height_m, SeededRandom& random) {
-  const MaterialId blades = scene.paint(kLabel, Recipe::kGrass, {1.0F, 1.0F, 0.9F});
+  const auto blades = scene.paint(kLabel, kGrass, {1.0F, 1.0F, 0.9F});
   const int count = 9 + random.below(6);
   for (int i = 0; i < count; ++i) {
     const float angle = random.uniform(0.0F, kTwoPi);
@@ -159,8 +158,8 @@ void add_tuft(Scene& scene, float height_m, SeededRandom& random) {
     const Vector3f out(std::cos(angle), std::sin(angle), 0.0F);
     const Vector3f side(-0.02F * out.y(), 0.02F * out.x(), 0.0F);
     const Vector3f base = root * out + Vector3f(0, 0, -0.03F);
-    scene.mesh.triangle(base + side, base - side,
-                        base + lean * out + Vector3f(0, 0, height + 0.03F), blades);
+    scene.triangle(base + side, base - side, base + lean * out + Vector3f(0, 0, height + 0.03F),
+                   blades);
   }
 }
 

@@ -2,13 +2,13 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "modules/core/label_palette.hpp"
-#include "modules/simulation/world/surface_mesh.hpp"
 #include "modules/simulation/world/texture.hpp"
 
 namespace km {
@@ -37,6 +37,16 @@ enum class SurfaceClass : LabelId {
 
 /// Names and colours of SurfaceClass.
 [[nodiscard]] const LabelPalette& simulation_palette();
+
+/// Triangles of the whole world, frame `world`: metres, z up. No vertex is shared between triangles
+/// that meet at an edge which shall look sharp. Leaves are single triangles, seen from both sides.
+struct SurfaceMesh {
+  std::vector<Eigen::Vector3f> vertices;                ///< [m]
+  std::vector<Eigen::Vector3f> normals;                 ///< Per vertex, unit length.
+  std::vector<Eigen::Vector2f> uv;                      ///< Per vertex, along the surface [m].
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Counter-clockwise seen from outside.
+  std::vector<std::uint16_t> materials;  ///< Per triangle: index into World::materials.
+};
 
 /// How a surface looks: albedo = tint * base(uv / base_period) * detail(uv / detail_period), where
 /// the two periods are incommensurate, so that the pattern of the base is not seen to repeat.

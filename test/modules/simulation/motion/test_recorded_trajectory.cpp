@@ -1,20 +1,22 @@
 #include <catch2/catch.hpp>
 
 #include <array>
-#include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "modules/core/frame.hpp"
 #include "modules/core/lie.hpp"
+#include "modules/core/text_rows.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/simulation/motion/flight_trajectory.hpp"
-#include "modules/simulation/motion/gaussian_random.hpp"
 #include "modules/simulation/motion/recorded_trajectory.hpp"
-#include "test/modules/simulation/motion/motion_checks.hpp"
+#include "modules/simulation/world/seeded_random.hpp"
 #include "test/support/shared_data.hpp"
 
 namespace km {
@@ -130,31 +132,24 @@ TEST_CASE("A fit refuses poses without order and options without sense", "[motio
   CHECK_THROWS_AS(fit_recording(good, kEpoch, options), ConfigError);
 }
 
-// Rows `t[ns], gyro x y z, ...` of a recorded inertial sensor.
-struct GyroRow {
-  Stamp stamp = 0;
-  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
-};
-
-std::vector<GyroRow> read_gyro(const std::filesystem::path& file) {
-  std::vector<GyroRow> rows;
+std::vector<ImuSample> read_gyro(const std::filesystem::path& file) {
   std::ifstream stream(file);
-  for (std::string line; std::getline(stream, line);) {
-    if (line.empty() || line[0] == '#') continue;
-    GyroRow row;
-    const char* const end = line.data() + line.size();
-    const char* at = std::from_chars(line.data(), end, row.stamp).ptr;
-    for (double& value : row.gyro) at = std::from_chars(at + 1, end, value).ptr;
-    rows.push_back(row);
+  const std::string text(std::istreambuf_iterator<char>(stream), {});
+  std::vector<ImuSample> rows;
+  for (const TextRow& row : split_rows(text)) {  // t[ns], gyro x y z, ...
+    ImuSample& sample = rows.emplace_back();
+    sample.stamp = parse_int64(row.fields.at(0)).value();
+    for (std::size_t k = 0; k < 3; ++k)
+      sample.gyro[static_cast<Eigen::Index>(k)] = parse_double(row.fields.at(k + 1)).value();
   }
   return rows;
 }
 
 // Root mean square difference of recorded and fitted angular rate, with the bias taken out.
-double gyro_rms(const std::vector<GyroRow>& rows, const RecordedTrajectory& fitted) {
+double gyro_rms(const std::vector<ImuSample>& rows, const RecordedTrajectory& fitted) {
   const SplineTrajectory& trajectory = fitted.trajectory;
   std::vector<Eigen::Vector3d> errors;
-  for (const GyroRow& row : rows) {
+  for (const ImuSample& row : rows) {
     const double t = seconds_between(fitted.epoch, row.stamp);
     if (t < trajectory.start_s() || t > trajectory.end_s()) continue;
     errors.push_back(row.gyro - trajectory.motion(t).angular_velocity_body);

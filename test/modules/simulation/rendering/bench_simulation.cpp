@@ -7,7 +7,8 @@
 #include <thread>
 #include <vector>
 
-#include "modules/simulation/rendering/renderer.hpp"
+#include "modules/simulation/motion/default_rig.hpp"
+#include "modules/simulation/motion/road.hpp"
 #include "modules/simulation/rendering/sensor_effects.hpp"
 
 // Stereo pairs per second of the whole chain but the encoding of files, on two threads, and where
@@ -22,26 +23,6 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// EuRoC's left and right camera, 11 cm apart, on a body that looks along its x axis.
-StereoRig euroc_rig(int shrink) {
-  PinholeCamera camera;
-  camera.width = 752;
-  camera.height = 480;
-  camera.fx = 458.654;
-  camera.fy = 457.296;
-  camera.cx = 367.215;
-  camera.cy = 248.375;
-  camera.distortion = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05};
-  Eigen::Matrix3d R_body_cam;
-  R_body_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  StereoRig rig;
-  for (int side = 0; side < 2; ++side) {
-    camera.T_body_cam = make_pose(R_body_cam, {0.0, 0.055 - 0.11 * side, 0.0});
-    rig.cameras[static_cast<std::size_t>(side)] = shrunk(camera, shrink);
-  }
-  return rig;
-}
-
 SE3 pose_at(const Eigen::Vector3d& position, double heading) {
   return make_pose(Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitZ()).toRotationMatrix(),
                    position);
@@ -49,29 +30,25 @@ SE3 pose_at(const Eigen::Vector3d& position, double heading) {
 
 std::vector<SE3> poses_in(const World& world, int count) {
   std::vector<SE3> poses;
-  if (world.routes.empty()) {
-    for (int i = 0; i < count; ++i)
-      poses.push_back(pose_at(world.flight_volume.center(), 6.2832 * i / count));
-    return poses;
-  }
-  const std::vector<Eigen::Vector2d>& route = world.routes[0].points;
-  double length = 0.0;
-  for (std::size_t i = 0; i < route.size(); ++i)
-    length += (route[(i + 1) % route.size()] - route[i]).norm();
   for (int i = 0; i < count; ++i) {
-    double rest = length * (i + 0.5) / count;
-    std::size_t leg = 0;
-    const auto leg_vector = [&] {
-      return Eigen::Vector2d(route[(leg + 1) % route.size()] - route[leg]);
-    };
-    for (; rest > leg_vector().norm(); ++leg) rest -= leg_vector().norm();
-    const Eigen::Vector2d direction = leg_vector().normalized();
-    const Eigen::Vector2d at = route[leg] + rest * direction;
-    constexpr double kCameraHeight_m = 1.5;
-    poses.push_back(pose_at({at.x(), at.y(), world.ground_height(at.x(), at.y()) + kCameraHeight_m},
-                            std::atan2(direction.y(), direction.x())));
+    if (world.routes.empty()) {
+      poses.push_back(pose_at(world.flight_volume.center(), 6.2832 * i / count));
+      continue;
+    }
+    const RoutePath path(world.routes[0], 5.0);
+    const RoutePath::Point point = path.at(path.length_m() * (i + 0.5) / count);
+    const double ground = world.ground_height(point.position.x(), point.position.y());
+    poses.push_back(pose_at({point.position.x(), point.position.y(), ground + 1.5},
+                            std::atan2(point.tangent.y(), point.tangent.x())));
   }
   return poses;
+}
+
+Shot driving_shot() {
+  Shot shot;
+  shot.exposure = {1.0, 0.005};
+  shot.body_velocity << 0.0, 0.0, 0.2, 8.0, 0.0, 0.0;
+  return shot;
 }
 
 struct Camera {
@@ -83,9 +60,7 @@ struct Camera {
 
 std::size_t develop_pair(const Renderer& renderer, const std::array<Camera, 2>& cameras,
                          const SE3& T_world_body) {
-  Shot shot;
-  shot.exposure = {1.0, 0.005};
-  shot.body_velocity << 0.0, 0.0, 0.2, 8.0, 0.0, 0.0;
+  const Shot shot = driving_shot();
   std::size_t bytes = 0;
   for (const Camera& camera : cameras) {
     const RenderedView view =
@@ -128,9 +103,7 @@ void print_stages(const World& world, const Renderer& renderer, const Camera& ca
   const double shadows = render(coarse, {});
   const double edges = render(renderer, {});
   const RenderedView view = renderer.render(camera.rays, poses[0], camera.effects.request(false));
-  Shot shot;
-  shot.exposure = {1.0, 0.005};
-  shot.body_velocity << 0.0, 0.0, 0.2, 8.0, 0.0, 0.0;
+  const Shot shot = driving_shot();
   const double develop = mean_ms(poses, [&](const SE3&) { (void)camera.effects.gray(view, shot); });
   const double pixels = static_cast<double>(view.radiance.size());
   std::printf(
@@ -145,7 +118,7 @@ void run(const World& world) {
   std::printf("%s: %zu triangles, %.1f s to prepare\n", world.name.c_str(),
               world.mesh.triangles.size(), seconds_since(start));
   for (const int shrink : {1, 2}) {
-    const StereoRig rig = euroc_rig(shrink);
+    const StereoRig rig = default_rig(RigKind::kVehicle, 752 / shrink, 480 / shrink).stereo;
     const std::array<Camera, 2> cameras = {Camera(rig.cameras[0]), Camera(rig.cameras[1])};
     const std::vector<SE3> poses = poses_in(world, 12);
     std::vector<double> rates;
@@ -157,15 +130,9 @@ void run(const World& world) {
   }
 }
 
-TEST_CASE("Stereo pairs per second in the city", "[!benchmark]") {
+TEST_CASE("Stereo pairs per second in the city, the camp and the Vicon room", "[!benchmark]") {
   run(make_city(1));
-}
-
-TEST_CASE("Stereo pairs per second in the camp", "[!benchmark]") {
   run(make_camp(1));
-}
-
-TEST_CASE("Stereo pairs per second in the Vicon room", "[!benchmark]") {
   run(make_vicon_room(1));
 }
 

@@ -6,7 +6,8 @@
 #include <vector>
 
 #include "modules/core/camera.hpp"
-#include "modules/simulation/world/mesh_builder.hpp"
+#include "modules/simulation/rendering/renderer.hpp"
+#include "modules/simulation/world/scene.hpp"
 #include "modules/simulation/world/world.hpp"
 
 namespace km::small_world {
@@ -38,21 +39,27 @@ class Builder {
 
   /// A square facing -x (towards a camera at the origin that looks along +x) at distance x.
   void wall(float x, float half_size, MaterialId id) {
-    mesh.quad({x, half_size, -half_size}, {x, -half_size, -half_size}, {x, -half_size, half_size},
-              {x, half_size, half_size}, id);
+    scene.quad({x, half_size, -half_size}, {x, -half_size, -half_size}, {x, -half_size, half_size},
+               {x, half_size, half_size}, id);
   }
 
   World build() {
-    world_.mesh = mesh.take();
+    world_.mesh = scene.mesh();
     return std::move(world_);
   }
 
-  MeshBuilder mesh;
+  Scene scene;
   World& world() { return world_; }
 
  private:
   World world_;
 };
+
+/// Radiance of a pixel.
+inline float at(const RenderedView& view, int x, int y) {
+  return view.radiance[static_cast<std::size_t>(y) * static_cast<std::size_t>(view.width) +
+                       static_cast<std::size_t>(x)];
+}
 
 /// Camera that looks along the body's +x with its image upright (body: x forward, z up).
 inline PinholeCamera forward_camera(int width, int height, double focal_px) {

@@ -32,7 +32,7 @@ TEST_CASE("Depth of a plane is the analytic one in every pixel", "[simulation][r
   const PinholeCamera camera =
       distorted ? distorted_camera(78, 58, 48.0) : forward_camera(78, 58, 48.0);
   Builder builder;
-  builder.wall(5.0F, 50.0F, builder.material(SurfaceClass::kWall, 0.5F));
+  builder.wall(2.0F, 6.0F, builder.material(SurfaceClass::kWall, 0.5F));
   const World world = builder.build();
   const SE3 T_world_body = tilted_pose();
   const RenderedView view = Renderer(world).render(camera, T_world_body, kEverything);
@@ -42,7 +42,7 @@ TEST_CASE("Depth of a plane is the analytic one in every pixel", "[simulation][r
     for (int x = 0; x < camera.width; ++x) {
       const Eigen::Vector3d bearing = camera.unproject({x, y}).value().homogeneous();
       const double along = (T_world_cam.linear() * bearing).x();
-      const double expected = (5.0 - T_world_cam.translation().x()) / along;
+      const double expected = (2.0 - T_world_cam.translation().x()) / along;
       CAPTURE(x, y);
       // Single precision of rays and of the triangle test.
       REQUIRE(view.depth_m[pixel(view, x, y)] == Approx(expected).epsilon(2e-5));
@@ -55,8 +55,8 @@ TEST_CASE("A box hides what is behind it, and only that", "[simulation][renderin
   const PinholeCamera camera = distorted_camera(62, 46, 40.0);
   Builder builder;
   builder.wall(8.0F, 3.0F, builder.material(SurfaceClass::kWall, 0.5F));
-  builder.mesh.box({4.0F, -0.5F, -0.25F}, {5.0F, 0.5F, 0.75F},
-                   builder.material(SurfaceClass::kVehicle, 0.5F));
+  builder.scene.box({4.0F, -0.5F, -0.25F}, {5.0F, 0.5F, 0.75F},
+                    builder.material(SurfaceClass::kVehicle, 0.5F));
   const World world = builder.build();
   const RenderedView view = Renderer(world).render(camera, SE3::Identity(), kEverything);
   for (int y = 0; y < camera.height; ++y) {
@@ -92,8 +92,8 @@ TEST_CASE("A known point is seen where the camera model projects it", "[simulati
   const MaterialId black = builder.material(SurfaceClass::kWall, 0.0F);
   const Eigen::Vector3f low = point.cast<float>() - Eigen::Vector3f(0.0F, 0.02F, 0.02F);
   const Eigen::Vector3f high = point.cast<float>() + Eigen::Vector3f(0.001F, 0.02F, 0.02F);
-  builder.mesh.box(low, high, white);
-  builder.wall(3.5F, 20.0F, black);
+  builder.scene.box(low, high, white);
+  builder.wall(3.5F, 5.0F, black);
   const World world = builder.build();
   Vector6 xi;
   xi << 0.03 * uniform(random), 0.0, 0.0, 0.1, 0.1 * uniform(random), 0.0;
@@ -130,8 +130,8 @@ TEST_CASE("An empty world is sky to the rim", "[simulation][rendering]") {
 
 TEST_CASE("A camera inside a solid sees its inner sides", "[simulation][rendering]") {
   Builder builder;
-  builder.mesh.box({-2.0F, -2.0F, -2.0F}, {2.0F, 2.0F, 2.0F},
-                   builder.material(SurfaceClass::kFurniture, 0.5F));
+  builder.scene.box({-2.0F, -2.0F, -2.0F}, {2.0F, 2.0F, 2.0F},
+                    builder.material(SurfaceClass::kFurniture, 0.5F));
   const World world = builder.build();
   const RenderedView view =
       Renderer(world).render(forward_camera(40, 30, 30.0), SE3::Identity(), kEverything);

@@ -10,13 +10,9 @@
 namespace km {
 namespace {
 
+using small_world::at;
 using small_world::Builder;
 using small_world::forward_camera;
-
-float at(const RenderedView& view, int x, int y) {
-  return view.radiance[static_cast<std::size_t>(y) * static_cast<std::size_t>(view.width) +
-                       static_cast<std::size_t>(x)];
-}
 
 // Looks straight down from above the origin: the image's right is -y, its top is +x.
 SE3 looking_down(double height_m) {
@@ -29,8 +25,8 @@ SE3 looking_down(double height_m) {
 World sunny_floor(bool slab) {
   Builder builder;
   const MaterialId gray = builder.material(SurfaceClass::kRoad, 0.5F);
-  builder.mesh.quad({-40, -40, 0}, {40, -40, 0}, {40, 40, 0}, {-40, 40, 0}, gray);
-  if (slab) builder.mesh.box({0.0F, -40.0F, 6.0F}, {40.0F, 40.0F, 6.1F}, gray);
+  builder.scene.quad({-10, -10, 0}, {10, -10, 0}, {10, 10, 0}, {-10, 10, 0}, gray);
+  if (slab) builder.scene.box({0.0F, -10.0F, 6.0F}, {10.0F, 10.0F, 6.1F}, gray);
   builder.world().lighting.sun = 1.0F;
   builder.world().lighting.ambient = 0.2F;
   builder.world().lighting.to_sun = Eigen::Vector3f::UnitZ();
@@ -60,8 +56,8 @@ TEST_CASE("A slab takes the sun away below it", "[simulation][rendering]") {
 TEST_CASE("Contact is visible without any sun", "[simulation][rendering]") {
   Builder builder;
   const MaterialId gray = builder.material(SurfaceClass::kFloor, 0.5F);
-  builder.mesh.quad({-5, -5, 0}, {5, -5, 0}, {5, 5, 0}, {-5, 5, 0}, gray);
-  builder.mesh.box({0.5F, -1.0F, 0.0F}, {2.0F, 1.0F, 1.5F}, gray);
+  builder.scene.quad({-5, -5, 0}, {5, -5, 0}, {5, 5, 0}, {-5, 5, 0}, gray);
+  builder.scene.box({0.5F, -1.0F, 0.0F}, {2.0F, 1.0F, 1.5F}, gray);
   const World world = builder.build();
   const RenderedView view =
       Renderer(world).render(forward_camera(96, 96, 60.0), looking_down(4.0), {});
@@ -76,8 +72,8 @@ TEST_CASE("A lamp lights by the square of its distance and casts shadows",
           "[simulation][rendering]") {
   Builder builder;
   const MaterialId gray = builder.material(SurfaceClass::kFloor, 1.0F);
-  builder.mesh.quad({-5, -5, 0}, {5, -5, 0}, {5, 5, 0}, {-5, 5, 0}, gray);
-  builder.mesh.box({1.0F, -5.0F, 0.0F}, {1.1F, 5.0F, 2.0F}, gray);  // hides x > 1 from the lamp
+  builder.scene.quad({-5, -5, 0}, {5, -5, 0}, {5, 5, 0}, {-5, 5, 0}, gray);
+  builder.scene.box({1.0F, -5.0F, 0.0F}, {1.1F, 5.0F, 2.0F}, gray);  // hides x > 1 from the lamp
   builder.world().lighting.ambient = 0.0F;
   builder.world().lighting.lamps.push_back({{0.0F, 0.0F, 2.0F}, 4.0F});
   const World world = builder.build();
@@ -92,7 +88,7 @@ TEST_CASE("A lamp lights by the square of its distance and casts shadows",
 TEST_CASE("Distance fades to the horizon's light", "[simulation][rendering]") {
   const auto contrast = [](float haze_distance_m) {
     Builder builder;
-    builder.wall(50.0F, 200.0F, builder.material(SurfaceClass::kWall, 0.0F));
+    builder.wall(50.0F, 4.0F, builder.material(SurfaceClass::kWall, 0.0F));
     builder.world().lighting.haze_distance_m = haze_distance_m;
     const World world = builder.build();
     return at(Renderer(world).render(forward_camera(8, 8, 80.0), SE3::Identity(), {}), 4, 4);

@@ -3,8 +3,6 @@
 #include <numeric>
 
 #include "modules/core/lie.hpp"
-#include "modules/simulation/rendering/lens_blur.hpp"
-#include "modules/simulation/rendering/motion_blur.hpp"
 #include "modules/simulation/rendering/sensor_effects.hpp"
 #include "test/modules/simulation/rendering/small_world.hpp"
 
@@ -23,6 +21,68 @@ RenderedView flat_view(const PinholeCamera& camera, float radiance) {
   view.rgb.assign(n, radiance * Eigen::Vector3f(1.0F, 0.5F, 0.25F));
   view.depth_m.assign(n, 2.0F);
   return view;
+}
+
+RenderedView evenly_lit(float radiance) {
+  return flat_view(forward_camera(8, 8, 8.0), radiance);
+}
+
+TEST_CASE("The first frame is exposed to its target", "[simulation][exposure]") {
+  const double gamma = GENERATE(1.0, 2.2);
+  SensorEffectsConfig config;
+  config.gamma = gamma;
+  ExposureControl control(config, 20.0);
+  const Exposure exposure = control.next(evenly_lit(0.2F));
+  const double level = std::pow(0.2 * exposure.gain, 1.0 / gamma);
+  CHECK(level == Approx(config.target_level).epsilon(1e-3));
+}
+
+TEST_CASE("The exposure follows a change of light with a lag, and settles",
+          "[simulation][exposure]") {
+  SensorEffectsConfig config;
+  config.adaptation = 0.1;
+  ExposureControl control(config, 20.0);
+  (void)control.next(evenly_lit(0.8F));
+  const RenderedView dark = evenly_lit(0.1F);
+  double last = 0.0;
+  double first_level = 0.0;
+  for (int i = 0; i < 100; ++i) {
+    const double level = control.next(dark).gain * 0.1;
+    CHECK(level > last);  // no overshoot
+    if (i == 0) first_level = level;
+    last = level;
+  }
+  CHECK(first_level < 0.6 * config.target_level);
+  CHECK(last == Approx(config.target_level).epsilon(0.01));
+}
+
+TEST_CASE("The pace of adaptation does not depend on the frame rate", "[simulation][exposure]") {
+  const auto gain_after_one_second = [](double rate_hz) {
+    ExposureControl control({}, rate_hz);
+    (void)control.next(evenly_lit(0.8F));
+    double gain = 0.0;
+    for (int i = 0; i < static_cast<int>(rate_hz); ++i) gain = control.next(evenly_lit(0.3F)).gain;
+    return gain;
+  };
+  CHECK(gain_after_one_second(10.0) == Approx(gain_after_one_second(40.0)).epsilon(0.02));
+}
+
+TEST_CASE("A dark scene opens the shutter to its limit", "[simulation][exposure]") {
+  const SensorEffectsConfig config;
+  ExposureControl bright(config, 20.0);
+  const Exposure short_time = bright.next(evenly_lit(1.0F));
+  CHECK(short_time.time_s == Approx(short_time.gain * config.unit_exposure_s));
+  ExposureControl dim(config, 20.0);
+  CHECK(dim.next(evenly_lit(0.01F)).time_s == config.max_exposure_s);
+}
+
+TEST_CASE("Exposure refuses what it cannot work with", "[simulation][exposure]") {
+  CHECK_THROWS_AS(ExposureControl({}, 0.0), std::invalid_argument);
+  SensorEffectsConfig config;
+  config.target_level = 2.0;
+  CHECK_THROWS_AS(ExposureControl(config, 20.0), ConfigError);
+  ExposureControl control({}, 20.0);
+  CHECK_THROWS_AS(control.next(RenderedView{}), std::invalid_argument);
 }
 
 SensorEffectsConfig clean() {
@@ -141,6 +201,26 @@ TEST_CASE("Colour is developed channel by channel", "[simulation][sensor]") {
   }
 }
 
+// Light of an image, and where it lies about the pixel `center`.
+struct LightMoments {
+  double mass = 0.0;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
+};
+
+LightMoments moments_of(const std::vector<float>& image, int width, const Eigen::Vector2d& center) {
+  LightMoments m;
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    const int k = static_cast<int>(i);
+    const auto value = static_cast<double>(image[i]);
+    const Eigen::Vector2d d = Eigen::Vector2d(k % width, k / width) - center;
+    m.mass += value;
+    m.mean += value * d;
+    m.spread += value * d * d.transpose();
+  }
+  return m;
+}
+
 TEST_CASE("The lens spreads a point as it is configured and keeps its light",
           "[simulation][sensor]") {
   const double sigma_px = GENERATE(0.6, 1.0, 2.5);
@@ -148,23 +228,13 @@ TEST_CASE("The lens spreads a point as it is configured and keeps its light",
   constexpr int kWidth = 31;
   constexpr int kHeight = 25;
   std::vector<float> point(kWidth * kHeight, 0.0F);
-  point[12 * kWidth + 15] = 4.0F;
-  const std::vector<float> spread = lens_blurred(point, kWidth, kHeight, sigma_px);
-  double light = 0.0;
-  double variance_x = 0.0;
-  double variance_y = 0.0;
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      const double share = spread[static_cast<std::size_t>(y * kWidth + x)] / 4.0;
-      light += share;
-      variance_x += share * (x - 15) * (x - 15);
-      variance_y += share * (y - 12) * (y - 12);
-    }
-  }
-  CHECK(light == Approx(1.0).epsilon(1e-5));
+  point[12 * kWidth + 15] = 1.0F;
+  const LightMoments m =
+      moments_of(lens_blurred(point, kWidth, kHeight, sigma_px), kWidth, {15, 12});
+  CHECK(m.mass == Approx(1.0).epsilon(1e-5));
   // The kernel ends at three deviations: its variance is up to 3 % short.
-  CHECK(variance_x == Approx(sigma_px * sigma_px).epsilon(0.03));
-  CHECK(variance_y == Approx(variance_x).epsilon(1e-4));
+  CHECK(m.spread(0, 0) == Approx(sigma_px * sigma_px).epsilon(0.03));
+  CHECK(m.spread(1, 1) == Approx(m.spread(0, 0)).epsilon(1e-4));
 
   const std::vector<float> flat(kWidth * kHeight, 0.75F);
   for (const float value : lens_blurred(flat, kWidth, kHeight, sigma_px))
@@ -205,18 +275,7 @@ TEST_CASE("A bright point is smeared along its motion, its light kept", "[simula
   const Eigen::Vector2f motion(9.0F, 6.0F);
   const std::vector<float> result =
       blurred(image, kWidth, kHeight, std::vector<Eigen::Vector2f>(image.size(), motion));
-  double mass = 0.0;
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      const auto value = static_cast<double>(result[static_cast<std::size_t>(y * kWidth + x)]);
-      const Eigen::Vector2d d(x - 30, y - 20);
-      mass += value;
-      mean += value * d;
-      spread += value * d * d.transpose();
-    }
-  }
+  const auto [mass, mean, spread] = moments_of(result, kWidth, {30, 20});
   CHECK(mass == Approx(1.0).margin(0.02));
   CHECK(mean.norm() < 0.01);
   // A segment of length L has the variance L^2 / 12 along it; bilinear taps add about 1/6 px^2.

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <span>
+#include <vector>
+
+namespace km {
+
+/// The closed way `right_m` to the right of the closed centre line through `nodes` in driving
+/// direction, both without rounded corners. Nodes may be visited more than once. Throws
+/// std::invalid_argument for fewer than three nodes, two neighbours at one place, or a turn back.
+[[nodiscard]] std::vector<Eigen::Vector2d> right_hand_lane(std::span<const Eigen::Vector2d> nodes,
+                                                           double right_m);
+
+/// A crossing in a grid of ways: its column and row.
+using Crossing = std::array<int, 2>;
+
+/// Four closed ways over a grid of at least 4 columns and 3 rows of crossings, to be begun between
+/// the first crossing and the second. The second follows the first from one street behind over
+/// three streets; the third meets both first and follows them on the street both begin with; the
+/// fourth follows the second and the third. Each comes back to a street of its own, in the same
+/// direction, after one block.
+[[nodiscard]] const std::array<std::vector<Crossing>, 4>& crossing_routes();
+
+}  // namespace km
