@@ -11,6 +11,14 @@
 
 namespace km {
 
+/// Mixes `value` into `hash`, byte by byte: FNV-1a (Fowler, Noll, Vo), 64 bits.
+inline void mix_fnv1a(std::uint64_t& hash, std::uint64_t value) {
+  for (int byte = 0; byte < 8; ++byte) {
+    hash ^= (value >> (8 * byte)) & 0xffU;
+    hash *= 0x100000001b3ULL;
+  }
+}
+
 /// Puts numbers one after the other, least significant byte first, whatever the machine.
 class ByteWriter {
  public:

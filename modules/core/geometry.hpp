@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <numbers>
 
 namespace km {
 
@@ -12,6 +13,9 @@ using SE3 = Eigen::Isometry3d;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+/// Degrees in a radian: for texts and tables that people read.
+inline constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 /// Rotation angle of `R`, in [0, pi] [rad].
 inline double angle_of(const Eigen::Matrix3d& R) {

@@ -6,7 +6,6 @@
 #include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <set>
 #include <utility>
 
@@ -20,7 +19,6 @@ namespace {
 constexpr int kGridColumns = 8;
 constexpr int kGridRows = 6;
 constexpr double kMaxDepthRatio = 2.0;
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 using Pair = std::pair<KeyframeId, KeyframeId>;  // the smaller first
 
@@ -214,7 +212,7 @@ namespace fs = std::filesystem;
 
 constexpr double kMaxTruthGap_s = 0.1;  // as for trajectories: between poses further apart none is
 constexpr double kMaxTruthDifference_s = 0.01;
-constexpr double kMaxNormError = 0.01;  // of a quaternion
+constexpr double kMaxClosureNormError = 0.01;  // of a quaternion
 constexpr std::size_t kPoseColumn = 8;
 
 constexpr std::array<std::pair<const char*, ClosureStage>, 5> kStages = {
@@ -271,7 +269,7 @@ class Fields {
   [[nodiscard]] SE3 pose(std::size_t i) const {
     const Eigen::Vector3d t(number(i), number(i + 1), number(i + 2));
     const Eigen::Quaterniond q(number(i + 6), number(i + 3), number(i + 4), number(i + 5));
-    if (std::abs(q.norm() - 1.0) > kMaxNormError) fail("a quaternion is not of unit length");
+    if (std::abs(q.norm() - 1.0) > kMaxClosureNormError) fail("a quaternion is not of unit length");
     return make_pose(q.normalized().toRotationMatrix(), t);
   }
 

@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 #include <utility>
 
@@ -12,7 +11,6 @@ namespace {
 
 constexpr std::size_t kLengths = 4;
 constexpr double kMinLength_m = 0.01;
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 SE3 scaled(SE3 T, double scale) {
   T.translation() *= scale;

@@ -9,7 +9,7 @@ namespace km {
 namespace {
 
 // Added to a closure's variances so that exact cycles can be weighed: 1e-6 rad and 1e-6 m.
-constexpr double kLeastVariance = 1e-12;
+constexpr double kLeastClosureVariance = 1e-12;
 
 // What odometry added between two keyframes of a chain, wherever both are seen from.
 BlockCovariance added(const KeyframeId& i, const BlockCovariance& at_i, const KeyframeId& k,
@@ -33,7 +33,7 @@ PreparedClosure::PreparedClosure(const OrientedClosure& closure)
       odometry_b(transported(closure.b.T_odom_kf, BlockCovariance(closure.b.covariance))),
       measured(transported(
           closure.a.T_odom_kf * closure.T_a_b.T,
-          BlockCovariance(closure.T_a_b.Sigma + kLeastVariance * Matrix6::Identity()))) {}
+          BlockCovariance(closure.T_a_b.Sigma + kLeastClosureVariance * Matrix6::Identity()))) {}
 
 PairCycle::PairCycle(const PreparedClosure& i, const PreparedClosure& k)
     : i_(i), k_(k), T_(i.T_odoma_odomb * k.T_odoma_odomb.inverse()) {}

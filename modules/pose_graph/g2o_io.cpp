@@ -15,7 +15,6 @@ namespace km {
 namespace {
 
 constexpr std::uint64_t kLetters = 26;
-constexpr double kUnitTolerance = 1e-3;      // files round their quaternions, some to 6 digits
 constexpr double kVerticalTolerance = 1e-3;  // likewise, of information relative to its size
 
 KeyframeId read_id(TextFields& fields) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "modules/core/bytes.hpp"
 #include "modules/core/config.hpp"
 
 namespace km {
@@ -13,24 +14,17 @@ namespace {
 
 constexpr std::size_t kKeptSets = 4;  // per peer
 
-void mix(std::uint64_t& hash, std::uint64_t value) {  // FNV-1a, bytewise
-  for (int byte = 0; byte < 8; ++byte) {
-    hash ^= (value >> (8 * byte)) & 0xffU;
-    hash *= 0x100000001b3ULL;
-  }
-}
-
 // Of the measurements used: direction, translation and weights, which cross the network as they
 // are. A rotation does not: as a quaternion it loses its last bit.
 EdgeSetId identify(std::uint32_t version, const std::vector<PoseEdge>& edges) {
   EdgeSetId id{version, 0xcbf29ce484222325ULL};
-  mix(id.hash, version);
+  mix_fnv1a(id.hash, version);
   for (const PoseEdge& e : edges) {
     for (const KeyframeId& end : {e.from, e.to})
-      mix(id.hash, (std::uint64_t{end.robot} << 32U) | end.index);
+      mix_fnv1a(id.hash, (std::uint64_t{end.robot} << 32U) | end.index);
     const Eigen::Vector3d& t = e.T_from_to.translation();
     for (const double x : {t.x(), t.y(), t.z(), e.precision.kappa, e.precision.tau})
-      mix(id.hash, std::bit_cast<std::uint64_t>(x + 0.0));  // -0.0 equals 0.0
+      mix_fnv1a(id.hash, std::bit_cast<std::uint64_t>(x + 0.0));  // -0.0 equals 0.0
   }
   return id;
 }

@@ -23,7 +23,6 @@ namespace {
 
 constexpr std::string_view kColumns =
     "robot_src,pose_src,robot_dst,pose_dst,qx,qy,qz,qw,tx,ty,tz,kappa,tau";
-constexpr double kUnitTolerance = 1e-3;  // quaternions are rounded to 6 digits
 
 KeyframeId read_keyframe(TextFields& fields) {
   const auto robot = fields.integer("robot", std::numeric_limits<RobotId>::max());

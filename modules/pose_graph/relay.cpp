@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "modules/core/bytes.hpp"
+
 namespace km {
 namespace {
 
@@ -16,13 +18,6 @@ constexpr std::size_t kRememberedCopies = 256;
 // Of what is told to all.
 std::uint32_t number_of(const TeamMessage& message) {
   return std::visit([](const auto& m) { return m.number; }, message);
-}
-
-void mix(std::uint64_t& hash, std::uint64_t value) {  // FNV-1a, bytewise
-  for (int byte = 0; byte < 8; ++byte) {
-    hash ^= (value >> (8 * byte)) & 0xffU;
-    hash *= 0x100000001b3ULL;
-  }
 }
 
 }  // namespace
@@ -169,7 +164,7 @@ std::uint64_t Relay::holds() const {
       if (!origin.newest[kind]) continue;
       for (const std::uint64_t value : {std::uint64_t{robot}, origin.boot, std::uint64_t{kind},
                                         std::uint64_t{origin.newest[kind]->number}})
-        mix(hash, value);
+        mix_fnv1a(hash, value);
     }
   return hash;
 }

@@ -27,7 +27,7 @@ constexpr std::size_t kPairBytes = 1 + 1 + 1 + 8;
 constexpr std::size_t kPoseBytes = 1 + 7 * 4;
 constexpr std::size_t kVerdictBytes = 4;
 
-class Writer {
+class MessageWriter {
  public:
   std::vector<std::uint8_t> message(const TeamMessage& message) {
     out_.u8(static_cast<std::uint8_t>(message.index()));
@@ -152,9 +152,9 @@ class Writer {
 };
 
 // Reads one message; the first thing that is wrong is the reason of the refusal.
-class Reader {
+class MessageReader {
  public:
-  explicit Reader(std::span<const std::uint8_t> bytes) : in_(bytes) {}
+  explicit MessageReader(std::span<const std::uint8_t> bytes) : in_(bytes) {}
 
   Decoded<TeamMessage> message() {
     switch (in_.u8()) {
@@ -402,12 +402,12 @@ class Reader {
 }  // namespace
 
 std::vector<std::uint8_t> encode(const TeamMessage& message) {
-  return Writer().message(message);
+  return MessageWriter().message(message);
 }
 
 Decoded<TeamMessage> decode_team_message(std::span<const std::uint8_t> bytes) {
   if (bytes.size() > kMaxTeamMessageBytes) return Decoded<TeamMessage>::refuse("too long");
-  return Reader(bytes).message();
+  return MessageReader(bytes).message();
 }
 
 }  // namespace km

@@ -15,7 +15,7 @@ constexpr std::uint8_t kUp = 1;
 constexpr std::uint8_t kDown = 2;
 constexpr std::size_t kMaxElements = 1U << 24U;
 
-class Writer : public ByteWriter {
+class LetterWriter : public ByteWriter {
  public:
   void id(const KeyframeId& k) {
     varint(k.robot);
@@ -30,7 +30,7 @@ class Writer : public ByteWriter {
   }
 };
 
-class Reader : public ByteReader {
+class LetterReader : public ByteReader {
  public:
   using ByteReader::ByteReader;
   KeyframeId id() {
@@ -75,7 +75,7 @@ bool below(const PairVote& x, const PairVote& y) {
   return std::pair(x.a, x.b) < std::pair(y.a, y.b);
 }
 
-void write(Writer& w, const TreeSums& s) {
+void write(LetterWriter& w, const TreeSums& s) {
   for (const double x : {s.base_cost, s.cost, s.decrement}) w.f64(x);
   w.f32(s.largest);
   for (const std::uint32_t n : {s.open, s.changed, s.fractional, s.isolated, s.fixed, s.poses})
@@ -93,7 +93,7 @@ void write(Writer& w, const TreeSums& s) {
   }
 }
 
-TreeSums read_sums(Reader& r) {
+TreeSums read_sums(LetterReader& r) {
   TreeSums s;
   for (double* x : {&s.base_cost, &s.cost, &s.decrement}) *x = r.number();
   s.largest = r.small_number();
@@ -125,7 +125,7 @@ std::vector<bool> present_blocks(const TreeSystem& system) {
   return present;
 }
 
-void write(Writer& w, const TreeSystem& system) {
+void write(LetterWriter& w, const TreeSystem& system) {
   const Index B = system.schur.block();
   w.u8(static_cast<std::uint8_t>(B));
   w.varint(system.variables.size());
@@ -165,7 +165,7 @@ void write(Writer& w, const TreeSystem& system) {
   }
 }
 
-void read_blocks(Reader& r, TreeSystem& system, Index B) {
+void read_blocks(LetterReader& r, TreeSystem& system, Index B) {
   const std::size_t n = system.variables.size();
   const std::size_t blocks = n + system.pairs.size();
   const auto bits = r.bytes((blocks + 7) / 8);
@@ -193,7 +193,7 @@ void read_blocks(Reader& r, TreeSystem& system, Index B) {
     if (present(k) != (k < blocks && nonzero[k])) r.fail();
 }
 
-void read_edges(Reader& r, TreeSystem& system) {
+void read_edges(LetterReader& r, TreeSystem& system) {
   for (std::size_t n = r.count(kMaxElements, 41); n > 0; --n) {
     ToldEdge e;
     const std::uint64_t code = r.varint();
@@ -214,7 +214,7 @@ void read_edges(Reader& r, TreeSystem& system) {
   }
 }
 
-std::optional<TreeSystem> read_system(Reader& r) {
+std::optional<TreeSystem> read_system(LetterReader& r) {
   TreeSystem system;
   const Index B = r.u8();
   if (B != 3 && B != 6) r.fail();
@@ -272,7 +272,7 @@ void TreeSums::add(const TreeSums& other) {
 }
 
 std::vector<std::uint8_t> encode(const UpLetter& letter) {
-  Writer w;
+  LetterWriter w;
   w.u8(kUp);
   w.varint(letter.round);
   w.u8(letter.failed ? 1 : 0);
@@ -290,7 +290,7 @@ std::vector<std::uint8_t> encode(const UpLetter& letter) {
 }
 
 std::optional<UpLetter> decode_up(std::span<const std::uint8_t> bytes) {
-  Reader r(bytes);
+  LetterReader r(bytes);
   if (r.u8() != kUp) return std::nullopt;
   UpLetter letter{.round = r.varint_as<std::uint32_t>(), .sums = {}};
   letter.failed = r.flag();
@@ -306,7 +306,7 @@ std::optional<UpLetter> decode_up(std::span<const std::uint8_t> bytes) {
 
 std::vector<std::uint8_t> encode(const DownLetter& letter) {
   const TreeVerdict& v = letter.verdict;
-  Writer w;
+  LetterWriter w;
   w.u8(kDown);
   w.varint(v.round);
   w.u8(static_cast<std::uint8_t>(v.next));
@@ -321,7 +321,7 @@ std::vector<std::uint8_t> encode(const DownLetter& letter) {
 }
 
 std::optional<DownLetter> decode_down(std::span<const std::uint8_t> bytes) {
-  Reader r(bytes);
+  LetterReader r(bytes);
   if (r.u8() != kDown) return std::nullopt;
   DownLetter letter;
   TreeVerdict& v = letter.verdict;

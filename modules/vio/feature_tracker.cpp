@@ -15,7 +15,7 @@
 namespace km {
 namespace {
 
-constexpr float kMinCorrelation = 0.85F;   // Of a track with the patch it began with.
+constexpr float kMinPatchCorrelation = 0.85F;   // Of a track with the patch it began with.
 constexpr float kMaxCorrectionPx = 2.0F;   // By which the patch may correct KLT.
 constexpr int kSearchEvery = 4;            // Images, for features that stereo has not found.
 constexpr double kMaxInverseDepth = 20.0;  // [1/m]; a carried depth beyond is no use.
@@ -226,7 +226,7 @@ void FeatureTracker::align(std::vector<Step>& steps, const ImagePyramid& left,
 
 bool FeatureTracker::place_on_patch(Track& track, const ImagePyramid& left) const {
   const auto found = track.patch->align(left.level(0), track.px, track.A);
-  if (!found || found->correlation < kMinCorrelation ||
+  if (!found || found->correlation < kMinPatchCorrelation ||
       (found->px - track.px).norm() > kMaxCorrectionPx) {
     return false;
   }

@@ -9,7 +9,7 @@
 namespace km {
 namespace {
 
-constexpr float kMinCorrelation = 0.8F;        // Of a match, full resolution.
+constexpr float kMinStereoCorrelation = 0.8F;        // Of a match, full resolution.
 constexpr float kMinSearchCorrelation = 0.7F;  // Half resolution, whole pixels.
 // The second best place must be this much less similar. A fence or a net has many alike.
 constexpr float kMinDistinction = 0.05F;
@@ -108,7 +108,7 @@ std::optional<StereoMatch> StereoMatcher::match_one(const ImagePyramid& left,
       local_warp(rig_.cameras[0], rig_.cameras[1], query.left, start->inverse_depth, T_right_left_);
   const std::optional<PatchAlignment> found =
       patch ? patch->align(right.level(0), start->right_px, A) : std::nullopt;
-  if (!found || found->correlation < kMinCorrelation) {
+  if (!found || found->correlation < kMinStereoCorrelation) {
     ++statistics_.dissimilar;
     return std::nullopt;
   }

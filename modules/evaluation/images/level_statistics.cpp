@@ -14,7 +14,6 @@ constexpr double kFlatGradient = 2.0;
 constexpr double kStrongGradient = 10.0;
 constexpr int kSaturated = 254;  // JPEG leaves 254 of a saturated 255
 constexpr int kDark = 16;
-constexpr double kMadToSigma = 1.0 / 0.6745;  // of a normal distribution
 
 // Level at which a share `p` of the histogram's pixels is passed, as the centre of its bin.
 double histogram_quantile(const std::array<std::uint64_t, 4096>& histogram, double p) {

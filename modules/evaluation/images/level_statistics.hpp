@@ -10,6 +10,9 @@
 
 namespace km {
 
+/// Standard deviation over the median absolute deviation, of a normal distribution.
+inline constexpr double kMadToSigma = 1.0 / 0.6745;
+
 /// Size of the gradient of an 8-bit image, per pixel [levels/px]: Sobel 3x3 over 8, as CV_32F.
 [[nodiscard]] cv::Mat gradient_magnitude(const cv::Mat& image);
 

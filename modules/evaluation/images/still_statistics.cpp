@@ -11,13 +11,12 @@ namespace km {
 namespace {
 
 constexpr double kLag_s = 1.0;
-constexpr double kLagTolerance_s = 0.1;
+constexpr double kStillLagTolerance_s = 0.1;
 constexpr double kCompareEvery_s = 0.5;
 constexpr double kMaxFlow_px = 0.1;
 constexpr double kReturns_px = 1.0;
-constexpr double kFlatGradient = 3.0;         // [levels/px]
+constexpr double kFlatStillGradient = 3.0;         // [levels/px]
 constexpr double kFlatGradientWithin = 2.0;   // as for single images
-constexpr double kMadToSigma = 1.0 / 0.6745;  // of a normal distribution
 constexpr std::size_t kMinCorners = 20;
 
 double robust_sigma(std::vector<double> values) {
@@ -35,8 +34,8 @@ void StillStatistics::add(Stamp stamp, const KltImage& image,
     last_compared_ = 0;
   }
   const auto age_s = [&](const Kept& kept) { return seconds_between(kept.stamp, stamp); };
-  while (!kept_.empty() && age_s(kept_.front()) > kLag_s + kLagTolerance_s) kept_.pop_front();
-  if (!kept_.empty() && age_s(kept_.front()) >= kLag_s - kLagTolerance_s &&
+  while (!kept_.empty() && age_s(kept_.front()) > kLag_s + kStillLagTolerance_s) kept_.pop_front();
+  if (!kept_.empty() && age_s(kept_.front()) >= kLag_s - kStillLagTolerance_s &&
       seconds_between(last_compared_, stamp) >= kCompareEvery_s) {
     last_compared_ = stamp;
     compare(kept_.front(), image);
@@ -71,7 +70,7 @@ void StillStatistics::add_noise(const cv::Mat& before, const cv::Mat& image) {
     const auto* const a = before.ptr<std::uint8_t>(y);
     const auto* const b = image.ptr<std::uint8_t>(y);
     for (int x = 1; x + 1 < image.cols; ++x) {
-      if (slope[x] >= kFlatGradient) continue;
+      if (slope[x] >= kFlatStillGradient) continue;
       const int difference = std::abs(int{b[x]} - int{a[x]});
       ++histogram[static_cast<std::size_t>(difference)];
       const double square = difference * difference;

@@ -4,12 +4,11 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "modules/core/geometry.hpp"
 #include "modules/core/text_table.hpp"
 
 namespace km {
 namespace {
-
-constexpr double kDegrees = 180.0 / M_PI;
 
 using Rows = std::vector<std::vector<std::string>>;
 

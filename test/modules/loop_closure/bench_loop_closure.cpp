@@ -19,7 +19,6 @@
 namespace km {
 namespace {
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr double kGross_m = 0.5;
 constexpr double kGross_deg = 10.0;
 constexpr double kQuantile95 = 12.592;  // chi-squared, 6 degrees of freedom

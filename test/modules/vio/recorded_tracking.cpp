@@ -185,7 +185,7 @@ ReprojectionErrors reprojection_errors(const Recording& recording, const Trackin
     for (const DepthPair& pair : pairs) fitted.push_back(f * reprojection_distance(pair, *fit));
     const SE3 error = truth.inverse() * *fit;
     fit_translation.push_back(1e3 * error.translation().norm());
-    fit_rotation.push_back(angle_of(error.linear()) * 180.0 / std::numbers::pi);
+    fit_rotation.push_back(kDegrees * angle_of(error.linear()));
   }
   return {summarize(std::move(left)), summarize(std::move(right)), summarize(std::move(fitted)),
           summarize(std::move(fit_translation)).median_px,
