@@ -93,6 +93,10 @@ Vector6 local_coordinates(const SE3& from, const SE3& to) {
   return delta;
 }
 
+Eigen::Matrix3d turn_to_z(const Eigen::Vector3d& up) {
+  return Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+}
+
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& M) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Vector3d signs = Eigen::Vector3d::Ones();

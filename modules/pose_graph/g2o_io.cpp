@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <unordered_set>
 
+#include "modules/core/lie.hpp"
 #include "modules/pose_graph/text_fields.hpp"
 
 namespace km {
@@ -226,9 +227,8 @@ void write_vertical(std::ostream& out, const G2oVertical& prior) {
   if (!(std::abs(up.norm() - 1.0) <= kUnitTolerance) || !(sigma > 0.0) || !std::isfinite(sigma))
     throw std::invalid_argument("write_g2o: the vertical of " + to_string(prior.id) +
                                 " is not a unit vector with a positive sigma");
-  const auto R = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
   out << "EDGE_SE3_PRIOR " << key_of_keyframe(prior.id) << " 0";
-  write_pose(out, make_pose(R.toRotationMatrix(), Eigen::Vector3d::Zero()));
+  write_pose(out, make_pose(turn_to_z(up), Eigen::Vector3d::Zero()));
   write_information(out, tilt_information(up.normalized()) / (sigma * sigma));
 }
 

@@ -12,7 +12,8 @@
 
 namespace km {
 
-/// How far a quaternion or a direction in a file may be from unit length: some are rounded to 6 digits.
+/// How far a quaternion or a direction in a file may be from unit length: some are rounded to 6
+/// digits.
 inline constexpr double kUnitTolerance = 1e-3;
 
 /// Takes the fields of one row in turn. Every failure throws std::runtime_error that begins with

@@ -1,7 +1,6 @@
 #include "modules/pose_graph/vertical_prior.hpp"
 
-#include <Eigen/Geometry>
-
+#include "modules/core/lie.hpp"
 #include "modules/pose_graph/stiefel.hpp"
 
 namespace km {
@@ -15,8 +14,7 @@ std::vector<SE3> levelled(std::vector<SE3> poses, std::span<const VerticalPrior>
   for (const VerticalPrior& prior : priors)
     up += prior.weight * (poses[static_cast<std::size_t>(prior.pose)].linear() * prior.up);
   if (up.isZero(0.0)) return poses;
-  const auto R = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
-  const SE3 turn = make_pose(R.toRotationMatrix(), Eigen::Vector3d::Zero());
+  const SE3 turn = make_pose(turn_to_z(up), Eigen::Vector3d::Zero());
   for (SE3& pose : poses) pose = turn * pose;
   return poses;
 }

@@ -15,10 +15,10 @@
 namespace km {
 namespace {
 
-constexpr float kMinPatchCorrelation = 0.85F;   // Of a track with the patch it began with.
-constexpr float kMaxCorrectionPx = 2.0F;   // By which the patch may correct KLT.
-constexpr int kSearchEvery = 4;            // Images, for features that stereo has not found.
-constexpr double kMaxInverseDepth = 20.0;  // [1/m]; a carried depth beyond is no use.
+constexpr float kMinPatchCorrelation = 0.85F;  // Of a track with the patch it began with.
+constexpr float kMaxCorrectionPx = 2.0F;       // By which the patch may correct KLT.
+constexpr int kSearchEvery = 4;                // Images, for features that stereo has not found.
+constexpr double kMaxInverseDepth = 20.0;      // [1/m]; a carried depth beyond is no use.
 constexpr float kMinSpacing = 0.4F;  // Of min_distance_px: tracks may come nearer than corners.
 
 std::vector<cv::Point2f> to_cv(std::span<const Eigen::Vector2f> points) {

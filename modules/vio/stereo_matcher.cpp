@@ -9,7 +9,7 @@
 namespace km {
 namespace {
 
-constexpr float kMinStereoCorrelation = 0.8F;        // Of a match, full resolution.
+constexpr float kMinStereoCorrelation = 0.8F;  // Of a match, full resolution.
 constexpr float kMinSearchCorrelation = 0.7F;  // Half resolution, whole pixels.
 // The second best place must be this much less similar. A fence or a net has many alike.
 constexpr float kMinDistinction = 0.05F;

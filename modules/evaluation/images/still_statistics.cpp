@@ -15,8 +15,8 @@ constexpr double kStillLagTolerance_s = 0.1;
 constexpr double kCompareEvery_s = 0.5;
 constexpr double kMaxFlow_px = 0.1;
 constexpr double kReturns_px = 1.0;
-constexpr double kFlatStillGradient = 3.0;         // [levels/px]
-constexpr double kFlatGradientWithin = 2.0;   // as for single images
+constexpr double kFlatStillGradient = 3.0;   // [levels/px]
+constexpr double kFlatGradientWithin = 2.0;  // as for single images
 constexpr std::size_t kMinCorners = 20;
 
 double robust_sigma(std::vector<double> values) {

@@ -161,7 +161,6 @@ TEST_CASE("The error of a real estimate agrees with an independent computation",
   CHECK(similar.joint.position_m.rmse == Approx(0.0133902).margin(1e-7));
 }
 
-
 // `count` pairs of a truth and an estimate of it.
 template <typename Truth, typename Estimate>
 std::vector<PosePair> pairs_of(int count, const Truth& truth, const Estimate& estimate) {

@@ -163,9 +163,7 @@ TEST_CASE("What Lanczos cannot see is not certified for that", "[pose_graph]") {
   for (double& v : start) v = normal(rng);
   std::vector<SE3> frames;
   for (Eigen::Index i = 0; i < kPoses; ++i) {
-    const auto D =
-        Eigen::Quaterniond::FromTwoVectors(start.segment<3>(4 * i), Eigen::Vector3d::UnitZ());
-    frames.push_back(make_pose(D.toRotationMatrix(), Eigen::Vector3d::Zero()));
+    frames.push_back(make_pose(turn_to_z(start.segment<3>(4 * i)), Eigen::Vector3d::Zero()));
   }
   std::vector<BlockEdge> edges = ring.graph.edges;
   std::vector<SE3> poses = ring.wound;
