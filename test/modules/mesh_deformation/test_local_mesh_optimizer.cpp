@@ -191,30 +191,30 @@ TEST_CASE("An empty mesh is deformed to an empty mesh", "[mesh_deformation]") {
 }
 
 TEST_CASE("Input that cannot be used is refused by name", "[mesh_deformation]") {
-  struct Input {
+  struct Call {
     MapMesh map = sheet(kSheet);
     std::vector<SE3> keyframes = keyframes_above(kSheet), optimised = keyframes;
   };
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   const auto check_refusal = [](const char* reason, const auto& spoil) {
-    Input input;
+    Call input;
     spoil(input);
     CHECK_THAT(refusal(input.map, input.keyframes, input.optimised), Contains(reason));
   };
   check_refusal("optimised pose of keyframe 3",
-                [](Input& in) { in.optimised[3].translation().y() = double{kNan}; });
-  check_refusal("odometry pose of keyframe 2", [](Input& in) { in.keyframes[2].linear() *= 1.01; });
-  check_refusal("odometry pose of keyframe 2", [](Input& in) { in.keyframes[2].linear() *= -1.0; });
-  check_refusal("optimised poses for", [](Input& in) { in.optimised.push_back(SE3::Identity()); });
-  check_refusal("0 optimised poses", [](Input& in) { in.optimised.clear(); });
-  check_refusal("vertex 4", [](Input& in) { in.map.mesh.vertices[4].x() = kNan; });
-  check_refusal("vertex 4", [](Input& in) { in.map.mesh.vertices[4].x() = 1e30F; });
-  check_refusal("vertex 5 was seen by keyframes", [](Input& in) { in.map.seen_by[5][1] = 1000; });
-  check_refusal("vertex 5 was seen by keyframes", [](Input& in) { in.map.seen_by[5] = {3, 2}; });
-  check_refusal("seen_by has", [](Input& in) { in.map.seen_by.pop_back(); });
-  check_refusal("face 1 names vertex", [](Input& in) { in.map.mesh.faces[1][2] = 1U << 30U; });
+                [](Call& in) { in.optimised[3].translation().y() = double{kNan}; });
+  check_refusal("odometry pose of keyframe 2", [](Call& in) { in.keyframes[2].linear() *= 1.01; });
+  check_refusal("odometry pose of keyframe 2", [](Call& in) { in.keyframes[2].linear() *= -1.0; });
+  check_refusal("optimised poses for", [](Call& in) { in.optimised.push_back(SE3::Identity()); });
+  check_refusal("0 optimised poses", [](Call& in) { in.optimised.clear(); });
+  check_refusal("vertex 4", [](Call& in) { in.map.mesh.vertices[4].x() = kNan; });
+  check_refusal("vertex 4", [](Call& in) { in.map.mesh.vertices[4].x() = 1e30F; });
+  check_refusal("vertex 5 was seen by keyframes", [](Call& in) { in.map.seen_by[5][1] = 1000; });
+  check_refusal("vertex 5 was seen by keyframes", [](Call& in) { in.map.seen_by[5] = {3, 2}; });
+  check_refusal("seen_by has", [](Call& in) { in.map.seen_by.pop_back(); });
+  check_refusal("face 1 names vertex", [](Call& in) { in.map.mesh.faces[1][2] = 1U << 30U; });
   check_refusal("ids do not ascend at vertex 2",
-                [](Input& in) { std::swap(in.map.ids[1], in.map.ids[2]); });
+                [](Call& in) { std::swap(in.map.ids[1], in.map.ids[2]); });
 }
 
 TEST_CASE("A refused call leaves the optimizer as it was", "[mesh_deformation]") {

@@ -337,7 +337,7 @@ TEST_CASE("The tool trains on real images and tells the two places apart", "[pla
                                        left(k) + " --json " + json.string());
     REQUIRE(run.exit_code == 0);
     const std::string text = folder.read("score.json");
-    const std::string key = "\"pair_score\": ";
+    const std::string key = "\"pair_score\":";
     return std::stod(text.substr(text.find(key) + key.size()));
   };
   CHECK(score_of(2, 2) == Approx(1.0).margin(1e-5));
