@@ -75,12 +75,14 @@ inline SE3 bend(const SE3& T, double radius_m) {
 
 inline std::vector<SE3> bent(const std::vector<SE3>& poses, double radius_m) {
   std::vector<SE3> result;
+  result.reserve(poses.size());
   for (const SE3& pose : poses) result.push_back(bend(pose, radius_m));
   return result;
 }
 
 inline std::vector<SE3> moved(const SE3& T, const std::vector<SE3>& poses) {
   std::vector<SE3> result;
+  result.reserve(poses.size());
   for (const SE3& pose : poses) result.push_back(T * pose);
   return result;
 }
