@@ -144,8 +144,11 @@ class Drawing {
 
   // Calls use(tick) for those of an axis.
   static void for_each_tick(const Axis& axis, const auto& use) {
-    for (double tick = axis.first; tick <= axis.high + 0.01 * axis.step; tick += axis.step)
-      use(tick);
+    for (int k = 0;; ++k) {
+      const double tick = axis.first + k * axis.step;
+      if (tick > axis.high + 0.01 * axis.step) return;
+      use(std::abs(tick) < 1e-9 * axis.step ? 0.0 : tick);  // nor -0, nor what rounding leaves
+    }
   }
 
   void draw_axes() {

@@ -86,5 +86,12 @@ TEST_CASE("A map has one scale for both axes", "[plot]") {
   CHECK_THAT(draw_plots({&map, 1}), Contains("M85.8,155.5 L614.2,49.8"));
 }
 
+TEST_CASE("Zero is a zero on axes with negative ends", "[plot]") {
+  const Plot map{.is_map = true, .series = {{.name = "", .points = {{-0.1, -3.1}, {3.0, 1.0}}}}};
+  const std::string svg = draw_plots({&map, 1});
+  CHECK_THAT(svg, Contains(">0<") && Contains(">-1<"));
+  CHECK_THAT(svg, !Contains(">-0<") && !Contains("e-1"));
+}
+
 }  // namespace
 }  // namespace km
