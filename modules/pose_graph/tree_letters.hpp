@@ -91,7 +91,7 @@ struct UpLetter {
 /// What the root has made of a round.
 struct TreeVerdict {
   enum class Next : std::uint8_t {
-    kStep,     ///< The poses at hand are accepted; here is the next step.
+    kStep,     ///< The poses at hand are accepted; here is the next step, to take times `scale`.
     kShorten,  ///< They are not: the last step, times `scale`.
     kRefresh,  ///< Back to the accepted poses, with fresh second derivatives.
     kStart,    ///< At the very beginning: set the weights and tell the equations.

@@ -20,7 +20,8 @@ namespace km {
 /// onto what concerns others, and the sums of cost and residuals; the root solves, decides, and
 /// down go the steps of the poses told: one round makes one Newton step of the whole team, exact
 /// but for single precision in second derivatives. A step counts once the next way up has brought
-/// the cost there: if it has risen, it is shortened. All decisions are the root's.
+/// the cost there: if it has risen, it is shortened; while weights change, the cost may rise by
+/// half, twice in a row. All decisions are the root's.
 ///
 /// Second derivatives hardly change (see edge_model.hpp): they are told anew only when the old ones
 /// slow down convergence (Shamanskii's variant of Newton's method). The first ones are

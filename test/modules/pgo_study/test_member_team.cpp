@@ -269,6 +269,10 @@ TEST_CASE("A team rejects false closures that agree with each other", "[pgo_stud
   check_clusters(kSphere, 3, 5, 1);
 }
 
+TEST_CASE("Many false closures that agree cost no more rounds than few", "[pgo_study]") {
+  check_clusters(kGarage, 3, 10, 1);
+}
+
 TEST_CASE("A team rejects random false closures, however many", "[.][slow][pgo_study]") {
   const std::string name = GENERATE(as<std::string>(), kSphere, kGarage);
   const std::size_t robots = GENERATE(3, 5);
