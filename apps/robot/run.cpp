@@ -155,7 +155,7 @@ class Watch {
         process_file_(open_result(options.output / "process.csv")),
         process_csv_(process_file_) {}
 
-  /// True when the robot may leave. Called ten times a second.
+  /// True when the robot may leave, or must: its id is another's. Called ten times a second.
   bool poll() {
     const double now_s = steady_now_s() - start_s_;
     const TrafficSnapshot traffic = robot_.bridge().traffic();
@@ -181,7 +181,7 @@ class Watch {
         robot_.expect_no_more_closures();
     });
     if (now_s - written_s_ >= kInterval_s) write(now_s, traffic);
-    return departure_.reason() != nullptr && said_goodbye(now_s);
+    return robot_.id_taken() || (departure_.reason() != nullptr && said_goodbye(now_s));
   }
 
   void finish() { write(seconds(), robot_.bridge().traffic()); }

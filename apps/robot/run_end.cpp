@@ -65,7 +65,7 @@ Verdict verdict_of(const RunEnd& end) {
   if (end.result.failure)
     return {kFailed, end.result.failure->node + ": " + end.result.failure->message};
   if (end.id_taken)
-    return {kFailed, "another robot claimed this robot's id " + std::to_string(end.robot) +
+    return {kFailed, "another robot has this robot's id " + std::to_string(end.robot) +
                          ": give every robot its own --robot, and run again"};
   if (end.result.interrupted) return {0, "interrupted"};
   if (end.images && end.images->with_pose == 0)

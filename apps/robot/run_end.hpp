@@ -63,7 +63,7 @@ struct ImageCounts {
 struct RunEnd {
   RobotId robot = 0;
   RunResult result;
-  bool id_taken = false;              ///< Another living robot claimed the same id meanwhile.
+  bool id_taken = false;              ///< Another living robot had the same id first.
   const char* departure = nullptr;    ///< Why the robot left its team, if it did.
   std::optional<ImageCounts> images;  ///< Absent for a robot without sensors.
 };

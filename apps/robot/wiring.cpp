@@ -186,7 +186,8 @@ void Robot::add_network(CrossingEnds meshes) {
   Topics& t = topics_;
   // All that crosses between robots: for what, and what its bytes are counted under.
   dds.exchange(t.bows, kEvent, kPlaceRecognition);
-  dds.exchange(t.requests, kRequest, kGeometricVerification);
+  // A request of 60 bytes is answered with up to 24 kB.
+  dds.exchange(t.requests, kRequest, kGeometricVerification, {}, {.per_second = 30, .burst = 60});
   dds.exchange(t.replies, kRequest, kGeometricVerification);
   dds.exchange(t.shared_closures, kEvent, kGeometricVerification);
   dds.exchange(t.shared_inlier_sets, kState, kPoseGraphOptimization);

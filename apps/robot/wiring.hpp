@@ -98,7 +98,7 @@ class Robot {
   [[nodiscard]] MeshFilesNode* mesh_files() { return mesh_files_; }
   /// Null unless meshes of the other robots are collected.
   [[nodiscard]] const TeamMeshNode* peer_meshes() const { return peer_meshes_; }
-  /// True if another living robot has claimed this robot's id.
+  /// True if another living robot had this robot's id first.
   [[nodiscard]] bool id_taken() const { return id_taken_; }
   [[nodiscard]] const NetworkInterface& interface() const { return participant_.interface(); }
   void set_settled(const Departure::Present& told) {

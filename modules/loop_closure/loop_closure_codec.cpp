@@ -102,20 +102,25 @@ KeyframeFeatures features_of(const km_wire_KeyframeReply& wire, WireKeypoints ke
 
 }  // namespace
 
+MessageKey Codec<KeyframeRequest>::key_of(const KeyframeRequest& request) {
+  return message_key({request.number});
+}
+
 Codec<KeyframeRequest>::Encoded Codec<KeyframeRequest>::encode(const KeyframeRequest& request) {
   Encoded encoded;
-  encoded.wire.robot = request.requester;
   encoded.wire.request = request.number;
   encoded.wire.keyframe = to_wire(request.keyframe);
   encoded.wire.own = request.own;
   return encoded;
 }
 
-Decoded<KeyframeRequest> Codec<KeyframeRequest>::decode(const Wire& wire) {
-  if (wire.robot != wire.header.robot)
-    return Decoded<KeyframeRequest>::refuse("asked in the name of another robot");
+Decoded<KeyframeRequest> Codec<KeyframeRequest>::decode(const Wire& wire, const Sender& writer) {
   return Decoded<KeyframeRequest>::accept(
-      {wire.robot, wire.request, from_wire(wire.keyframe), wire.own});
+      {writer.robot, wire.request, from_wire(wire.keyframe), wire.own});
+}
+
+MessageKey Codec<KeyframeReply>::key_of(const KeyframeReply& reply) {
+  return message_key({reply.keyframe.odometry.id.index, reply.number});
 }
 
 Codec<KeyframeReply>::Encoded Codec<KeyframeReply>::encode(const KeyframeReply& reply) {
@@ -141,9 +146,9 @@ Codec<KeyframeReply>::Encoded Codec<KeyframeReply>::encode(const KeyframeReply& 
   return encoded;
 }
 
-Decoded<KeyframeReply> Codec<KeyframeReply>::decode(const Wire& wire) {
+Decoded<KeyframeReply> Codec<KeyframeReply>::decode(const Wire& wire, const Sender& writer) {
   using Result = Decoded<KeyframeReply>;
-  if (wire.keyframe.robot != wire.header.robot)
+  if (wire.keyframe.robot != writer.robot)
     return Result::refuse("a keyframe of another robot than the writer");
   KeyframeReply reply{.number = wire.request, .found = wire.found, .keyframe = {}};
   reply.keyframe.odometry.id = from_wire(wire.keyframe);
@@ -164,13 +169,17 @@ Decoded<KeyframeReply> Codec<KeyframeReply>::decode(const Wire& wire) {
   return Result::accept(std::move(reply));
 }
 
+MessageKey Codec<Closure>::key_of(const Closure& closure) {
+  const KeyframeId& from = closure.from.id;
+  const KeyframeId& to = closure.to.id;
+  return message_key({from.robot, from.index, to.robot, to.index});
+}
+
 Codec<Closure>::Encoded Codec<Closure>::encode(const Closure& closure) {
   Encoded encoded;
   Wire& wire = encoded.wire;
-  wire.from = to_wire(closure.from.id);
-  wire.to = to_wire(closure.to.id);
-  wire.from_odometry = to_wire(closure.from);
-  wire.to_odometry = to_wire(closure.to);
+  wire.from = to_wire(closure.from);
+  wire.to = to_wire(closure.to);
   wire.T_from_to = to_wire(closure.T_from_to);
   wire.covariance = to_wire(closure.covariance);
   wire.inliers = static_cast<std::uint32_t>(std::max(0, closure.inliers));
@@ -178,15 +187,13 @@ Codec<Closure>::Encoded Codec<Closure>::encode(const Closure& closure) {
   return encoded;
 }
 
-Decoded<Closure> Codec<Closure>::decode(const Wire& wire) {
+Decoded<Closure> Codec<Closure>::decode(const Wire& wire, const Sender& writer) {
   using Result = Decoded<Closure>;
-  if (wire.from.robot != wire.header.robot)
+  if (wire.from.keyframe.robot != writer.robot)
     return Result::refuse("it starts from another robot than the writer");
-  const auto from = from_wire(wire.from_odometry);
-  const auto to = from_wire(wire.to_odometry);
+  const auto from = from_wire(wire.from);
+  const auto to = from_wire(wire.to);
   if (!from || !to) return Result::refuse("odometry is not a pose with a covariance");
-  if (from->id != from_wire(wire.from) || to->id != from_wire(wire.to))
-    return Result::refuse("odometry of another keyframe");
   if (from->id == to->id) return Result::refuse("a closure from a keyframe to itself");
   const auto T_from_to = from_wire(wire.T_from_to);
   const auto covariance = from_wire(wire.covariance);

@@ -21,13 +21,15 @@ struct Codec<KeyframeRequest> {
   using Wire = km_wire_KeyframeRequest;
   static constexpr const char* kTopic = "keyframe_requests";
   static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::size_t kMaxBytes = 64;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_KeyframeRequest_desc; }
 
   struct Encoded {
     Wire wire{};
   };
+  static MessageKey key_of(const KeyframeRequest& request);
   static Encoded encode(const KeyframeRequest& request);
-  static Decoded<KeyframeRequest> decode(const Wire& wire);
+  static Decoded<KeyframeRequest> decode(const Wire& wire, const Sender& writer);
 };
 
 /// Written by the owner of the keyframe. Bearings and inverse depths travel as 16-bit numbers in
@@ -37,14 +39,16 @@ struct Codec<KeyframeReply> {
   using Wire = km_wire_KeyframeReply;
   static constexpr const char* kTopic = "keyframe_replies";
   static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::size_t kMaxBytes = 1024 + 48 * kMaxKeypoints;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_KeyframeReply_desc; }
 
   struct Encoded {
     Wire wire{};
     std::vector<km_wire_Keypoint> keypoints;
   };
+  static MessageKey key_of(const KeyframeReply& reply);
   static Encoded encode(const KeyframeReply& reply);
-  static Decoded<KeyframeReply> decode(const Wire& wire);
+  static Decoded<KeyframeReply> decode(const Wire& wire, const Sender& writer);
 };
 
 /// Written by the robot that verified it, which owns the keyframe it starts from.
@@ -53,13 +57,15 @@ struct Codec<Closure> {
   using Wire = km_wire_Closure;
   static constexpr const char* kTopic = "closures";
   static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::size_t kMaxBytes = 1024;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_Closure_desc; }
 
   struct Encoded {
     Wire wire{};
   };
+  static MessageKey key_of(const Closure& closure);
   static Encoded encode(const Closure& closure);
-  static Decoded<Closure> decode(const Wire& wire);
+  static Decoded<Closure> decode(const Wire& wire, const Sender& writer);
 };
 
 }  // namespace km

@@ -45,13 +45,18 @@ bool are_positions_usable(float step_m, const km_wire_MeshCell& origin) {
 
 }  // namespace
 
+MessageKey Codec<MeshChunk>::key_of(const MeshChunk& chunk) {
+  const auto number = [](std::int32_t c) { return static_cast<std::uint32_t>(c); };
+  const auto& [x, y, z] = chunk.key.cell;
+  return message_key({number(x), number(y), number(z), chunk.key.part});
+}
+
 Codec<MeshChunk>::Encoded Codec<MeshChunk>::encode(const MeshChunk& chunk) {
   Encoded encoded;
   encoded.offsets = flat(chunk.offsets);
   encoded.faces = flat(chunk.faces);
   encoded.labels = chunk.labels;
   Wire& wire = encoded.wire;
-  wire.robot = chunk.key.robot;
   wire.cell = {.x = chunk.key.cell[0], .y = chunk.key.cell[1], .z = chunk.key.cell[2]};
   wire.part = chunk.key.part;
   wire.anchor = chunk.anchor;
@@ -63,10 +68,8 @@ Codec<MeshChunk>::Encoded Codec<MeshChunk>::encode(const MeshChunk& chunk) {
   return encoded;
 }
 
-Decoded<MeshChunk> Codec<MeshChunk>::decode(const Wire& wire) {
+Decoded<MeshChunk> Codec<MeshChunk>::decode(const Wire& wire, const Sender& writer) {
   using Result = Decoded<MeshChunk>;
-  if (wire.robot != wire.header.robot)
-    return Result::refuse("the mesh of another robot than the writer");
   const auto offsets = elements_of(wire.offsets, kMaxChunkBytes);
   const auto labels = elements_of(wire.labels, kMaxChunkBytes);
   const auto faces = elements_of(wire.faces, kMaxChunkBytes);
@@ -83,8 +86,8 @@ Decoded<MeshChunk> Codec<MeshChunk>::decode(const Wire& wire) {
   if (faces->empty() != offsets->empty()) return Result::refuse("vertices without faces");
   if (!are_positions_usable(wire.step_m, wire.origin))
     return Result::refuse("positions are not finite or too far away");
-  return Result::accept({.key = {wire.robot, {wire.cell.x, wire.cell.y, wire.cell.z}, wire.part},
-                         .boot = wire.header.boot,
+  return Result::accept({.key = {writer.robot, {wire.cell.x, wire.cell.y, wire.cell.z}, wire.part},
+                         .boot = writer.boot,
                          .anchor = wire.anchor,
                          .step_m = wire.step_m,
                          .origin = {wire.origin.x, wire.origin.y, wire.origin.z},

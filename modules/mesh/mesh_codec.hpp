@@ -18,6 +18,7 @@ struct Codec<MeshChunk> {
   using Wire = km_wire_MeshChunk;
   static constexpr const char* kTopic = "mesh_chunks";
   static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::size_t kMaxBytes = kMaxChunkBytes;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_MeshChunk_desc; }
 
   struct Encoded {
@@ -25,8 +26,9 @@ struct Codec<MeshChunk> {
     std::vector<std::uint16_t> offsets, faces;
     std::vector<std::uint8_t> labels;
   };
+  static MessageKey key_of(const MeshChunk& chunk);
   static Encoded encode(const MeshChunk& chunk);
-  static Decoded<MeshChunk> decode(const Wire& wire);
+  static Decoded<MeshChunk> decode(const Wire& wire, const Sender& writer);
 };
 
 }  // namespace km

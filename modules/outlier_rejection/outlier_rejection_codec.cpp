@@ -8,6 +8,10 @@
 
 namespace km {
 
+MessageKey Codec<InlierSet>::key_of(const InlierSet& set) {
+  return message_key({set.a, set.b});
+}
+
 Codec<InlierSet>::Encoded Codec<InlierSet>::encode(const InlierSet& set) {
   Encoded encoded;
   encoded.closures.reserve(set.closures.size());
@@ -20,10 +24,10 @@ Codec<InlierSet>::Encoded Codec<InlierSet>::encode(const InlierSet& set) {
   return encoded;
 }
 
-Decoded<InlierSet> Codec<InlierSet>::decode(const Wire& wire) {
+Decoded<InlierSet> Codec<InlierSet>::decode(const Wire& wire, const Sender& writer) {
   using Result = Decoded<InlierSet>;
   if (wire.a > wire.b) return Result::refuse("the pair is not in ascending order");
-  if (wire.header.robot != wire.a) return Result::refuse("decided by another robot than the lower");
+  if (writer.robot != wire.a) return Result::refuse("decided by another robot than the lower");
   const auto closures = elements_of(wire.closures, kMaxInliers);
   if (!closures) return Result::refuse("closures are missing or too many");
 

@@ -20,14 +20,16 @@ struct Codec<InlierSet> {
   using Wire = km_wire_InlierSet;
   static constexpr const char* kTopic = "inlier_sets";
   static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::size_t kMaxBytes = 64 + 12 * kMaxInliers;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_InlierSet_desc; }
 
   struct Encoded {
     Wire wire{};
     std::vector<km_wire_ClosureRef> closures;
   };
+  static MessageKey key_of(const InlierSet& set);
   static Encoded encode(const InlierSet& set);
-  static Decoded<InlierSet> decode(const Wire& wire);
+  static Decoded<InlierSet> decode(const Wire& wire, const Sender& writer);
 };
 
 }  // namespace km

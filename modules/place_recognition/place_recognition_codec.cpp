@@ -57,6 +57,10 @@ std::optional<BagOfWords> unpack(std::span<const std::uint8_t> bytes) {
   return bits.ended() ? std::optional(std::move(bag)) : std::nullopt;
 }
 
+MessageKey Codec<KeyframeBow>::key_of(const KeyframeBow& message) {
+  return message_key({message.id.index});
+}
+
 Codec<KeyframeBow>::Encoded Codec<KeyframeBow>::encode(const KeyframeBow& message) {
   Encoded encoded;
   encoded.bag = pack(message.words);
@@ -68,8 +72,8 @@ Codec<KeyframeBow>::Encoded Codec<KeyframeBow>::encode(const KeyframeBow& messag
   return encoded;
 }
 
-Decoded<KeyframeBow> Codec<KeyframeBow>::decode(const Wire& wire) {
-  if (wire.keyframe.robot != wire.header.robot)
+Decoded<KeyframeBow> Codec<KeyframeBow>::decode(const Wire& wire, const Sender& writer) {
+  if (wire.keyframe.robot != writer.robot)
     return Decoded<KeyframeBow>::refuse("a keyframe of another robot than the writer");
   const auto packed = elements_of(wire.bag, kMaxPackedBytes);
   if (!packed) return Decoded<KeyframeBow>::refuse("words are missing or too many");

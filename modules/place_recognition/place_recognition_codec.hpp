@@ -29,14 +29,16 @@ struct Codec<KeyframeBow> {
   using Wire = km_wire_WordBag;
   static constexpr const char* kTopic = "word_bags";
   static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::size_t kMaxBytes = 1U << 18U;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_WordBag_desc; }
 
   struct Encoded {
     Wire wire{};
     std::vector<std::uint8_t> bag;
   };
+  static MessageKey key_of(const KeyframeBow& message);
   static Encoded encode(const KeyframeBow& message);
-  static Decoded<KeyframeBow> decode(const Wire& wire);
+  static Decoded<KeyframeBow> decode(const Wire& wire, const Sender& writer);
 };
 
 }  // namespace km

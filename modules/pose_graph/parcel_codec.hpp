@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "modules/pose_graph/team_message_bytes.hpp"
 #include "modules/pose_graph/team_messages.hpp"
 #include "runtime/dds/codec.hpp"
 
@@ -25,14 +26,16 @@ struct Codec<TeamParcel> {
   using Wire = km_wire_TeamParcel;
   static constexpr const char* kTopic = "team_parcels";
   static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::size_t kMaxBytes = kMaxTeamMessageBytes + 64;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_TeamParcel_desc; }
 
   struct Encoded {
     Wire wire{};
     std::vector<std::uint8_t> content;
   };
+  static MessageKey key_of(const TeamParcel& parcel);
   static Encoded encode(const TeamParcel& parcel);
-  static Decoded<TeamParcel> decode(const Wire& wire);
+  static Decoded<TeamParcel> decode(const Wire& wire, const Sender& writer);
 };
 
 }  // namespace km

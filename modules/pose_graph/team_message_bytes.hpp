@@ -13,7 +13,7 @@ namespace km {
 /// Messages with more are refused.
 inline constexpr std::size_t kMaxPublicPoses = 1U << 20U;
 /// No message is longer [bytes].
-inline constexpr std::size_t kMaxTeamMessageBytes = 1U << 26U;
+inline constexpr std::size_t kMaxTeamMessageBytes = 1U << 24U;
 
 /// The form in which a message crosses the network: a byte for its kind, then its members in order
 /// of declaration. Ids, indices and counts are varints, ascending ones as differences; public poses

@@ -15,6 +15,14 @@ constexpr std::size_t kSendQueue = 8192;
 constexpr std::chrono::seconds kAcknowledgementTime{2};
 constexpr dds_duration_t kWakeUp = DDS_MSECS(250);  // for what only time tells
 
+// What one peer may have waiting on a topic of this kind.
+QueueQuota quota_of(TopicKind kind, Pace pace) {
+  QueueQuota quota{.per_second = pace.per_second, .burst = pace.burst};
+  quota.newest_wins = kind == TopicKind::kStatus || kind == TopicKind::kState;
+  if (kind == TopicKind::kStatus) quota.messages = 8;
+  return quota;
+}
+
 // Attachment numbers of the wait set; incoming topics follow.
 constexpr dds_attach_t kOther = 0;
 constexpr dds_attach_t kFirstTopic = 1;
@@ -42,10 +50,11 @@ OutgoingTopic& DdsBridge::add_outgoing(TopicSpec spec) {
   return *outgoing_.back();
 }
 
-void DdsBridge::add_incoming(TopicSpec spec, bool addressed, IncomingTopic::HeaderOf header_of,
+void DdsBridge::add_incoming(TopicSpec spec, bool addressed, Pace pace,
                              IncomingTopic::Handler handler) {
+  const QueueQuota quota = quota_of(spec.kind, pace);
   incoming_.push_back(std::make_unique<IncomingTopic>(participant_, peers_, std::move(spec),
-                                                      addressed, header_of, std::move(handler)));
+                                                      addressed, quota, std::move(handler)));
   const auto number = kFirstTopic + static_cast<dds_attach_t>(incoming_.size() - 1);
   check_dds(dds_waitset_attach(waitset_.handle(), incoming_.back()->condition(), number),
             "cannot wait");
@@ -60,6 +69,8 @@ TrafficSnapshot DdsBridge::traffic() const {
 
 void DdsBridge::start() {
   sender_.start();
+  peers_.start();
+  for (const auto& topic : incoming_) topic->start();
   receiver_ = std::thread(&DdsBridge::receive_until_stopped, this);
 }
 
@@ -70,10 +81,16 @@ void DdsBridge::stop() noexcept {
   await_acknowledgements();
   dds_set_guardcondition(stop_request_.handle(), true);
   receiver_.join();
+  for (const auto& topic : incoming_) topic->stop();
+  peers_.stop();
 }
 
 std::exception_ptr DdsBridge::error() const {
-  return receive_failed_ ? receive_error_ : sender_.error();
+  if (receive_failed_) return receive_error_;
+  if (const auto error = sender_.error()) return error;
+  for (const auto& topic : incoming_)
+    if (const auto error = topic->error()) return error;
+  return peers_.error();
 }
 
 void DdsBridge::receive_until_stopped() try {
@@ -87,11 +104,12 @@ void DdsBridge::receive_until_stopped() try {
     dds_read_guardcondition(stop_request_.handle(), &stop);
     // Who is there comes before what they say.
     const double now_s = steady_now_s();
-    peers_.poll(now_s);
+    peers_.poll();
     const auto n = std::min(triggered.size(), static_cast<std::size_t>(count));
     for (std::size_t i = 0; i < n; ++i)
       if (triggered[i] >= kFirstTopic)
         incoming_[static_cast<std::size_t>(triggered[i] - kFirstTopic)]->take(now_s);
+    for (const auto& topic : incoming_) topic->recall(now_s);
   }
 } catch (...) {
   receive_error_ = std::current_exception();

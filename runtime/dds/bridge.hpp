@@ -3,8 +3,10 @@
 #include <atomic>
 #include <exception>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <thread>
 #include <type_traits>
@@ -12,6 +14,8 @@
 #include <vector>
 
 #include "runtime/dds/codec.hpp"
+#include "runtime/dds/envelope.hpp"
+#include "runtime/dds/fair_queue.hpp"
 #include "runtime/dds/incoming_topic.hpp"
 #include "runtime/dds/outgoing_topic.hpp"
 #include "runtime/dds/participant.hpp"
@@ -54,12 +58,21 @@ struct CrossingEnds {
   bool receive = true;
 };
 
+/// How many messages of each peer are handed on per second; more wait. For what is cheap to send
+/// and costly to answer.
+struct Pace {
+  double per_second = std::numeric_limits<double>::infinity();
+  double burst = 1.0;  ///< At once, after a silence.
+};
+
 /// Carries topics between robots: in-process Topic<T> <-> DDS topic, through Codec<T>.
 ///
 /// Wire it (exchange) before start(). What is published to the peers is encoded and written on the
 /// bridge's sending thread: DDS never blocks here for want of a receiver (all kinds keep the last
 /// sample per key), but a thin link can hold up the socket, and no algorithm should wait for that.
-/// What is received is published on the bridge's receive thread, one for all topics.
+/// What is received is filed on the bridge's receive thread, which waits for nothing else, and
+/// published on a thread of each topic, in turn between the peers (see IncomingTopic): a node that
+/// is busy holds up what is for it, and a peer that sends much holds up itself.
 ///
 /// The bridge is the last of the nodes to stop: it then sends what is queued, and waits up to two
 /// seconds until the peers have acknowledged it.
@@ -73,7 +86,7 @@ class DdsBridge final : public Node {
   /// or, if it is addressed, each message with the robot it is for and no other.
   template <typename T, typename Sent>
   void exchange(Crossing<T, Sent>& crossing, TopicKind kind, TrafficCategory category,
-                CrossingEnds ends = {});
+                CrossingEnds ends = {}, Pace pace = {});
 
   /// Needs a crossing of kind kStatus: presence is its liveliness.
   [[nodiscard]] Peers& peers() { return peers_; }
@@ -91,8 +104,7 @@ class DdsBridge final : public Node {
   using Job = std::function<void()>;
 
   OutgoingTopic& add_outgoing(TopicSpec spec);
-  void add_incoming(TopicSpec spec, bool addressed, IncomingTopic::HeaderOf header_of,
-                    IncomingTopic::Handler handler);
+  void add_incoming(TopicSpec spec, bool addressed, Pace pace, IncomingTopic::Handler handler);
   void post(Job job) { sender_.post(std::move(job)); }
   void receive_until_stopped();
   void await_acknowledgements() noexcept;
@@ -114,9 +126,8 @@ namespace detail {
 
 template <typename T>
 void write_encoded(OutgoingTopic& topic, const T& message, std::optional<RobotId> to = {}) {
-  auto encoded = Codec<T>::encode(message);
-  encoded.wire.header.version = Codec<T>::kVersion;
-  topic.write(to, encoded.wire.header, &encoded.wire);
+  const auto encoded = Codec<T>::encode(message);
+  topic.write(to, Codec<T>::key_of(message), serialize(Codec<T>::descriptor(), &encoded.wire));
 }
 
 template <typename T>
@@ -124,12 +135,31 @@ void write_encoded(OutgoingTopic& topic, const Addressed<T>& message) {
   write_encoded(topic, *message.message, message.to);
 }
 
+// Publishes what `content` holds, or says why not.
+template <typename T>
+const char* publish_decoded(const Out<T>& to, const Sender& sender,
+                            std::span<const std::uint8_t> content, std::shared_ptr<void> token) {
+  struct Delivery {
+    T message;
+    std::shared_ptr<void> token;
+  };
+  WireSample sample(Codec<T>::descriptor());
+  if (!sample.read(content)) return "not deserializable";
+  using Wire = typename Codec<T>::Wire;
+  Decoded<T> decoded = Codec<T>::decode(*static_cast<const Wire*>(sample.get()), sender);
+  if (!decoded.value) return decoded.refusal;
+  const auto delivery =
+      std::make_shared<const Delivery>(std::move(*decoded.value), std::move(token));
+  to.publish(std::shared_ptr<const T>(delivery, &delivery->message));
+  return nullptr;
+}
+
 }  // namespace detail
 
 template <typename T, typename Sent>
 void DdsBridge::exchange(Crossing<T, Sent>& crossing, TopicKind kind, TrafficCategory category,
-                         CrossingEnds ends) {
-  const TopicSpec spec{Codec<T>::kTopic, &Codec<T>::descriptor(), kind, category};
+                         CrossingEnds ends, Pace pace) {
+  const TopicSpec spec{Codec<T>::kTopic, Codec<T>::kVersion, Codec<T>::kMaxBytes, kind, category};
   if (ends.send) {
     OutgoingTopic& topic = add_outgoing(spec);
     crossing.own_.subscribe([this, &topic](const std::shared_ptr<const Sent>& message) {
@@ -137,18 +167,11 @@ void DdsBridge::exchange(Crossing<T, Sent>& crossing, TopicKind kind, TrafficCat
     });
   }
   if (!ends.receive) return;
-  using Wire = typename Codec<T>::Wire;
-  const auto header_of = [](const void* wire) -> const km_wire_Header& {
-    return static_cast<const Wire*>(wire)->header;
-  };
-  const auto handler = [to = Out<T>(crossing.peers_)](const void* wire) -> const char* {
-    Decoded<T> decoded = Codec<T>::decode(*static_cast<const Wire*>(wire));
-    if (!decoded.value) return decoded.refusal;
-    to.publish(std::move(*decoded.value));
-    return nullptr;
-  };
   constexpr bool kAddressed = !std::is_same_v<T, Sent>;
-  add_incoming(spec, kAddressed, header_of, handler);
+  add_incoming(spec, kAddressed, pace,
+               [to = Out<T>(crossing.peers_)](const Sender& sender, auto content, auto token) {
+                 return detail::publish_decoded(to, sender, content, std::move(token));
+               });
 }
 
 }  // namespace km

@@ -3,14 +3,36 @@
 #include <dds/dds.h>
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <optional>
 #include <span>
 #include <type_traits>
 #include <vector>
 
+#include "modules/core/bytes.hpp"
 #include "modules/core/decoded.hpp"
+#include "modules/core/ids.hpp"
 
 namespace km {
+
+/// The process of a robot that wrote a message.
+struct Sender {
+  RobotId robot = 0;
+  std::uint64_t boot = 0;
+
+  auto operator<=>(const Sender&) const = default;
+};
+
+/// What tells a message apart from those that must not replace it: a hash. Only what its own
+/// sender keeps depends on it.
+using MessageKey = std::uint64_t;
+
+/// The key of a message that these numbers name.
+[[nodiscard]] inline MessageKey message_key(std::initializer_list<std::uint64_t> numbers) {
+  MessageKey key = 0xcbf29ce484222325ULL;  // FNV-1a's offset basis
+  for (const std::uint64_t number : numbers) mix_fnv1a(key, number);
+  return key;
+}
 
 /// How messages of type T travel between robots. Specialised by the module that owns T, in its
 /// <module>_codec.hpp:
@@ -20,14 +42,16 @@ namespace km {
 ///       using Wire = km_wire_InlierSet;                      // generated from idl/
 ///       static constexpr const char* kTopic = "inlier_sets"; // DDS topic name
 ///       static constexpr std::uint16_t kVersion = 1;         // of the wire type, idl/README.md
+///       static constexpr std::size_t kMaxBytes = 800000;     // a longer one is not even read
 ///       static const dds_topic_descriptor_t& descriptor() { return km_wire_InlierSet_desc; }
 ///
 ///       struct Encoded {                         // owns what `wire` points to; movable
 ///         Wire wire{};
 ///         std::vector<km_wire_ClosureRef> closures;
 ///       };
-///       static Encoded encode(const InlierSet&);  // all but wire.header, which the writer fills
-///       static Decoded<InlierSet> decode(const Wire&);  // trusts nothing; header is checked
+///       static MessageKey key_of(const InlierSet&);
+///       static Encoded encode(const InlierSet&);
+///       static Decoded<InlierSet> decode(const Wire&, const Sender&);  // trusts nothing in Wire
 ///     };
 template <typename T>
 struct Codec;

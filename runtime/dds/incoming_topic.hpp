@@ -1,89 +1,128 @@
 #pragma once
 
 #include <dds/ddsi/ddsi_serdata.h>
-#include <cstddef>
+#include <envelope.h>
+#include <atomic>
+#include <condition_variable>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <utility>
+#include <span>
+#include <string>
+#include <thread>
 #include <vector>
 
+#include "runtime/dds/fair_queue.hpp"
 #include "runtime/dds/outgoing_topic.hpp"
+#include "runtime/dds/sequence_tracker.hpp"
 
 namespace km {
 
-/// Which numbers of a counted stream have arrived, in whatever order: drops duplicates, counts
-/// gaps. Memory is bounded: of more than kMaxIntervals separate runs, the oldest are joined, and
-/// what lay between them stays missing for good.
-class SequenceTracker {
+/// How many messages are with their subscribers, so that the next waits with those of its peer
+/// instead of before those of others in a node's queue. Thread-safe.
+class InFlight : public std::enable_shared_from_this<InFlight> {
  public:
-  static constexpr std::size_t kMaxIntervals = 1024;
-
-  /// `from_zero`: the stream is expected whole, else from the lowest number that arrives.
-  explicit SequenceTracker(bool from_zero) : from_zero_(from_zero) {}
-
-  /// Records `number`. False if it had arrived before.
-  [[nodiscard]] bool is_new(std::uint32_t number);
-
-  /// How many numbers below the highest have not arrived (yet).
-  [[nodiscard]] std::uint64_t missing() const;
+  /// Waits until there is room, at most for a while: what a subscriber keeps must not stop the
+  /// rest. The one it counts is in flight until the token is gone.
+  [[nodiscard]] std::shared_ptr<void> enter();
 
  private:
-  bool from_zero_;
-  std::uint64_t lost_ = 0;                             // given up in joined runs
-  std::map<std::uint64_t, std::uint64_t> end_of_run_;  // begin -> end, half open, disjoint
+  void leave();
+
+  std::mutex mutex_;  // guards what follows
+  std::condition_variable left_;
+  int count_ = 0;
 };
 
-/// The receiving end of a topic. Everything that arrives is untrusted: what is not from an
-/// accepted peer, not new, or not decodable is counted by reason, logged at a limited rate, and
-/// goes no further. take() belongs to the receive thread; add_to() is thread-safe.
+/// The receiving end of a topic, in two steps. The gate, on the receive thread, knows of a message
+/// who wrote it and how long it is, and nothing else: it files what comes from a robot of the team,
+/// apart by robot, lets wait shortly what comes from one that is not known yet, and refuses all
+/// else. It never waits itself. Delivery, on the topic's own thread, reads what was filed, in turn
+/// between the robots, drops duplicates, and hands it to its subscribers.
+///
+/// Everything that arrives is untrusted: what is refused, and for want of room dropped, is counted
+/// by reason, logged at a limited rate, and goes no further.
 class IncomingTopic {
  public:
-  /// Gets a sample of the topic's C type; publishes it, or returns why not (a string literal).
-  using Handler = std::function<const char*(const void* wire)>;
-  /// The header inside a sample of the topic's C type.
-  using HeaderOf = const km_wire_Header& (*)(const void* wire);
+  /// Gets what a message carries; publishes it, or returns why not (a string literal). `token` is
+  /// to be held as long as subscribers are busy with it.
+  using Handler = std::function<const char*(
+      const Sender& sender, std::span<const std::uint8_t> content, std::shared_ptr<void> token)>;
 
   /// `addressed`: takes only what is sent to this robot alone, else only what is sent to all.
   IncomingTopic(const DdsParticipant& participant, Peers& peers, TopicSpec spec, bool addressed,
-                HeaderOf header_of, Handler handler);
+                const QueueQuota& quota, Handler handler);
+  ~IncomingTopic();
+
+  // The gate: for the receive thread.
 
   /// Triggers while there is something to take.
   [[nodiscard]] dds_entity_t condition() const { return condition_.handle(); }
-
-  /// Handles everything there is.
+  /// Files everything there is.
   void take(double now_s);
+  /// Files what has been waiting for its writer to be known. For now and then.
+  void recall(double now_s);
 
+  // Delivery.
+
+  void start();
+  /// What is still filed is dropped. Idempotent.
+  void stop() noexcept;
+  [[nodiscard]] std::exception_ptr error() const { return failed_ ? error_ : nullptr; }
+
+  /// Thread-safe.
   void add_to(TrafficSnapshot& snapshot) const;
 
  private:
-  using Stream = std::pair<RobotId, std::uint64_t>;  // robot and boot
+  struct SerdataDeleter {
+    void operator()(ddsi_serdata* data) const { ddsi_serdata_unref(data); }
+  };
+  using Serdata = std::unique_ptr<ddsi_serdata, SerdataDeleter>;
+  struct Filed {
+    Serdata serialized;
+    Sender sender;
+  };
+  struct Waiting {
+    Serdata serialized;
+    Guid writer{};
+    double since_s = 0.0;
+  };
 
-  void handle(const ddsi_serdata& serialized, dds_instance_handle_t writer, double now_s);
-  const char* accept(const void* wire, std::uint64_t size, dds_instance_handle_t writer,
-                     double now_s);
-  const char* check_sender(const km_wire_Header& header, dds_instance_handle_t writer,
-                           double now_s);
-  std::optional<Guid> participant_of(dds_instance_handle_t writer);
-  bool is_new(const km_wire_Header& header);
+  DdsEntity make_reader(bool addressed);
+  void arrive(Serdata serialized, dds_instance_handle_t writer, double now_s);
+  bool admit(Serdata& serialized, const Guid& writer, double now_s);
+  void hear_twin(const ddsi_serdata& serialized, const Guid& writer, double now_s);
+  void deliver_until_stopped();
+  const char* deliver(const Filed& filed);
+  const char* accept(const km_wire_Envelope& envelope, const Sender& sender, std::uint64_t size);
+  bool is_new(const Sender& sender, std::uint32_t number);
+  void refuse(const char* reason);
 
   const DdsParticipant& participant_;
   Peers& peers_;
   TopicSpec spec_;
-  HeaderOf header_of_;
   Handler handler_;
-  std::vector<std::max_align_t> sample_;                         // one C sample, reused
-  std::map<dds_instance_handle_t, Guid> participant_of_writer_;  // receive thread only
+  WriterBook writers_;
+  std::deque<Waiting> waiting_;    // receive thread only
+  std::optional<double> first_s_;  // likewise: when it was first asked for anything
 
-  mutable std::mutex mutex_;  // guards the counts
-  std::map<Stream, SequenceTracker> streams_;
+  mutable std::mutex mutex_;  // guards what is filed, and the counts
+  std::condition_variable filed_changed_;
+  FairQueue<Filed> filed_;
+  bool stopping_ = false;
+  std::map<Sender, SequenceTracker> streams_;
   std::map<RobotId, TrafficCount> from_;
   std::uint64_t duplicates_ = 0;
   std::map<std::string, std::uint64_t> refused_;
 
+  std::shared_ptr<InFlight> in_flight_ = std::make_shared<InFlight>();
+  std::exception_ptr error_;
+  std::atomic<bool> failed_ = false;
+  std::thread delivery_;
   DdsEntity topic_;
   DdsEntity subscriber_;
   DdsEntity reader_;

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "common.h"
+#include "runtime/dds/codec.hpp"
 #include "runtime/dds/entity.hpp"
 #include "runtime/dds/participant.hpp"
 #include "runtime/dds/peers.hpp"
@@ -19,10 +19,11 @@
 
 namespace km {
 
-/// A topic between robots as DDS knows it.
+/// A topic between robots: what travels on it are envelopes (idl/envelope.idl).
 struct TopicSpec {
   std::string name;
-  const dds_topic_descriptor_t* descriptor = nullptr;
+  std::uint16_t version = 1;  ///< Of the content's type.
+  std::size_t max_bytes = 0;  ///< Of the content.
   TopicKind kind = TopicKind::kEvent;
   TrafficCategory category = TrafficCategory::kOther;
 };
@@ -37,9 +38,9 @@ class OutgoingTopic {
  public:
   OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec);
 
-  /// Fills the rest of `header`, which is part of the sample `wire`, and writes to robot `to`, or
-  /// to all. Messages are numbered per writer. What DDS refuses is counted and logged.
-  void write(std::optional<RobotId> to, km_wire_Header& header, const void* wire);
+  /// Writes to robot `to`, or to all. Messages are numbered per writer. What DDS refuses is
+  /// counted and logged, as is content that no reader would take.
+  void write(std::optional<RobotId> to, MessageKey key, std::vector<std::uint8_t> content);
 
   /// Waits until every matched reader has everything. False on timeout.
   bool wait_for_acks(std::chrono::nanoseconds timeout);

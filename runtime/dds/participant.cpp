@@ -21,6 +21,9 @@
 namespace km {
 namespace {
 
+// No topic has larger messages (see Codec::kMaxBytes); DDS does not put larger ones together.
+constexpr int kMaxSampleBytes = (1 << 24) + 65536;
+
 // Empty if the host is known.
 std::string why_unknown(const std::string& host) {
   const std::size_t colon = host.find(':');
@@ -95,7 +98,8 @@ void write_internal(std::ostream& xml, const DdsConfig& config) {
       << "B'/><BurstSize><MaxRexmit>" << config.max_rexmit_bytes << "B</MaxRexmit>";
   if (config.max_init_transmit_percent >= 0)
     xml << "<MaxInitTransmit>" << config.max_init_transmit_percent << "</MaxInitTransmit>";
-  xml << "</BurstSize><NackDelay>" << milliseconds(config.nack_delay_ms * 1e-3) << "</NackDelay>"
+  xml << "</BurstSize><MaxSampleSize>" << kMaxSampleBytes << "B</MaxSampleSize><NackDelay>"
+      << milliseconds(config.nack_delay_ms * 1e-3) << "</NackDelay>"
       << "<Watermarks><WhcHigh>64MB</WhcHigh><WhcHighInit>64MB</WhcHighInit>"
          "<WhcAdaptive>false</WhcAdaptive></Watermarks></Internal>";
 }

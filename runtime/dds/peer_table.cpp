@@ -1,24 +1,26 @@
 #include "runtime/dds/peer_table.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace km {
 namespace {
 
-// A former self is silent after the liveliness period; this much later it must be alive.
-constexpr double kConflictMargin_s = 1.0;
+// A robot that has been running for longer is not new: it keeps its id.
+constexpr double kNew_s = 10.0;
+// Uptimes nearer to each other than this do not tell who was first: two statuses.
+constexpr double kSameUptime_s = 1.0;
 
 }  // namespace
 
-PeerTable::PeerTable(const RobotIdentity& self, double liveliness_s)
-    : self_(self), conflict_after_s_(liveliness_s + kConflictMargin_s) {}
-
 void PeerTable::participant(const Guid& guid, std::string_view user_data,
-                            const std::string& addresses, double now_s) {
-  if (!claims_to_be_a_robot(user_data)) return;
-  Participant& participant = participants_[guid];
+                            const std::string& addresses) {
+  Participant* found = remember(guid);
+  if (found == nullptr) return;
+  Participant& participant = *found;
   participant.addresses = addresses;
   if (std::exchange(participant.announced, true)) return;
+  if (!claims_to_be_a_robot(user_data)) return;
 
   const auto decoded = parse_user_data(user_data);
   if (!decoded.value) {
@@ -32,8 +34,7 @@ void PeerTable::participant(const Guid& guid, std::string_view user_data,
                 "refused: speaks protocol version " + std::to_string(decoded.value->protocol) +
                     ", this robot " + std::to_string(self_.protocol));
   participant.identity = *decoded.value;
-  met_.emplace(decoded.value->robot, decoded.value->boot);
-  if (participant.alive) appear(guid, now_s);
+  if (participant.alive) appear(guid, participant);
 }
 
 void PeerTable::participant_gone(const Guid& guid) {
@@ -41,45 +42,40 @@ void PeerTable::participant_gone(const Guid& guid) {
   const auto found = participants_.find(guid);
   if (found == participants_.end()) return;
   found->second.announced = false;
-  if (!found->second.identity) participants_.erase(found);  // robots are remembered
+  const auto& identity = found->second.identity;
+  const auto peer = identity ? peers_.find(identity->robot) : peers_.end();
+  const bool is_known = peer != peers_.end() && peer->second.guid == guid;
+  if (!is_known) participants_.erase(found);  // robots are remembered
 }
 
-void PeerTable::alive(const Guid& guid, double now_s) {
-  Participant& participant = participants_[guid];
-  if (std::exchange(participant.alive, true)) return;
-  if (participant.identity) appear(guid, now_s);
+void PeerTable::alive(const Guid& guid) {
+  Participant* participant = remember(guid);
+  if (participant == nullptr || std::exchange(participant->alive, true)) return;
+  participant->arrival = ++arrivals_;
+  if (participant->identity) appear(guid, *participant);
 }
 
 void PeerTable::silent(const Guid& guid) {
-  const auto found = participants_.find(guid);
-  if (found == participants_.end() || !std::exchange(found->second.alive, false)) return;
-  KnownPeer* known = peer_at(guid);
-  if (known == nullptr || known->peer.state != PeerState::kAlive) return;
-  known->peer.state = PeerState::kLost;
-  emit(PeerEventKind::kLost, known->peer.identity, "lost: silent");
+  give_way(guid, PeerState::kLost, PeerEventKind::kLost, "lost: silent");
 }
 
 void PeerTable::closed(const Guid& guid) {
-  const auto found = participants_.find(guid);
-  if (found == participants_.end() || !std::exchange(found->second.alive, false)) return;
-  KnownPeer* known = peer_at(guid);
-  if (known == nullptr || known->peer.state != PeerState::kAlive) return;
-  known->peer.state = PeerState::kLeft;
-  emit(PeerEventKind::kLeft, known->peer.identity, "left");
+  give_way(guid, PeerState::kLeft, PeerEventKind::kLeft, "left");
 }
 
-void PeerTable::tick(double now_s) {
-  const auto is_over = [&](const Rival& rival) {
-    const auto found = participants_.find(rival.guid);
-    if (found == participants_.end() || !found->second.alive) return true;
-    if (now_s - rival.since_s < conflict_after_s_) return false;
-    const RobotIdentity& identity = *found->second.identity;
-    emit(PeerEventKind::kConflict, identity,
-         "two living processes claim robot id " + std::to_string(identity.robot) +
-             ": give every robot its own --robot");
-    return true;
-  };
-  std::erase_if(rivals_, is_over);
+void PeerTable::twin_heard(const Guid& guid, double its_uptime_s, double own_uptime_s) {
+  const auto found = participants_.find(guid);
+  if (found == participants_.end() || !found->second.identity) return;
+  Participant& twin = found->second;
+  if (std::exchange(twin.warned, true)) return;
+  const double younger_by_s = its_uptime_s - own_uptime_s;
+  const bool tie = std::abs(younger_by_s) < kSameUptime_s;
+  const bool was_first = tie ? self_.boot < twin.identity->boot : younger_by_s < 0.0;
+  const std::string claim = "at " + twin.addresses + " also claims this robot's id " +
+                            std::to_string(self_.robot) + ": give every robot its own --robot";
+  if (was_first || own_uptime_s > kNew_s)
+    return emit(PeerEventKind::kRefused, *twin.identity, claim + "; this one keeps it");
+  emit(PeerEventKind::kConflict, *twin.identity, claim + "; it had it first");
 }
 
 std::vector<Peer> PeerTable::peers() const {
@@ -93,46 +89,88 @@ std::optional<RobotIdentity> PeerTable::identity_of(const Guid& guid) const {
   return found == participants_.end() ? std::nullopt : found->second.identity;
 }
 
-bool PeerTable::has_met(RobotId robot, std::uint64_t boot) const {
-  return met_.contains({robot, boot});
+Standing PeerTable::standing(const Guid& guid) const {
+  const auto found = participants_.find(guid);
+  if (found == participants_.end()) return Standing::kUnknown;
+  const Participant& participant = found->second;
+  if (!participant.identity)
+    return participant.announced ? Standing::kStranger : Standing::kUnknown;
+  if (participant.identity->robot == self_.robot) return Standing::kTwin;
+  const auto known = peers_.find(participant.identity->robot);
+  const bool admitted = known != peers_.end() && known->second.guid == guid;
+  return admitted ? Standing::kAdmitted : Standing::kRival;
+}
+
+bool PeerTable::is_current(const Sender& sender) const {
+  const auto known = peers_.find(sender.robot);
+  return known != peers_.end() && known->second.peer.identity.boot == sender.boot;
 }
 
 // The participant is accepted and its status writer alive.
-void PeerTable::appear(const Guid& guid, double now_s) {
-  const Participant& participant = participants_.at(guid);
+void PeerTable::appear(const Guid& guid, Participant& participant) {
   const RobotIdentity& identity = *participant.identity;
-  if (identity.robot == self_.robot)
-    return emit(PeerEventKind::kConflict, identity,
-                "also claims this robot's id " + std::to_string(identity.robot) +
-                    ": give every robot its own --robot");
-
-  const auto [entry, fresh] = peers_.try_emplace(
-      identity.robot, KnownPeer{{identity, PeerState::kAlive, participant.addresses}, guid});
-  if (fresh) return emit(PeerEventKind::kJoined, identity, "joined from " + participant.addresses);
-  meet_again(entry->second, guid, participant, now_s);
+  if (identity.robot == self_.robot) return;  // its uptime decides: see twin_heard()
+  const auto found = peers_.find(identity.robot);
+  if (found == peers_.end()) {
+    if (peers_.size() >= kMaxRobots)
+      return emit(PeerEventKind::kRefused, identity,
+                  "refused: there are " + std::to_string(kMaxRobots) + " robots already");
+    peers_.emplace(identity.robot,
+                   KnownPeer{{identity, PeerState::kAlive, participant.addresses}, guid});
+    return emit(PeerEventKind::kJoined, identity, "joined from " + participant.addresses);
+  }
+  KnownPeer& known = found->second;
+  if (known.guid == guid || known.peer.state != PeerState::kAlive)
+    return take_over(known, guid, participant);
+  if (!std::exchange(participant.warned, true))
+    emit(PeerEventKind::kRefused, identity,
+         "at " + participant.addresses + " not heard: another process, at " + known.peer.addresses +
+             ", has that id, until it falls silent");
 }
 
-void PeerTable::meet_again(KnownPeer& known, const Guid& guid, const Participant& participant,
-                           double now_s) {
+void PeerTable::take_over(KnownPeer& known, const Guid& guid, const Participant& participant) {
   const RobotIdentity& identity = *participant.identity;
   const bool same_boot = known.peer.identity.boot == identity.boot;
-  const bool was_alive = known.peer.state == PeerState::kAlive;
-  if (!same_boot && was_alive) rivals_.push_back({known.guid, now_s});
+  const Guid former = known.guid;
   known = {{identity, PeerState::kAlive, participant.addresses}, guid};
-  if (!same_boot) {
-    emit(PeerEventKind::kRestarted, identity, "restarted");
-  } else if (!was_alive) {
-    emit(PeerEventKind::kReturned, identity, "returned");
+  if (former != guid && !participants_.at(former).announced) participants_.erase(former);
+  emit(same_boot ? PeerEventKind::kReturned : PeerEventKind::kRestarted, identity,
+       same_boot ? "returned" : "restarted");
+}
+
+// The participant is heard no more. Its id goes to who has been claiming it for longest.
+void PeerTable::give_way(const Guid& guid, PeerState state, PeerEventKind kind, const char* text) {
+  const auto found = participants_.find(guid);
+  if (found == participants_.end() || !std::exchange(found->second.alive, false)) return;
+  if (!found->second.identity) {
+    if (!found->second.announced) participants_.erase(found);
+    return;
   }
+  const auto entry = peers_.find(found->second.identity->robot);
+  if (entry == peers_.end() || entry->second.guid != guid) return;
+  KnownPeer& known = entry->second;
+  known.peer.state = state;
+  emit(kind, known.peer.identity, text);
+
+  auto heir = participants_.end();
+  for (auto p = participants_.begin(); p != participants_.end(); ++p) {
+    const Participant& claimant = p->second;
+    if (!claimant.alive || !claimant.identity || claimant.identity->robot != entry->first) continue;
+    if (heir == participants_.end() || claimant.arrival < heir->second.arrival) heir = p;
+  }
+  if (heir != participants_.end()) take_over(known, heir->first, heir->second);
+}
+
+// Null if there are too many.
+PeerTable::Participant* PeerTable::remember(const Guid& guid) {
+  const auto found = participants_.find(guid);
+  if (found != participants_.end()) return &found->second;
+  if (participants_.size() >= kMaxParticipants) return nullptr;
+  return &participants_[guid];
 }
 
 void PeerTable::emit(PeerEventKind kind, const RobotIdentity& identity, const std::string& text) {
   events_.push_back({kind, identity, to_string(identity) + ' ' + text});
-}
-
-PeerTable::KnownPeer* PeerTable::peer_at(const Guid& guid) {
-  const auto found = std::ranges::find(peers_, guid, [](const auto& e) { return e.second.guid; });
-  return found == peers_.end() ? nullptr : &found->second;
 }
 
 }  // namespace km

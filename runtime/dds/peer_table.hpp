@@ -4,12 +4,12 @@
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "runtime/dds/codec.hpp"
 #include "runtime/dds/robot_identity.hpp"
 
 namespace km {
@@ -33,8 +33,18 @@ enum class PeerEventKind {
   kReturned,   ///< Heard again, same boot.
   kLeft,       ///< Ended in order.
   kRestarted,  ///< Same robot id, other boot.
-  kRefused,    ///< Another protocol version, or unreadable user data: not talked to.
-  kConflict,   ///< Two living processes claim one robot id.
+  kRefused,    ///< Not talked to: another protocol version, unreadable user data, one robot too
+               ///< many, or the id of a robot that is there already.
+  kConflict,   ///< This robot's id is another's, which had it first: this one must not go on.
+};
+
+/// What a participant's messages are worth.
+enum class Standing {
+  kUnknown,   ///< Nothing is known of it, yet.
+  kStranger,  ///< No robot, or one that is refused.
+  kTwin,      ///< Claims this robot's id.
+  kRival,     ///< Claims the id of a robot that is there already, or has not been heard itself.
+  kAdmitted,  ///< The robot of its id.
 };
 
 struct PeerEvent {
@@ -44,26 +54,32 @@ struct PeerEvent {
 };
 
 /// Who is there: turns what DDS reports about participants and the liveliness of their status
-/// writers, in any order, into peers and events. Pure: time comes in [s], any origin.
+/// writers, in any order, into peers and events. Pure: time comes in [s], any origin. Memory is
+/// bounded, whatever strangers announce.
 ///
 /// A robot is present while its participant's user data is accepted and its status writer alive;
-/// that the participant expires (dds.lease_s) changes nothing. Not thread-safe.
+/// that the participant expires (dds.lease_s) changes nothing. An id belongs to the first process
+/// that is heard with it, for as long as that is heard; then to the next. Not thread-safe.
 class PeerTable {
  public:
-  PeerTable(const RobotIdentity& self, double liveliness_s);
+  static constexpr std::size_t kMaxRobots = 64;
+  static constexpr std::size_t kMaxParticipants = 1024;
 
-  /// A participant announced itself (again) with this user data. Other programs are ignored.
-  void participant(const Guid& guid, std::string_view user_data, const std::string& addresses,
-                   double now_s);
+  explicit PeerTable(const RobotIdentity& self) : self_(self) {}
+
+  /// A participant announced itself (again) with this user data.
+  void participant(const Guid& guid, std::string_view user_data, const std::string& addresses);
   void participant_gone(const Guid& guid);
 
   /// Its status writer is alive, silent, or closed.
-  void alive(const Guid& guid, double now_s);
+  void alive(const Guid& guid);
   void silent(const Guid& guid);
   void closed(const Guid& guid);
 
-  /// Finds conflicts that only time can tell from a restart.
-  void tick(double now_s);
+  /// A status of a process with this robot's own id: how long that has been running, and this one,
+  /// both [s]. The younger one yields, if it is new itself; nobody can talk an older robot out of
+  /// its id.
+  void twin_heard(const Guid& guid, double its_uptime_s, double own_uptime_s);
 
   /// Events since the last call, in order.
   [[nodiscard]] std::vector<PeerEvent> take_events() { return std::exchange(events_, {}); }
@@ -71,12 +87,13 @@ class PeerTable {
   /// Ascending by robot id.
   [[nodiscard]] std::vector<Peer> peers() const;
 
-  /// Identity of a participant that may be talked to, or could before it was gone; nullopt for a
-  /// stranger or a refused one.
+  /// What it announced, where that could be read and accepted.
   [[nodiscard]] std::optional<RobotIdentity> identity_of(const Guid& guid) const;
 
-  /// True if this boot of `robot` was ever accepted.
-  [[nodiscard]] bool has_met(RobotId robot, std::uint64_t boot) const;
+  [[nodiscard]] Standing standing(const Guid& guid) const;
+
+  /// True unless another process has taken the id over since.
+  [[nodiscard]] bool is_current(const Sender& sender) const;
 
  private:
   struct Participant {
@@ -84,27 +101,24 @@ class PeerTable {
     std::string addresses;
     bool announced = false;
     bool alive = false;
+    bool warned = false;        // of a twin or rival, once
+    std::uint64_t arrival = 0;  // counts those that came alive
   };
   struct KnownPeer {
     Peer peer;
     Guid guid{};
   };
-  struct Rival {  // alive when another boot of its robot appeared
-    Guid guid{};
-    double since_s = 0.0;
-  };
 
-  void appear(const Guid& guid, double now_s);
-  void meet_again(KnownPeer& known, const Guid& guid, const Participant& participant, double now_s);
+  void appear(const Guid& guid, Participant& participant);
+  void take_over(KnownPeer& known, const Guid& guid, const Participant& participant);
+  void give_way(const Guid& guid, PeerState state, PeerEventKind kind, const char* text);
+  Participant* remember(const Guid& guid);
   void emit(PeerEventKind kind, const RobotIdentity& identity, const std::string& text);
-  KnownPeer* peer_at(const Guid& guid);
 
   RobotIdentity self_;
-  double conflict_after_s_;
   std::map<Guid, Participant> participants_;
   std::map<RobotId, KnownPeer> peers_;
-  std::vector<Rival> rivals_;
-  std::set<std::pair<RobotId, std::uint64_t>> met_;
+  std::uint64_t arrivals_ = 0;
   std::vector<PeerEvent> events_;
 };
 

@@ -10,6 +10,8 @@
 namespace km {
 namespace {
 
+constexpr std::size_t kMaxEvents = 1024;  // that wait; strangers can make many
+
 Guid to_guid(const dds_guid_t& guid) {
   Guid result{};
   std::ranges::copy(guid.v, result.begin());
@@ -60,29 +62,61 @@ void log_event(const PeerEvent& event) {
 
 }  // namespace
 
-std::optional<Guid> participant_of_publication(dds_entity_t reader, dds_instance_handle_t writer) {
-  return take_participant(dds_get_matched_publication_data(reader, writer));
-}
-
 std::optional<Guid> participant_of_subscription(dds_entity_t writer, dds_instance_handle_t reader) {
   return take_participant(dds_get_matched_subscription_data(writer, reader));
 }
 
+WriterBook::WriterBook() = default;
+
+void WriterBook::listen(dds_listener_t* listener) {
+  dds_lset_subscription_matched_arg(listener, &WriterBook::on_matched, this, true);
+}
+
+std::optional<Guid> WriterBook::participant_of(dds_instance_handle_t writer) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = participant_of_.find(writer);
+  return found == participant_of_.end() ? std::nullopt : std::optional(found->second);
+}
+
+// Runs on a thread of DDS, once per change.
+void WriterBook::on_matched(dds_entity_t reader, dds_subscription_matched_status_t status,
+                            void* self) {
+  auto& book = *static_cast<WriterBook*>(self);
+  const dds_instance_handle_t writer = status.last_publication_handle;
+  if (status.current_count_change > 0) {
+    const auto guid = take_participant(dds_get_matched_publication_data(reader, writer));
+    const std::lock_guard lock(book.mutex_);
+    if (guid) book.participant_of_.emplace(writer, *guid);
+    return;
+  }
+  constexpr std::size_t kMaxGone = 4096;  // whose last messages may still be waiting
+  const std::lock_guard lock(book.mutex_);
+  book.gone_.push_back(writer);
+  if (book.gone_.size() <= kMaxGone) return;
+  book.participant_of_.erase(book.gone_.front());
+  book.gone_.pop_front();
+}
+
 Peers::Peers(const DdsParticipant& participant)
-    : table_(participant.identity(), participant.config().liveliness_s),
-      listener_(dds_create_listener(this)),
+    : table_(participant.identity()),
       liveliness_changed_(dds_create_guardcondition(participant.handle()), "guard condition"),
       reader_(dds_create_reader(participant.handle(), DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr,
                                 nullptr),
               "reader of the participants"),
-      discovered_(dds_create_readcondition(reader_.handle(), DDS_ANY_STATE), "read condition") {
+      discovered_(dds_create_readcondition(reader_.handle(), DDS_ANY_STATE), "read condition"),
+      announcer_(
+          kMaxEvents, Overflow::kDropOldest,
+          [this](const PeerEvent& event) { events_.publish(event); }, "peer_events") {
   dds_guid_t self{};
   check_dds(dds_get_guid(participant.handle(), &self), "cannot read the participant's identity");
   self_ = to_guid(self);
-  dds_lset_liveliness_changed(listener_.get(), &Peers::on_liveliness_changed);
 }
 
 Peers::~Peers() = default;
+
+void Peers::listen(dds_listener_t* listener) {
+  dds_lset_liveliness_changed_arg(listener, &Peers::on_liveliness_changed, this, true);
+}
 
 std::vector<Peer> Peers::list() const {
   const std::lock_guard lock(mutex_);
@@ -94,9 +128,23 @@ std::optional<RobotIdentity> Peers::identity_of(const Guid& guid) const {
   return table_.identity_of(guid);
 }
 
-bool Peers::has_met(RobotId robot, std::uint64_t boot) const {
+Peers::Claim Peers::claim_of(const Guid& guid) const {
   const std::lock_guard lock(mutex_);
-  return table_.has_met(robot, boot);
+  const auto identity = table_.identity_of(guid);
+  return {table_.standing(guid), identity ? Sender{identity->robot, identity->boot} : Sender{}};
+}
+
+bool Peers::is_current(const Sender& sender) const {
+  const std::lock_guard lock(mutex_);
+  return table_.is_current(sender);
+}
+
+void Peers::twin_heard(const Guid& guid, double its_uptime_s, double own_uptime_s) {
+  {
+    const std::lock_guard lock(mutex_);
+    table_.twin_heard(guid, its_uptime_s, own_uptime_s);
+  }
+  publish_events();
 }
 
 // Runs on a thread of DDS, once per change: only notes it.
@@ -111,17 +159,13 @@ void Peers::on_liveliness_changed(dds_entity_t /*reader*/, dds_liveliness_change
   dds_set_guardcondition(peers.liveliness_changed_.handle(), true);
 }
 
-void Peers::poll(double now_s) {
-  take_discovered(now_s);
-  take_liveliness(now_s);
-  {
-    const std::lock_guard lock(mutex_);
-    table_.tick(now_s);
-  }
+void Peers::poll() {
+  take_discovered();
+  take_liveliness();
   publish_events();
 }
 
-void Peers::take_discovered(double now_s) {
+void Peers::take_discovered() {
   constexpr std::uint32_t kBatch = 16;
   while (true) {
     std::array<void*, kBatch> samples{};
@@ -138,14 +182,14 @@ void Peers::take_discovered(double now_s) {
       if (infos[i].instance_state != DDS_IST_ALIVE) {
         table_.participant_gone(guid);
       } else if (infos[i].valid_data) {
-        table_.participant(guid, user_data_of(sample.qos), addresses_of(sample.qos), now_s);
+        table_.participant(guid, user_data_of(sample.qos), addresses_of(sample.qos));
       }
     }
     dds_return_loan(reader_.handle(), samples.data(), count);
   }
 }
 
-void Peers::take_liveliness(double now_s) {
+void Peers::take_liveliness() {
   bool triggered = false;
   dds_take_guardcondition(liveliness_changed_.handle(), &triggered);
   std::deque<LivelinessChange> changes;
@@ -153,39 +197,29 @@ void Peers::take_liveliness(double now_s) {
     const std::lock_guard lock(mutex_);
     changes.swap(changes_);
   }
-  // A writer may be reported alive a moment before its match can be looked up: try again.
+  // A writer may be reported alive a moment before it is matched: try again.
   constexpr int kMaxAttempts = 20;
   std::deque<LivelinessChange> again;
   for (LivelinessChange& change : changes)
-    if (!apply(change, now_s) && ++change.attempts < kMaxAttempts) again.push_back(change);
+    if (!apply(change) && ++change.attempts < kMaxAttempts) again.push_back(change);
   const std::lock_guard lock(mutex_);
   changes_.insert(changes_.begin(), again.begin(), again.end());
 }
 
 // False if the writer's participant is not known yet.
-bool Peers::apply(const LivelinessChange& change, double now_s) {
-  const auto guid = participant_of(change.writer);
-  const bool closed = change.alive + change.not_alive < 0;
-  if (!guid) return closed;
+bool Peers::apply(const LivelinessChange& change) {
+  const auto guid = status_writers_->participant_of(change.writer);
+  if (!guid) return false;
   const std::lock_guard lock(mutex_);
-  if (closed) {
+  if (change.alive + change.not_alive < 0) {
     // A silent writer that is closed by DDS has expired: its robot stays lost.
     if (change.alive < 0) table_.closed(*guid);
-    participant_of_writer_.erase(change.writer);
   } else if (change.alive > 0) {
-    table_.alive(*guid, now_s);
+    table_.alive(*guid);
   } else if (change.alive < 0) {
     table_.silent(*guid);
   }
   return true;
-}
-
-std::optional<Guid> Peers::participant_of(dds_instance_handle_t writer) {
-  const auto known = participant_of_writer_.find(writer);
-  if (known != participant_of_writer_.end()) return known->second;
-  const auto guid = participant_of_publication(status_reader_, writer);
-  if (guid) participant_of_writer_.emplace(writer, *guid);
-  return guid;
 }
 
 void Peers::publish_events() {
@@ -196,7 +230,7 @@ void Peers::publish_events() {
   }
   for (PeerEvent& event : events) {
     log_event(event);
-    events_.publish(std::move(event));
+    announcer_.post(std::move(event));
   }
 }
 

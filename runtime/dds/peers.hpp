@@ -1,6 +1,8 @@
 #pragma once
 
 #include <deque>
+#include <exception>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <vector>
@@ -9,8 +11,31 @@
 #include "runtime/dds/participant.hpp"
 #include "runtime/dds/peer_table.hpp"
 #include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
 
 namespace km {
+
+/// Which participant each writer of a topic belongs to, noted as DDS matches it: what a writer that
+/// is gone has left behind is its robot's still. Thread-safe.
+class WriterBook {
+ public:
+  WriterBook();
+  WriterBook(const WriterBook&) = delete;
+  WriterBook& operator=(const WriterBook&) = delete;
+
+  /// To create the topic's reader with, merged into what else that listens for.
+  void listen(dds_listener_t* listener);
+
+  /// nullopt for a writer that has never been matched.
+  [[nodiscard]] std::optional<Guid> participant_of(dds_instance_handle_t writer) const;
+
+ private:
+  static void on_matched(dds_entity_t reader, dds_subscription_matched_status_t status, void* self);
+
+  mutable std::mutex mutex_;  // guards what follows
+  std::map<dds_instance_handle_t, Guid> participant_of_;
+  std::deque<dds_instance_handle_t> gone_;  // oldest first
+};
 
 /// Feeds a PeerTable from DDS discovery and from the liveliness of the status topic, and logs its
 /// events. The bridge's receive thread calls poll(); everything else is thread-safe.
@@ -21,25 +46,39 @@ class Peers {
   Peers(const Peers&) = delete;
   Peers& operator=(const Peers&) = delete;
 
-  /// Published on the receive thread. Subscribe before the bridge starts.
+  /// Published on a thread of their own. Subscribe before start().
   [[nodiscard]] In<PeerEvent> events() { return events_; }
 
   /// Robots of the team ever met by this one, ascending by id.
   [[nodiscard]] std::vector<Peer> list() const;
 
   [[nodiscard]] std::optional<RobotIdentity> identity_of(const Guid& guid) const;
-  [[nodiscard]] bool has_met(RobotId robot, std::uint64_t boot) const;
+
+  /// What is to be done with what a participant sends, and whom it says it is.
+  struct Claim {
+    Standing standing = Standing::kUnknown;
+    Sender sender;  ///< Of a robot: kTwin, kRival, kAdmitted.
+  };
+  [[nodiscard]] Claim claim_of(const Guid& guid) const;
+  [[nodiscard]] bool is_current(const Sender& sender) const;
+
+  /// See PeerTable.
+  void twin_heard(const Guid& guid, double its_uptime_s, double own_uptime_s);
 
   // For the bridge.
 
-  /// The listener to create the status reader with, and then that reader.
-  [[nodiscard]] const dds_listener_t* liveliness_listener() const { return listener_.get(); }
-  void watch(dds_entity_t status_reader) { status_reader_ = status_reader; }
+  /// For the listener of the status reader; and who its writers are.
+  void listen(dds_listener_t* listener);
+  void watch(const WriterBook& status_writers) { status_writers_ = &status_writers; }
 
   /// Entities to wait for; when one triggers, or now and then, poll().
   [[nodiscard]] dds_entity_t discovery_condition() const { return discovered_.handle(); }
   [[nodiscard]] dds_entity_t liveliness_condition() const { return liveliness_changed_.handle(); }
-  void poll(double now_s);
+  void poll();
+
+  void start() { announcer_.start(); }
+  void stop() noexcept { announcer_.stop(); }
+  [[nodiscard]] std::exception_ptr error() const { return announcer_.error(); }
 
  private:
   struct LivelinessChange {
@@ -48,16 +87,11 @@ class Peers {
     int not_alive = 0;  // and of silent ones
     int attempts = 0;
   };
-  struct ListenerDeleter {
-    void operator()(dds_listener_t* listener) const { dds_delete_listener(listener); }
-  };
-
   static void on_liveliness_changed(dds_entity_t reader, dds_liveliness_changed_status_t status,
                                     void* self);
-  void take_discovered(double now_s);
-  void take_liveliness(double now_s);
-  bool apply(const LivelinessChange& change, double now_s);
-  std::optional<Guid> participant_of(dds_instance_handle_t writer);
+  void take_discovered();
+  void take_liveliness();
+  bool apply(const LivelinessChange& change);
   void publish_events();
 
   Topic<PeerEvent> events_;
@@ -65,17 +99,14 @@ class Peers {
   mutable std::mutex mutex_;  // guards table_ and changes_
   PeerTable table_;
   std::deque<LivelinessChange> changes_;
-  std::map<dds_instance_handle_t, Guid> participant_of_writer_;  // receive thread only
-  dds_entity_t status_reader_ = 0;
-  std::unique_ptr<dds_listener_t, ListenerDeleter> listener_;
+  const WriterBook* status_writers_ = nullptr;
   DdsEntity liveliness_changed_;  // guard condition
   DdsEntity reader_;
   DdsEntity discovered_;
+  Worker<PeerEvent> announcer_;  // last member: stops first
 };
 
-/// Participant that a reader's or writer's matched counterpart belongs to; nullopt if it is gone.
-[[nodiscard]] std::optional<Guid> participant_of_publication(dds_entity_t reader,
-                                                             dds_instance_handle_t writer);
+/// Participant that a writer's matched reader belongs to; nullopt if it is gone.
 [[nodiscard]] std::optional<Guid> participant_of_subscription(dds_entity_t writer,
                                                               dds_instance_handle_t reader);
 

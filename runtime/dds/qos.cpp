@@ -25,7 +25,7 @@ const char* to_string(TrafficCategory category) {
   return "other";
 }
 
-DdsQos make_topic_qos(TopicKind kind, const DdsConfig& config) {
+DdsQos make_writer_qos(TopicKind kind, const DdsConfig& config) {
   DdsQos owner = make_dds_qos();
   dds_qos_t* qos = owner.get();
   dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, 1);
@@ -49,6 +49,12 @@ DdsQos make_topic_qos(TopicKind kind, const DdsConfig& config) {
   // clocks of the robots need not agree.
   if (kind == TopicKind::kRequest) dds_qset_lifespan(qos, nanoseconds_of(config.lease_s));
   return owner;
+}
+
+DdsQos make_reader_qos(TopicKind kind, const DdsConfig& config) {
+  DdsQos qos = make_writer_qos(kind, config);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_ALL, 0);
+  return qos;
 }
 
 }  // namespace km

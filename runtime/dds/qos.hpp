@@ -7,7 +7,8 @@ namespace km {
 
 /// What a topic between robots is for; decides its quality of service (see make_topic_qos()).
 ///
-/// All kinds keep the last sample of each key, so a writer never blocks on an unreachable robot.
+/// Writers of all kinds keep the last sample of each key, so that none blocks on an unreachable
+/// robot. Readers keep all until it is taken: another's sample with the same key replaces nothing.
 enum class TopicKind {
   kEvent,    ///< Every sample arrives, also at robots that join later. One key value per sample.
   kState,    ///< Reliable, newest sample of each key wins, also for robots that join later.
@@ -26,9 +27,10 @@ enum class TrafficCategory {
 /// "place_recognition", "geometric_verification", "pgo", "other".
 const char* to_string(TrafficCategory category);
 
-/// Quality of service of a reader and of a writer of a topic of this kind. Samples of the own
+/// Quality of service of a writer, or reader, of a topic of this kind. Samples of the own
 /// participant are not delivered.
-[[nodiscard]] DdsQos make_topic_qos(TopicKind kind, const DdsConfig& config);
+[[nodiscard]] DdsQos make_writer_qos(TopicKind kind, const DdsConfig& config);
+[[nodiscard]] DdsQos make_reader_qos(TopicKind kind, const DdsConfig& config);
 
 /// True for the kinds whose writers wait for acknowledgements before they close.
 [[nodiscard]] constexpr bool is_reliable(TopicKind kind) {

@@ -22,10 +22,13 @@ const char* to_string(RobotPhase phase) {
   return "leaving";
 }
 
+MessageKey Codec<RobotStatus>::key_of(const RobotStatus& /*status*/) {
+  return message_key({});
+}
+
 Codec<RobotStatus>::Encoded Codec<RobotStatus>::encode(const RobotStatus& status) {
   Encoded encoded;
   Wire& wire = encoded.wire;
-  wire.robot = status.robot;
   const std::size_t length = std::min(status.name.size(), sizeof wire.name - 1);
   std::memcpy(wire.name, status.name.data(), length);
   wire.phase = static_cast<km_wire_Phase>(status.phase);
@@ -35,24 +38,24 @@ Codec<RobotStatus>::Encoded Codec<RobotStatus>::encode(const RobotStatus& status
   return encoded;
 }
 
-Decoded<RobotStatus> Codec<RobotStatus>::decode(const Wire& wire) {
+Decoded<RobotStatus> Codec<RobotStatus>::decode(const Wire& wire, const Sender& writer) {
   using Result = Decoded<RobotStatus>;
   const std::size_t length = strnlen(wire.name, sizeof wire.name);
   const std::string name(wire.name, length);
   const auto printable = [](char c) { return c >= ' ' && c <= '~'; };
-  if (wire.robot != wire.header.robot) return Result::refuse("status of another robot");
   if (!std::ranges::all_of(name, printable)) return Result::refuse("name is not printable");
   if (wire.phase > km_wire_PHASE_LEAVING) return Result::refuse("unknown phase");
   if (!std::isfinite(wire.dataset_time_s)) return Result::refuse("time is not finite");
   const auto phase = static_cast<RobotPhase>(wire.phase);
   return Result::accept(
-      {wire.robot, name, phase, wire.dataset_time_s, wire.keyframes, wire.settled_links});
+      {writer.robot, name, phase, wire.dataset_time_s, wire.keyframes, wire.settled_links});
 }
 
 RobotStatusNode::RobotStatusNode(std::function<RobotStatus()> provider,
                                  const RobotStatusTopics& topics)
     : periodic_(
-          std::chrono::milliseconds(500),
+          std::chrono::duration_cast<std::chrono::nanoseconds>(
+              std::chrono::duration<double>(kStatusPeriod_s)),
           [provider = std::move(provider), own = topics.own] { own.publish(provider()); },
           "robot_status") {
   topics.peers.subscribe([this](const Topic<RobotStatus>::Message& status) {

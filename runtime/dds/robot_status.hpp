@@ -35,6 +35,9 @@ struct RobotStatus {
   std::uint8_t settled_links = 0;
 };
 
+/// How often a robot tells its status [s].
+inline constexpr double kStatusPeriod_s = 0.5;
+
 /// As far as anybody asks.
 inline constexpr std::uint8_t kManyLinks = 255;
 
@@ -43,13 +46,15 @@ struct Codec<RobotStatus> {
   using Wire = km_wire_RobotStatus;
   static constexpr const char* kTopic = "robot_status";
   static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::size_t kMaxBytes = 256;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_RobotStatus_desc; }
 
   struct Encoded {
     Wire wire{};
   };
+  static MessageKey key_of(const RobotStatus& status);
   static Encoded encode(const RobotStatus& status);
-  static Decoded<RobotStatus> decode(const Wire& wire);
+  static Decoded<RobotStatus> decode(const Wire& wire, const Sender& writer);
 };
 
 /// Channels of the status node; they must outlive it.
@@ -58,8 +63,8 @@ struct RobotStatusTopics {
   In<RobotStatus> peers;
 };
 
-/// Publishes this robot's status twice a second and keeps the latest of each peer. Both topics
-/// cross as kStatus: they carry the presence of the robots.
+/// Publishes this robot's status every kStatusPeriod_s and keeps the latest of each peer. Both
+/// topics cross as kStatus: they carry the presence of the robots.
 class RobotStatusNode final : public Node {
  public:
   /// `provider` is called on this node's thread.

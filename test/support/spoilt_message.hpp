@@ -9,12 +9,24 @@
 
 namespace km {
 
-/// `message` as it arrives: with the writer's header.
+/// A message as it arrives, and who wrote it.
 template <typename T>
-[[nodiscard]] typename Codec<T>::Encoded encoded_by(RobotId writer, const T& message) {
-  auto encoded = Codec<T>::encode(message);
-  encoded.wire.header.robot = writer;
-  return encoded;
+struct Arrived : Codec<T>::Encoded {
+  Sender writer;
+};
+
+template <typename T>
+[[nodiscard]] Arrived<T> encoded_by(Sender writer, const T& message) {
+  return {Codec<T>::encode(message), writer};
+}
+template <typename T>
+[[nodiscard]] Arrived<T> encoded_by(RobotId writer, const T& message) {
+  return encoded_by(Sender{writer, 1}, message);
+}
+
+template <typename T>
+[[nodiscard]] Decoded<T> decoded(const Arrived<T>& message) {
+  return Codec<T>::decode(message.wire, message.writer);
 }
 
 /// A way to spoil a message, and what it must be refused for.
@@ -22,7 +34,7 @@ template <typename T>
 struct Spoilt {
   const char* what;
   const char* reason;
-  std::function<void(typename Codec<T>::Encoded&)> spoil;
+  std::function<void(Arrived<T>&)> spoil;
 };
 
 /// Checks each of `ways` on a fresh message by `make`.
@@ -30,12 +42,12 @@ template <typename T, typename Make>
 void check_refusals(const Make& make, const std::vector<Spoilt<T>>& ways) {
   for (const Spoilt<T>& way : ways) {
     CAPTURE(way.what);
-    typename Codec<T>::Encoded encoded = make();
-    REQUIRE(Codec<T>::decode(encoded.wire).value);
-    way.spoil(encoded);
-    const Decoded<T> decoded = Codec<T>::decode(encoded.wire);
-    CHECK_FALSE(decoded.value);
-    CHECK(std::string(decoded.refusal == nullptr ? "" : decoded.refusal) == way.reason);
+    Arrived<T> message = make();
+    REQUIRE(decoded(message).value);
+    way.spoil(message);
+    const Decoded<T> result = decoded(message);
+    CHECK_FALSE(result.value);
+    CHECK(std::string(result.refusal == nullptr ? "" : result.refusal) == way.reason);
   }
 }
 

@@ -102,6 +102,22 @@ TEST_CASE("A robot whose peer is killed goes on and finishes", "[system]") {
   CHECK(read_summary(folder.path() / "a/summary.json").pgo.settled);
 }
 
+TEST_CASE("A robot whose id is taken says so and ends, and who had it first goes on", "[system]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const int domain = random_domain();
+  auto command = robot_command("7", *dataset, folder.path() / "a", domain);
+  command.insert(command.end(), {"--to", "7.5"});
+  Process incumbent(command);
+  REQUIRE(incumbent.wait_until(is_past_start).has_value());
+  Process twin(robot_command("7", *dataset, folder.path() / "b", domain));
+  CHECK(twin.wait() == 3);
+  CHECK_THAT(read_summary(folder.path() / "b/summary.json").exit_reason,
+             Catch::Contains("give every robot its own --robot"));
+  CHECK(incumbent.wait() == 0);
+}
+
 TEST_CASE("Bad input and configuration end a robot with one clear message", "[system]") {
   const TemporaryFolder folder;
   const std::string robot = std::string(KM_BIN_DIR) + "/kimera_multi_robot --robot 1 --output " +

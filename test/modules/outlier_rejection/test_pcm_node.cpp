@@ -235,19 +235,19 @@ const InlierSet kSet{.a = 3,
 
 TEST_CASE("An inlier set survives the wire", "[codec]") {
   const auto encoded = encoded_by(kSet.a, kSet);
-  const Decoded<InlierSet> decoded = Codec<InlierSet>::decode(encoded.wire);
-  REQUIRE(decoded.value);
-  CHECK(decoded.value->a == kSet.a);
-  CHECK(decoded.value->b == kSet.b);
-  CHECK(decoded.value->version == kSet.version);
-  CHECK(decoded.value->closures == kSet.closures);
+  const Decoded<InlierSet> result = decoded(encoded);
+  REQUIRE(result.value);
+  CHECK(result.value->a == kSet.a);
+  CHECK(result.value->b == kSet.b);
+  CHECK(result.value->version == kSet.version);
+  CHECK(result.value->closures == kSet.closures);
 }
 
 TEST_CASE("An empty set and one inside a robot survive the wire", "[codec]") {
   InlierSet set{.a = 5, .b = 5, .version = 1, .closures = {}};
-  CHECK(Codec<InlierSet>::decode(encoded_by(set.a, set).wire).value);
+  CHECK(decoded(encoded_by(set.a, set)).value);
   set.closures = {{{5, 2}, {5, 9}}};
-  CHECK(Codec<InlierSet>::decode(encoded_by(set.a, set).wire).value);
+  CHECK(decoded(encoded_by(set.a, set)).value);
 }
 
 TEST_CASE("An inlier set that cannot be is refused", "[codec]") {
@@ -256,7 +256,7 @@ TEST_CASE("An inlier set that cannot be is refused", "[codec]") {
       {{"descending pair", "the pair is not in ascending order",
         [](auto& m) { std::swap(m.wire.a, m.wire.b); }},
        {"written by the higher robot", "decided by another robot than the lower",
-        [](auto& m) { m.wire.header.robot = 700; }},
+        [](auto& m) { m.writer.robot = 700; }},
        {"of a third robot", "a closure of another pair",
         [](auto& m) { m.closures[1].to.robot = 4; }},
        {"inside one of two robots", "a closure of another pair",

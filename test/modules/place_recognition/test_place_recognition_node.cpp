@@ -13,6 +13,7 @@
 #include "modules/place_recognition/place_recognition_codec.hpp"
 #include "modules/place_recognition/place_recognition_node.hpp"
 #include "test/modules/place_recognition/toy_vocabulary.hpp"
+#include "test/support/spoilt_message.hpp"
 
 namespace km {
 namespace {
@@ -288,26 +289,24 @@ TEST_CASE("A keyframe's words survive the wire", "[place_recognition]") {
                             .stamp = 1403636584763555584,
                             .vocabulary = 0xFEDCBA9876543210ULL,
                             .words = {{3, 1}, {900, 4}}};
-  auto encoded = Codec<KeyframeBow>::encode(message);
-  auto moved = std::move(encoded);  // the wire type points into its owner
-  moved.wire.header.robot = 700;
-  const auto decoded = Codec<KeyframeBow>::decode(moved.wire);
-  REQUIRE(decoded.value);
-  CHECK(decoded.value->id == message.id);
-  CHECK(decoded.value->stamp == message.stamp);
-  CHECK(decoded.value->vocabulary == message.vocabulary);
-  CHECK(decoded.value->words == message.words);
+  auto encoded = encoded_by(700, message);
+  const auto moved = std::move(encoded);  // the wire type points into its owner
+  const auto result = decoded(moved);
+  REQUIRE(result.value);
+  CHECK(result.value->id == message.id);
+  CHECK(result.value->stamp == message.stamp);
+  CHECK(result.value->vocabulary == message.vocabulary);
+  CHECK(result.value->words == message.words);
 }
 
 TEST_CASE("A message that contradicts itself is refused with the reason", "[place_recognition]") {
-  auto encoded = Codec<KeyframeBow>::encode({.id = {7, 1}, .words = {{3, 1}}});
-  encoded.wire.header.robot = 8;
-  CHECK(std::strstr(Codec<KeyframeBow>::decode(encoded.wire).refusal, "another robot") != nullptr);
-  encoded.wire.header.robot = 7;
+  auto encoded = encoded_by<KeyframeBow>(8, {.id = {7, 1}, .words = {{3, 1}}});
+  CHECK(std::strstr(decoded(encoded).refusal, "another robot") != nullptr);
+  encoded.writer.robot = 7;
   encoded.bag[0] = 0x00;
-  CHECK(std::strstr(Codec<KeyframeBow>::decode(encoded.wire).refusal, "decoded") != nullptr);
+  CHECK(std::strstr(decoded(encoded).refusal, "decoded") != nullptr);
   encoded.wire.bag._buffer = nullptr;
-  CHECK(std::strstr(Codec<KeyframeBow>::decode(encoded.wire).refusal, "missing") != nullptr);
+  CHECK(std::strstr(decoded(encoded).refusal, "missing") != nullptr);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <unistd.h>
+#include <catch2/catch.hpp>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -32,26 +33,27 @@ struct Codec<Ping> {
   using Wire = km_wire_Ping;
   static constexpr const char* kTopic = "pings";
   static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::size_t kMaxBytes = 100000;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_Ping_desc; }
 
   struct Encoded {
     Wire wire{};
     std::vector<std::uint8_t> payload;
   };
+  static MessageKey key_of(const Ping& ping) { return message_key({ping.index}); }
   static Encoded encode(const Ping& ping) {
     Encoded encoded;
     encoded.payload = ping.payload;
-    encoded.wire.robot = ping.robot;
     encoded.wire.index = ping.index;
     borrow(encoded.wire.payload, encoded.payload);
     return encoded;
   }
   /// Refuses payloads that start with 0xFF.
-  static Decoded<Ping> decode(const Wire& wire) {
+  static Decoded<Ping> decode(const Wire& wire, const Sender& writer) {
     const std::uint8_t* data = wire.payload._buffer;
     const std::uint32_t size = wire.payload._length;
     if (size > 0 && data[0] == 0xFF) return Decoded<Ping>::refuse("payload starts with 0xFF");
-    return Decoded<Ping>::accept({wire.robot, wire.index, {data, data + size}});
+    return Decoded<Ping>::accept({writer.robot, wire.index, {data, data + size}});
   }
 };
 
@@ -76,21 +78,25 @@ inline bool eventually(const std::function<bool()>& condition) {
   return true;
 }
 
-/// Writes pings with whatever header it is given, as a faulty or hostile program may.
-class RawPingWriter {
+/// Writes whatever envelopes it is given, as a faulty or hostile program may.
+class RawWriter {
  public:
-  RawPingWriter(dds_entity_t participant, const DdsConfig& config, TopicKind kind)
-      : topic_(dds_create_topic(participant, &km_wire_Ping_desc, Codec<Ping>::kTopic, nullptr,
-                                nullptr),
+  RawWriter(dds_entity_t participant, const DdsConfig& config, TopicKind kind,
+            const char* topic = Codec<Ping>::kTopic)
+      : topic_(dds_create_topic(participant, &km_wire_Envelope_desc, topic, nullptr, nullptr),
                "topic"),
-        writer_(dds_create_writer(participant, topic_.handle(), make_topic_qos(kind, config).get(),
+        writer_(dds_create_writer(participant, topic_.handle(), make_writer_qos(kind, config).get(),
                                   nullptr),
                 "writer") {}
 
-  void write(const km_wire_Header& header, const Ping& ping) {
-    auto encoded = Codec<Ping>::encode(ping);
-    encoded.wire.header = header;
-    check_dds(dds_write(writer_.handle(), &encoded.wire), "write");
+  void write_bytes(km_wire_Envelope head, std::vector<std::uint8_t> content) {
+    borrow(head.content, content);
+    check_dds(dds_write(writer_.handle(), &head), "write");
+  }
+  void write(km_wire_Envelope head, const Ping& ping) {
+    const auto encoded = Codec<Ping>::encode(ping);
+    head.key = Codec<Ping>::key_of(ping);
+    write_bytes(head, serialize(Codec<Ping>::descriptor(), &encoded.wire));
   }
 
  private:
@@ -163,6 +169,13 @@ struct TestRobot {
         return t.count;
     return {};
   }
+  /// How many statuses it has sent.
+  std::uint64_t status_count() {
+    for (const TopicTraffic& t : bridge.traffic().topics)
+      if (t.topic == Codec<RobotStatus>::kTopic && t.direction == Direction::kOut)
+        return t.count.messages;
+    return 0;
+  }
   static TrafficCategory category(bool addressed) {
     return addressed ? TrafficCategory::kGeometricVerification : TrafficCategory::kPlaceRecognition;
   }
@@ -175,6 +188,30 @@ struct TestRobot {
   RobotStatusNode status;
   Inbox<PeerEvent> peer_events;
   Inbox<Ping> received, received_addressed;
+};
+
+/// The head of an envelope that `identity` writes as its message `number`.
+inline km_wire_Envelope header(const RobotIdentity& identity, std::uint32_t number) {
+  return {.key = 0,
+          .boot = identity.boot,
+          .number = number,
+          .version = 1,
+          .robot = identity.robot,
+          .content = {}};
+}
+
+/// Two robots of one domain that know of each other.
+struct Two {
+  explicit Two(const DdsConfig& config = loopback_config())
+      : domain(std::make_shared<const DdsDomain>(config)) {
+    a.start();
+    b.start();
+    REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+    REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  }
+
+  std::shared_ptr<const DdsDomain> domain;
+  TestRobot a{domain, 3}, b{domain, 4};
 };
 
 }  // namespace km

@@ -6,15 +6,14 @@
 #include <string>
 #include <vector>
 
-#include "runtime/dds/incoming_topic.hpp"
 #include "runtime/dds/peer_table.hpp"
 #include "runtime/dds/robot_identity.hpp"
+#include "runtime/dds/sequence_tracker.hpp"
 #include "runtime/dds/traffic.hpp"
 
 namespace km {
 namespace {
 
-constexpr double kLiveliness_s = 2.0;
 const RobotIdentity kSelf{1, "self", kProtocolVersion, 1000};
 
 Guid guid(std::uint8_t n) {
@@ -37,53 +36,54 @@ using Kinds = std::vector<PeerEventKind>;
 
 TEST_CASE("A robot joins once its identity and its liveliness are known, in either order",
           "[peers]") {
-  PeerTable table(kSelf, kLiveliness_s);
+  PeerTable table(kSelf);
   SECTION("identity first") {
-    table.participant(guid(2), data_of(7, 70), "udp/10.0.0.7", 0.0);
+    table.participant(guid(2), data_of(7, 70), "udp/10.0.0.7");
     CHECK(kinds(table).empty());
-    table.alive(guid(2), 0.1);
+    table.alive(guid(2));
   }
   SECTION("liveliness first") {
-    table.alive(guid(2), 0.0);
+    table.alive(guid(2));
     CHECK(kinds(table).empty());
-    table.participant(guid(2), data_of(7, 70), "udp/10.0.0.7", 0.1);
+    table.participant(guid(2), data_of(7, 70), "udp/10.0.0.7");
   }
-  table.participant(guid(2), data_of(7, 70), "udp/10.0.0.7", 0.2);  // announced again
+  table.participant(guid(2), data_of(7, 70), "udp/10.0.0.7");  // announced again
   CHECK(kinds(table) == Kinds{PeerEventKind::kJoined});
   REQUIRE(table.peers().size() == 1);
   CHECK(table.peers()[0].identity.robot == 7);
   CHECK(table.peers()[0].state == PeerState::kAlive);
   CHECK(table.peers()[0].addresses == "udp/10.0.0.7");
   CHECK(table.identity_of(guid(2))->boot == 70);
-  CHECK(table.has_met(7, 70));
-  CHECK_FALSE(table.has_met(7, 71));
+  CHECK(table.standing(guid(2)) == Standing::kAdmitted);
+  CHECK(table.is_current({7, 70}));
+  CHECK_FALSE(table.is_current({7, 71}));
 }
 
 TEST_CASE("Silence is a loss, sound a return, whatever happens to the lease", "[peers]") {
-  PeerTable table(kSelf, kLiveliness_s);
-  table.participant(guid(2), data_of(7, 70), "", 0.0);
-  table.alive(guid(2), 0.0);
+  PeerTable table(kSelf);
+  table.participant(guid(2), data_of(7, 70), "");
+  table.alive(guid(2));
   table.silent(guid(2));
   CHECK(kinds(table) == Kinds{PeerEventKind::kJoined, PeerEventKind::kLost});
   CHECK(table.peers()[0].state == PeerState::kLost);
 
   SECTION("within the lease") {
-    table.alive(guid(2), 9.0);
+    table.alive(guid(2));
   }
   SECTION("after the lease, as the same participant") {
     table.participant_gone(guid(2));
     CHECK(table.peers()[0].state == PeerState::kLost);
-    table.participant(guid(2), data_of(7, 70), "", 99.0);
-    table.alive(guid(2), 99.0);
+    table.participant(guid(2), data_of(7, 70), "");
+    table.alive(guid(2));
   }
   CHECK(kinds(table) == Kinds{PeerEventKind::kReturned});
   CHECK(table.peers()[0].state == PeerState::kAlive);
 }
 
 TEST_CASE("An orderly end is not a loss", "[peers]") {
-  PeerTable table(kSelf, kLiveliness_s);
-  table.participant(guid(2), data_of(7, 70), "", 0.0);
-  table.alive(guid(2), 0.0);
+  PeerTable table(kSelf);
+  table.participant(guid(2), data_of(7, 70), "");
+  table.alive(guid(2));
   table.closed(guid(2));
   table.participant_gone(guid(2));
   CHECK(kinds(table) == Kinds{PeerEventKind::kJoined, PeerEventKind::kLeft});
@@ -91,72 +91,154 @@ TEST_CASE("An orderly end is not a loss", "[peers]") {
   CHECK(table.identity_of(guid(2)).has_value());  // what it sent may still be on its way
 }
 
-TEST_CASE("Another boot of a robot is a restart, also while the old one is still listed",
+// Robot 7, heard from guid 2, with boot 70.
+PeerTable with_robot() {
+  PeerTable table(kSelf);
+  table.participant(guid(2), data_of(7, 70), "udp/10.0.0.7");
+  table.alive(guid(2));
+  REQUIRE(kinds(table) == Kinds{PeerEventKind::kJoined});
+  return table;
+}
+
+TEST_CASE("A robot that is started again has its id back once its former self is missed",
           "[peers]") {
-  PeerTable table(kSelf, kLiveliness_s);
-  table.participant(guid(2), data_of(7, 70), "", 0.0);
-  table.alive(guid(2), 0.0);
+  PeerTable table = with_robot();
   SECTION("killed and restarted at once") {
-    table.participant(guid(3), data_of(7, 71), "", 0.5);
-    table.alive(guid(3), 0.5);
-    table.tick(1.0);
-    table.silent(guid(2));  // its former self fades
-    table.tick(100.0);
-    CHECK(kinds(table) == Kinds{PeerEventKind::kJoined, PeerEventKind::kRestarted});
+    table.participant(guid(3), data_of(7, 71), "");
+    table.alive(guid(3));
+    CHECK(table.standing(guid(3)) == Standing::kRival);
+    CHECK(kinds(table) == Kinds{PeerEventKind::kRefused});
+    table.silent(guid(2));
   }
   SECTION("restarted after it was lost") {
     table.silent(guid(2));
-    table.participant(guid(3), data_of(7, 71), "", 10.0);
-    table.alive(guid(3), 10.0);
-    table.tick(100.0);
-    CHECK(kinds(table) ==
-          Kinds{PeerEventKind::kJoined, PeerEventKind::kLost, PeerEventKind::kRestarted});
+    table.participant(guid(3), data_of(7, 71), "");
+    CHECK(table.standing(guid(3)) == Standing::kRival);  // not heard itself yet
+    table.alive(guid(3));
   }
+  SECTION("restarted after it left") {
+    table.closed(guid(2));
+    table.participant_gone(guid(2));
+    CHECK(table.standing(guid(2)) == Standing::kAdmitted);  // what it said may still be coming
+    CHECK(kinds(table) == Kinds{PeerEventKind::kLeft});
+    table.participant(guid(3), data_of(7, 71), "");
+    table.alive(guid(3));
+  }
+  const Kinds events = kinds(table);
+  REQUIRE_FALSE(events.empty());
+  CHECK(events.back() == PeerEventKind::kRestarted);
   REQUIRE(table.peers().size() == 1);
   CHECK(table.peers()[0].identity.boot == 71);
   CHECK(table.peers()[0].state == PeerState::kAlive);
+  CHECK(table.standing(guid(3)) == Standing::kAdmitted);
+  CHECK(table.is_current({7, 71}));
+  CHECK_FALSE(table.is_current({7, 70}));
+  CHECK(table.standing(guid(2)) != Standing::kAdmitted);
 }
 
-TEST_CASE("Two living processes with one id are a conflict, reported once", "[peers]") {
-  PeerTable table(kSelf, kLiveliness_s);
-  table.participant(guid(2), data_of(7, 70), "", 0.0);
-  table.alive(guid(2), 0.0);
-  table.participant(guid(3), data_of(7, 71), "", 10.0);
-  table.alive(guid(3), 10.0);
-  table.tick(12.0);
-  CHECK(kinds(table) == Kinds{PeerEventKind::kJoined, PeerEventKind::kRestarted});
-  table.tick(13.5);
-  table.tick(20.0);
+TEST_CASE("Nobody takes over the id of a robot that is there", "[peers]") {
+  PeerTable table = with_robot();
+  const std::uint64_t boot = GENERATE(70, 71);  // that of the robot itself is no secret
+  for (int i = 0; i < 3; ++i) {
+    table.participant(guid(3), data_of(7, boot), "udp/10.0.0.66");
+    table.alive(guid(3));
+  }
   const auto events = table.take_events();
   REQUIRE(events.size() == 1);
-  CHECK(events[0].kind == PeerEventKind::kConflict);
-  CHECK_THAT(events[0].text, Catch::Matchers::Contains("two living processes claim robot id 7"));
+  CHECK(events[0].kind == PeerEventKind::kRefused);
+  CHECK_THAT(events[0].text, Catch::Matchers::Contains("udp/10.0.0.66"));
+  CHECK(table.standing(guid(3)) == Standing::kRival);
+  CHECK(table.standing(guid(2)) == Standing::kAdmitted);
+  CHECK(table.peers()[0].identity.boot == 70);
+
+  table.closed(guid(3));
+  CHECK(table.take_events().empty());
+  table.silent(guid(2));
+  CHECK(kinds(table) == Kinds{PeerEventKind::kLost});
+  table.alive(guid(2));
+  CHECK(kinds(table) == Kinds{PeerEventKind::kReturned});
 }
 
-TEST_CASE("A peer with this robot's own id is a conflict at once", "[peers]") {
-  PeerTable table(kSelf, kLiveliness_s);
-  table.participant(guid(2), data_of(kSelf.robot, 70), "", 0.0);
-  table.alive(guid(2), 0.0);
-  CHECK(kinds(table) == Kinds{PeerEventKind::kConflict});
+TEST_CASE("An id goes to who has claimed it for longest", "[peers]") {
+  PeerTable table = with_robot();
+  for (const std::uint8_t n : std::vector<std::uint8_t>{5, 4, 3}) {
+    table.participant(guid(n), data_of(7, 70U + n), "");
+    table.alive(guid(n));
+  }
+  table.closed(guid(2));
+  CHECK(table.standing(guid(5)) == Standing::kAdmitted);
+  table.closed(guid(4));
+  table.closed(guid(5));
+  CHECK(table.standing(guid(3)) == Standing::kAdmitted);
+}
+
+TEST_CASE("Of two processes with this robot's id the newer one yields", "[peers]") {
+  struct Case {
+    const char* what;
+    double its_s, own_s;
+    std::uint64_t its_boot;
+    PeerEventKind expected;
+  };
+  const auto [what, its_s, own_s, its_boot, expected] = GENERATE(
+      values({Case{"it is older", 100.0, 2.0, 70, PeerEventKind::kConflict},
+              Case{"it is younger", 2.0, 5.0, 70, PeerEventKind::kRefused},
+              Case{"both are new, and its boot is lower", 2.0, 2.5, 70, PeerEventKind::kConflict},
+              Case{"both are new, and its boot is higher", 2.0, 2.5, 7000, PeerEventKind::kRefused},
+              Case{"it says it is older, to one that is not new", 1e6, 11.0, 70,
+                   PeerEventKind::kRefused}}));
+  CAPTURE(what);
+  PeerTable table(kSelf);
+  table.participant(guid(2), data_of(kSelf.robot, its_boot), "udp/10.0.0.66");
+  table.alive(guid(2));
+  CHECK(kinds(table).empty());
+  CHECK(table.standing(guid(2)) == Standing::kTwin);
+  for (int i = 0; i < 3; ++i) table.twin_heard(guid(2), its_s + i, own_s + i);
+  const auto events = table.take_events();
+  REQUIRE(events.size() == 1);
+  CHECK(events[0].kind == expected);
+  CHECK_THAT(events[0].text, Catch::Matchers::Contains("give every robot its own --robot"));
   CHECK(table.peers().empty());
+}
+
+TEST_CASE("Crowds of strangers do not use up the memory", "[peers]") {
+  PeerTable table(kSelf);
+  const auto wide_guid = [](std::size_t n) {
+    Guid result{};
+    for (std::size_t k = 0; k < 4; ++k) result[k] = static_cast<std::uint8_t>(n >> (8 * k));
+    return result;
+  };
+  std::size_t admitted = 0;
+  for (std::size_t n = 0; n < 3 * PeerTable::kMaxParticipants; ++n) {
+    table.participant(wide_guid(n), data_of(static_cast<RobotId>(n + 2), n + 1), "");
+    table.alive(wide_guid(n));
+    admitted += table.standing(wide_guid(n)) == Standing::kAdmitted ? 1 : 0;
+  }
+  CHECK(admitted == PeerTable::kMaxRobots);
+  CHECK(table.peers().size() == PeerTable::kMaxRobots);
+  CHECK(table.standing(wide_guid(2 * PeerTable::kMaxParticipants)) == Standing::kUnknown);
+  // Who goes makes room.
+  for (std::size_t n = 0; n < PeerTable::kMaxParticipants; ++n)
+    table.participant_gone(wide_guid(n));
+  table.participant(wide_guid(9999), "some tool", "");
+  CHECK(table.standing(wide_guid(9999)) == Standing::kStranger);
 }
 
 TEST_CASE("Another protocol version and unreadable user data are refused, once", "[peers]") {
-  PeerTable table(kSelf, kLiveliness_s);
+  PeerTable table(kSelf);
   const std::string data = GENERATE(data_of(7, 70, kProtocolVersion + 1), std::string("robot=x"));
-  for (int i = 0; i < 3; ++i) table.participant(guid(2), data, "", i);
-  table.alive(guid(2), 3.0);
+  for (int i = 0; i < 3; ++i) table.participant(guid(2), data, "");
+  table.alive(guid(2));
   CHECK(kinds(table) == Kinds{PeerEventKind::kRefused});
   CHECK(table.peers().empty());
   CHECK_FALSE(table.identity_of(guid(2)).has_value());
-  CHECK_FALSE(table.has_met(7, 70));
+  CHECK(table.standing(guid(2)) == Standing::kStranger);
 }
 
 TEST_CASE("Programs that are no robots are not our business", "[peers]") {
-  PeerTable table(kSelf, kLiveliness_s);
-  table.participant(guid(2), "", "", 0.0);
-  table.participant(guid(3), "some tool", "", 0.0);
-  table.alive(guid(3), 0.0);
+  PeerTable table(kSelf);
+  table.participant(guid(2), "", "");
+  table.participant(guid(3), "some tool", "");
+  table.alive(guid(3));
   table.silent(guid(3));
   table.participant_gone(guid(3));
   table.participant_gone(guid(4));

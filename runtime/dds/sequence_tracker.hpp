@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+
+namespace km {
+
+/// Which numbers of a counted stream have arrived, in whatever order: drops duplicates, counts
+/// gaps. Memory is bounded: of more than kMaxIntervals separate runs, the oldest are joined, and
+/// what lay between them stays missing for good.
+class SequenceTracker {
+ public:
+  static constexpr std::size_t kMaxIntervals = 1024;
+
+  /// `from_zero`: the stream is expected whole, else from the lowest number that arrives.
+  explicit SequenceTracker(bool from_zero) : from_zero_(from_zero) {}
+
+  /// Records `number`. False if it had arrived before.
+  [[nodiscard]] bool is_new(std::uint32_t number);
+
+  /// How many numbers below the highest have not arrived (yet).
+  [[nodiscard]] std::uint64_t missing() const;
+
+ private:
+  bool from_zero_;
+  std::uint64_t lost_ = 0;                             // given up in joined runs
+  std::map<std::uint64_t, std::uint64_t> end_of_run_;  // begin -> end, half open, disjoint
+};
+
+}  // namespace km
