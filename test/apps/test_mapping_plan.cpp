@@ -24,7 +24,7 @@ struct Recording {
   }
 };
 
-TEST_CASE("Off is no plan; metric takes depth alone", "[robot][mapping]") {
+TEST_CASE("Off is no plan, metric takes depth alone", "[robot][mapping]") {
   const Recording recording({"cam0", "cam1", "depth0", "label0"});
   CHECK_FALSE(recording.plan({}).has_value());
   const auto plan = recording.plan({.mode = MappingMode::kMetric});

@@ -78,7 +78,7 @@ TEST_CASE("Mean, scale and channels are applied before the network", "[segmentat
   CHECK(int{result.labels.ids[9]} == 2);
 }
 
-TEST_CASE("Classes become the labels of the map; those beyond it are counted", "[segmentation]") {
+TEST_CASE("Classes become the labels of the map, those beyond it are counted", "[segmentation]") {
   const TemporaryFolder folder;
   SegmentationConfig config = config_of(folder.write("net.onnx", three_levels().onnx()));
   config.label_map = {"7", "9"};

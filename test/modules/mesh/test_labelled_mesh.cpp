@@ -98,7 +98,7 @@ TEST_CASE("The three encodings of one recorded mesh read alike") {
   CHECK(cube.colors.size() == 8);
 }
 
-TEST_CASE("Text with mixed types is read; polygons become fans") {
+TEST_CASE("Text with mixed types is read, polygons become fans") {
   const TemporaryFolder folder;
   std::string text = kAsciiHeader + "0 0 0 4\n1 0 0 4\n1 1 0 9\n3 0 1 2\n";
   CHECK(read_ply(write_text(folder, text)).labels == std::vector<LabelId>{4, 4, 9});
