@@ -165,7 +165,8 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeReply>& reply) {
   if (!reply->found) return requests_.absent(id, now_s_);
   // Also the answer to a repeated request, or one nobody asked for.
   if (!requests_.arrived(id)) return;
-  const KeyframePtr keyframe(reply, &reply->keyframe);
+  // A copy: the message itself counts as under way for as long as it is held.
+  const auto keyframe = std::make_shared<const Keyframe>(reply->keyframe);
   peers_.put(keyframe);
   arrived(keyframe);
   send_due_requests();
@@ -181,10 +182,10 @@ void LoopClosureNode::step(const std::shared_ptr<const PeerEvent>& event) {
 
 void LoopClosureNode::step(const std::shared_ptr<const KeyframeBow>& bow) {
   if (bow->vocabulary != vocabulary_->id()) return;
-  std::vector<std::uint32_t>& words = words_[bow->id];
-  words.clear();
+  std::vector<std::uint32_t> words;
   words.reserve(bow->words.size());
   for (const WordCount& entry : bow->words) words.push_back(entry.word);
+  words_.put(bow->id, std::move(words));
 }
 
 void LoopClosureNode::step(const LoopClosureTick& tick) {
@@ -218,10 +219,9 @@ KeyframeFeatures LoopClosureNode::worth_sending(const KeyframeFeatures& features
                                                 const KeyframeId& to) {
   const bool strangers = ++replies_[to.robot] <= kFirstReplies;
   const std::size_t most = strangers ? kFirstFactor * reply_keypoints_ : reply_keypoints_;
-  const auto words = words_.find(to);
-  if (words == words_.end()) return reduced(features, most);
-  return chosen_by_words(features, {reply_keypoints_ / kLeastPart, most}, *vocabulary_,
-                         words->second);
+  const std::vector<std::uint32_t>* words = words_.find(to);
+  if (words == nullptr) return reduced(features, most);
+  return chosen_by_words(features, {reply_keypoints_ / kLeastPart, most}, *vocabulary_, *words);
 }
 
 // Goes on with what is there; waits for what is not, a peer's keyframe by asking for it.

@@ -14,6 +14,7 @@
 #include "modules/core/keyframe.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
+#include "modules/loop_closure/peer_words.hpp"
 #include "modules/loop_closure/request_economy.hpp"
 #include "modules/loop_closure/verifier.hpp"
 #include "modules/place_recognition/bag_of_words.hpp"
@@ -112,8 +113,8 @@ class LoopClosureNode final : public Node {
   const LoopClosureTopics topics_;
   const Verifier verifier_;
   std::map<KeyframeId, KeyframePtr> own_;
-  std::map<RobotId, int> replies_;                          // sent
-  std::map<KeyframeId, std::vector<std::uint32_t>> words_;  // of the peers' keyframes, ascending
+  std::map<RobotId, int> replies_;  // sent
+  PeerWords words_;
   KeyframeCache peers_;
   KeyframeRequests requests_;
   RequestEconomy economy_;

@@ -5,7 +5,7 @@
 
 namespace km {
 
-/// What a topic between robots is for; decides its quality of service (see make_topic_qos()).
+/// What a topic between robots is for; decides its quality of service (see make_writer_qos()).
 ///
 /// Writers of all kinds keep the last sample of each key, so that none blocks on an unreachable
 /// robot. Readers keep all until it is taken: another's sample with the same key replaces nothing.
