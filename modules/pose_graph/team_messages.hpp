@@ -13,6 +13,7 @@
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/core/precision.hpp"
+#include "modules/core/robot_identity.hpp"
 #include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/pose_graph/pgo_method.hpp"
 
@@ -20,13 +21,6 @@ namespace km {
 
 /// No team has more robots.
 inline constexpr std::size_t kMaxTeam = 1024;
-
-/// A process of a robot: a restarted robot keeps its id and gets another boot.
-struct TeamPeer {
-  RobotId robot = 0;
-  std::uint64_t boot = 0;
-  auto operator<=>(const TeamPeer&) const = default;
-};
 
 /// The gauge that poses are expressed in: the process whose own frame it was. Robots with equal
 /// frames need no alignment to each other.

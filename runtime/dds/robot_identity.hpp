@@ -5,23 +5,9 @@
 #include <string_view>
 
 #include "modules/core/decoded.hpp"
-#include "modules/core/ids.hpp"
+#include "modules/core/robot_identity.hpp"
 
 namespace km {
-
-/// Version of the protocol between robots as a whole: robots of different versions do not talk.
-/// Fields appended to a topic type do not change it, see idl/README.md.
-inline constexpr std::uint16_t kProtocolVersion = 1;
-
-/// What a robot tells of itself in the USER_DATA of its DDS participant.
-struct RobotIdentity {
-  RobotId robot = 0;
-  std::string name;  ///< 1 to 64 printable ASCII characters without ';'.
-  std::uint16_t protocol = kProtocolVersion;
-  std::uint64_t boot = 0;  ///< random_boot_id(): tells a restarted robot from its former self.
-
-  bool operator==(const RobotIdentity&) const = default;
-};
 
 /// "name (id 7)", for messages.
 [[nodiscard]] std::string to_string(const RobotIdentity& identity);
@@ -29,6 +15,7 @@ struct RobotIdentity {
 /// A fresh, nonzero boot id.
 [[nodiscard]] std::uint64_t random_boot_id();
 
+/// What a robot tells of itself in the USER_DATA of its DDS participant:
 /// "robot=7;name=alpha;proto=1;boot=0123456789abcdef". Throws std::invalid_argument for a name
 /// that cannot be sent.
 [[nodiscard]] std::string to_user_data(const RobotIdentity& identity);
