@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace km {
+
+using Octets = std::vector<std::uint8_t>;
+using OctetView = std::span<const std::uint8_t>;
+
+/// Ed25519 (RFC 8032): who signed.
+using PublicKey = std::array<std::uint8_t, 32>;
+using Signature = std::array<std::uint8_t, 64>;
+
+/// Octets that are wiped when they are no longer needed.
+template <std::size_t N>
+class Secret {
+ public:
+  Secret() = default;
+  Secret(const Secret&) = default;
+  Secret& operator=(const Secret&) = default;
+  ~Secret() {
+    // A volatile write is not optimised away, though nothing reads the octets any more.
+    for (volatile std::uint8_t& octet : octets_) octet = 0;
+  }
+
+  [[nodiscard]] std::uint8_t* data() { return octets_.data(); }
+  [[nodiscard]] const std::uint8_t* data() const { return octets_.data(); }
+  [[nodiscard]] static constexpr std::size_t size() { return N; }
+
+ private:
+  std::array<std::uint8_t, N> octets_{};
+};
+
+/// Ed25519, in libsodium's form: the seed and the public key.
+using SigningKey = Secret<64>;
+
+/// XChaCha20-Poly1305.
+using SealingKey = Secret<32>;
+
+}  // namespace km

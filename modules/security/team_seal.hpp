@@ -1,0 +1,130 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "modules/core/robot_identity.hpp"
+#include "modules/security/key_folder.hpp"
+#include "modules/security/key_types.hpp"
+
+namespace km {
+
+/// Octets that sealing adds to a message for one robot: nonce 24, tag 16.
+inline constexpr std::size_t kAddressedSealBytes = 24 + 16;
+
+/// Octets that sealing adds to a message to all: key number 4, nonce 24, tag 16, signature 64.
+inline constexpr std::size_t kTeamSealBytes = 4 + 24 + 16 + 64;
+
+/// Characters of TeamSeal::credentials(): letters, digits, '-' and '_' only.
+inline constexpr std::size_t kCredentialsLength = 290;
+
+/// Processes of robots that a TeamSeal knows keys of at most, and those of one robot.
+inline constexpr std::size_t kMaxAdmitted = 256;
+inline constexpr std::size_t kMaxAdmittedPerRobot = 4;
+
+/// What goes with a message in clear. All of it is authenticated: a message opens only with the
+/// context that it was sealed with.
+struct SealContext {
+  std::string_view topic;
+  TeamPeer sender;
+  std::uint64_t number = 0;            ///< Of the message, counted by its sender.
+  std::array<std::uint8_t, 16> key{};  ///< Of the envelope.
+  std::optional<TeamPeer> addressee;   ///< None: for every member of the team.
+};
+
+/// What open() made of a message.
+struct [[nodiscard]] Opened {
+  enum class Status {
+    kOpened,
+    kNotYet,   ///< A key is missing that may still come: keep the message (a bounded number), and
+               ///< try again after the next admit() or accept_key_message() for its sender.
+    kRefused,  ///< It will never open.
+  };
+  Status status = Status::kRefused;
+  Octets content;                ///< If opened.
+  const char* reason = nullptr;  ///< If not: a string literal.
+};
+
+/// Seals what one process of a robot sends to its team, and opens what it receives.
+///
+/// A message for one robot is encrypted by a key that only the two processes have: X25519 keys that
+/// each draws at its start (crypto_kx, so that either direction has its own). A message to all is
+/// encrypted by a key that its sender draws, and signed by the sender, so that no member can speak
+/// for another. Encryption is XChaCha20-Poly1305. Keys are gone when the process ends: what was
+/// recorded cannot be opened by a robot's long-lived secret found later.
+///
+/// Nonces are drawn at random, 24 octets each. Two equal ones under one key would give the contents
+/// away; among 2^64 messages the probability of that is below 2^-64, and no counter has to survive
+/// a crash.
+///
+/// What the caller does:
+/// - announces credentials() with its identity; admits others by theirs, before anything else.
+///   Credentials can be recorded and shown again by a stranger: they say who could be there, not
+///   who is. A member lives once a message of its opens; only then may a new process of a robot
+///   take the place of an older one.
+/// - sends key_message_for(peer) to each newly admitted peer, once more whenever that peer is
+///   admitted anew, and to all after update() has forgotten anyone.
+/// - drops repeated messages. A sealed message can be recorded and shown again and opens again: the
+///   caller keeps which numbers of (robot, boot) it has taken.
+///
+/// Thread-safe.
+class TeamSeal {
+ public:
+  /// For the process `own` at `now_s` [s since 1970-01-01 UTC]. Throws std::invalid_argument if the
+  /// keys are another robot's (id or name), lapsed or revoked.
+  TeamSeal(RobotKeys keys, const RobotIdentity& own, std::int64_t now_s);
+  ~TeamSeal();
+  TeamSeal(const TeamSeal&) = delete;
+  TeamSeal& operator=(const TeamSeal&) = delete;
+
+  /// What this process shows others: certificate, a key of this start, and a signature over them
+  /// and the identity. kCredentialsLength characters.
+  [[nodiscard]] const std::string& credentials() const;
+
+  /// Checks what a process shows of itself at `now_s` and remembers its keys. nullptr, or why it is
+  /// not a member (a string literal): not understood, another team's authority, lapsed, revoked,
+  /// another id or name than the certificate's, a signature that is not its own. Admitting again is
+  /// harmless. Beyond kMaxAdmitted, or kMaxAdmittedPerRobot of one robot, the one that has been
+  /// silent for longest is forgotten; those whose messages never opened come first.
+  [[nodiscard]] const char* admit(const RobotIdentity& identity, std::string_view credentials,
+                                  std::int64_t now_s);
+
+  [[nodiscard]] bool is_admitted(const TeamPeer& peer) const;
+
+  /// A process that is gone: its keys are forgotten. Nothing happens if it is not known.
+  void forget(const TeamPeer& peer);
+
+  /// Takes a list of revocations and the time: forgets members that are revoked or lapsed, draws a
+  /// new key for messages to all if there were any, and returns them. Send key_message_for() to all
+  /// others then. Throws std::invalid_argument if the list is not the authority's, or older than
+  /// the one in use; nothing has changed then.
+  [[nodiscard]] std::vector<TeamPeer> update(const Revocations& revocations, std::int64_t now_s);
+
+  /// What lets `peer` open this process's messages to all: octets to send to it as they are, sealed
+  /// for it. nullopt if it is not admitted.
+  [[nodiscard]] std::optional<Octets> key_message_for(const TeamPeer& peer) const;
+
+  /// Takes what key_message_for() of `from` gave. nullptr, or why it is refused (a string literal).
+  /// The same message again changes nothing.
+  [[nodiscard]] const char* accept_key_message(const TeamPeer& from, OctetView message);
+
+  /// The sealed message. nullopt if the addressee is not admitted. Throws std::invalid_argument if
+  /// `context` names another sender than this process, or this process as addressee.
+  [[nodiscard]] std::optional<Octets> seal(const SealContext& context, OctetView content) const;
+
+  /// The content of a message that anybody may have sent. The work is bounded by its size; a
+  /// stranger's message costs no signature check.
+  [[nodiscard]] Opened open(const SealContext& context, OctetView sealed);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace km
