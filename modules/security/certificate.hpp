@@ -36,7 +36,7 @@ struct Revocations {
   Signature signature{};  ///< By the authority.
 };
 
-/// Signs with the authority's key. libsodium must be ready: see make_signing_key().
+/// Signs with the authority's key.
 void sign(Certificate& certificate, const SigningKey& authority);
 void sign(Revocations& revocations, const SigningKey& authority);
 
@@ -48,10 +48,5 @@ void sign(Revocations& revocations, const SigningKey& authority);
 /// the authority, not valid yet or any more, or revoked. `revocations` are believed as they are.
 [[nodiscard]] const char* refusal_of(const Certificate& certificate, const PublicKey& authority,
                                      const Revocations& revocations, std::int64_t now_s);
-
-/// A fresh key. Throws std::runtime_error if libsodium cannot start.
-[[nodiscard]] SigningKey make_signing_key();
-
-[[nodiscard]] PublicKey public_key_of(const SigningKey& key);
 
 }  // namespace km

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "modules/core/robot_identity.hpp"
+#include "modules/security/credentials.hpp"
 #include "modules/security/key_folder.hpp"
 #include "modules/security/key_types.hpp"
 
@@ -20,9 +21,6 @@ inline constexpr std::size_t kAddressedSealBytes = 24 + 16;
 
 /// Octets that sealing adds to a message to all: key number 4, nonce 24, tag 16, signature 64.
 inline constexpr std::size_t kTeamSealBytes = 4 + 24 + 16 + 64;
-
-/// Characters of TeamSeal::credentials(): letters, digits, '-' and '_' only.
-inline constexpr std::size_t kCredentialsLength = 290;
 
 /// Processes of robots that a TeamSeal knows keys of at most, and those of one robot.
 inline constexpr std::size_t kMaxAdmitted = 256;
@@ -51,6 +49,12 @@ struct [[nodiscard]] Opened {
   const char* reason = nullptr;  ///< If not: a string literal.
 };
 
+/// What TeamSeal::update() changed.
+struct [[nodiscard]] MembershipChange {
+  std::vector<TeamPeer> forgotten;
+  bool new_key = false;  ///< Send key_message_for() to all peers again.
+};
+
 /// Seals what one process of a robot sends to its team, and opens what it receives.
 ///
 /// A message for one robot is encrypted by a key that only the two processes have: X25519 keys that
@@ -69,7 +73,7 @@ struct [[nodiscard]] Opened {
 ///   who is. A member lives once a message of its opens; only then may a new process of a robot
 ///   take the place of an older one.
 /// - sends key_message_for(peer) to each newly admitted peer, once more whenever that peer is
-///   admitted anew, and to all after update() has forgotten anyone.
+///   admitted anew, and to all when update() says so.
 /// - drops repeated messages. A sealed message can be recorded and shown again and opens again: the
 ///   caller keeps which numbers of (robot, boot) it has taken.
 ///
@@ -100,11 +104,11 @@ class TeamSeal {
   /// A process that is gone: its keys are forgotten. Nothing happens if it is not known.
   void forget(const TeamPeer& peer);
 
-  /// Takes a list of revocations and the time: forgets members that are revoked or lapsed, draws a
-  /// new key for messages to all if there were any, and returns them. Send key_message_for() to all
-  /// others then. Throws std::invalid_argument if the list is not the authority's, or older than
-  /// the one in use; nothing has changed then.
-  [[nodiscard]] std::vector<TeamPeer> update(const Revocations& revocations, std::int64_t now_s);
+  /// Takes a list of revocations (the same as before, to let time alone work) and the time: forgets
+  /// members that are revoked or lapsed, and draws a new key for messages to all if anyone who was
+  /// given the last one is no longer a member. Throws std::invalid_argument if the list is not the
+  /// authority's, or older than the one in use; nothing has changed then.
+  MembershipChange update(const Revocations& revocations, std::int64_t now_s);
 
   /// What lets `peer` open this process's messages to all: octets to send to it as they are, sealed
   /// for it. nullopt if it is not admitted.

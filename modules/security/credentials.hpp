@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "modules/core/decoded.hpp"
+#include "modules/core/robot_identity.hpp"
+#include "modules/security/certificate.hpp"
+
+namespace km {
+
+/// X25519 (RFC 7748): what two processes agree on a key by.
+using ExchangeKey = std::array<std::uint8_t, 32>;
+
+/// What a process shows of itself beside its identity: of its certificate, what the identity does
+/// not say already, and a key of this start that the robot signs.
+struct Credentials {
+  std::array<std::uint8_t, 8> authority{};  ///< Begin of the authority's public key: which team.
+  PublicKey key{};
+  std::int64_t valid_from_s = 0;
+  std::int64_t valid_until_s = 0;
+  Signature certificate{};  ///< By the authority.
+  ExchangeKey exchange{};
+  Signature signature{};  ///< By the robot, over its identity, `exchange` and `certificate`.
+};
+
+/// Characters of to_text().
+inline constexpr std::size_t kCredentialsLength = 290;
+
+/// Makes and signs what the robot of `certificate` shows.
+[[nodiscard]] Credentials make_credentials(const Certificate& certificate,
+                                           const PublicKey& authority, const SigningKey& robot,
+                                           const RobotIdentity& identity,
+                                           const ExchangeKey& exchange);
+
+/// Base 64 with '-' and '_' (RFC 4648, section 5), without padding.
+[[nodiscard]] std::string to_text(const Credentials& credentials);
+
+/// Inverse of to_text() for a text that anybody may have sent; every credentials have one spelling.
+[[nodiscard]] Decoded<Credentials> parse_credentials(std::string_view text);
+
+/// The certificate that the credentials claim for `identity`, in a team of this name.
+[[nodiscard]] Certificate claimed_certificate(const Credentials& credentials,
+                                              const RobotIdentity& identity,
+                                              const std::string& team);
+
+/// True if the owner of credentials.key signed this identity and these keys.
+[[nodiscard]] bool is_signed_by_robot(const Credentials& credentials,
+                                      const RobotIdentity& identity);
+
+}  // namespace km
