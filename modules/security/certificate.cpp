@@ -48,16 +48,21 @@ bool is_signed_by(const PublicKey& authority, const Revocations& revocations) {
   return verify(statement_of(revocations), revocations.signature, authority);
 }
 
-const char* refusal_of(const Certificate& certificate, const PublicKey& authority,
-                       const Revocations& revocations, std::int64_t now_s) {
-  if (!is_signed_by(authority, certificate))
-    return "certificate is not the authority's for this id, name and key";
+const char* lapse_of(const Certificate& certificate, const Revocations& revocations,
+                     std::int64_t now_s) {
   if (now_s < certificate.valid_from_s) return "certificate is not valid yet (are clocks right?)";
   if (now_s > certificate.valid_until_s) return "certificate has expired (are clocks right?)";
   if (std::ranges::any_of(revocations.revoked,
                           [&](const auto& one) { return one.key == certificate.key; }))
     return "certificate is revoked";
   return nullptr;
+}
+
+const char* refusal_of(const Certificate& certificate, const PublicKey& authority,
+                       const Revocations& revocations, std::int64_t now_s) {
+  if (!is_signed_by(authority, certificate))
+    return "certificate is not the authority's for this id, name and key";
+  return lapse_of(certificate, revocations, now_s);
 }
 
 }  // namespace km

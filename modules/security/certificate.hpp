@@ -44,8 +44,12 @@ void sign(Revocations& revocations, const SigningKey& authority);
 [[nodiscard]] bool is_signed_by(const PublicKey& authority, const Certificate& certificate);
 [[nodiscard]] bool is_signed_by(const PublicKey& authority, const Revocations& revocations);
 
-/// nullptr, or why the certificate does not hold at `now_s` [s since 1970-01-01 UTC]: not signed by
-/// the authority, not valid yet or any more, or revoked. `revocations` are believed as they are.
+/// nullptr, or why a certificate of the authority's does not hold at `now_s`
+/// [s since 1970-01-01 UTC] (a string literal): not valid yet or any more, or revoked.
+[[nodiscard]] const char* lapse_of(const Certificate& certificate, const Revocations& revocations,
+                                   std::int64_t now_s);
+
+/// The same, or that it is not signed by the authority. `revocations` are believed as they are.
 [[nodiscard]] const char* refusal_of(const Certificate& certificate, const PublicKey& authority,
                                      const Revocations& revocations, std::int64_t now_s);
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "modules/core/robot_identity.hpp"
+#include "modules/security/admitted_peers.hpp"
 #include "modules/security/credentials.hpp"
 #include "modules/security/key_folder.hpp"
 #include "modules/security/key_types.hpp"
@@ -21,10 +22,6 @@ inline constexpr std::size_t kAddressedSealBytes = 24 + 16;
 
 /// Octets that sealing adds to a message to all: key number 4, nonce 24, tag 16, signature 64.
 inline constexpr std::size_t kTeamSealBytes = 4 + 24 + 16 + 64;
-
-/// Processes of robots that a TeamSeal knows keys of at most, and those of one robot.
-inline constexpr std::size_t kMaxAdmitted = 256;
-inline constexpr std::size_t kMaxAdmittedPerRobot = 4;
 
 /// What goes with a message in clear. All of it is authenticated: a message opens only with the
 /// context that it was sealed with.
@@ -112,7 +109,7 @@ class TeamSeal {
 
   /// What lets `peer` open this process's messages to all: octets to send to it as they are, sealed
   /// for it. nullopt if it is not admitted.
-  [[nodiscard]] std::optional<Octets> key_message_for(const TeamPeer& peer) const;
+  [[nodiscard]] std::optional<Octets> key_message_for(const TeamPeer& peer);
 
   /// Takes what key_message_for() of `from` gave. nullptr, or why it is refused (a string literal).
   /// The same message again changes nothing.
