@@ -1,7 +1,5 @@
 #include "apps/team/team_file.hpp"
 
-#include <algorithm>
-#include <cctype>
 #include <cstdlib>
 
 #include "modules/evaluation/trajectory_file.hpp"
@@ -24,13 +22,6 @@ fs::path find_truth(const fs::path& place, std::vector<std::string>& notes) {
 }
 
 }  // namespace
-
-bool is_folder_name(const std::string& name) {
-  return !name.empty() && name.front() != '.' && name.size() <= 64 &&
-         std::all_of(name.begin(), name.end(), [](unsigned char c) {
-           return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.';
-         });
-}
 
 bool is_rate(const std::string& text) {
   if (text == "max") return true;

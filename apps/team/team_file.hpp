@@ -7,13 +7,11 @@
 #include <vector>
 
 #include "modules/core/config.hpp"
+#include "modules/core/folder_name.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 
 namespace km {
-
-/// True for what can name a folder of results: letters, digits, _, - and .
-[[nodiscard]] bool is_folder_name(const std::string& name);
 
 /// True for what --rate of a robot takes: a positive number, or max.
 [[nodiscard]] bool is_rate(const std::string& text);

@@ -1,0 +1,41 @@
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <iostream>
+
+#include "apps/keys/commands.hpp"
+
+namespace {
+
+constexpr const char* kAbout =
+    "Keys of a team: who may take part. The team's authority gives each robot a key and a\n"
+    "certificate; robots that are started with them (--security) believe, and can be read by, "
+    "each\n"
+    "other alone. Examples:\n"
+    "  kimera_multi_keys make survey --robots alpha:0,beta:1   # name:id of each robot\n"
+    "  scp -rp survey/alpha alpha.local:keys                   # its folder goes onto the robot\n"
+    "  kimera_multi_keys add survey --robots gamma:2           # later, one more\n"
+    "  kimera_multi_keys revoke survey beta                    # beta is lost\n"
+    "  kimera_multi_keys show survey\n"
+    "Keep survey/authority off the robots, and a copy of it in a safe place: whoever has it can\n"
+    "admit anyone to the team, and without it no robot can be added or revoked.\n"
+    "Every subcommand has a --help. Exit code: 0 if it was done, 1 if not.";
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  CLI::App app(kAbout);
+  app.require_subcommand(1);
+  km::add_make(app);
+  km::add_add(app);
+  km::add_revoke(app);
+  km::add_show(app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 1;
+  }
+  return 0;
+} catch (const std::exception& error) {
+  std::cerr << "kimera_multi_keys: " << error.what() << '\n';
+  return 1;
+}
