@@ -55,10 +55,7 @@ std::vector<RobotName> robots_from(const std::vector<std::string>& texts) {
   return robots;
 }
 
-void issue(TeamFolder& team, const KeysCommand& command) {
-  const auto robots = robots_from(command.robots);
-  const std::int64_t now = now_s();
-  team.issue(robots, now, now + command.days * kDay_s);
+void print_issued(const KeysCommand& command, const std::vector<RobotName>& robots) {
   for (const RobotName& robot : robots)
     std::cout << (command.team / robot.name).string() << "  for robot " << robot.id << ", valid "
               << command.days << " days\n";
@@ -70,14 +67,17 @@ void issue(TeamFolder& team, const KeysCommand& command) {
 }
 
 void make(const KeysCommand& command) {
-  (void)robots_from(command.robots);  // told before anything is written
-  TeamFolder team = TeamFolder::make(command.team);
-  issue(team, command);
+  const auto robots = robots_from(command.robots);
+  const std::int64_t now = now_s();
+  TeamFolder::make(command.team, robots, now, now + command.days * kDay_s);
+  print_issued(command, robots);
 }
 
 void add(const KeysCommand& command) {
-  TeamFolder team(command.team);
-  issue(team, command);
+  const auto robots = robots_from(command.robots);
+  const std::int64_t now = now_s();
+  TeamFolder(command.team).issue(robots, now, now + command.days * kDay_s);
+  print_issued(command, robots);
 }
 
 void revoke(const KeysCommand& command) {

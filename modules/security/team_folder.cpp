@@ -31,29 +31,30 @@ std::string describe(RobotId id, const std::string& name) {
 
 }  // namespace
 
-TeamFolder TeamFolder::make(const fs::path& given) {
-  const fs::path folder = fs::absolute(given / "").lexically_normal().parent_path();
-  const std::string team = folder.filename().string();
-  if (!is_folder_name(team))
-    throw std::runtime_error(folder.string() +
-                             ": the folder's name is the team's, so it is made "
-                             "of letters, digits, _, - and .");
-  if (fs::exists(folder) && !fs::is_empty(folder))
-    throw std::runtime_error(folder.string() +
-                             ": is there already; `kimera_multi_keys add` adds robots to a team");
+TeamFolder TeamFolder::make(const fs::path& given, const std::vector<RobotName>& robots,
+                            std::int64_t now_s, std::int64_t valid_until_s) {
   TeamFolder result;
-  result.folder_ = folder;
+  result.folder_ = fs::absolute(given / "").lexically_normal().parent_path();
+  const std::string team = result.folder_.filename().string();
+  if (!is_folder_name(team))
+    throw std::runtime_error(result.folder_.string() +
+                             ": the folder's name is the team's, so it is made of letters, "
+                             "digits, _, - and .");
+  if (fs::exists(result.folder_) && !fs::is_empty(result.folder_))
+    throw std::runtime_error(result.folder_.string() +
+                             ": is there already; `kimera_multi_keys add` adds robots to a team");
+  result.check(robots, now_s);
   result.secret_ = make_signing_key();
   result.authority_ = {team, public_key_of(result.secret_)};
   sign(result.revocations_, result.secret_);
 
-  const fs::path authority = folder / kAuthorityFolder;
-  make_private_folder(folder);
-  make_private_folder(authority);
-  make_private_folder(authority / kIssuedFolder);
+  const fs::path authority = result.folder_ / kAuthorityFolder;
+  for (const fs::path& folder : {result.folder_, authority, authority / kIssuedFolder})
+    make_private_folder(folder);
   write_secret_key(authority / kSecretKeyFile, result.secret_, "the authority of team " + team);
   write_revocations(authority / kRevocationsFile, result.revocations_);
   write_authority(authority / kAuthorityFile, result.authority_);
+  result.issue(robots, now_s, valid_until_s);
   return result;
 }
 

@@ -23,9 +23,11 @@ struct RobotName {
 /// What cannot be done throws std::runtime_error that names the file or the robot, and the way out.
 class TeamFolder {
  public:
-  /// Makes a team with an authority and no robots. Its name is that of the folder, which must not
-  /// exist or be empty.
-  static TeamFolder make(const std::filesystem::path& folder);
+  /// Makes a team with an authority, and keys of these robots as issue() does. Its name is that of
+  /// the folder, which must not exist or be empty. Nothing is written if the robots' names or ids
+  /// cannot be.
+  static TeamFolder make(const std::filesystem::path& folder, const std::vector<RobotName>& robots,
+                         std::int64_t now_s, std::int64_t valid_until_s);
 
   /// Opens what make() made; needs the authority's secret.
   explicit TeamFolder(const std::filesystem::path& folder);

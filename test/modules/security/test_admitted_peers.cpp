@@ -1,0 +1,57 @@
+#include <catch2/catch.hpp>
+
+#include "modules/security/admitted_peers.hpp"
+
+namespace km {
+namespace {
+
+TEST_CASE("Of one robot, recordings of former starts do not displace the one that speaks",
+          "[security]") {
+  AdmittedPeers peers;
+  const TeamPeer live{3, 1000};
+  peers.add(live, {});
+  peers.heard(live);
+  for (std::uint64_t boot = 1; boot <= 50; ++boot) peers.add({3, boot}, {});
+  CHECK(peers.find(live) != nullptr);
+  CHECK(peers.size() == kMaxAdmittedPerRobot);
+}
+
+TEST_CASE("Of starts that spoke, the one that has been silent for longest makes room",
+          "[security]") {
+  AdmittedPeers peers;
+  for (std::uint64_t boot = 1; boot <= kMaxAdmittedPerRobot; ++boot) {
+    peers.add({3, boot}, {});
+    peers.heard({3, boot});
+  }
+  peers.heard({3, 1});
+  peers.add({3, 99}, {});
+  CHECK(peers.find({3, 1}) != nullptr);
+  CHECK(peers.find({3, 2}) == nullptr);
+  CHECK(peers.find({3, 99}) != nullptr);
+}
+
+TEST_CASE("The number of admitted processes is bounded", "[security]") {
+  AdmittedPeers peers;
+  const TeamPeer live{0, 1};
+  peers.add(live, {});
+  peers.heard(live);
+  for (RobotId robot = 1; robot < 2 * kMaxAdmitted; ++robot) peers.add({robot, 1}, {});
+  CHECK(peers.size() == kMaxAdmitted);
+  CHECK(peers.find(live) != nullptr);
+  CHECK(peers.find({2 * kMaxAdmitted - 1, 1}) != nullptr);
+}
+
+TEST_CASE("One robot's many starts cost other robots nothing", "[security]") {
+  AdmittedPeers peers;
+  peers.add({2, 7}, {});
+  peers.add({4, 7}, {});
+  for (std::uint64_t boot = 1; boot <= 500; ++boot) {
+    peers.add({3, boot}, {});
+    peers.heard({3, boot});
+  }
+  CHECK(peers.find({2, 7}) != nullptr);
+  CHECK(peers.find({4, 7}) != nullptr);
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,81 @@
+#include <catch2/catch.hpp>
+
+#include <string>
+
+#include "modules/security/authenticated_encryption.hpp"
+#include "test/modules/security/hex.hpp"
+
+namespace km {
+namespace {
+
+// draft-irtf-cfrg-xchacha-03, appendix A.3.1.
+struct PublishedExample {
+  SealingKey key =
+      secret_from_hex<32>("808182838485868788898a8b8c8d8e8f909192939495969798999a9b9c9d9e9f");
+  Nonce nonce = array_from_hex<24>("404142434445464748494a4b4c4d4e4f5051525354555657");
+  Octets associated = octets_from_hex("50515253c0c1c2c3c4c5c6c7");
+  std::string content =
+      "Ladies and Gentlemen of the class of '99: If I could offer you only one tip for the future, "
+      "sunscreen would be it.";
+  Octets encrypted = octets_from_hex(
+      "404142434445464748494a4b4c4d4e4f5051525354555657"
+      "bd6d179d3e83d43b9576579493c0e939572a1700252bfaccbed2902c21396cbb"
+      "731c7f1b0b4aa6440bf3a82f4eda7e39ae64c6708c54c216cb96b72e1213b452"
+      "2f8c9ba40db5d945b11b69b982c1bb9e3f3fac2bc369488f76b2383565d3fff9"
+      "21f9664c97637da9768812f615c68b13b52e"
+      "c0875924c1c7987947deafd8780acf49");
+};
+
+TEST_CASE("Encryption is the XChaCha20-Poly1305 of the standard's example", "[security]") {
+  const PublishedExample example;
+  const Octets content(example.content.begin(), example.content.end());
+  Octets encrypted = {0xaa};  // what is there stays
+  encrypt(example.key, example.nonce, example.associated, content, encrypted);
+  CHECK(encrypted.front() == 0xaa);
+  encrypted.erase(encrypted.begin());
+  CHECK(encrypted == example.encrypted);
+  const auto decrypted = decrypt(example.key, example.associated, example.encrypted);
+  REQUIRE(decrypted);
+  CHECK(*decrypted == content);
+}
+
+TEST_CASE("What was encrypted is not decrypted with anything else", "[security]") {
+  const PublishedExample example;
+  REQUIRE(decrypt(example.key, example.associated, example.encrypted));
+  SECTION("another key") {
+    SealingKey key = example.key;
+    key.data()[31] ^= 1U;
+    CHECK_FALSE(decrypt(key, example.associated, example.encrypted));
+  }
+  SECTION("other associated data") {
+    Octets longer = example.associated;
+    longer.push_back(0);
+    CHECK_FALSE(decrypt(example.key, longer, example.encrypted));
+  }
+  SECTION("any shorter part") {
+    for (std::size_t size = 0; size < example.encrypted.size(); ++size) {
+      CAPTURE(size);
+      CHECK_FALSE(
+          decrypt(example.key, example.associated, OctetView(example.encrypted).first(size)));
+    }
+  }
+}
+
+TEST_CASE("Nothing can be encrypted, too", "[security]") {
+  const SealingKey key = make_sealing_key();
+  Octets encrypted;
+  encrypt(key, random_nonce(), {}, {}, encrypted);
+  CHECK(encrypted.size() == kEncryptionBytes);
+  const auto decrypted = decrypt(key, {}, encrypted);
+  REQUIRE(decrypted);
+  CHECK(decrypted->empty());
+}
+
+TEST_CASE("Nonces and keys differ from draw to draw", "[security]") {
+  CHECK(random_nonce() != random_nonce());
+  const SealingKey a = make_sealing_key(), b = make_sealing_key();
+  CHECK(Octets(a.data(), a.data() + 32) != Octets(b.data(), b.data() + 32));
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,70 @@
+#include <catch2/catch.hpp>
+
+#include "modules/security/credentials.hpp"
+#include "modules/security/signing.hpp"
+#include "test/modules/security/toy_team.hpp"
+
+namespace km {
+namespace {
+
+TEST_CASE("Credentials survive being written and read", "[security]") {
+  const ToyTeam team;
+  const RobotKeys keys = team.keys_of(3, "alpha");
+  const RobotIdentity identity = toy_identity(3, "alpha");
+  const ExchangeKey exchange = {9, 8, 7};
+  const std::string text =
+      to_text(make_credentials(keys.certificate, keys.authority, keys.secret, identity, exchange));
+  CHECK(text.size() == kCredentialsLength);
+  CHECK(text.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
+                               "0123456789-_") == std::string::npos);
+  const auto parsed = parse_credentials(text);
+  REQUIRE(parsed.value);
+  CHECK(to_text(*parsed.value) == text);
+  CHECK(parsed.value->exchange == exchange);
+  CHECK(is_signed_by_robot(*parsed.value, identity));
+  CHECK(is_signed_by(team.authority(), claimed_certificate(*parsed.value, identity, "survey")));
+}
+
+TEST_CASE("Credentials are signed with every field of the identity", "[security]") {
+  const ToyTeam team;
+  const RobotKeys keys = team.keys_of(3, "alpha");
+  RobotIdentity identity = toy_identity(3, "alpha");
+  const Credentials shown =
+      make_credentials(keys.certificate, keys.authority, keys.secret, identity, {});
+  REQUIRE(is_signed_by_robot(shown, identity));
+  SECTION("robot") {
+    identity.robot = 4;
+  }
+  SECTION("name") {
+    identity.name = "alpha2";
+  }
+  SECTION("protocol") {
+    identity.protocol += 1;
+  }
+  SECTION("boot") {
+    identity.boot += 1;
+  }
+  CHECK_FALSE(is_signed_by_robot(shown, identity));
+}
+
+TEST_CASE("The most that a robot tells of itself fits into its user data", "[security]") {
+  const std::string most =
+      "robot=65535;name=" + std::string(64, 'n') + ";proto=65535;boot=ffffffffffffffff;auth=";
+  CHECK(most.size() + kCredentialsLength <= 1024);
+}
+
+TEST_CASE("Texts that are no credentials are refused with the reason", "[security]") {
+  const std::string zeros(kCredentialsLength, 'A');
+  CHECK(reason_of(parse_credentials("").refusal) == "credentials of another length");
+  CHECK(reason_of(parse_credentials(zeros + "A").refusal) == "credentials of another length");
+  CHECK(reason_of(parse_credentials(zeros).refusal) == "credentials of another format");
+  std::string text = zeros;
+  text[17] = '+';
+  CHECK(reason_of(parse_credentials(text).refusal) == "credentials are not base 64");
+  text = zeros;
+  text.back() = 'B';  // another spelling of the same octets
+  CHECK(reason_of(parse_credentials(text).refusal) == "credentials are not base 64");
+}
+
+}  // namespace
+}  // namespace km

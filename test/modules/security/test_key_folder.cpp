@@ -1,0 +1,157 @@
+#include <catch2/catch.hpp>
+
+#include <filesystem>
+#include <string>
+
+#include "modules/security/key_file.hpp"
+#include "modules/security/key_folder.hpp"
+#include "modules/security/team_folder.hpp"
+#include "test/modules/security/toy_team.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A team of two on disk.
+struct TeamOnDisk {
+  TeamOnDisk() {
+    TeamFolder::make(folder.path() / "survey", {{3, "alpha"}, {65535, "beta"}}, kToyNow_s,
+                     kToyNow_s + 86400);
+  }
+
+  [[nodiscard]] fs::path alpha() const { return folder.path() / "survey" / "alpha"; }
+
+  // Replaces a part of a file of alpha's, keeping its mode.
+  void replace(const std::string& file, const std::string& part, const std::string& by) const {
+    std::string text = folder.read("survey/alpha/" + file);
+    const std::size_t at = text.find(part);
+    REQUIRE(at != std::string::npos);
+    folder.write("survey/alpha/" + file, text.replace(at, part.size(), by));
+  }
+
+  [[nodiscard]] std::string refusal() const {
+    try {
+      (void)load_robot_keys(alpha());
+      return {};
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+  }
+
+  TemporaryFolder folder;
+};
+
+TEST_CASE("A robot's folder gives the keys that were made for it", "[security]") {
+  const TeamOnDisk team;
+  const RobotKeys keys = load_robot_keys(team.alpha());
+  CHECK(keys.certificate.team == "survey");
+  CHECK(keys.certificate.robot == 3);
+  CHECK(keys.certificate.name == "alpha");
+  CHECK(keys.certificate.valid_until_s == kToyNow_s + 86400);
+  CHECK(refusal_of(keys.certificate, keys.authority, keys.revocations, kToyNow_s) == nullptr);
+  CHECK_NOTHROW(TeamSeal(keys, toy_identity(3, "alpha"), kToyNow_s));
+  CHECK(load_revocations(team.alpha()).number == 0);
+}
+
+TEST_CASE("Robots whose keys are on disk understand each other", "[security]") {
+  const TeamOnDisk team;
+  const RobotIdentity alpha = toy_identity(3, "alpha"), beta = toy_identity(65535, "beta");
+  TeamSeal a(load_robot_keys(team.alpha()), alpha, kToyNow_s);
+  TeamSeal b(load_robot_keys(team.folder.path() / "survey" / "beta"), beta, kToyNow_s);
+  REQUIRE(a.admit(beta, b.credentials(), kToyNow_s) == nullptr);
+  REQUIRE(b.admit(alpha, a.credentials(), kToyNow_s) == nullptr);
+  const SealContext context{
+      .topic = "closures", .sender = {3, alpha.boot}, .addressee = TeamPeer{65535, beta.boot}};
+  CHECK(b.open(context, a.seal(context, toy_content()).value()).content == toy_content());
+}
+
+TEST_CASE("Secrets are for their owner alone", "[security]") {
+  const TeamOnDisk team;
+  const auto secret = team.alpha() / "secret_key.txt";
+  CHECK(fs::status(secret).permissions() == (fs::perms::owner_read | fs::perms::owner_write));
+  CHECK(fs::status(team.alpha()).permissions() == fs::perms::owner_all);
+  const fs::perms others = GENERATE(fs::perms::group_read, fs::perms::others_read,
+                                    fs::perms::group_write, fs::perms::others_write);
+  fs::permissions(secret, others, fs::perm_options::add);
+  CHECK_THAT(team.refusal(), Catch::Contains(secret.string()) &&
+                                 Catch::Contains("others than its owner") &&
+                                 Catch::Contains("chmod 600"));
+  fs::permissions(secret, others, fs::perm_options::remove);
+  CHECK(team.refusal().empty());
+}
+
+TEST_CASE("A file that was changed is refused by its name and line", "[security]") {
+  const TeamOnDisk team;
+  REQUIRE(team.refusal().empty());
+  SECTION("another id") {
+    team.replace("certificate.txt", "robot: 3", "robot: 4");
+    CHECK_THAT(team.refusal(), Catch::Contains("certificate.txt: is not signed by the authority"));
+  }
+  SECTION("an id that is none") {
+    team.replace("certificate.txt", "robot: 3", "robot: 65536");
+    CHECK_THAT(team.refusal(),
+               Catch::Contains("certificate.txt, line 4: robot \"65536\" is not a number"));
+  }
+  SECTION("a time that is none") {
+    team.replace("certificate.txt", "valid_from: 2027-01-", "valid_from: 2027-13-");
+    CHECK_THAT(team.refusal(), Catch::Contains("certificate.txt, line 7: valid_from") &&
+                                   Catch::Contains("is not a time like"));
+  }
+  SECTION("a missing line") {
+    team.replace("certificate.txt", "name: alpha\n", "");
+    CHECK_THAT(team.refusal(), Catch::Contains("line 5: has \"public_key\" instead of \"name\""));
+  }
+  SECTION("a line too many") {
+    team.replace("authority.txt", "team:", "public: 1\nteam:");
+    CHECK_THAT(team.refusal(), Catch::Contains("line 3: has \"public\" instead of \"team\""));
+  }
+  SECTION("something behind its end") {
+    team.folder.write("survey/alpha/authority.txt",
+                      team.folder.read("survey/alpha/authority.txt") + "more: 1\n");
+    CHECK_THAT(team.refusal(), Catch::Contains("line 5: \"more\" is not expected"));
+  }
+  SECTION("another format") {
+    team.replace("certificate.txt", "certificate 1", "certificate 2");
+    CHECK_THAT(team.refusal(), Catch::Contains("line 2: format \"kimera_multi certificate 2\""));
+  }
+  SECTION("a line without a colon") {
+    team.replace("revocations.txt", "number: 0", "number 0");
+    CHECK_THAT(team.refusal(), Catch::Contains("revocations.txt, line 3: has no \"name: value\""));
+  }
+  SECTION("another list of revocations") {
+    team.replace("revocations.txt", "number: 0", "number: 1");
+    CHECK_THAT(team.refusal(), Catch::Contains("revocations.txt: is not signed"));
+  }
+  SECTION("another robot's secret") {
+    fs::copy_file(team.folder.path() / "survey/beta/secret_key.txt",
+                  team.alpha() / "secret_key.txt", fs::copy_options::overwrite_existing);
+    CHECK_THAT(team.refusal(), Catch::Contains("is not the secret of certificate.txt"));
+  }
+  SECTION("half a secret, which is not printed") {
+    const std::string text = team.folder.read("survey/alpha/secret_key.txt");
+    const std::string half = text.substr(text.find("secret_key: ") + 12, 32);
+    team.folder.write("survey/alpha/secret_key.txt", text.substr(0, text.size() - 33) + "\n");
+    CHECK_THAT(team.refusal(), Catch::Contains("64 hexadecimal digits"));
+    CHECK_THAT(team.refusal(), !Catch::Contains(half));
+  }
+  SECTION("no file") {
+    fs::remove(team.alpha() / "revocations.txt");
+    CHECK_THAT(team.refusal(), Catch::Contains("revocations.txt: cannot be opened") &&
+                                   Catch::Contains("kimera_multi_keys"));
+  }
+}
+
+TEST_CASE("Times survive being written and read", "[security]") {
+  CHECK(time_text(0) == "1970-01-01T00:00:00Z");
+  CHECK(time_text(951'826'154) == "2000-02-29T12:09:14Z");
+  const TemporaryFolder folder;
+  const std::int64_t time_s = GENERATE(-1, 0, 951'826'154, 4'102'444'799);
+  const auto file = folder.write("x", "format: x\ntime: " + time_text(time_s) + "\n");
+  KeyFile read = KeyFile::read(file, "x", KeyFileAccess::kEveryone);
+  CHECK(read.time_s(read.next("time")) == time_s);
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,52 @@
+#include <catch2/catch.hpp>
+
+#include "modules/security/signing.hpp"
+#include "test/modules/security/hex.hpp"
+
+namespace km {
+namespace {
+
+TEST_CASE("Signatures are the Ed25519 of the standard's first example", "[security]") {
+  // RFC 8032, section 7.1, test 1: of the empty message.
+  const SigningKey key = signing_key_from(
+      secret_from_hex<32>("9d61b19deffd5a60ba844af492ec2cc44449c5697b326919703bac031cae7f60"));
+  const auto public_key =
+      array_from_hex<32>("d75a980182b10ab7d54bfed3c964073a0ee172f3daa62325af021a68f707511a");
+  const auto signature = array_from_hex<64>(
+      "e5564300c360ac729086e2cc806e828a84877f1eb8e5d974d873e06522490155"
+      "5fb8821590a33bacc61e39701cf9b46bd25bf5f0595bbe24655141438e7a100b");
+  CHECK(public_key_of(key) == public_key);
+  CHECK(sign(OctetView(), key) == signature);
+  CHECK(verify({}, signature, public_key));
+}
+
+TEST_CASE("A signature holds for its statement and its signer alone", "[security]") {
+  const SigningKey key = make_signing_key();
+  const Octets said = {1, 2, 3};
+  const Signature signature = sign(said, key);
+  REQUIRE(verify(said, signature, public_key_of(key)));
+  CHECK_FALSE(verify(Octets{1, 2, 4}, signature, public_key_of(key)));
+  CHECK_FALSE(verify(said, signature, public_key_of(make_signing_key())));
+  CHECK_FALSE(verify(said, signature, PublicKey{}));  // of small order
+}
+
+TEST_CASE("A secret that was written and read again signs alike", "[security]") {
+  const SigningKey key = make_signing_key();
+  const SigningKey again = signing_key_from(seed_of(key));
+  CHECK(sign(Octets{5}, again) == sign(Octets{5}, key));
+}
+
+TEST_CASE("Statements with other fields have other octets", "[security]") {
+  const auto of = [](std::string_view kind, std::string_view a, std::string_view b) {
+    ByteWriter writer = statement(kind);
+    put_text(writer, a);
+    put_text(writer, b);
+    return writer.release();
+  };
+  CHECK(of("x", "ab", "c") != of("x", "a", "bc"));
+  CHECK(of("x", "", "c") != of("xc", "", ""));
+  CHECK(of("x", "a", "c") == of("x", "a", "c"));
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,189 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <thread>
+#include <vector>
+
+#include "test/modules/security/toy_team.hpp"
+
+namespace km {
+namespace {
+
+using Status = Opened::Status;
+
+TEST_CASE("A message for one robot arrives there, and only there", "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
+  introduce(a, b);
+  introduce(a, c);
+  introduce(b, c);
+  const std::size_t size = GENERATE(0, 1, 40, 2000, 30000);
+  CAPTURE(size);
+  const Octets content = toy_content(size);
+  const SealContext context = toy_context(a, b.peer());
+  const auto sealed = a.seal.seal(context, content);
+  REQUIRE(sealed);
+  CHECK(sealed->size() == content.size() + kAddressedSealBytes);
+
+  const Opened opened = b.seal.open(context, *sealed);
+  CHECK(opened.status == Status::kOpened);
+  CHECK(opened.reason == nullptr);
+  CHECK(opened.content == content);
+  CHECK(reason_of(c.seal.open(context, *sealed).reason) == "message for another process");
+  const SealContext for_c = toy_context(a, c.peer());
+  CHECK(c.seal.open(for_c, *sealed).status == Status::kRefused);
+}
+
+TEST_CASE("A message to all arrives at every member", "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
+  introduce(a, b);
+  introduce(a, c);
+  const std::size_t size = GENERATE(0, 1, 40, 2000, 30000);
+  CAPTURE(size);
+  const Octets content = toy_content(size);
+  const SealContext context = toy_context(a);
+  const auto sealed = a.seal.seal(context, content);
+  REQUIRE(sealed);
+  CHECK(sealed->size() == content.size() + kTeamSealBytes);
+  CHECK(b.seal.open(context, *sealed).content == content);
+  CHECK(c.seal.open(context, *sealed).content == content);
+}
+
+TEST_CASE("Both directions of a pair have keys of their own", "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  introduce(a, b);
+  const auto sealed = a.seal.seal(toy_context(a, b.peer()), toy_content());
+  REQUIRE(sealed);
+  const Opened reflected = a.seal.open(toy_context(b, a.peer()), *sealed);
+  CHECK(reflected.status == Status::kRefused);
+  const auto answer = b.seal.seal(toy_context(b, a.peer()), toy_content());
+  REQUIRE(answer);
+  CHECK(a.seal.open(toy_context(b, a.peer()), *answer).content == toy_content());
+}
+
+TEST_CASE("Sealed content cannot be read, and equal messages do not look equal", "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  introduce(a, b);
+  const bool addressed = GENERATE(true, false);
+  const auto to = addressed ? std::optional(b.peer()) : std::nullopt;
+  const Octets content = toy_content(64);
+  const auto one = a.seal.seal(toy_context(a, to), content);
+  const auto two = a.seal.seal(toy_context(a, to), content);
+  REQUIRE(one);
+  REQUIRE(two);
+  CHECK(*one != *two);
+  CHECK(std::search(one->begin(), one->end(), content.begin(), content.begin() + 8) == one->end());
+}
+
+TEST_CASE("A message waits for the keys it needs", "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  REQUIRE(a.admit(b) == nullptr);
+  const SealContext for_b = toy_context(a, b.peer());
+  const SealContext to_all = toy_context(a);
+  const auto sealed_for_b = a.seal.seal(for_b, toy_content());
+  const auto sealed_to_all = a.seal.seal(to_all, toy_content());
+  REQUIRE(sealed_for_b);
+  REQUIRE(sealed_to_all);
+  CHECK(b.seal.open(for_b, *sealed_for_b).status == Status::kNotYet);
+  CHECK(b.seal.open(to_all, *sealed_to_all).status == Status::kNotYet);
+
+  REQUIRE(b.admit(a) == nullptr);
+  CHECK(b.seal.open(for_b, *sealed_for_b).status == Status::kOpened);
+  CHECK(b.seal.open(to_all, *sealed_to_all).status == Status::kNotYet);
+
+  const auto key = a.seal.key_message_for(b.peer());
+  REQUIRE(key);
+  CHECK(b.seal.accept_key_message(a.peer(), *key) == nullptr);
+  CHECK(b.seal.open(to_all, *sealed_to_all).status == Status::kOpened);
+}
+
+TEST_CASE("A key message is for one process, and known from others' messages", "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
+  introduce(a, b);
+  introduce(a, c);
+  introduce(b, c);
+  const auto key = a.seal.key_message_for(b.peer());
+  REQUIRE(key);
+  CHECK(c.seal.accept_key_message(a.peer(), *key) != nullptr);
+  CHECK(b.seal.accept_key_message(c.peer(), *key) != nullptr);
+  CHECK(b.seal.accept_key_message({9, 9}, *key) != nullptr);
+  const auto message = a.seal.seal(toy_context(a, b.peer()), toy_content());
+  CHECK(b.seal.accept_key_message(a.peer(), *message) != nullptr);
+  CHECK(b.seal.open(toy_context(a, b.peer()), *key).status == Status::kRefused);
+  CHECK(b.seal.accept_key_message(a.peer(), *key) == nullptr);
+  CHECK(b.seal.accept_key_message(a.peer(), *key) == nullptr);  // once more is harmless
+}
+
+TEST_CASE("Nothing is sealed in another's name, for itself, or for a stranger", "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  CHECK_THROWS_AS(a.seal.seal(toy_context(b), toy_content()), std::invalid_argument);
+  CHECK_THROWS_AS(a.seal.seal(toy_context(a, a.peer()), toy_content()), std::invalid_argument);
+  CHECK_FALSE(a.seal.seal(toy_context(a, b.peer()), toy_content()));
+  CHECK_FALSE(a.seal.key_message_for(b.peer()));
+}
+
+TEST_CASE("Another start of a robot has other keys", "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  ToyMember restarted(b, 5000);
+  introduce(a, b);
+  introduce(a, restarted);
+  const auto sealed = a.seal.seal(toy_context(a, b.peer()), toy_content());
+  REQUIRE(sealed);
+  CHECK(restarted.seal.open(toy_context(a, b.peer()), *sealed).status == Status::kRefused);
+  CHECK(restarted.seal.open(toy_context(a, restarted.peer()), *sealed).status == Status::kRefused);
+  const auto former = b.seal.seal(toy_context(b, a.peer()), toy_content());
+  REQUIRE(former);
+  CHECK(a.seal.open(toy_context(restarted, a.peer()), *former).status == Status::kRefused);
+  CHECK(a.seal.open(toy_context(b, a.peer()), *former).status == Status::kOpened);
+}
+
+TEST_CASE("Keys of a process that is gone are forgotten", "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  introduce(a, b);
+  const auto sealed = b.seal.seal(toy_context(b, a.peer()), toy_content());
+  REQUIRE(a.seal.is_admitted(b.peer()));
+  a.seal.forget(b.peer());
+  CHECK_FALSE(a.seal.is_admitted(b.peer()));
+  CHECK(a.seal.open(toy_context(b, a.peer()), *sealed).status == Status::kNotYet);
+  CHECK_FALSE(a.seal.seal(toy_context(a, b.peer()), toy_content()));
+}
+
+TEST_CASE("Threads may seal, open, admit and update at once", "[security]") {
+  ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  introduce(a, b);
+  constexpr int kMessages = 100;
+  const auto exchange = [&](ToyMember& from, ToyMember& to, std::optional<TeamPeer> addressee,
+                            int& arrived) {
+    const SealContext context = toy_context(from, addressee);
+    for (int i = 0; i < kMessages; ++i) {
+      const auto sealed = from.seal.seal(context, toy_content());
+      arrived += sealed && to.seal.open(context, *sealed).content == toy_content();
+    }
+  };
+  int for_b = 0, for_a = 0, to_all = 0, unchanged = 0;
+  std::vector<std::thread> threads;
+  threads.emplace_back([&] { exchange(a, b, b.peer(), for_b); });
+  threads.emplace_back([&] { exchange(b, a, a.peer(), for_a); });
+  threads.emplace_back([&] { exchange(a, b, std::nullopt, to_all); });
+  threads.emplace_back([&] {
+    for (int i = 0; i < kMessages; ++i)
+      unchanged += a.admit(b) == nullptr && !a.seal.update(team.revocations(), kToyNow_s).new_key;
+  });
+  for (std::thread& thread : threads) thread.join();
+  CHECK(for_b == kMessages);
+  CHECK(for_a == kMessages);
+  CHECK(to_all == kMessages);
+  CHECK(unchanged == kMessages);
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,268 @@
+#include <catch2/catch.hpp>
+
+#include "test/modules/security/rogue_member.hpp"
+#include "test/modules/security/toy_team.hpp"
+
+namespace km {
+namespace {
+
+using Status = Opened::Status;
+
+constexpr std::int64_t kDay_s = 86400;
+
+std::string admission(ToyMember& to, const RobotKeys& keys, const RobotIdentity& identity,
+                      std::int64_t now_s = kToyNow_s) {
+  const Credentials shown =
+      make_credentials(keys.certificate, keys.authority, keys.secret, identity, {9});
+  return reason_of(to.seal.admit(identity, to_text(shown), now_s));
+}
+
+TEST_CASE("A robot is admitted by its certificate, and no other", "[security]") {
+  const ToyTeam team, others("survey");
+  ToyMember a(team, 0, "alpha");
+  RobotKeys keys = team.keys_of(1, "beta");
+  RobotIdentity identity = toy_identity(1, "beta");
+  REQUIRE(admission(a, keys, identity).empty());
+  const std::string not_certified = "certificate is not the authority's for this id, name and key";
+
+  SECTION("another team of the same name") {
+    CHECK(admission(a, others.keys_of(1, "beta"), identity) == "credentials of another team");
+  }
+  SECTION("another team that claims this one's authority") {
+    keys = others.keys_of(1, "beta");
+    keys.authority = team.authority();
+    CHECK(admission(a, keys, identity) == not_certified);
+  }
+  SECTION("another id than the certificate's") {
+    identity.robot = 0;
+    CHECK(admission(a, keys, identity) == not_certified);
+  }
+  SECTION("another name than the certificate's") {
+    identity.name = "alpha";
+    CHECK(admission(a, keys, identity) == not_certified);
+  }
+  SECTION("a longer time than the certificate's") {
+    keys.certificate.valid_until_s += 1;
+    CHECK(admission(a, keys, identity) == not_certified);
+  }
+  SECTION("the certificate of a robot whose secret it does not have") {
+    keys.secret = make_signing_key();
+    CHECK(admission(a, keys, identity) == "credentials are not signed by the robot that they name");
+  }
+  SECTION("before its time") {
+    CHECK(admission(a, keys, identity, keys.certificate.valid_from_s - 1) ==
+          "certificate is not valid yet (are clocks right?)");
+    CHECK(admission(a, keys, identity, keys.certificate.valid_from_s).empty());
+  }
+  SECTION("after its time") {
+    CHECK(admission(a, keys, identity, keys.certificate.valid_until_s).empty());
+    CHECK(admission(a, keys, identity, keys.certificate.valid_until_s + 1) ==
+          "certificate has expired (are clocks right?)");
+  }
+  SECTION("its own credentials, shown to it") {
+    CHECK(reason_of(a.seal.admit(a.identity, a.seal.credentials(), kToyNow_s)) ==
+          "these are this process's own credentials");
+  }
+}
+
+TEST_CASE("An exchange key of small order is refused", "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha");
+  const RobotKeys keys = team.keys_of(1, "beta");
+  const RobotIdentity identity = toy_identity(1, "beta");
+  const Credentials shown =
+      make_credentials(keys.certificate, keys.authority, keys.secret, identity, ExchangeKey{});
+  CHECK(reason_of(a.seal.admit(identity, to_text(shown), kToyNow_s)) ==
+        "credentials have an exchange key of small order");
+  CHECK_FALSE(a.seal.is_admitted({1, identity.boot}));
+}
+
+TEST_CASE("A start of a robot keeps the keys that it was admitted with", "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  introduce(a, b);
+  ToyMember twin(b, b.identity.boot);
+  CHECK(reason_of(a.admit(twin)) == "credentials have another key for the same boot");
+  const auto sealed = a.seal.seal(toy_context(a, b.peer()), toy_content());
+  CHECK(b.seal.open(toy_context(a, b.peer()), *sealed).status == Status::kOpened);
+}
+
+TEST_CASE("A robot without keys of its own does not start", "[security]") {
+  ToyTeam team;
+  RobotKeys keys = team.keys_of(1, "beta");
+  RobotIdentity identity = toy_identity(1, "beta");
+  std::int64_t now_s = kToyNow_s;
+  REQUIRE_NOTHROW(TeamSeal(keys, identity, now_s));
+  SECTION("another id") {
+    identity.robot = 2;
+  }
+  SECTION("another name") {
+    identity.name = "gamma";
+  }
+  SECTION("expired") {
+    now_s += 100 * kDay_s;
+  }
+  SECTION("revoked") {
+    keys.revocations = team.revoking({keys.certificate});
+  }
+  SECTION("revocations that someone changed") {
+    keys.revocations.number += 1;
+  }
+  CHECK_THROWS_AS(TeamSeal(keys, identity, now_s), std::invalid_argument);
+}
+
+TEST_CASE("A revoked robot is forgotten, refused, and cannot read on", "[security]") {
+  ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
+  introduce(a, b);
+  introduce(a, c);
+  introduce(b, c);
+  const SealContext to_all = toy_context(a);
+  const auto before = a.seal.seal(to_all, toy_content());
+
+  const Revocations list = team.revoking({c.keys.certificate});
+  const MembershipChange change = a.seal.update(list, kToyNow_s);
+  CHECK(change.forgotten == std::vector<TeamPeer>{c.peer()});
+  CHECK(change.new_key);
+  CHECK(reason_of(a.admit(c)) == "certificate is revoked");
+  CHECK_FALSE(a.seal.key_message_for(c.peer()));
+
+  const auto after = a.seal.seal(to_all, toy_content());
+  CHECK(c.seal.open(to_all, *after).status == Status::kNotYet);
+  CHECK(b.seal.open(to_all, *after).status == Status::kNotYet);
+  REQUIRE(b.seal.accept_key_message(a.peer(), *a.seal.key_message_for(b.peer())) == nullptr);
+  CHECK(b.seal.open(to_all, *after).status == Status::kOpened);
+  CHECK(b.seal.open(to_all, *before).status == Status::kOpened);
+  CHECK_FALSE(a.seal.update(list, kToyNow_s).new_key);
+}
+
+TEST_CASE("A new member reads what was sealed to all before a revocation", "[security]") {
+  ToyTeam team;
+  ToyMember a(team, 0, "alpha"), late(team, 3, "delta"), c(team, 2, "gamma");
+  introduce(a, c);
+  const SealContext to_all = toy_context(a);
+  const auto before = a.seal.seal(to_all, toy_content());
+  const Revocations list = team.revoking({c.keys.certificate});
+  (void)a.seal.update(list, kToyNow_s);
+  introduce(a, late);
+  CHECK(late.seal.open(to_all, *before).status == Status::kOpened);
+}
+
+TEST_CASE("A robot that is revoked after it left cannot read on either", "[security]") {
+  ToyTeam team;
+  ToyMember a(team, 0, "alpha"), c(team, 2, "gamma");
+  introduce(a, c);
+  a.seal.forget(c.peer());
+  const MembershipChange change = a.seal.update(team.revoking({c.keys.certificate}), kToyNow_s);
+  CHECK(change.forgotten.empty());
+  CHECK(change.new_key);
+  const auto after = a.seal.seal(toy_context(a), toy_content());
+  CHECK(c.seal.open(toy_context(a), *after).status == Status::kNotYet);
+}
+
+TEST_CASE("A certificate that expires during the run is no longer believed", "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  introduce(a, b);
+  const std::int64_t end_s = b.keys.certificate.valid_until_s;
+  CHECK_FALSE(a.seal.update(team.revocations(), end_s).new_key);
+  const bool left_before = GENERATE(false, true);
+  if (left_before) a.seal.forget(b.peer());
+  const MembershipChange change = a.seal.update(team.revocations(), end_s + 1);
+  CHECK(change.forgotten.size() == (left_before ? 0 : 1));
+  CHECK(change.new_key);
+  CHECK_FALSE(a.seal.is_admitted(b.peer()));
+}
+
+TEST_CASE("Old and forged lists of revocations change nothing", "[security]") {
+  ToyTeam team, others;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  introduce(a, b);
+  const Revocations former = team.revoking({});
+  Revocations list = team.revoking({});
+  (void)a.seal.update(list, kToyNow_s);
+  CHECK_THROWS_AS(a.seal.update(former, kToyNow_s), std::invalid_argument);
+  CHECK_THROWS_AS(a.seal.update(others.revoking({b.keys.certificate}), kToyNow_s),
+                  std::invalid_argument);
+  list.revoked.push_back({b.keys.certificate.key, 1, "beta"});
+  CHECK_THROWS_AS(a.seal.update(list, kToyNow_s), std::invalid_argument);
+  CHECK(a.seal.is_admitted(b.peer()));
+}
+
+TEST_CASE("After more revocations than keys are kept, old messages are refused", "[security]") {
+  ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  const SealContext to_all = toy_context(a);
+  const auto first = a.seal.seal(to_all, toy_content());
+  for (RobotId lost = 10; lost < 20; ++lost)
+    (void)a.seal.update(team.revoking({team.keys_of(lost, "lost").certificate}), kToyNow_s);
+  introduce(a, b);
+  CHECK(b.seal.open(to_all, *first).status == Status::kRefused);
+  CHECK(b.seal.open(to_all, *a.seal.seal(to_all, toy_content())).status == Status::kOpened);
+}
+
+TEST_CASE("A recording of an older key message does not take newer keys away", "[security]") {
+  ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  introduce(a, b);
+  const auto old = a.seal.key_message_for(b.peer());
+  (void)a.seal.update(team.revoking({team.keys_of(9, "lost").certificate}), kToyNow_s);
+  REQUIRE(b.seal.accept_key_message(a.peer(), *a.seal.key_message_for(b.peer())) == nullptr);
+  CHECK(b.seal.accept_key_message(a.peer(), *old) == nullptr);
+  const auto sealed = a.seal.seal(toy_context(a), toy_content());
+  CHECK(b.seal.open(toy_context(a), *sealed).status == Status::kOpened);
+}
+
+TEST_CASE("A member cannot speak to all in another's name, though it has that one's key",
+          "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  RogueMember c(team, 2, "gamma");
+  introduce(a, b);
+  for (ToyMember* one : {&a, &b})
+    REQUIRE(one->seal.admit(c.identity(), c.credentials(), kToyNow_s) == nullptr);
+  const TeamKey key = c.team_key_of(b, b.seal.key_message_for(c.peer()).value());
+  const SealContext as_b = toy_context(b);
+  const Octets lie = toy_content();
+
+  const Octets genuine = RogueMember::message_to_all(as_b, key, key.key, b.keys.secret, lie);
+  CHECK(a.seal.open(as_b, genuine).content == lie);
+  const Octets forged = RogueMember::message_to_all(as_b, key, key.key, c.signing_key(), lie);
+  CHECK(reason_of(a.seal.open(as_b, forged).reason) == "message is not signed by its sender");
+}
+
+TEST_CASE("A member cannot pass another's words to all for its own", "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
+  introduce(a, b);
+  introduce(a, c);
+  const auto sealed = b.seal.seal(toy_context(b), toy_content());
+  CHECK(a.seal.open(toy_context(c), *sealed).status == Status::kRefused);
+}
+
+TEST_CASE("The sender's signature commits to the key, so that all read the same", "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  RogueMember c(team, 2, "gamma");
+  introduce(a, b);
+  REQUIRE(b.seal.admit(c.identity(), c.credentials(), kToyNow_s) == nullptr);
+  const TeamKey key = c.team_key_of(b, b.seal.key_message_for(c.peer()).value());
+  const Octets other_key = RogueMember::message_to_all(toy_context(b), key, make_sealing_key(),
+                                                       b.keys.secret, toy_content());
+  CHECK(a.seal.open(toy_context(b), other_key).status == Status::kRefused);
+}
+
+TEST_CASE("A process's recorded credentials do not push the living one out", "[security]") {
+  const ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  std::vector<std::unique_ptr<ToyMember>> former;
+  for (std::uint64_t boot = 1; boot <= 2 * kMaxAdmittedPerRobot; ++boot)
+    former.push_back(std::make_unique<ToyMember>(b, boot));
+  introduce(a, b);
+  for (const auto& one : former) CHECK(a.admit(*one) == nullptr);
+  const auto sealed = b.seal.seal(toy_context(b, a.peer()), toy_content());
+  CHECK(a.seal.open(toy_context(b, a.peer()), *sealed).status == Status::kOpened);
+}
+
+}  // namespace
+}  // namespace km
