@@ -67,10 +67,10 @@ struct [[nodiscard]] MembershipChange {
 /// What the caller does:
 /// - announces credentials() with its identity; admits others by theirs, before anything else.
 ///   Credentials can be recorded and shown again by a stranger: they say who could be there, not
-///   who is. A member lives once a message of its opens; only then may a new process of a robot
-///   take the place of an older one.
-/// - sends key_message_for(peer) to each newly admitted peer, once more whenever that peer is
-///   admitted anew, and to all when update() says so.
+///   who is. A member lives once a message of its opens that is not a repeated one; only then may a
+///   new process of a robot take the place of an older one.
+/// - sends key_message_for(peer) to each newly admitted peer, again at times (a peer that forgot
+///   this process and admitted it again has lost the key), and to all when update() says so.
 /// - drops repeated messages. A sealed message can be recorded and shown again and opens again: the
 ///   caller keeps which numbers of (robot, boot) it has taken.
 ///
