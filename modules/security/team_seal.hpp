@@ -37,8 +37,9 @@ struct SealContext {
 struct [[nodiscard]] Opened {
   enum class Status {
     kOpened,
-    kNotYet,   ///< A key is missing that may still come: keep the message (a bounded number), and
-               ///< try again after the next admit() or accept_key_message() for its sender.
+    kNotYet,   ///< A key is missing that may still come: keep the message and try again after the
+               ///< next admit() or accept_key_message() for its sender. Keep a bounded number:
+               ///< strangers can make such messages, too.
     kRefused,  ///< It will never open.
   };
   Status status = Status::kRefused;
@@ -102,9 +103,9 @@ class TeamSeal {
   void forget(const TeamPeer& peer);
 
   /// Takes a list of revocations (the same as before, to let time alone work) and the time: forgets
-  /// members that are revoked or lapsed, and draws a new key for messages to all if anyone who was
-  /// given the last one is no longer a member. Throws std::invalid_argument if the list is not the
-  /// authority's, or older than the one in use; nothing has changed then.
+  /// members that are revoked or lapsed, and draws a new key for messages to all if the list is
+  /// another one, or anyone who was given the last key has lapsed. Throws std::invalid_argument if
+  /// the list is not the authority's, or older than the one in use; nothing has changed then.
   MembershipChange update(const Revocations& revocations, std::int64_t now_s);
 
   /// What lets `peer` open this process's messages to all: octets to send to it as they are, sealed
