@@ -38,7 +38,8 @@ class ConfigLayers {
     known_.insert(Config::kSection);
     Config config;
     fill_config(sections_[Config::kSection], Config::kSection, ConfigContext{problems_}, config);
-    effective_ += (effective_.empty() ? "" : "\n") + to_yaml(config);
+    if (!effective_.empty()) effective_ += '\n';
+    effective_ += to_yaml(config);
     return config;
   }
 

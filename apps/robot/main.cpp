@@ -87,6 +87,9 @@ void add_network(CLI::App& app, RobotOptions& options) {
   app.add_option("--peers", options.peers, "Addresses of the other hosts, where multicast is off")
       ->delimiter(',');
   app.add_option("--interface", options.interface_name, "Network interface, e.g. wlan0");
+  app.add_option("--security", options.security,
+                 "Folder of this robot's keys (kimera_multi_keys): only the team reads and speaks")
+      ->check(CLI::ExistingDirectory);
 }
 
 // Exits the process for --help and mistakes, after telling.

@@ -44,6 +44,7 @@ struct RobotOptions {
   std::string link;           ///< Name or file of a link profile; from the configuration if empty.
   std::vector<std::string> peers;
   std::string interface_name;
+  std::filesystem::path security;  ///< Folder of this robot's keys; messages are sealed if given.
 
   std::filesystem::path output;
   double serve_limit_s = 120.0;  ///< Longest time to serve peers after the input has ended.

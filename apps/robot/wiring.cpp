@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "apps/robot/team_keys_node.hpp"
 #include "modules/dense_sensing/dense_sensing_node.hpp"
 #include "modules/loop_closure/keyframe_features_node.hpp"
 #include "modules/loop_closure/loop_closure_codec.hpp"
@@ -41,7 +42,8 @@ NodeType& Robot::add(bool feeds, Arguments&&... arguments) {
 Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput input,
              const std::optional<MappingPlan>& mapping, SignalWatch& signals)
     : identity_{.robot = options.robot, .name = options.name, .boot = random_boot_id()},
-      participant_(config.dds, identity_),
+      seal_(make_team_seal(options.security, identity_)),
+      participant_(config.dds, identity_, seal_),
       supervisor_(signals) {
   auto bridge = std::make_unique<DdsBridge>(participant_);
   bridge_ = bridge.get();
@@ -53,6 +55,8 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   if (mapping) add_mesh_correction(config, options.output);
   add_network(share_meshes(config.mesh_chunks));
   add_records();
+  if (seal_ != nullptr)
+    add<TeamKeysNode>(false, options.security, *seal_, [this] { bridge_->tell_keys(); });
   nodes_.push_back(bridge_);
   supervisor_.add(std::move(bridge));
 }

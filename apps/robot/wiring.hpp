@@ -130,6 +130,7 @@ class Robot {
   NodeType& add(bool feeds, Arguments&&... arguments);
 
   const RobotIdentity identity_;
+  std::shared_ptr<TeamSeal> seal_;  // null without keys
   DdsParticipant participant_;
   Topics topics_;
   std::shared_ptr<const Vocabulary> vocabulary_;  // null where nothing is perceived

@@ -34,7 +34,7 @@ constexpr const char* kAbout =
     "  kimera_multi_team --config team.yaml --output results --report   # robots ran elsewhere";
 
 struct TeamOptions {
-  fs::path config, dataset, output, truth, json, robot_binary;
+  fs::path config, dataset, output, truth, security, json, robot_binary;
   std::string rate;
   std::optional<std::uint32_t> domain;
   std::optional<double> time_limit_s;
@@ -54,6 +54,9 @@ void define(CLI::App& app, TeamOptions& options) {
   app.add_option("--domain", options.domain, "DDS domain (default: the file's, or random)")
       ->check(CLI::Range(0, 230));
   app.add_option("--output", options.output, "Results, one folder per robot (default: the file's)");
+  app.add_option("--security", options.security,
+                 "Team folder of kimera_multi_keys: each robot uses the keys in its folder there")
+      ->check(CLI::ExistingDirectory);
   app.add_option("--truth", options.truth, "True poses of all robots, instead of the file's")
       ->check(CLI::ExistingPath);
   app.add_option("--time-limit", options.time_limit_s, "Ask the robots to end after this [s]")
@@ -77,6 +80,7 @@ km::TeamPlan make_plan(const TeamOptions& options) {
     std::random_device device;  // teams of one host must not meet
     plan.domain = std::uniform_int_distribution<std::uint32_t>(1, 230)(device);
   }
+  if (!options.security.empty()) plan.security = options.security;
   if (!options.truth.empty()) plan.notes.clear();  // they are about the truths of the file
   for (km::RobotPlan& robot : plan.robots) {
     if (!options.truth.empty()) robot.truth = options.truth;

@@ -145,6 +145,7 @@ std::vector<std::string> robot_command(const fs::path& binary, const TeamPlan& p
   for (const auto& config : plan.configs) option("--config", config.string());
   option("--robot", std::to_string(robot.id));
   option("--name", robot.name);
+  if (!plan.security.empty()) option("--security", (plan.security / robot.name).string());
   if (!robot.dataset.empty()) option("--dataset", robot.dataset.string());
   if (!robot.graph.empty()) option("--graph", robot.graph.string());
   if (robot.from_s) option("--from", rounded(*robot.from_s, kDigits));

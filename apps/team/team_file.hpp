@@ -55,6 +55,7 @@ struct TeamPlan {
   std::optional<std::uint32_t> domain;
   std::filesystem::path output;
   std::optional<double> time_limit_s;
+  std::filesystem::path security;
   std::filesystem::path truth;
   std::filesystem::path truth_mesh;
   ClosureTruthOptions closure_truth;
@@ -70,6 +71,8 @@ struct TeamPlan {
                   "folder of the results, relative to the working directory; default: results/ "
                   "and this file's name");
     visitor.field("time_limit_s", time_limit_s, {0.0, 1e9}, "[s] then the team is asked to end");
+    visitor.field("security", security, Input{},
+                  "team folder of kimera_multi_keys: each robot uses the keys in its folder there");
     visitor.field("truth", truth, Input{.must_exist = false},
                   "true poses, in one world for all robots");
     visitor.field("truth_mesh", truth_mesh, Input{}, "PLY file in the world of the true poses");

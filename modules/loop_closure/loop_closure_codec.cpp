@@ -114,7 +114,7 @@ Codec<KeyframeRequest>::Encoded Codec<KeyframeRequest>::encode(const KeyframeReq
   return encoded;
 }
 
-Decoded<KeyframeRequest> Codec<KeyframeRequest>::decode(const Wire& wire, const Sender& writer) {
+Decoded<KeyframeRequest> Codec<KeyframeRequest>::decode(const Wire& wire, const TeamPeer& writer) {
   return Decoded<KeyframeRequest>::accept(
       {writer.robot, wire.request, from_wire(wire.keyframe), wire.own});
 }
@@ -146,7 +146,7 @@ Codec<KeyframeReply>::Encoded Codec<KeyframeReply>::encode(const KeyframeReply& 
   return encoded;
 }
 
-Decoded<KeyframeReply> Codec<KeyframeReply>::decode(const Wire& wire, const Sender& writer) {
+Decoded<KeyframeReply> Codec<KeyframeReply>::decode(const Wire& wire, const TeamPeer& writer) {
   using Result = Decoded<KeyframeReply>;
   if (wire.keyframe.robot != writer.robot)
     return Result::refuse("a keyframe of another robot than the writer");
@@ -187,7 +187,7 @@ Codec<Closure>::Encoded Codec<Closure>::encode(const Closure& closure) {
   return encoded;
 }
 
-Decoded<Closure> Codec<Closure>::decode(const Wire& wire, const Sender& writer) {
+Decoded<Closure> Codec<Closure>::decode(const Wire& wire, const TeamPeer& writer) {
   using Result = Decoded<Closure>;
   if (wire.from.keyframe.robot != writer.robot)
     return Result::refuse("it starts from another robot than the writer");

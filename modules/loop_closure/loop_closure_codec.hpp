@@ -29,7 +29,7 @@ struct Codec<KeyframeRequest> {
   };
   static MessageKey key_of(const KeyframeRequest& request);
   static Encoded encode(const KeyframeRequest& request);
-  static Decoded<KeyframeRequest> decode(const Wire& wire, const Sender& writer);
+  static Decoded<KeyframeRequest> decode(const Wire& wire, const TeamPeer& writer);
 };
 
 /// Written by the owner of the keyframe. Bearings and inverse depths travel as 16-bit numbers in
@@ -48,7 +48,7 @@ struct Codec<KeyframeReply> {
   };
   static MessageKey key_of(const KeyframeReply& reply);
   static Encoded encode(const KeyframeReply& reply);
-  static Decoded<KeyframeReply> decode(const Wire& wire, const Sender& writer);
+  static Decoded<KeyframeReply> decode(const Wire& wire, const TeamPeer& writer);
 };
 
 /// Written by the robot that verified it, which owns the keyframe it starts from.
@@ -65,7 +65,7 @@ struct Codec<Closure> {
   };
   static MessageKey key_of(const Closure& closure);
   static Encoded encode(const Closure& closure);
-  static Decoded<Closure> decode(const Wire& wire, const Sender& writer);
+  static Decoded<Closure> decode(const Wire& wire, const TeamPeer& writer);
 };
 
 }  // namespace km

@@ -68,7 +68,7 @@ Codec<MeshChunk>::Encoded Codec<MeshChunk>::encode(const MeshChunk& chunk) {
   return encoded;
 }
 
-Decoded<MeshChunk> Codec<MeshChunk>::decode(const Wire& wire, const Sender& writer) {
+Decoded<MeshChunk> Codec<MeshChunk>::decode(const Wire& wire, const TeamPeer& writer) {
   using Result = Decoded<MeshChunk>;
   const auto offsets = elements_of(wire.offsets, kMaxChunkBytes);
   const auto labels = elements_of(wire.labels, kMaxChunkBytes);

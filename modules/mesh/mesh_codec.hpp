@@ -28,7 +28,7 @@ struct Codec<MeshChunk> {
   };
   static MessageKey key_of(const MeshChunk& chunk);
   static Encoded encode(const MeshChunk& chunk);
-  static Decoded<MeshChunk> decode(const Wire& wire, const Sender& writer);
+  static Decoded<MeshChunk> decode(const Wire& wire, const TeamPeer& writer);
 };
 
 }  // namespace km

@@ -24,7 +24,7 @@ Codec<InlierSet>::Encoded Codec<InlierSet>::encode(const InlierSet& set) {
   return encoded;
 }
 
-Decoded<InlierSet> Codec<InlierSet>::decode(const Wire& wire, const Sender& writer) {
+Decoded<InlierSet> Codec<InlierSet>::decode(const Wire& wire, const TeamPeer& writer) {
   using Result = Decoded<InlierSet>;
   if (wire.a > wire.b) return Result::refuse("the pair is not in ascending order");
   if (writer.robot != wire.a) return Result::refuse("decided by another robot than the lower");

@@ -29,7 +29,7 @@ struct Codec<InlierSet> {
   };
   static MessageKey key_of(const InlierSet& set);
   static Encoded encode(const InlierSet& set);
-  static Decoded<InlierSet> decode(const Wire& wire, const Sender& writer);
+  static Decoded<InlierSet> decode(const Wire& wire, const TeamPeer& writer);
 };
 
 }  // namespace km

@@ -72,7 +72,7 @@ Codec<KeyframeBow>::Encoded Codec<KeyframeBow>::encode(const KeyframeBow& messag
   return encoded;
 }
 
-Decoded<KeyframeBow> Codec<KeyframeBow>::decode(const Wire& wire, const Sender& writer) {
+Decoded<KeyframeBow> Codec<KeyframeBow>::decode(const Wire& wire, const TeamPeer& writer) {
   if (wire.keyframe.robot != writer.robot)
     return Decoded<KeyframeBow>::refuse("a keyframe of another robot than the writer");
   const auto packed = elements_of(wire.bag, kMaxPackedBytes);

@@ -38,7 +38,7 @@ struct Codec<KeyframeBow> {
   };
   static MessageKey key_of(const KeyframeBow& message);
   static Encoded encode(const KeyframeBow& message);
-  static Decoded<KeyframeBow> decode(const Wire& wire, const Sender& writer);
+  static Decoded<KeyframeBow> decode(const Wire& wire, const TeamPeer& writer);
 };
 
 }  // namespace km

@@ -33,7 +33,7 @@ Codec<TeamParcel>::Encoded Codec<TeamParcel>::encode(const TeamParcel& parcel) {
   return encoded;
 }
 
-Decoded<TeamParcel> Codec<TeamParcel>::decode(const Wire& wire, const Sender& writer) {
+Decoded<TeamParcel> Codec<TeamParcel>::decode(const Wire& wire, const TeamPeer& writer) {
   using Result = Decoded<TeamParcel>;
   const auto content = elements_of(wire.content, kMaxTeamMessageBytes);
   if (!content) return Result::refuse("the content is missing or too long");

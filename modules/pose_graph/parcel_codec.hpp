@@ -35,7 +35,7 @@ struct Codec<TeamParcel> {
   };
   static MessageKey key_of(const TeamParcel& parcel);
   static Encoded encode(const TeamParcel& parcel);
-  static Decoded<TeamParcel> decode(const Wire& wire, const Sender& writer);
+  static Decoded<TeamParcel> decode(const Wire& wire, const TeamPeer& writer);
 };
 
 }  // namespace km

@@ -13,6 +13,8 @@ namespace {
 
 constexpr std::size_t kSendQueue = 8192;
 constexpr std::chrono::seconds kAcknowledgementTime{2};
+constexpr double kTellKeys_s = 30.0;  // a robot that was short of memory may have lost one
+constexpr std::size_t kMaxKeyMessageBytes = 512;
 constexpr dds_duration_t kWakeUp = DDS_MSECS(250);  // for what only time tells
 
 // What one peer may have waiting on a topic of this kind.
@@ -39,10 +41,36 @@ DdsBridge::DdsBridge(const DdsParticipant& participant)
   for (const dds_entity_t condition :
        {stop_request_.handle(), peers_.discovery_condition(), peers_.liveliness_condition()})
     check_dds(dds_waitset_attach(waitset_.handle(), condition, kOther), "cannot wait");
+  if (participant_.seal() != nullptr) exchange_keys();
 }
 
 DdsBridge::~DdsBridge() {
   stop();
+}
+
+void DdsBridge::exchange_keys() {
+  const TopicSpec spec{.name = "team_keys",
+                       .max_bytes = kMaxKeyMessageBytes,
+                       .kind = TopicKind::kState,
+                       .carries_keys = true};
+  keys_ = &add_outgoing(spec);
+  add_incoming(spec, true, {},
+               [seal = participant_.seal()](const TeamPeer& sender, auto content, const auto&) {
+                 return seal->accept_key_message(sender, content);
+               });
+}
+
+void DdsBridge::tell_key(const TeamPeer& peer) {
+  post([this, peer] {
+    if (auto message = participant_.seal()->key_message_for(peer))
+      keys_->write(peer.robot, message_key({peer.boot}), *std::move(message));
+  });
+}
+
+void DdsBridge::tell_keys() {
+  if (keys_ == nullptr) return;
+  for (const Peer& peer : peers_.list())
+    if (peer.state == PeerState::kAlive) tell_key({peer.identity.robot, peer.identity.boot});
 }
 
 OutgoingTopic& DdsBridge::add_outgoing(TopicSpec spec) {
@@ -105,6 +133,11 @@ void DdsBridge::receive_until_stopped() try {
     // Who is there comes before what they say.
     const double now_s = steady_now_s();
     peers_.poll();
+    for (const TeamPeer& peer : peers_.take_admitted()) tell_key(peer);
+    if (now_s - told_keys_s_ >= kTellKeys_s) {
+      told_keys_s_ = now_s;
+      tell_keys();
+    }
     const auto n = std::min(triggered.size(), static_cast<std::size_t>(count));
     for (std::size_t i = 0; i < n; ++i)
       if (triggered[i] >= kFirstTopic)

@@ -74,6 +74,9 @@ struct Pace {
 /// published on a thread of each topic, in turn between the peers (see IncomingTopic): a node that
 /// is busy holds up what is for it, and a peer that sends much holds up itself.
 ///
+/// Where the team has keys (DdsParticipant::seal()), all of it is sealed, and only robots of the
+/// team are heard.
+///
 /// The bridge is the last of the nodes to stop: it then sends what is queued, and waits up to two
 /// seconds until the peers have acknowledged it.
 class DdsBridge final : public Node {
@@ -87,6 +90,10 @@ class DdsBridge final : public Node {
   template <typename T, typename Sent>
   void exchange(Crossing<T, Sent>& crossing, TopicKind kind, TrafficCategory category,
                 CrossingEnds ends = {}, Pace pace = {});
+
+  /// Sends this process's key for messages to all to every robot there is, where the team has
+  /// keys. The bridge does so itself when a robot appears, and now and then. Thread-safe.
+  void tell_keys();
 
   /// Needs a crossing of kind kStatus: presence is its liveliness.
   [[nodiscard]] Peers& peers() { return peers_; }
@@ -106,6 +113,8 @@ class DdsBridge final : public Node {
   OutgoingTopic& add_outgoing(TopicSpec spec);
   void add_incoming(TopicSpec spec, bool addressed, Pace pace, IncomingTopic::Handler handler);
   void post(Job job) { sender_.post(std::move(job)); }
+  void exchange_keys();
+  void tell_key(const TeamPeer& peer);
   void receive_until_stopped();
   void await_acknowledgements() noexcept;
 
@@ -113,6 +122,8 @@ class DdsBridge final : public Node {
   Peers peers_;
   std::vector<std::unique_ptr<OutgoingTopic>> outgoing_;
   std::vector<std::unique_ptr<IncomingTopic>> incoming_;
+  OutgoingTopic* keys_ = nullptr;  // where the team has keys
+  double told_keys_s_ = 0.0;       // receive thread only
   DdsEntity waitset_;
   DdsEntity stop_request_;  // guard condition
   bool stopped_ = false;
@@ -137,7 +148,7 @@ void write_encoded(OutgoingTopic& topic, const Addressed<T>& message) {
 
 // Publishes what `content` holds, or says why not.
 template <typename T>
-const char* publish_decoded(const Out<T>& to, const Sender& sender,
+const char* publish_decoded(const Out<T>& to, const TeamPeer& sender,
                             std::span<const std::uint8_t> content, std::shared_ptr<void> token) {
   struct Delivery {
     T message;
@@ -169,7 +180,7 @@ void DdsBridge::exchange(Crossing<T, Sent>& crossing, TopicKind kind, TrafficCat
   if (!ends.receive) return;
   constexpr bool kAddressed = !std::is_same_v<T, Sent>;
   add_incoming(spec, kAddressed, pace,
-               [to = Out<T>(crossing.peers_)](const Sender& sender, auto content, auto token) {
+               [to = Out<T>(crossing.peers_)](const TeamPeer& sender, auto content, auto token) {
                  return detail::publish_decoded(to, sender, content, std::move(token));
                });
 }

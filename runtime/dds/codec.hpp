@@ -11,17 +11,9 @@
 
 #include "modules/core/bytes.hpp"
 #include "modules/core/decoded.hpp"
-#include "modules/core/ids.hpp"
+#include "modules/core/robot_identity.hpp"
 
 namespace km {
-
-/// The process of a robot that wrote a message.
-struct Sender {
-  RobotId robot = 0;
-  std::uint64_t boot = 0;
-
-  auto operator<=>(const Sender&) const = default;
-};
 
 /// What tells a message apart from those that must not replace it: a hash. Only what its own
 /// sender keeps depends on it.
@@ -51,7 +43,7 @@ using MessageKey = std::uint64_t;
 ///       };
 ///       static MessageKey key_of(const InlierSet&);
 ///       static Encoded encode(const InlierSet&);
-///       static Decoded<InlierSet> decode(const Wire&, const Sender&);  // trusts nothing in Wire
+///       static Decoded<InlierSet> decode(const Wire&, const TeamPeer&);  // trusts nothing in Wire
 ///     };
 template <typename T>
 struct Codec;

@@ -2,6 +2,9 @@
 
 #include <dds/dds.h>
 
+#include <algorithm>
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -13,6 +16,15 @@ namespace km {
 struct DdsError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
+
+/// Identity of a DDS participant on the network.
+using Guid = std::array<std::uint8_t, 16>;
+
+[[nodiscard]] inline Guid to_guid(const dds_guid_t& guid) {
+  Guid result{};
+  std::ranges::copy(guid.v, result.begin());
+  return result;
+}
 
 /// Returns `result`, a handle or a count, or throws DdsError if it is an error code.
 inline dds_return_t check_dds(dds_return_t result, const std::string& purpose) {

@@ -4,11 +4,13 @@
 #include <array>
 #include <chrono>
 #include <exception>
+#include <iterator>
 
 #include "runtime/clock.hpp"
 #include "runtime/dds/envelope.hpp"
 #include "runtime/dds/qos.hpp"
 #include "runtime/dds/robot_status.hpp"
+#include "runtime/dds/sealed_envelope.hpp"
 #include "runtime/log.hpp"
 #include "runtime/thread.hpp"
 
@@ -19,8 +21,10 @@ constexpr std::size_t kMaxStreams = 4096;  // boots of robots remembered per top
 // For a writer to become known: DDS may tell of its messages before its robot is heard, and a
 // robot that is killed and started again waits for its former self to be missed.
 constexpr double kPatience_s = 8.0;
-constexpr std::size_t kMaxWaiting = 512;
-constexpr std::size_t kMaxWaitingOfOne = 64;
+constexpr std::size_t kMaxWaitingBytes = 32U << 20U;
+constexpr std::size_t kMaxWaitingBytesOfOne = 8U << 20U;  // a history of some hours
+constexpr std::size_t kMaxSealed = 512;
+constexpr double kRetry_s = 0.1;
 constexpr int kMaxInFlight = 16;
 constexpr std::chrono::milliseconds kMaxStay{100};
 constexpr std::size_t kFilingBytes = 256;  // that a message takes beside its own
@@ -62,21 +66,22 @@ IncomingTopic::IncomingTopic(const DdsParticipant& participant, Peers& peers, To
     : participant_(participant),
       peers_(peers),
       spec_(std::move(spec)),
+      addressed_(addressed),
       handler_(std::move(handler)),
       filed_(quota),
       topic_(dds_create_topic(participant.handle(), &km_wire_Envelope_desc, spec_.name.c_str(),
                               nullptr, nullptr),
              "topic " + spec_.name),
-      reader_(make_reader(addressed)),
+      reader_(make_reader()),
       condition_(dds_create_readcondition(reader_.handle(), DDS_ANY_STATE), "read condition") {}
 
 IncomingTopic::~IncomingTopic() {
   stop();
 }
 
-DdsEntity IncomingTopic::make_reader(bool addressed) {
+DdsEntity IncomingTopic::make_reader() {
   const DdsQos partition = make_dds_qos();
-  if (addressed)
+  if (addressed_)
     dds_qset_partition1(partition.get(), partition_of(participant_.identity().robot).c_str());
   subscriber_ = DdsEntity(dds_create_subscriber(participant_.handle(), partition.get(), nullptr),
                           "subscriber of " + spec_.name);
@@ -109,66 +114,111 @@ void IncomingTopic::take(double now_s) {
 }
 
 void IncomingTopic::arrive(Serdata serialized, dds_instance_handle_t writer, double now_s) {
-  if (ddsi_serdata_size(serialized.get()) > envelope_bytes(spec_.max_bytes))
+  const std::size_t seal_bytes = participant_.seal() == nullptr ? 0 : kTeamSealBytes;
+  if (ddsi_serdata_size(serialized.get()) > envelope_bytes(spec_.max_bytes + seal_bytes))
     return refuse("larger than its topic allows");
   const auto guid = writers_.participant_of(writer);
   if (!guid) return refuse("from no known writer");
-  if (admit(serialized, *guid, now_s)) return;
-  const auto of_one = std::ranges::count(waiting_, *guid, &Waiting::writer);
-  if (waiting_.size() >= kMaxWaiting || of_one >= static_cast<std::ptrdiff_t>(kMaxWaitingOfOne))
+  // What waits comes first.
+  if (!waiting_.contains(*guid) && is_settled(peers_.claim_of(*guid).standing))
+    return admit(std::move(serialized), *guid, now_s);
+  hear_claim(*serialized, *guid, now_s);
+  wait(std::move(serialized), *guid, now_s);
+}
+
+void IncomingTopic::wait(Serdata serialized, const Guid& writer, double now_s) {
+  const std::size_t bytes = ddsi_serdata_size(serialized.get()) + kFilingBytes;
+  WaitingRoom& room = waiting_[writer];
+  if (room.bytes + bytes > kMaxWaitingBytesOfOne || waiting_bytes_ + bytes > kMaxWaitingBytes)
     return refuse("one too many from a robot that is not known yet");
-  waiting_.push_back({std::move(serialized), *guid, now_s});
+  room.bytes += bytes;
+  waiting_bytes_ += bytes;
+  room.messages.push_back({std::move(serialized), now_s});
 }
 
 void IncomingTopic::recall(double now_s) {
-  const auto is_settled = [&](Waiting& message) {
-    if (admit(message.serialized, message.writer, now_s)) return true;
-    if (now_s - message.since_s < kPatience_s) return false;
-    const bool rival = peers_.claim_of(message.writer).standing == Standing::kRival;
-    refuse(rival ? "claims another robot's id" : "from no known robot");
-    return true;
-  };
-  std::erase_if(waiting_, is_settled);
+  for (auto entry = waiting_.begin(); entry != waiting_.end();) {
+    auto& [writer, room] = *entry;
+    const Standing standing = peers_.claim_of(writer).standing;
+    while (!room.messages.empty()) {
+      Waiting& oldest = room.messages.front();
+      const bool settled = is_settled(standing);
+      if (!settled && now_s - oldest.since_s < kPatience_s) break;
+      const std::size_t bytes = ddsi_serdata_size(oldest.serialized.get()) + kFilingBytes;
+      if (settled) {
+        admit(std::move(oldest.serialized), writer, now_s);
+      } else {
+        refuse(standing == Standing::kRival ? "claims another robot's id" : "from no known robot");
+      }
+      room.messages.pop_front();
+      room.bytes -= bytes;
+      waiting_bytes_ -= bytes;
+    }
+    entry = room.messages.empty() ? waiting_.erase(entry) : std::next(entry);
+  }
 }
 
-// Files or refuses the message; false if it is not known yet which.
-bool IncomingTopic::admit(Serdata& serialized, const Guid& writer, double now_s) {
+// Whether it is known what is to be done with the messages of a participant.
+bool IncomingTopic::is_settled(Standing standing) const {
+  const bool is_open = standing == Standing::kUnknown || standing == Standing::kRival;
+  // Keys come before anything can show who sends them; each is sealed by itself.
+  return !is_open || (spec_.carries_keys && standing == Standing::kRival);
+}
+
+void IncomingTopic::admit(Serdata serialized, const Guid& writer, double now_s) {
   const Peers::Claim claim = peers_.claim_of(writer);
-  switch (claim.standing) {
-    case Standing::kUnknown:
-    case Standing::kRival:
-      return false;
-    case Standing::kStranger:
-      refuse("from no known robot");
-      return true;
-    case Standing::kTwin:
-      hear_twin(*serialized, writer, now_s);
-      refuse("claims this robot's id");
-      return true;
-    case Standing::kAdmitted:
-      break;
+  if (claim.standing == Standing::kStranger) return refuse("from no known robot");
+  if (claim.standing == Standing::kTwin && !spec_.carries_keys) {
+    hear_claim(*serialized, writer, now_s);
+    return refuse("claims this robot's id");
   }
+  file(std::move(serialized), claim.sender, writer, now_s);
+}
+
+void IncomingTopic::file(Serdata serialized, const TeamPeer& sender, const Guid& writer,
+                         double now_s) {
   const std::size_t bytes = ddsi_serdata_size(serialized.get()) + kFilingBytes;
   bool fits = true;
   {
     const std::lock_guard lock(mutex_);
-    fits = filed_.push(claim.sender.robot, {std::move(serialized), claim.sender}, bytes, now_s);
+    fits = filed_.push(sender.robot, {std::move(serialized), sender, writer, now_s}, bytes, now_s);
     filed_changed_.notify_one();
   }
   if (!fits) refuse("for want of room");
-  return true;
 }
 
-// The numbers of a twin's statuses tell how long it has been running.
-void IncomingTopic::hear_twin(const ddsi_serdata& serialized, const Guid& writer, double now_s) {
-  if (spec_.kind != TopicKind::kStatus || !first_s_) return;
+// A status of a participant that is not the robot it says it is, or not yet. Of a twin, its number
+// tells how long it has been running; where the team has keys, its seal tells who it is.
+void IncomingTopic::hear_claim(const ddsi_serdata& serialized, const Guid& writer, double now_s) {
+  if (spec_.kind != TopicKind::kStatus) return;
+  const Peers::Claim claim = peers_.claim_of(writer);
+  if (claim.standing != Standing::kRival && claim.standing != Standing::kTwin) return;
   const ReceivedEnvelope received(serialized);
-  if (received.usable())
-    peers_.twin_heard(writer, kStatusPeriod_s * received.get().number, now_s - *first_s_);
+  if (!received.usable()) return;
+  const km_wire_Envelope& envelope = received.get();
+  if (TeamPeer{envelope.robot, envelope.boot} != claim.sender) return;
+  if (open(envelope, writer).status != Opened::Status::kOpened) return;
+  if (claim.standing == Standing::kTwin) {
+    peers_.twin_heard(writer, kStatusPeriod_s * envelope.number, now_s - started_s_);
+  } else {
+    peers_.prove(writer);
+  }
+}
+
+Opened IncomingTopic::open(const km_wire_Envelope& envelope, const Guid& writer) const {
+  const auto bytes = elements_of(envelope.content, spec_.max_bytes + kTeamSealBytes);
+  if (!bytes) return {Opened::Status::kRefused, {}, "larger than its topic allows"};
+  TeamSeal* seal = participant_.seal();
+  if (seal == nullptr || spec_.carries_keys)
+    return {Opened::Status::kOpened, {bytes->begin(), bytes->end()}, nullptr};
+  const RobotIdentity& self = participant_.identity();
+  const auto addressee = addressed_ ? std::optional(TeamPeer{self.robot, self.boot}) : std::nullopt;
+  const SealedEnvelope way(spec_.name, writer, envelope, addressee);
+  return seal->open(way.context(), *bytes);
 }
 
 void IncomingTopic::start() {
-  first_s_ = steady_now_s();
+  started_s_ = steady_now_s();
   delivery_ = std::thread(&IncomingTopic::deliver_until_stopped, this);
 }
 
@@ -183,14 +233,22 @@ void IncomingTopic::stop() noexcept {
 
 void IncomingTopic::deliver_until_stopped() try {
   name_this_thread("dds_in");
+  double retried_s = 0.0;
   std::unique_lock lock(mutex_);
   while (!stopping_) {
     const double now_s = steady_now_s();
-    if (const auto filed = filed_.pop(now_s)) {
+    const bool retry = !sealed_.empty() && now_s - retried_s >= kRetry_s;
+    if (retry) retried_s = now_s;
+    if (auto filed = filed_.pop(now_s); filed || retry) {
       lock.unlock();
-      if (const char* reason = deliver(*filed)) refuse(reason);
+      if (retry) deliver_again(now_s);
+      if (filed && deliver(*filed) == Verdict::kNotYet) sealed_.push_back(std::move(*filed));
       lock.lock();
-    } else if (const auto wait_s = filed_.wait_s(now_s)) {
+      continue;
+    }
+    std::optional<double> wait_s = filed_.wait_s(now_s);
+    if (!sealed_.empty()) wait_s = std::min(kRetry_s, wait_s.value_or(kRetry_s));
+    if (wait_s) {
       filed_changed_.wait_for(lock, std::chrono::duration<double>(*wait_s));
     } else {
       filed_changed_.wait(lock);
@@ -201,30 +259,52 @@ void IncomingTopic::deliver_until_stopped() try {
   failed_ = true;  // after error_: publishes it
 }
 
-// Null, or why the message is refused. A duplicate is neither.
-const char* IncomingTopic::deliver(const Filed& filed) {
-  const ReceivedEnvelope received(*filed.serialized);
-  if (!received.usable()) return "not deserializable";
-  return accept(received.get(), filed.sender, ddsi_serdata_size(filed.serialized.get()));
+// What could not be opened for want of a key.
+void IncomingTopic::deliver_again(double now_s) {
+  const auto is_done = [&](const Filed& filed) {
+    if (deliver(filed) == Verdict::kTaken) return true;
+    if (now_s - filed.since_s < kPatience_s && sealed_.size() < kMaxSealed) return false;
+    refuse("sealed with a key that is not known");
+    return true;
+  };
+  std::erase_if(sealed_, is_done);
 }
 
-const char* IncomingTopic::accept(const km_wire_Envelope& envelope, const Sender& sender,
-                                  std::uint64_t size) {
-  if (Sender{envelope.robot, envelope.boot} != sender) return "claims another robot's id";
-  if (!peers_.is_current(sender)) return "from a former process of its robot";
+IncomingTopic::Verdict IncomingTopic::deliver(const Filed& filed) {
+  const ReceivedEnvelope received(*filed.serialized);
+  if (received.usable()) return accept(received.get(), filed);
+  refuse("not deserializable");
+  return Verdict::kTaken;
+}
+
+IncomingTopic::Verdict IncomingTopic::accept(const km_wire_Envelope& envelope, const Filed& filed) {
+  const Opened opened = open(envelope, filed.writer);
+  if (opened.status == Opened::Status::kNotYet) return Verdict::kNotYet;
+  const char* reason = opened.status == Opened::Status::kOpened
+                           ? hand_on(envelope, filed, opened.content)
+                           : opened.reason;
+  if (reason != nullptr) refuse(reason);
+  return Verdict::kTaken;
+}
+
+// Null, or why the message is refused. A duplicate is neither.
+const char* IncomingTopic::hand_on(const km_wire_Envelope& envelope, const Filed& filed,
+                                   std::span<const std::uint8_t> content) {
+  if (TeamPeer{envelope.robot, envelope.boot} != filed.sender) return "claims another robot's id";
+  if (!spec_.carries_keys && !peers_.is_current(filed.sender))
+    return "from a former process of its robot";
   if (envelope.version == 0) return "unknown version of the topic";
-  const auto content = elements_of(envelope.content, spec_.max_bytes);
-  if (!content) return "larger than its topic allows";
+  if (content.size() > spec_.max_bytes) return "larger than its topic allows";
   {
     const std::lock_guard lock(mutex_);
-    if (!is_new(sender, envelope.number)) {
+    if (!is_new(filed.sender, envelope.number)) {
       ++duplicates_;
       return nullptr;
     }
-    from_[sender.robot].add(size);
+    from_[filed.sender.robot].add(ddsi_serdata_size(filed.serialized.get()));
   }
   try {
-    return handler_(sender, *content, in_flight_->enter());
+    return handler_(filed.sender, content, in_flight_->enter());
   } catch (const std::exception& e) {
     log::limited(log::Level::kError, "dds", spec_.name + e.what())
         << spec_.name << ": " << e.what();
@@ -232,7 +312,7 @@ const char* IncomingTopic::accept(const km_wire_Envelope& envelope, const Sender
   }
 }
 
-bool IncomingTopic::is_new(const Sender& sender, std::uint32_t number) {
+bool IncomingTopic::is_new(const TeamPeer& sender, std::uint32_t number) {
   if (streams_.size() >= kMaxStreams && !streams_.contains(sender)) streams_.clear();
   const auto entry = streams_.try_emplace(sender, has_full_history(spec_.kind)).first;
   return entry->second.is_new(number);

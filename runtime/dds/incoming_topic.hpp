@@ -51,7 +51,7 @@ class IncomingTopic {
   /// Gets what a message carries; publishes it, or returns why not (a string literal). `token` is
   /// to be held as long as subscribers are busy with it.
   using Handler = std::function<const char*(
-      const Sender& sender, std::span<const std::uint8_t> content, std::shared_ptr<void> token)>;
+      const TeamPeer& sender, std::span<const std::uint8_t> content, std::shared_ptr<void> token)>;
 
   /// `addressed`: takes only what is sent to this robot alone, else only what is sent to all.
   IncomingTopic(const DdsParticipant& participant, Peers& peers, TopicSpec spec, bool addressed,
@@ -84,37 +84,53 @@ class IncomingTopic {
   using Serdata = std::unique_ptr<ddsi_serdata, SerdataDeleter>;
   struct Filed {
     Serdata serialized;
-    Sender sender;
-  };
-  struct Waiting {
-    Serdata serialized;
+    TeamPeer sender;
     Guid writer{};
     double since_s = 0.0;
   };
+  struct Waiting {
+    Serdata serialized;
+    double since_s = 0.0;
+  };
+  struct WaitingRoom {  // of one participant
+    std::deque<Waiting> messages;
+    std::size_t bytes = 0;
+  };
+  enum class Verdict { kTaken, kNotYet };
 
-  DdsEntity make_reader(bool addressed);
+  DdsEntity make_reader();
   void arrive(Serdata serialized, dds_instance_handle_t writer, double now_s);
-  bool admit(Serdata& serialized, const Guid& writer, double now_s);
-  void hear_twin(const ddsi_serdata& serialized, const Guid& writer, double now_s);
+  void wait(Serdata serialized, const Guid& writer, double now_s);
+  bool is_settled(Standing standing) const;
+  void admit(Serdata serialized, const Guid& writer, double now_s);
+  void file(Serdata serialized, const TeamPeer& sender, const Guid& writer, double now_s);
+  void hear_claim(const ddsi_serdata& serialized, const Guid& writer, double now_s);
+  [[nodiscard]] Opened open(const km_wire_Envelope& envelope, const Guid& writer) const;
   void deliver_until_stopped();
-  const char* deliver(const Filed& filed);
-  const char* accept(const km_wire_Envelope& envelope, const Sender& sender, std::uint64_t size);
-  bool is_new(const Sender& sender, std::uint32_t number);
+  void deliver_again(double now_s);
+  Verdict deliver(const Filed& filed);
+  Verdict accept(const km_wire_Envelope& envelope, const Filed& filed);
+  const char* hand_on(const km_wire_Envelope& envelope, const Filed& filed,
+                      std::span<const std::uint8_t> content);
+  bool is_new(const TeamPeer& sender, std::uint32_t number);
   void refuse(const char* reason);
 
   const DdsParticipant& participant_;
   Peers& peers_;
   TopicSpec spec_;
+  const bool addressed_;
   Handler handler_;
   WriterBook writers_;
-  std::deque<Waiting> waiting_;    // receive thread only
-  std::optional<double> first_s_;  // likewise: when it was first asked for anything
+  std::map<Guid, WaitingRoom> waiting_;  // receive thread only
+  std::size_t waiting_bytes_ = 0;        // likewise
+  std::deque<Filed> sealed_;             // delivery only: for which a key is missing
+  double started_s_ = 0.0;
 
   mutable std::mutex mutex_;  // guards what is filed, and the counts
   std::condition_variable filed_changed_;
   FairQueue<Filed> filed_;
   bool stopping_ = false;
-  std::map<Sender, SequenceTracker> streams_;
+  std::map<TeamPeer, SequenceTracker> streams_;
   std::map<RobotId, TrafficCount> from_;
   std::uint64_t duplicates_ = 0;
   std::map<std::string, std::uint64_t> refused_;

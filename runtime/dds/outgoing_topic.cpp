@@ -5,6 +5,7 @@
 
 #include "runtime/dds/envelope.hpp"
 #include "runtime/dds/qos.hpp"
+#include "runtime/dds/sealed_envelope.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -49,17 +50,20 @@ void OutgoingTopic::write(std::optional<RobotId> to, MessageKey key,
                             .version = spec_.version,
                             .robot = participant_.identity().robot,
                             .content = {}};
-  borrow(envelope.content, content);
-  const bool fits = content.size() <= spec_.max_bytes;
-  const dds_return_t result =
-      fits ? dds_write(writer.writer.handle(), &envelope) : DDS_RETCODE_OUT_OF_RESOURCES;
+  const char* problem =
+      content.size() > spec_.max_bytes ? "too large" : seal(to, envelope, content);
+  if (problem == nullptr) {
+    borrow(envelope.content, content);
+    const dds_return_t result = dds_write(writer.writer.handle(), &envelope);
+    if (result != DDS_RETCODE_OK) problem = dds_strretcode(result);
+  }
   refresh_readers(writer);
-  if (result != DDS_RETCODE_OK)
+  if (problem != nullptr)
     log::limited(log::Level::kError, "dds", "write " + spec_.name)
         << spec_.name << ": message " << writer.next_number << " of " << content.size()
-        << " bytes not written: " << (fits ? dds_strretcode(result) : "too large");
+        << " bytes not written: " << problem;
   const std::lock_guard lock(mutex_);
-  if (result != DDS_RETCODE_OK) {
+  if (problem != nullptr) {
     ++writer.failures;
     return;
   }
@@ -67,6 +71,20 @@ void OutgoingTopic::write(std::optional<RobotId> to, MessageKey key,
   const std::uint64_t size = envelope_bytes(content.size());
   writer.written.add(size);
   for (const Guid& reader : writer.readers) writer.sent_to[reader].add(size);
+}
+
+// Null, or why it cannot be sealed.
+const char* OutgoingTopic::seal(std::optional<RobotId> to, const km_wire_Envelope& head,
+                                std::vector<std::uint8_t>& content) const {
+  const TeamSeal* seal = participant_.seal();
+  if (seal == nullptr || spec_.carries_keys) return nullptr;
+  const auto addressee = to ? peers_.current(*to) : std::nullopt;
+  if (to && !addressee) return "the robot that it is for is not there";
+  const SealedEnvelope envelope(spec_.name, participant_.guid(), head, addressee);
+  auto sealed = seal->seal(envelope.context(), content);
+  if (!sealed) return "the robot that it is for has shown no keys";
+  content = std::move(*sealed);
+  return nullptr;
 }
 
 // Called on the writing thread only, as readers_ is used by it alone.

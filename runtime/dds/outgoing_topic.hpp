@@ -1,6 +1,7 @@
 #pragma once
 
 #include <dds/ddsc/dds_statistics.h>
+#include <envelope.h>
 
 #include <chrono>
 #include <map>
@@ -26,6 +27,7 @@ struct TopicSpec {
   std::size_t max_bytes = 0;  ///< Of the content.
   TopicKind kind = TopicKind::kEvent;
   TrafficCategory category = TrafficCategory::kOther;
+  bool carries_keys = false;  ///< Its messages are sealed by themselves.
 };
 
 /// DDS partition in which the messages to one robot travel.
@@ -38,8 +40,9 @@ class OutgoingTopic {
  public:
   OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec);
 
-  /// Writes to robot `to`, or to all. Messages are numbered per writer. What DDS refuses is
-  /// counted and logged, as is content that no reader would take.
+  /// Writes to robot `to`, or to all, sealed where the team has keys. Messages are numbered per
+  /// writer. What DDS refuses is counted and logged, as is content that no reader would take and
+  /// what is for a robot that has shown no keys.
   void write(std::optional<RobotId> to, MessageKey key, std::vector<std::uint8_t> content);
 
   /// Waits until every matched reader has everything. False on timeout.
@@ -63,6 +66,8 @@ class OutgoingTopic {
   };
 
   Writer& writer_to(std::optional<RobotId> to);
+  const char* seal(std::optional<RobotId> to, const km_wire_Envelope& head,
+                   std::vector<std::uint8_t>& content) const;
   static void refresh_readers(Writer& writer);
   static std::uint64_t retransmitted_bytes(const Writer& writer);
 

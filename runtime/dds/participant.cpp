@@ -124,8 +124,10 @@ NetworkInterface choose_interface(const DdsConfig& config) {
   return chosen;
 }
 
-dds_entity_t create_participant(const DdsConfig& config, const RobotIdentity& identity) {
-  const std::string user_data = to_user_data(identity);
+dds_entity_t create_participant(const DdsConfig& config, const RobotIdentity& identity,
+                                const TeamSeal* seal) {
+  const std::string user_data =
+      to_user_data(identity, seal != nullptr ? seal->credentials() : std::string());
   const DdsQos qos = make_dds_qos();
   dds_qset_userdata(qos.get(), user_data.data(), user_data.size());
   dds_qset_entity_name(qos.get(), identity.name.c_str());
@@ -202,15 +204,21 @@ DdsDomain::DdsDomain(const DdsConfig& config)
       "DDS domain " + std::to_string(config_.domain) + " on interface " + interface_.name);
 }
 
-DdsParticipant::DdsParticipant(const DdsConfig& config, const RobotIdentity& identity)
-    : DdsParticipant(std::make_shared<const DdsDomain>(config), identity) {}
+DdsParticipant::DdsParticipant(const DdsConfig& config, const RobotIdentity& identity,
+                               std::shared_ptr<TeamSeal> seal)
+    : DdsParticipant(std::make_shared<const DdsDomain>(config), identity, std::move(seal)) {}
 
 DdsParticipant::DdsParticipant(std::shared_ptr<const DdsDomain> domain,
-                               const RobotIdentity& identity)
+                               const RobotIdentity& identity, std::shared_ptr<TeamSeal> seal)
     : domain_(std::move(domain)),
       identity_(identity),
-      participant_(create_participant(domain_->config(), identity),
+      seal_(std::move(seal)),
+      participant_(create_participant(domain_->config(), identity, seal_.get()),
                    "DDS participant (are there more than dds.max_participant_index robots on this "
-                   "host?)") {}
+                   "host?)") {
+  dds_guid_t guid{};
+  check_dds(dds_get_guid(participant_.handle(), &guid), "cannot read the participant's identity");
+  guid_ = to_guid(guid);
+}
 
 }  // namespace km

@@ -29,12 +29,22 @@ void PeerTable::participant(const Guid& guid, std::string_view user_data,
     events_.push_back({PeerEventKind::kRefused, unreadable, text});
     return;
   }
-  if (decoded.value->protocol != self_.protocol)
-    return emit(PeerEventKind::kRefused, *decoded.value,
-                "refused: speaks protocol version " + std::to_string(decoded.value->protocol) +
+  const auto& [identity, credentials] = *decoded.value;
+  if (identity.protocol != self_.protocol)
+    return emit(PeerEventKind::kRefused, identity,
+                "refused: speaks protocol version " + std::to_string(identity.protocol) +
                     ", this robot " + std::to_string(self_.protocol));
-  participant.identity = *decoded.value;
-  if (participant.alive) appear(guid, participant);
+  if (const char* reason = admit_ ? admit_(identity, credentials) : nullptr)
+    return emit(PeerEventKind::kRefused, identity, std::string("refused: ") + reason);
+  participant.identity = identity;
+  participant.proven = !admit_;
+  appear_if_there(guid, participant);
+}
+
+void PeerTable::prove(const Guid& guid) {
+  const auto found = participants_.find(guid);
+  if (found == participants_.end() || std::exchange(found->second.proven, true)) return;
+  appear_if_there(guid, found->second);
 }
 
 void PeerTable::participant_gone(const Guid& guid) {
@@ -52,7 +62,7 @@ void PeerTable::alive(const Guid& guid) {
   Participant* participant = remember(guid);
   if (participant == nullptr || std::exchange(participant->alive, true)) return;
   participant->arrival = ++arrivals_;
-  if (participant->identity) appear(guid, *participant);
+  appear_if_there(guid, *participant);
 }
 
 void PeerTable::silent(const Guid& guid) {
@@ -101,12 +111,20 @@ Standing PeerTable::standing(const Guid& guid) const {
   return admitted ? Standing::kAdmitted : Standing::kRival;
 }
 
-bool PeerTable::is_current(const Sender& sender) const {
-  const auto known = peers_.find(sender.robot);
-  return known != peers_.end() && known->second.peer.identity.boot == sender.boot;
+std::optional<TeamPeer> PeerTable::current(RobotId robot) const {
+  const auto known = peers_.find(robot);
+  if (known == peers_.end()) return std::nullopt;
+  return TeamPeer{robot, known->second.peer.identity.boot};
 }
 
-// The participant is accepted and its status writer alive.
+bool PeerTable::is_current(const TeamPeer& sender) const {
+  return current(sender.robot) == sender;
+}
+
+void PeerTable::appear_if_there(const Guid& guid, Participant& participant) {
+  if (participant.identity && participant.proven && participant.alive) appear(guid, participant);
+}
+
 void PeerTable::appear(const Guid& guid, Participant& participant) {
   const RobotIdentity& identity = *participant.identity;
   if (identity.robot == self_.robot) return;  // its uptime decides: see twin_heard()
@@ -155,7 +173,9 @@ void PeerTable::give_way(const Guid& guid, PeerState state, PeerEventKind kind, 
   auto heir = participants_.end();
   for (auto p = participants_.begin(); p != participants_.end(); ++p) {
     const Participant& claimant = p->second;
-    if (!claimant.alive || !claimant.identity || claimant.identity->robot != entry->first) continue;
+    if (!claimant.alive || !claimant.proven || !claimant.identity ||
+        claimant.identity->robot != entry->first)
+      continue;
     if (heir == participants_.end() || claimant.arrival < heir->second.arrival) heir = p;
   }
   if (heir != participants_.end()) take_over(known, heir->first, heir->second);

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -9,13 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/dds/codec.hpp"
+#include "runtime/dds/entity.hpp"
 #include "runtime/dds/robot_identity.hpp"
 
 namespace km {
-
-/// Identity of a DDS participant on the network.
-using Guid = std::array<std::uint8_t, 16>;
 
 /// kLost: went silent. kLeft: said good-bye.
 enum class PeerState { kAlive, kLost, kLeft };
@@ -65,11 +62,22 @@ class PeerTable {
   static constexpr std::size_t kMaxRobots = 64;
   static constexpr std::size_t kMaxParticipants = 1024;
 
-  explicit PeerTable(const RobotIdentity& self) : self_(self) {}
+  /// Whether a robot may be talked to, by what it shows beside its identity: null, or why not (a
+  /// string literal).
+  using Admit =
+      std::function<const char*(const RobotIdentity& identity, std::string_view credentials)>;
+
+  /// With `admit`, a robot is there only once prove() is called for it, too: what it shows could be
+  /// a recording.
+  explicit PeerTable(const RobotIdentity& self, Admit admit = {})
+      : self_(self), admit_(std::move(admit)) {}
 
   /// A participant announced itself (again) with this user data.
   void participant(const Guid& guid, std::string_view user_data, const std::string& addresses);
   void participant_gone(const Guid& guid);
+
+  /// A message shows that the participant is who it says it is.
+  void prove(const Guid& guid);
 
   /// Its status writer is alive, silent, or closed.
   void alive(const Guid& guid);
@@ -92,14 +100,17 @@ class PeerTable {
 
   [[nodiscard]] Standing standing(const Guid& guid) const;
 
+  /// The process that has this id, or had it last.
+  [[nodiscard]] std::optional<TeamPeer> current(RobotId robot) const;
   /// True unless another process has taken the id over since.
-  [[nodiscard]] bool is_current(const Sender& sender) const;
+  [[nodiscard]] bool is_current(const TeamPeer& sender) const;
 
  private:
   struct Participant {
     std::optional<RobotIdentity> identity;  // if accepted
     std::string addresses;
     bool announced = false;
+    bool proven = false;
     bool alive = false;
     bool warned = false;        // of a twin or rival, once
     std::uint64_t arrival = 0;  // counts those that came alive
@@ -109,6 +120,7 @@ class PeerTable {
     Guid guid{};
   };
 
+  void appear_if_there(const Guid& guid, Participant& participant);
   void appear(const Guid& guid, Participant& participant);
   void take_over(KnownPeer& known, const Guid& guid, const Participant& participant);
   void give_way(const Guid& guid, PeerState state, PeerEventKind kind, const char* text);
@@ -116,6 +128,7 @@ class PeerTable {
   void emit(PeerEventKind kind, const RobotIdentity& identity, const std::string& text);
 
   RobotIdentity self_;
+  Admit admit_;
   std::map<Guid, Participant> participants_;
   std::map<RobotId, KnownPeer> peers_;
   std::uint64_t arrivals_ = 0;

@@ -4,19 +4,15 @@
 #include <array>
 #include <string>
 #include <string_view>
+#include <utility>
 
+#include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
 namespace {
 
 constexpr std::size_t kMaxEvents = 1024;  // that wait; strangers can make many
-
-Guid to_guid(const dds_guid_t& guid) {
-  Guid result{};
-  std::ranges::copy(guid.v, result.begin());
-  return result;
-}
 
 std::optional<Guid> take_participant(dds_builtintopic_endpoint_t* endpoint) {
   if (endpoint == nullptr) return std::nullopt;
@@ -98,7 +94,14 @@ void WriterBook::on_matched(dds_entity_t reader, dds_subscription_matched_status
 }
 
 Peers::Peers(const DdsParticipant& participant)
-    : table_(participant.identity()),
+    : self_(participant.guid()),
+      seal_(participant.seal()),
+      table_(
+          participant.identity(),
+          seal_ == nullptr
+              ? PeerTable::Admit()
+              : [this](const auto& identity,
+                       std::string_view credentials) { return admit(identity, credentials); }),
       liveliness_changed_(dds_create_guardcondition(participant.handle()), "guard condition"),
       reader_(dds_create_reader(participant.handle(), DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr,
                                 nullptr),
@@ -106,10 +109,34 @@ Peers::Peers(const DdsParticipant& participant)
       discovered_(dds_create_readcondition(reader_.handle(), DDS_ANY_STATE), "read condition"),
       announcer_(
           kMaxEvents, Overflow::kDropOldest,
-          [this](const PeerEvent& event) { events_.publish(event); }, "peer_events") {
-  dds_guid_t self{};
-  check_dds(dds_get_guid(participant.handle(), &self), "cannot read the participant's identity");
-  self_ = to_guid(self);
+          [this](const PeerEvent& event) { events_.publish(event); }, "peer_events") {}
+
+// Called with the mutex held, as all of the table is.
+const char* Peers::admit(const RobotIdentity& identity, std::string_view credentials) {
+  if (credentials.empty()) return "shows no keys";
+  if (const char* reason =
+          seal_->admit(identity, credentials, static_cast<std::int64_t>(wall_now_s())))
+    return reason;
+  admitted_.push_back({identity.robot, identity.boot});
+  return nullptr;
+}
+
+void Peers::prove(const Guid& guid) {
+  {
+    const std::lock_guard lock(mutex_);
+    table_.prove(guid);
+  }
+  publish_events();
+}
+
+std::vector<TeamPeer> Peers::take_admitted() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(admitted_, {});
+}
+
+std::optional<TeamPeer> Peers::current(RobotId robot) const {
+  const std::lock_guard lock(mutex_);
+  return table_.current(robot);
 }
 
 Peers::~Peers() = default;
@@ -131,10 +158,10 @@ std::optional<RobotIdentity> Peers::identity_of(const Guid& guid) const {
 Peers::Claim Peers::claim_of(const Guid& guid) const {
   const std::lock_guard lock(mutex_);
   const auto identity = table_.identity_of(guid);
-  return {table_.standing(guid), identity ? Sender{identity->robot, identity->boot} : Sender{}};
+  return {table_.standing(guid), identity ? TeamPeer{identity->robot, identity->boot} : TeamPeer{}};
 }
 
-bool Peers::is_current(const Sender& sender) const {
+bool Peers::is_current(const TeamPeer& sender) const {
   const std::lock_guard lock(mutex_);
   return table_.is_current(sender);
 }

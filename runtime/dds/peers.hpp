@@ -57,12 +57,17 @@ class Peers {
   /// What is to be done with what a participant sends, and whom it says it is.
   struct Claim {
     Standing standing = Standing::kUnknown;
-    Sender sender;  ///< Of a robot: kTwin, kRival, kAdmitted.
+    TeamPeer sender;  ///< Of a robot: kTwin, kRival, kAdmitted.
   };
   [[nodiscard]] Claim claim_of(const Guid& guid) const;
-  [[nodiscard]] bool is_current(const Sender& sender) const;
+  [[nodiscard]] bool is_current(const TeamPeer& sender) const;
+  [[nodiscard]] std::optional<TeamPeer> current(RobotId robot) const;
+
+  /// Processes whose credentials were admitted since the last call: they need this one's key.
+  [[nodiscard]] std::vector<TeamPeer> take_admitted();
 
   /// See PeerTable.
+  void prove(const Guid& guid);
   void twin_heard(const Guid& guid, double its_uptime_s, double own_uptime_s);
 
   // For the bridge.
@@ -89,15 +94,18 @@ class Peers {
   };
   static void on_liveliness_changed(dds_entity_t reader, dds_liveliness_changed_status_t status,
                                     void* self);
+  const char* admit(const RobotIdentity& identity, std::string_view credentials);
   void take_discovered();
   void take_liveliness();
   bool apply(const LivelinessChange& change);
   void publish_events();
 
   Topic<PeerEvent> events_;
-  Guid self_{};
-  mutable std::mutex mutex_;  // guards table_ and changes_
+  const Guid self_;
+  TeamSeal* const seal_;      // may be null
+  mutable std::mutex mutex_;  // guards what follows, up to changes_
   PeerTable table_;
+  std::vector<TeamPeer> admitted_;
   std::deque<LivelinessChange> changes_;
   const WriterBook* status_writers_ = nullptr;
   DdsEntity liveliness_changed_;  // guard condition

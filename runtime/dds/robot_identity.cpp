@@ -27,7 +27,7 @@ std::optional<T> number(std::string_view text, int base) {
 }
 
 struct Fields {
-  std::optional<std::string_view> robot, name, proto, boot;
+  std::optional<std::string_view> robot, name, proto, boot, keys;
 };
 
 // nullopt if a known key appears twice.
@@ -41,6 +41,7 @@ std::optional<Fields> split(std::string_view bytes) {
                                              : key == "name"  ? &fields.name
                                              : key == "proto" ? &fields.proto
                                              : key == "boot"  ? &fields.boot
+                                             : key == "keys"  ? &fields.keys
                                                               : nullptr;
     if (field == nullptr) continue;
     if (field->has_value()) return std::nullopt;
@@ -65,22 +66,23 @@ std::uint64_t random_boot_id() {
   return boot;
 }
 
-std::string to_user_data(const RobotIdentity& identity) {
+std::string to_user_data(const RobotIdentity& identity, std::string_view credentials) {
   if (!is_name(identity.name))
     throw std::invalid_argument("robot name '" + identity.name +
                                 "' is not 1 to 64 printable ASCII characters without ';'");
   char boot[17];
   std::snprintf(boot, sizeof boot, "%016llx", static_cast<unsigned long long>(identity.boot));
   return "robot=" + std::to_string(identity.robot) + ";name=" + identity.name +
-         ";proto=" + std::to_string(identity.protocol) + ";boot=" + boot;
+         ";proto=" + std::to_string(identity.protocol) + ";boot=" + boot +
+         (credentials.empty() ? "" : ";keys=" + std::string(credentials));
 }
 
 bool claims_to_be_a_robot(std::string_view bytes) {
   return bytes.starts_with("robot=");
 }
 
-Decoded<RobotIdentity> parse_user_data(std::string_view bytes) {
-  using Result = Decoded<RobotIdentity>;
+Decoded<Announcement> parse_user_data(std::string_view bytes) {
+  using Result = Decoded<Announcement>;
   if (bytes.size() > kMaxUserData) return Result::refuse("user data too long");
   const auto fields = split(bytes);
   if (!fields) return Result::refuse("user data names a field twice");
@@ -94,7 +96,8 @@ Decoded<RobotIdentity> parse_user_data(std::string_view bytes) {
   if (!is_name(*fields->name)) return Result::refuse("robot name is not printable");
   if (!protocol) return Result::refuse("protocol version is not a 16-bit number");
   if (!boot || *boot == 0) return Result::refuse("boot id is not a nonzero 64-bit number");
-  return Result::accept({*robot, std::string(*fields->name), *protocol, *boot});
+  return Result::accept({{*robot, std::string(*fields->name), *protocol, *boot},
+                         std::string(fields->keys.value_or(std::string_view()))});
 }
 
 }  // namespace km

@@ -16,12 +16,19 @@ namespace km {
 [[nodiscard]] std::uint64_t random_boot_id();
 
 /// What a robot tells of itself in the USER_DATA of its DDS participant:
-/// "robot=7;name=alpha;proto=1;boot=0123456789abcdef". Throws std::invalid_argument for a name
-/// that cannot be sent.
-[[nodiscard]] std::string to_user_data(const RobotIdentity& identity);
+/// "robot=7;name=alpha;proto=1;boot=0123456789abcdef", and where the team has keys
+/// ";keys=CREDENTIALS" (see TeamSeal). Throws std::invalid_argument for a name that cannot be sent.
+[[nodiscard]] std::string to_user_data(const RobotIdentity& identity,
+                                       std::string_view credentials = {});
+
+/// What a robot announces.
+struct Announcement {
+  RobotIdentity identity;
+  std::string credentials;  ///< Empty: none.
+};
 
 /// Inverse of to_user_data() for bytes that anybody may have sent. Unknown keys are ignored.
-[[nodiscard]] Decoded<RobotIdentity> parse_user_data(std::string_view bytes);
+[[nodiscard]] Decoded<Announcement> parse_user_data(std::string_view bytes);
 
 /// True if the bytes claim to be a robot's at all; other programs on the domain are not our
 /// business.

@@ -38,7 +38,7 @@ Codec<RobotStatus>::Encoded Codec<RobotStatus>::encode(const RobotStatus& status
   return encoded;
 }
 
-Decoded<RobotStatus> Codec<RobotStatus>::decode(const Wire& wire, const Sender& writer) {
+Decoded<RobotStatus> Codec<RobotStatus>::decode(const Wire& wire, const TeamPeer& writer) {
   using Result = Decoded<RobotStatus>;
   const std::size_t length = strnlen(wire.name, sizeof wire.name);
   const std::string name(wire.name, length);

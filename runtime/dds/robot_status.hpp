@@ -54,7 +54,7 @@ struct Codec<RobotStatus> {
   };
   static MessageKey key_of(const RobotStatus& status);
   static Encoded encode(const RobotStatus& status);
-  static Decoded<RobotStatus> decode(const Wire& wire, const Sender& writer);
+  static Decoded<RobotStatus> decode(const Wire& wire, const TeamPeer& writer);
 };
 
 /// Channels of the status node; they must outlive it.

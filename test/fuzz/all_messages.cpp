@@ -18,7 +18,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr Sender kWriter{2, 70};
+constexpr TeamPeer kWriter{2, 70};
 constexpr RobotId kReader = 5;
 
 template <typename T>

@@ -12,16 +12,16 @@ namespace km {
 /// A message as it arrives, and who wrote it.
 template <typename T>
 struct Arrived : Codec<T>::Encoded {
-  Sender writer;
+  TeamPeer writer;
 };
 
 template <typename T>
-[[nodiscard]] Arrived<T> encoded_by(Sender writer, const T& message) {
+[[nodiscard]] Arrived<T> encoded_by(TeamPeer writer, const T& message) {
   return {Codec<T>::encode(message), writer};
 }
 template <typename T>
 [[nodiscard]] Arrived<T> encoded_by(RobotId writer, const T& message) {
-  return encoded_by(Sender{writer, 1}, message);
+  return encoded_by(TeamPeer{writer, 1}, message);
 }
 
 template <typename T>

@@ -180,7 +180,7 @@ MeshChunk some_chunk() {
 }
 
 Arrived<MeshChunk> received(const MeshChunk& chunk) {
-  return encoded_by(Sender{chunk.key.robot, 12345}, chunk);
+  return encoded_by(TeamPeer{chunk.key.robot, 12345}, chunk);
 }
 
 TEST_CASE("A mesh chunk survives the wire", "[codec]") {

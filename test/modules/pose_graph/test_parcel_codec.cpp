@@ -11,7 +11,7 @@ constexpr TeamPeer kSelf{7, 70};
 constexpr TeamPeer kFar{300, 3};
 
 Arrived<TeamParcel> written(const TeamMessage& message, const TeamPeer& by) {
-  return encoded_by<TeamParcel>(Sender{by.robot, by.boot},
+  return encoded_by<TeamParcel>(TeamPeer{by.robot, by.boot},
                                 {by.robot, std::make_shared<const TeamMessage>(message)});
 }
 

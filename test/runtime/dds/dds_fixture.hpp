@@ -49,7 +49,7 @@ struct Codec<Ping> {
     return encoded;
   }
   /// Refuses payloads that start with 0xFF.
-  static Decoded<Ping> decode(const Wire& wire, const Sender& writer) {
+  static Decoded<Ping> decode(const Wire& wire, const TeamPeer& writer) {
     const std::uint8_t* data = wire.payload._buffer;
     const std::uint32_t size = wire.payload._length;
     if (size > 0 && data[0] == 0xFF) return Decoded<Ping>::refuse("payload starts with 0xFF");
@@ -104,16 +104,31 @@ class RawWriter {
   DdsEntity writer_;
 };
 
+inline std::string robot_name(RobotId id) {
+  std::string name = "robot";
+  name += std::to_string(id);
+  return name;
+}
+
 /// A robot that does nothing but talk: status, pings to all, pings to one.
 struct TestRobot {
+  using MakeSeal = std::function<std::shared_ptr<TeamSeal>(const RobotIdentity&)>;
+
   explicit TestRobot(std::shared_ptr<const DdsDomain> domain, RobotId id,
                      TopicKind ping_kind = TopicKind::kEvent,
                      TopicKind addressed_kind = TopicKind::kRequest,
                      std::uint16_t protocol = kProtocolVersion)
-      : participant(std::move(domain),
-                    {id, "robot" + std::to_string(id), protocol, random_boot_id()}),
+      : TestRobot(std::move(domain), {id, robot_name(id), protocol, random_boot_id()}, nullptr,
+                  ping_kind, addressed_kind) {}
+  TestRobot(std::shared_ptr<const DdsDomain> domain, RobotId id, const MakeSeal& make_seal)
+      : TestRobot(std::move(domain), {id, robot_name(id), kProtocolVersion, random_boot_id()},
+                  make_seal) {}
+  TestRobot(std::shared_ptr<const DdsDomain> domain, const RobotIdentity& identity,
+            const MakeSeal& make_seal, TopicKind ping_kind = TopicKind::kEvent,
+            TopicKind addressed_kind = TopicKind::kRequest)
+      : participant(std::move(domain), identity, make_seal ? make_seal(identity) : nullptr),
         bridge(participant),
-        status([id] { return RobotStatus{.robot = id, .name = "robot" + std::to_string(id)}; },
+        status([identity] { return RobotStatus{.robot = identity.robot, .name = identity.name}; },
                {.own = statuses.to_peers(), .peers = statuses.from_peers()}),
         peer_events(bridge.peers().events()),
         received(pings.from_peers()),

@@ -252,7 +252,12 @@ TEST_CASE("An identity survives its user data", "[identity]") {
   CHECK(data == "robot=65535;name=Alpha 1;proto=7;boot=0123456789abcdef");
   const auto parsed = parse_user_data(data);
   REQUIRE(parsed.value.has_value());
-  CHECK(*parsed.value == identity);
+  CHECK(parsed.value->identity == identity);
+  CHECK(parsed.value->credentials.empty());
+  const auto with_keys = parse_user_data(to_user_data(identity, "AbC-_9"));
+  REQUIRE(with_keys.value.has_value());
+  CHECK(with_keys.value->identity == identity);
+  CHECK(with_keys.value->credentials == "AbC-_9");
 }
 
 TEST_CASE("Keys of a later protocol are ignored", "[identity]") {

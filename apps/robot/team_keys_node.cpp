@@ -1,0 +1,46 @@
+#include "apps/robot/team_keys_node.hpp"
+
+#include <chrono>
+#include <cstdint>
+#include <utility>
+
+#include "modules/security/key_folder.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/log.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::chrono::seconds kPeriod{10};
+
+std::int64_t now_s() {
+  return static_cast<std::int64_t>(wall_now_s());
+}
+
+}  // namespace
+
+std::shared_ptr<TeamSeal> make_team_seal(const std::filesystem::path& folder,
+                                         const RobotIdentity& own) {
+  if (folder.empty()) return nullptr;
+  return std::make_shared<TeamSeal>(load_robot_keys(folder), own, now_s());
+}
+
+TeamKeysNode::TeamKeysNode(std::filesystem::path folder, TeamSeal& seal,
+                           std::function<void()> tell_keys)
+    : folder_(std::move(folder)),
+      seal_(seal),
+      tell_keys_(std::move(tell_keys)),
+      periodic_(
+          kPeriod, [this] { step(); }, "team_keys") {}
+
+void TeamKeysNode::step() try {
+  const MembershipChange change = seal_.update(load_revocations(folder_), now_s());
+  for (const TeamPeer& peer : change.forgotten)
+    log::warn("keys") << "robot " << peer.robot << " is a member no more: revoked or expired";
+  if (change.new_key) tell_keys_();
+} catch (const std::exception& error) {
+  // A list that is being copied may be incomplete for a moment; the one in use stays.
+  log::limited(log::Level::kWarn, "keys", "revocations") << error.what();
+}
+
+}  // namespace km

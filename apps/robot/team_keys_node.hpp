@@ -1,0 +1,42 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string_view>
+
+#include "modules/core/robot_identity.hpp"
+#include "modules/security/team_seal.hpp"
+#include "runtime/node.hpp"
+#include "runtime/periodic.hpp"
+
+namespace km {
+
+/// The seal of this process, from the robot's folder of keys; null without a folder. Throws
+/// std::runtime_error and std::invalid_argument that say what is wrong with the keys and what
+/// helps.
+[[nodiscard]] std::shared_ptr<TeamSeal> make_team_seal(const std::filesystem::path& folder,
+                                                       const RobotIdentity& own);
+
+/// Looks now and then whether members have expired, or the folder's list of revocations has
+/// changed, and has keys told anew where they have.
+class TeamKeysNode final : public Node {
+ public:
+  /// `tell_keys` sends this process's new key to the others. `seal` outlives this.
+  TeamKeysNode(std::filesystem::path folder, TeamSeal& seal, std::function<void()> tell_keys);
+
+  void step();
+
+  std::string_view name() const override { return "team_keys"; }
+  void start() override { periodic_.start(); }
+  void stop() noexcept override { periodic_.stop(); }
+  std::exception_ptr error() const override { return periodic_.error(); }
+
+ private:
+  const std::filesystem::path folder_;
+  TeamSeal& seal_;
+  const std::function<void()> tell_keys_;
+  Periodic periodic_;  // last member: stops first
+};
+
+}  // namespace km

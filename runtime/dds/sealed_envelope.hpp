@@ -1,0 +1,33 @@
+#pragma once
+
+#include <envelope.h>
+
+#include <optional>
+#include <string>
+
+#include "modules/security/team_seal.hpp"
+#include "runtime/dds/entity.hpp"
+
+namespace km {
+
+/// What the seal of an envelope's content covers beside the content: the topic, the participant
+/// that writes it, the envelope's head, and whom it is for. So a recorded envelope opens neither on
+/// another topic nor from another participant.
+class SealedEnvelope {
+ public:
+  /// `head` is copied; its content is not looked at. `addressee`: none for a message to all.
+  SealedEnvelope(const std::string& topic, const Guid& writer, const km_wire_Envelope& head,
+                 std::optional<TeamPeer> addressee);
+
+  /// Valid as long as this.
+  [[nodiscard]] SealContext context() const;
+
+ private:
+  std::string way_;
+  TeamPeer sender_;
+  std::uint32_t number_;
+  std::array<std::uint8_t, 16> key_{};
+  std::optional<TeamPeer> addressee_;
+};
+
+}  // namespace km

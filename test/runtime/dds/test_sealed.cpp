@@ -1,0 +1,159 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+
+#include "runtime/clock.hpp"
+#include "test/modules/security/toy_team.hpp"
+#include "test/runtime/dds/dds_fixture.hpp"
+
+namespace km {
+namespace {
+
+std::int64_t today_s() {
+  return static_cast<std::int64_t>(wall_now_s());
+}
+
+// Each process of a robot of the team, with keys that hold today.
+TestRobot::MakeSeal member_of(const ToyTeam& team) {
+  return [&team](const RobotIdentity& own) {
+    return std::make_shared<TeamSeal>(team.keys_of(own.robot, own.name, today_s() - 3600), own,
+                                      today_s());
+  };
+}
+
+std::uint64_t refused(TestRobot& robot) {
+  std::uint64_t count = 0;
+  for (const auto& [reason, times] : robot.traffic(Direction::kIn).refused) count += times;
+  return count;
+}
+
+TEST_CASE("Robots of a team with keys talk, to all and to one", "[sealed]") {
+  const ToyTeam team;
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3, member_of(team)), b(domain, 4, member_of(team));
+  a.start();
+  b.start();
+  for (std::uint32_t i = 0; i < 100; ++i) a.ping(i, {1, 2, 3});  // before anybody is known
+  REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  CHECK(b.received.wait_for(100).size() == 100);
+  a.ping_one(4, 7, {9});
+  REQUIRE(b.received_addressed.wait_for(1).size() == 1);
+  CHECK(b.received_addressed.messages()[0].payload == std::vector<std::uint8_t>{9});
+  CHECK(refused(b) == 0);
+
+  TestRobot late(domain, 5, member_of(team));
+  late.start();
+  CHECK(late.received.wait_for(100).size() == 100);
+  CHECK(late.received_addressed.messages().empty());
+}
+
+TEST_CASE("Who has no keys of the team is not heard and hears nothing", "[sealed]") {
+  const ToyTeam team, others("survey");
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3, member_of(team)), b(domain, 4, member_of(team));
+  const bool has_keys = GENERATE(false, true);
+  TestRobot stranger(domain, 9, has_keys ? member_of(others) : TestRobot::MakeSeal());
+  for (TestRobot* robot : {&a, &b, &stranger}) robot->start();
+  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  CHECK(b.hears(PeerEventKind::kRefused, 9));
+  stranger.ping(1);
+  CHECK(eventually([&] { return refused(b) >= 1; }));
+  a.ping(2, {42});
+  REQUIRE(b.received.wait_for(1).size() == 1);
+  CHECK(b.received.messages()[0].index == 2);
+  CHECK(stranger.received.messages().empty());
+  CHECK(b.bridge.peers().list().size() == 1);
+}
+
+// Listens to the network as anybody in reach can.
+TEST_CASE("What is sealed is not to be read on the way", "[sealed]") {
+  const ToyTeam team;
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3, member_of(team)), b(domain, 4, member_of(team));
+  a.start();
+  b.start();
+  const DdsEntity ear(dds_create_participant(static_cast<dds_domainid_t>(domain->config().domain),
+                                             nullptr, nullptr),
+                      "participant");
+  const dds_entity_t topic =
+      dds_create_topic(ear.handle(), &km_wire_Envelope_desc, Codec<Ping>::kTopic, nullptr, nullptr);
+  const dds_entity_t reader = dds_create_reader(
+      ear.handle(), topic, make_reader_qos(TopicKind::kEvent, domain->config()).get(), nullptr);
+  const std::vector<std::uint8_t> secret(500, 0x5A);
+  a.ping(1, secret);
+  REQUIRE(b.received.wait_for(1).size() == 1);
+
+  km_wire_Envelope envelope{};
+  void* sample = &envelope;
+  dds_sample_info_t info{};
+  REQUIRE(eventually([&] { return dds_take(reader, &sample, &info, 1, 1) == 1; }));
+  const auto content = elements_of(envelope.content, 100000);
+  REQUIRE(content);
+  CHECK(content->size() > secret.size());
+  CHECK(std::ranges::search(*content, std::vector<std::uint8_t>(8, 0x5A)).empty());
+  dds_sample_free(&envelope, &km_wire_Envelope_desc, DDS_FREE_CONTENTS);
+}
+
+TEST_CASE("Recorded credentials and recorded messages make nobody a member", "[sealed]") {
+  const ToyTeam team;
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  auto b = std::make_unique<TestRobot>(domain, 4, member_of(team));
+  // What robot 3 once showed and said; then it is gone.
+  std::string shown;
+  const RobotIdentity identity{3, "robot3", kProtocolVersion, random_boot_id()};
+  {
+    TestRobot a(domain, identity, [&](const RobotIdentity& own) {
+      auto seal = member_of(team)(own);
+      shown = to_user_data(own, seal->credentials());
+      return seal;
+    });
+    a.start();
+    b->start();
+    REQUIRE(b->hears(PeerEventKind::kJoined, 3));
+    a.ping(1);
+    REQUIRE(b->received.wait_for(1).size() == 1);
+  }
+  REQUIRE(b->hears(PeerEventKind::kLeft, 3));
+  const DdsQos qos = make_dds_qos();
+  dds_qset_userdata(qos.get(), shown.data(), shown.size());
+  const DdsEntity impostor(
+      dds_create_participant(static_cast<dds_domainid_t>(domain->config().domain), qos.get(),
+                             nullptr),
+      "participant");
+  RawWriter status(impostor.handle(), domain->config(), TopicKind::kStatus,
+                   Codec<RobotStatus>::kTopic);
+  RawWriter pings(impostor.handle(), domain->config(), TopicKind::kEvent);
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    status.write_bytes(header(identity, 100 + i), std::vector<std::uint8_t>(200, 1));
+    pings.write(header(identity, 100 + i), {3, 100 + i, {}});
+  }
+  TestRobot c(domain, 5, member_of(team));
+  c.start();
+  REQUIRE(b->hears(PeerEventKind::kJoined, 5));
+  c.ping(2);
+  REQUIRE(b->received.wait_for(2).size() == 2);
+  CHECK(b->received.messages()[1].index == 2);
+  CHECK_FALSE(TestRobot::matching(b->peer_events.messages(), PeerEventKind::kReturned, 3) > 0);
+  REQUIRE(c.hears(PeerEventKind::kJoined, 4));
+  CHECK(c.bridge.peers().list().size() == 1);
+}
+
+TEST_CASE("A robot with keys that starts again is known by its new process", "[sealed]") {
+  const ToyTeam team;
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3, member_of(team));
+  a.start();
+  for (std::uint32_t life = 0; life < 3; ++life) {
+    TestRobot b(domain, 4, member_of(team));
+    b.start();
+    b.ping(life);
+    REQUIRE(a.received.wait_for(life + 1).size() == life + 1);
+    REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+    a.ping_one(4, life);
+    REQUIRE(b.received_addressed.wait_for(1).size() == 1);
+    CHECK(b.received_addressed.messages()[0].index == life);
+  }
+}
+
+}  // namespace
+}  // namespace km
