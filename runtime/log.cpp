@@ -6,11 +6,11 @@
 #include <atomic>
 #include <chrono>
 #include <ctime>
-#include <iostream>
 #include <mutex>
 #include <utility>
 
 #include "runtime/clock.hpp"
+#include "runtime/unblocked_output.hpp"
 
 namespace km {
 
@@ -36,7 +36,7 @@ constexpr double kLimitedInterval_s = 5.0;
 // The terminal is one per process, and so is this: log lines and the status line share it.
 struct Console {
   std::mutex mutex;  // guards what follows
-  std::ostream* log_output = &std::cerr;
+  std::ostream* log_output = &unblocked_stderr();
   RateLimit rate_limit{kLimitedInterval_s};
   std::ostream* status_output = nullptr;
   bool status_in_place = false;
@@ -138,7 +138,7 @@ std::ostream* set_output(std::ostream* output) {
 
 }  // namespace log
 
-StatusLine::StatusLine() : StatusLine(std::cout, isatty(STDOUT_FILENO) == 1) {
+StatusLine::StatusLine() : StatusLine(unblocked_stdout(), isatty(STDOUT_FILENO) == 1) {
   const std::lock_guard lock(console().mutex);
   console().status_measures_width = console().status_in_place;
 }

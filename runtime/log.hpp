@@ -78,7 +78,8 @@ inline Line limited(Level level, std::string_view tag, std::string key) {
 /// Lines less important than `level` are dropped. Default kInfo. Thread-safe.
 void set_level(Level level);
 
-/// Where lines go, std::cerr by default; returns where they went. For tests.
+/// Where lines go, unblocked_stderr() by default: no thread waits for whoever reads them. Returns
+/// where they went. For tests.
 std::ostream* set_output(std::ostream* output);
 
 }  // namespace log
@@ -87,7 +88,7 @@ std::ostream* set_output(std::ostream* output);
 /// seconds. Log lines go above it and never into it. One per process. Thread-safe.
 class StatusLine {
  public:
-  /// On standard output; a terminal if isatty() says so.
+  /// On unblocked_stdout(); a terminal if isatty() says so.
   StatusLine();
   /// For tests: `output` outlives this.
   StatusLine(std::ostream& output, bool terminal, double plain_interval_s = 5.0);

@@ -9,6 +9,7 @@
 #include "apps/robot/robot_config.hpp"
 #include "apps/robot/run.hpp"
 #include "runtime/log.hpp"
+#include "runtime/unblocked_output.hpp"
 
 #ifdef __GLIBC__  // known to the headers above
 #include <malloc.h>
@@ -155,6 +156,6 @@ int main(int argc, char** argv) try {
   cv::setNumThreads(1);  // every module has its own thread; OpenCV's pool would fight them
   return km::run_robot(options, signals);
 } catch (const std::exception& error) {
-  std::cerr << "kimera_multi_robot: " << error.what() << '\n';
+  km::unblocked_stderr() << "kimera_multi_robot: " << error.what() << std::endl;
   return km::kBadInput;
 }

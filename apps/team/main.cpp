@@ -11,6 +11,7 @@
 #include "apps/team/team_report.hpp"
 #include "apps/team/team_results.hpp"
 #include "modules/mesh/ply_file.hpp"
+#include "runtime/unblocked_output.hpp"
 
 namespace {
 
@@ -97,11 +98,12 @@ std::vector<km::RobotRun> run_robots(const TeamOptions& options, const km::TeamP
   km::SignalWatch signals;
   std::vector<std::string> names;
   for (const km::RobotPlan& robot : plan.robots) names.push_back(robot.name);
-  std::cout << names.size() << " robots in DDS domain " << *plan.domain << ", results in "
-            << plan.output.string() << std::endl;
+  std::ostream& out = km::unblocked_stdout();
+  out << names.size() << " robots in DDS domain " << *plan.domain << ", results in "
+      << plan.output.string() << std::endl;
   km::TeamDisplay display(names);
   std::vector<km::RobotRun> runs = km::run_team(options.robot_binary, plan, signals, display);
-  std::cout << '\n';
+  out << '\n';
   return runs;
 }
 
@@ -119,19 +121,20 @@ int run(const TeamOptions& options) {
   const km::TeamPlan plan = make_plan(options);
   const km::TeamResult team = km::collect_results(
       plan, options.report ? km::finished_runs(plan) : run_robots(options, plan));
-  std::cout << to_table(team);
+  std::ostream& told = km::unblocked_stdout();
+  told << to_table(team);
   if (!options.json.empty()) km::write_json(options.json, team);
   if (!team.plot.empty()) {
     const fs::path path = plan.output / "trajectories.svg";
     km::write_output(path, [&](std::ostream& out) { out << team.plot; });
-    std::cout << "\nSeen from above: " << path.string() << '\n';
+    told << "\nSeen from above: " << path.string() << '\n';
   }
   if (!team.meshes.merged.empty()) {
     const fs::path path = plan.output / "team_mesh.ply";
     km::write_ply(path, team.meshes.merged);
     copy_palette(plan);
-    std::cout << "The mesh of all robots"
-              << (team.optimized ? ", in the frame of the truth: " : ": ") << path.string() << '\n';
+    told << "The mesh of all robots" << (team.optimized ? ", in the frame of the truth: " : ": ")
+         << path.string() << '\n';
   }
   const bool ok = std::all_of(team.robots.begin(), team.robots.end(),
                               [](const km::RobotResult& robot) { return robot.run.exit.ok(); });
@@ -156,6 +159,6 @@ int main(int argc, char** argv) try {
   }
   return run(options);
 } catch (const std::exception& error) {
-  std::cerr << "kimera_multi_team: " << error.what() << '\n';
+  km::unblocked_stderr() << "kimera_multi_team: " << error.what() << std::endl;
   return 1;
 }

@@ -4,8 +4,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <iostream>
 #include <utility>
+
+#include "runtime/unblocked_output.hpp"
 
 namespace km {
 namespace {
@@ -19,7 +20,8 @@ int terminal_width() {
 }  // namespace
 
 TeamDisplay::TeamDisplay(std::vector<std::string> names)
-    : TeamDisplay(std::move(names), std::cout, isatty(STDOUT_FILENO) == 1, terminal_width()) {}
+    : TeamDisplay(std::move(names), unblocked_stdout(), isatty(STDOUT_FILENO) == 1,
+                  terminal_width()) {}
 
 TeamDisplay::TeamDisplay(std::vector<std::string> names, std::ostream& output, bool terminal,
                          int width)

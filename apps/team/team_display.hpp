@@ -10,7 +10,7 @@ namespace km {
 /// robot's name in front.
 class TeamDisplay {
  public:
-  /// On standard output; a terminal if isatty() says so.
+  /// On unblocked_stdout(); a terminal if isatty() says so.
   explicit TeamDisplay(std::vector<std::string> names);
   /// For tests: `output` outlives this. `width` [characters] cuts lines on a terminal.
   TeamDisplay(std::vector<std::string> names, std::ostream& output, bool terminal, int width);

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <thread>
+
+namespace km {
+
+/// Writes text to a file descriptor on a thread of its own: who has something to say never waits
+/// for a terminal, a pipe or a disk. What does not fit any more, or cannot be written, is lost and
+/// counted; "12 lines lost: output blocked or failed" stands where they would have been.
+/// Thread-safe.
+class OutputQueue {
+ public:
+  /// `descriptor` stays open as long as this lives, and is not changed to non-blocking: others may
+  /// share it.
+  explicit OutputQueue(int descriptor, std::size_t capacity_bytes = std::size_t{1} << 20);
+  /// Waits as drain() does, at most kGrace_s. A thread that is still blocked then is left behind.
+  ~OutputQueue();
+  OutputQueue(const OutputQueue&) = delete;
+  OutputQueue& operator=(const OutputQueue&) = delete;
+
+  static constexpr double kGrace_s = 2.0;
+
+  /// Queues `text`, whole lines. Never waits.
+  void write(std::string text);
+
+  /// Waits until everything queued has been written or has failed; false after `grace_s`.
+  bool drain(double grace_s);
+
+ private:
+  struct State;
+  std::shared_ptr<State> state_;  // shared with the thread, which may outlive this
+  std::thread writer_;
+};
+
+/// Standard output and standard error through an OutputQueue each, or one for both where they are
+/// the same file, so that the order is kept. A flush passes on what was written since the last.
+/// The program's end waits for what is queued, at most OutputQueue::kGrace_s; what is written to
+/// std::cout or std::cerr beside them comes out of turn, unless drain_standard_output() is called
+/// before. Each stream is for one thread at a time.
+std::ostream& unblocked_stdout();
+std::ostream& unblocked_stderr();
+
+/// Waits until both are written, at most OutputQueue::kGrace_s.
+void drain_standard_output();
+
+}  // namespace km

@@ -1,0 +1,148 @@
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <array>
+#include <catch2/catch.hpp>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "runtime/unblocked_output.hpp"
+#include "test/support/patience.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kPatience_s = std::chrono::duration<double>(kPatience).count();
+
+// A pipe; what is read of it comes line by line.
+class Pipe {
+ public:
+  Pipe() { REQUIRE(pipe2(ends_.data(), O_CLOEXEC) == 0); }
+  ~Pipe() {
+    close_reader();
+    close(ends_[1]);
+  }
+
+  [[nodiscard]] int writer() const { return ends_[1]; }
+  void close_reader() {
+    if (ends_[0] >= 0) close(ends_[0]);
+    ends_[0] = -1;
+  }
+  // Reads up to and with the first line that ends so.
+  std::vector<std::string> read_to(const std::string& ending) {
+    std::vector<std::string> lines;
+    std::string line;
+    char c = 0;
+    while (::read(ends_[0], &c, 1) == 1) {
+      if (c != '\n') {
+        line += c;
+        continue;
+      }
+      lines.push_back(line);
+      if (line.ends_with(ending)) break;
+      line.clear();
+    }
+    return lines;
+  }
+
+ private:
+  std::array<int, 2> ends_{};
+};
+
+std::string numbered(int i) {
+  return "line " + std::to_string(i);
+}
+
+TEST_CASE("What is queued comes out whole and in order", "[output]") {
+  constexpr int kLines = 20000;  // many times what a pipe holds
+  Pipe pipe;
+  std::vector<std::string> lines;
+  std::thread reader([&] { lines = pipe.read_to(numbered(kLines - 1)); });
+  {
+    OutputQueue queue(pipe.writer());
+    for (int i = 0; i < kLines; ++i) queue.write(numbered(i) + '\n');
+  }  // writes the rest
+  reader.join();
+  REQUIRE(lines.size() == kLines);
+  for (int i = 0; i < kLines; ++i) REQUIRE(lines[static_cast<std::size_t>(i)] == numbered(i));
+}
+
+TEST_CASE("A blocked output holds nobody up, and what is lost is counted in its place",
+          "[output]") {
+  constexpr int kLines = 20000;
+  Pipe pipe;
+  OutputQueue queue(pipe.writer(), 50000);
+  for (int i = 0; i < kLines; ++i) queue.write(numbered(i) + '\n');  // nobody reads
+  const auto lines = pipe.read_to("lost: output blocked or failed");
+  REQUIRE(lines.size() > 1);
+  const std::size_t kept = lines.size() - 1;
+  for (std::size_t i = 0; i < kept; ++i) CHECK(lines[i] == numbered(static_cast<int>(i)));
+  CHECK(lines.back() == std::to_string(kLines - kept) + " lines lost: output blocked or failed");
+  queue.write("news\n");
+  CHECK(pipe.read_to("news") == std::vector<std::string>{"news"});
+}
+
+TEST_CASE("An output that stays blocked does not hold up the end", "[output]") {
+  Pipe pipe;
+  {
+    OutputQueue queue(pipe.writer());
+    for (int i = 0; i < 20000; ++i) queue.write(numbered(i) + '\n');
+    CHECK_FALSE(queue.drain(0.01));
+  }
+  SUCCEED("the queue has gone, its thread has not");
+}
+
+TEST_CASE("A closed pipe is an error of a write and not the end of the process", "[output]") {
+  const auto before = std::signal(SIGPIPE, SIG_DFL);
+  Pipe pipe;
+  pipe.close_reader();
+  {
+    OutputQueue queue(pipe.writer());
+    for (int i = 0; i < 100; ++i) queue.write(numbered(i) + '\n');
+    CHECK(queue.drain(kPatience_s));
+  }
+  std::signal(SIGPIPE, before);
+}
+
+TEST_CASE("A full disk costs the lines that it does not take, and tells so later", "[output]") {
+  Pipe pipe;
+  OutputQueue queue(pipe.writer());
+  const int working = dup(pipe.writer());
+  const int full = open("/dev/full", O_WRONLY | O_CLOEXEC);
+  REQUIRE(full >= 0);
+  REQUIRE(dup2(full, pipe.writer()) >= 0);
+  queue.write("one\ntwo\n");
+  queue.write("three\n");
+  CHECK(queue.drain(kPatience_s));
+  REQUIRE(dup2(working, pipe.writer()) >= 0);
+  queue.write("four\n");
+  CHECK(pipe.read_to("four") ==
+        std::vector<std::string>{"3 lines lost: output blocked or failed", "four"});
+  close(working);
+  close(full);
+}
+
+TEST_CASE("A program's end writes all it said on both streams, in order where they are one",
+          "[output]") {
+  Pipe pipe;
+  const pid_t child = fork();
+  if (child == 0) {
+    dup2(pipe.writer(), STDOUT_FILENO);
+    dup2(pipe.writer(), STDERR_FILENO);
+    execl(KM_BIN_DIR "/test_two_streams", "test_two_streams", nullptr);
+    _exit(127);
+  }
+  std::vector<std::string> expected;
+  for (int i = 0; i < 1000; ++i) {
+    expected.push_back("out " + std::to_string(i));
+    expected.push_back("err " + std::to_string(i));
+  }
+  CHECK(pipe.read_to("err 999") == expected);
+}
+
+}  // namespace
+}  // namespace km
