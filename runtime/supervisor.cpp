@@ -15,10 +15,15 @@ SignalWatch::SignalWatch() {
   sigemptyset(&watched_);
   sigaddset(&watched_, SIGINT);
   sigaddset(&watched_, SIGTERM);
+  struct sigaction on_hangup {};
+  sigaction(SIGHUP, nullptr, &on_hangup);
+  if (on_hangup.sa_handler != SIG_IGN) sigaddset(&watched_, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &watched_, &previous_);
+  previous_pipe_ = std::signal(SIGPIPE, SIG_IGN);
 }
 
 SignalWatch::~SignalWatch() {
+  std::signal(SIGPIPE, previous_pipe_);
   pthread_sigmask(SIG_SETMASK, &previous_, nullptr);
 }
 
@@ -33,6 +38,7 @@ std::optional<int> SignalWatch::wait(double timeout_s) {
 void SignalWatch::give_up() {
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
+  std::signal(SIGHUP, SIG_IGN);
   pthread_sigmask(SIG_UNBLOCK, &watched_, nullptr);
 }
 

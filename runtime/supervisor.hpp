@@ -14,9 +14,10 @@
 
 namespace km {
 
-/// Turns SIGINT and SIGTERM into a question that can be asked. Make one before any other thread
-/// exists: threads inherit the blocked signals. Programs started by this one inherit them too,
-/// unless their spawn attributes restore previous().
+/// Turns SIGINT, SIGTERM and SIGHUP into a question that can be asked, SIGHUP unless it is ignored
+/// (nohup); SIGPIPE is ignored: a closed pipe is an error of a write. Make one before any other
+/// thread exists: threads inherit the blocked signals. Programs started by this one inherit both,
+/// unless what starts them restores previous() and the default of SIGPIPE.
 class SignalWatch {
  public:
   SignalWatch();
@@ -27,7 +28,8 @@ class SignalWatch {
   /// Waits up to `timeout_s` for a signal; its number, or nullopt.
   std::optional<int> wait(double timeout_s);
 
-  /// From now on a signal ends the process at once, as if nobody watched.
+  /// From now on SIGINT and SIGTERM end the process at once, as if nobody watched. SIGHUP does
+  /// nothing more: a terminal that closes may send it several times.
   void give_up();
 
   /// The signals that were blocked before.
@@ -36,6 +38,7 @@ class SignalWatch {
  private:
   sigset_t watched_{};
   sigset_t previous_{};
+  void (*previous_pipe_)(int) = nullptr;  // what SIGPIPE did before
 };
 
 /// Why a robot stopped.

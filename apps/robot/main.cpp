@@ -34,7 +34,7 @@ Examples
 Files written to --output: odometry.tum, optimized.tum, pose_graph.g2o, keyframes.csv, loop_closures.csv,
 optimizer.csv, traffic.csv, process.csv, timing.csv, config.yaml, summary.json; with mapping.mode on also mesh.ply,
 mesh_optimized.ply and label_palette.csv.
-Ctrl-C ends the run in order with everything written; a second Ctrl-C ends it at once.
+Ctrl-C, SIGTERM and SIGHUP end the run in order with everything written; a second Ctrl-C or SIGTERM ends it at once.
 Exit codes: 0 done; 1 bad input or configuration, or a recording that gave no pose; 2 bad command line;
 3 a module failed while running, or another robot claimed this robot's id.)";
 

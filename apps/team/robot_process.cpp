@@ -1,6 +1,7 @@
 #include "apps/team/robot_process.hpp"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -11,10 +12,14 @@
 #include <system_error>
 #include <utility>
 
+#include "runtime/clock.hpp"
+
 namespace km {
 namespace {
 
 constexpr std::size_t kLastWords = 12;
+constexpr double kGrace_s = 20.0;
+constexpr int kPoll_ms = 50;
 
 std::runtime_error system_error(const std::string& what) {
   return std::runtime_error(what + ": " + std::generic_category().message(errno));
@@ -31,9 +36,12 @@ std::array<int, 2> make_pipe() {
 // In the child between fork and exec: async-signal-safe calls only.
 [[noreturn]] void become(char* const* arguments, int out, int err, const sigset_t& blocked,
                          pid_t parent) {
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  // Not SIGTERM: whoever has asked for the end already would see a second one, which ends at once.
+  prctl(PR_SET_PDEATHSIG, SIGHUP);
   if (getppid() != parent) _exit(127);  // it died before the line above
   setpgid(0, 0);
+  signal(SIGHUP, SIG_DFL);  // also under nohup
+  signal(SIGPIPE, SIG_DFL);
   sigprocmask(SIG_SETMASK, &blocked, nullptr);
   const int nothing = open("/dev/null", O_RDONLY);
   if (nothing >= 0) dup2(nothing, STDIN_FILENO);
@@ -81,8 +89,16 @@ RobotProcess::RobotProcess(const std::vector<std::string>& command, const sigset
 
 RobotProcess::~RobotProcess() {
   if (!exit_ && pid_ > 0) {
-    kill(pid_, SIGKILL);
-    waitpid(pid_, nullptr, 0);
+    ask_to_end();
+    const double end_s = steady_now_s() + kGrace_s;
+    // What it prints meanwhile is taken: full pipes might hold it up.
+    while (!exit_ && steady_now_s() < end_s) {
+      std::array<pollfd, 2> polled{{{out_.fd, POLLIN, 0}, {err_.fd, POLLIN, 0}}};
+      poll(polled.data(), polled.size(), kPoll_ms);
+      read();
+    }
+    send(SIGKILL);
+    if (!exit_) waitpid(pid_, nullptr, 0);
   }
   for (const int fd : descriptors())
     if (fd >= 0) close(fd);
@@ -127,7 +143,12 @@ std::vector<std::string> RobotProcess::read() {
 }
 
 void RobotProcess::send(int signal) {
+  asked_ = true;
   if (!exit_) kill(pid_, signal);
+}
+
+void RobotProcess::ask_to_end() {
+  if (!asked_) send(SIGTERM);
 }
 
 }  // namespace km

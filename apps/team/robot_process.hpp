@@ -25,15 +25,15 @@ struct ProcessExit {
 [[nodiscard]] std::string to_string(const ProcessExit& exit);
 
 /// A child process with its output on pipes. Its standard input is empty, it is in a process group
-/// of its own (so that a terminal's Ctrl-C does not reach it), and it is killed if this program
-/// ends first. Not thread-safe.
+/// of its own (so that a terminal's Ctrl-C does not reach it), and it is sent SIGHUP if this
+/// program, or the thread that started it, ends first, however it ends. Not thread-safe.
 class RobotProcess {
  public:
   /// Starts `command` (the program first), with the signals in `blocked` blocked and all others
   /// free. What it prints also goes to `log`. Throws std::runtime_error.
   RobotProcess(const std::vector<std::string>& command, const sigset_t& blocked,
                const std::filesystem::path& log);
-  /// Kills it if it is still running.
+  /// If it is still running, asks it to end and kills it 20 s later.
   ~RobotProcess();
   RobotProcess(const RobotProcess&) = delete;
   RobotProcess& operator=(const RobotProcess&) = delete;
@@ -47,6 +47,9 @@ class RobotProcess {
 
   /// Sends a signal if it is still running.
   void send(int signal);
+
+  /// Sends SIGTERM, unless it has been sent a signal before: a second one ends a robot at once.
+  void ask_to_end();
 
   /// How it ended; nullopt while it runs or has output left.
   [[nodiscard]] const std::optional<ProcessExit>& exit() const { return exit_; }
@@ -62,6 +65,7 @@ class RobotProcess {
   std::vector<std::string> drain(Pipe& pipe);
 
   pid_t pid_ = -1;
+  bool asked_ = false;  // to end, by some signal
   Pipe out_;
   Pipe err_;
   std::ofstream log_;

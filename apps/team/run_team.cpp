@@ -48,6 +48,14 @@ class RunningTeam {
     }
   }
 
+  // Where something has failed here, robots may still be running: all are asked before each is
+  // waited for.
+  ~RunningTeam() {
+    for (const auto& robot : robots_) robot->ask_to_end();
+  }
+  RunningTeam(const RunningTeam&) = delete;
+  RunningTeam& operator=(const RunningTeam&) = delete;
+
   void wait() {
     const double start_s = steady_now_s();
     while (is_running()) {

@@ -92,7 +92,7 @@ TEST_CASE("Two nodes of one name are refused", "[supervisor]") {
 }
 
 TEST_CASE("The first signal ends the run in order", "[supervisor]") {
-  const int signal = GENERATE(SIGINT, SIGTERM);
+  const int signal = GENERATE(SIGINT, SIGTERM, SIGHUP);
   Run run;
   auto& [log, diary, signals, supervisor] = run;
   supervisor.emplace<ToyNode>("camera", diary);
@@ -103,6 +103,17 @@ TEST_CASE("The first signal ends the run in order", "[supervisor]") {
   });
   CHECK(result.interrupted);
   CHECK(diary.back() == "stop camera");
+}
+
+TEST_CASE("A hang-up is not waited for where it was ignored before, as under nohup",
+          "[supervisor]") {
+  const auto before = std::signal(SIGHUP, SIG_IGN);
+  {
+    SignalWatch signals;
+    kill(getpid(), SIGHUP);
+    CHECK_FALSE(signals.wait(0.0).has_value());
+  }
+  std::signal(SIGHUP, before);
 }
 
 // A node that never ends, in a process of its own: only the second signal can help.
@@ -146,6 +157,7 @@ TEST_CASE("A second signal ends the process at once", "[supervisor]") {
   kill(child, SIGINT);
   REQUIRE(read(ends[0], &told, 1) == 1);
   REQUIRE(told == 's');
+  kill(child, SIGHUP);  // a terminal that closes may send several
   kill(child, SIGINT);
   int status = 0;
   REQUIRE(waitpid(child, &status, 0) == child);

@@ -60,5 +60,39 @@ TEST_CASE("A team whose output nobody reads ends on a signal with the results of
     CHECK(read_summary(folder.path() / robot / "summary.json").exit_reason == "interrupted");
 }
 
+TEST_CASE("A hung-up terminal and a closed pipe end a robot in order", "[system]") {
+  const TemporaryFolder folder;
+  const fs::path output = folder.path() / "out";
+  std::array<int, 2> ends{};
+  REQUIRE(pipe2(ends.data(), O_CLOEXEC) == 0);
+  Child robot(robot_on_walk(long_walk(folder.path(), 0), output), ends[1]);
+  close(ends[1]);
+  close(ends[0]);  // whoever read has gone: every line it says is SIGPIPE, or an error
+  REQUIRE(wait_for_lines(output / "process.csv", 10));
+  robot.kill(SIGHUP);
+  robot.kill(SIGHUP);  // as from the terminal and from its shell
+  CHECK(robot.wait() == 0);
+  CHECK(read_summary(output / "summary.json").exit_reason == "interrupted");
+}
+
+TEST_CASE("Robots whose team is killed end in order with their results", "[system]") {
+  const TemporaryFolder folder;
+  const int quiet = open("/dev/null", O_WRONLY | O_CLOEXEC);
+  {
+    Child team(team_on_walks(folder), quiet);
+    for (const char* robot : {"robot0", "robot1"})
+      REQUIRE(wait_for_lines(folder.path() / robot / "process.csv", 3));
+    team.kill(SIGKILL);
+    CHECK(team.wait() == -SIGKILL);
+  }
+  close(quiet);
+  for (const char* robot : {"robot0", "robot1"}) {
+    CAPTURE(robot);
+    const fs::path summary = folder.path() / robot / "summary.json";
+    REQUIRE(wait_for_lines(summary, 1));
+    CHECK(read_summary(summary).exit_reason == "interrupted");
+  }
+}
+
 }  // namespace
 }  // namespace km

@@ -98,6 +98,29 @@ TEST_CASE("A process does not outlive its owner", "[team]") {
   CHECK(kill(child, 0) != 0);
 }
 
+TEST_CASE("A process whose owner goes ends in order", "[team]") {
+  const TemporaryFolder folder;
+  {
+    Script script("trap 'echo ended > " + (folder.path() / "diary").string() +
+                  "; exit 0' TERM; echo ready; while :; do sleep 0.02; done");
+    while (script.lines.empty()) script.read_once();
+  }
+  CHECK(folder.read("diary") == "ended\n");
+}
+
+TEST_CASE("A process that was asked to end is not asked again", "[team]") {
+  const TemporaryFolder folder;
+  {
+    Script script(
+        "trap 'echo asked >> " + (folder.path() / "diary").string() +
+        "' INT TERM; echo ready; for i in $(seq 10); do sleep 0.02; done; echo ended >> " +
+        (folder.path() / "diary").string());
+    while (script.lines.empty()) script.read_once();
+    script.process.send(SIGINT);
+  }
+  CHECK(folder.read("diary") == "asked\nended\n");
+}
+
 TEST_CASE("The display redraws a terminal and prefixes lines elsewhere", "[team]") {
   std::ostringstream plain;
   TeamDisplay log({"a", "long"}, plain, false, 0);
