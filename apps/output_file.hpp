@@ -1,21 +1,21 @@
 #pragma once
 
 #include <filesystem>
-#include <fstream>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
+#include "modules/core/write_file.hpp"
+
 namespace km {
 
-/// Writes `file` by `writer(std::ostream&)`; nothing if the name is empty. Throws
-/// std::runtime_error that names the file.
+/// Writes `file` by `writer(std::ostream&)`; nothing if the name is empty. See write_file(): whole
+/// or not at all. Throws std::runtime_error that names the file and why.
 inline void write_output(const std::filesystem::path& file, const auto& writer) {
   if (file.empty()) return;
-  std::ofstream out(file);
-  const char* const problem = out ? ": writing failed, is the disk full?" : ": cannot be written";
+  std::ostringstream out;
   writer(out);
-  out.close();
-  if (!out) throw std::runtime_error(file.string() + problem);
+  write_file(file, out.view());
 }
 
 /// Throws std::runtime_error if there is no folder to write `file` to, or if it is one (empty: none

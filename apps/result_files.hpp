@@ -2,6 +2,7 @@
 
 #include <array>
 #include <filesystem>
+#include <string>
 
 namespace km {
 
@@ -20,7 +21,9 @@ inline constexpr const char* kPeerMeshes = "peer_meshes";
 /// Removes a robot's results from `folder`, so that those of an earlier run cannot be taken for
 /// those of one that fails. Throws std::filesystem::filesystem_error naming the file.
 inline void remove_results(const std::filesystem::path& folder) {
-  for (const char* file : kResultFiles) std::filesystem::remove(folder / file);
+  for (const std::string file : kResultFiles)
+    for (const char* ending : {"", ".part"})  // that of a file cut short by the process's end
+      std::filesystem::remove(folder / (file + ending));
   std::filesystem::remove_all(folder / kPeerMeshes);
 }
 

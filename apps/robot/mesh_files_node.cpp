@@ -13,8 +13,10 @@ constexpr std::size_t kQueueCapacity = 1;
 
 }  // namespace
 
-MeshFilesNode::MeshFilesNode(std::filesystem::path folder, const MeshFilesTopics& topics)
+MeshFilesNode::MeshFilesNode(std::filesystem::path folder, ResultWriter& results,
+                             const MeshFilesTopics& topics)
     : folder_(std::move(folder)),
+      results_(results),
       worker_(
           kQueueCapacity, Overflow::kDropOldest,
           [this](const News&) {
@@ -53,7 +55,8 @@ void MeshFilesNode::step(const MapMesh& map) {
 }
 
 void MeshFilesNode::step(const OptimizedMesh& mesh) {
-  write_ply(folder_ / "mesh_optimized.ply", mesh.mesh);
+  results_.write(folder_ / "mesh_optimized.ply",
+                 [&mesh](const auto& file) { write_ply(file, mesh.mesh); });
 }
 
 void MeshFilesNode::finish(const std::optional<Trajectory>& trajectory) {
@@ -61,10 +64,10 @@ void MeshFilesNode::finish(const std::optional<Trajectory>& trajectory) {
   if (map_) write_map(map_->mesh);
 }
 
-void MeshFilesNode::write_map(const LabelledMesh& map) const {
+void MeshFilesNode::write_map(const LabelledMesh& map) {
   LabelledMesh mesh = map;
   if (T_world_first_ && T_odom_first_) mesh.transform(*T_world_first_ * T_odom_first_->inverse());
-  write_ply(folder_ / "mesh.ply", mesh);
+  results_.write(folder_ / "mesh.ply", [&mesh](const auto& file) { write_ply(file, mesh); });
 }
 
 }  // namespace km

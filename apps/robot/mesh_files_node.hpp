@@ -6,6 +6,7 @@
 #include <optional>
 #include <string_view>
 
+#include "apps/result_writer.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/mesh/map_mesh.hpp"
@@ -32,7 +33,8 @@ struct MeshFilesTopics {
 /// the mesh bent to the optimised keyframes, in the team's frame.
 class MeshFilesNode final : public Node {
  public:
-  MeshFilesNode(std::filesystem::path folder, const MeshFilesTopics& topics);
+  /// `results` outlives this, and learns which meshes could not be written: no reason to end.
+  MeshFilesNode(std::filesystem::path folder, ResultWriter& results, const MeshFilesTopics& topics);
 
   std::string_view name() const override { return "mesh_files"; }
   void start() override { worker_.start(); }
@@ -40,7 +42,7 @@ class MeshFilesNode final : public Node {
   std::exception_ptr error() const override { return worker_.error(); }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Handles one input synchronously, as the thread does. Throws MeshFileError.
+  /// Handles one input synchronously, as the thread does.
   void step(const KeyframeOdometry& keyframe);
   void step(const Trajectory& trajectory);
   void step(const MapMesh& map);
@@ -60,9 +62,10 @@ class MeshFilesNode final : public Node {
     });
   }
   void take_latest();
-  void write_map(const LabelledMesh& map) const;
+  void write_map(const LabelledMesh& map);
 
   const std::filesystem::path folder_;
+  ResultWriter& results_;
   std::optional<SE3> T_odom_first_;   // the first keyframe
   std::optional<SE3> T_world_first_;  // likewise, optimised
   std::shared_ptr<const MapMesh> map_;

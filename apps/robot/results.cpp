@@ -126,13 +126,16 @@ void write_poses(std::ostream& out, const std::vector<StampedPose>& poses) {
 
 }  // namespace
 
-void write_results(const fs::path& folder, const RunRecord& record) {
-  const auto write = [&](const char* file, const auto& write_rows, const auto& rows) {
-    write_output(folder / file, [&](std::ostream& out) { write_rows(out, rows); });
+void write_results(const fs::path& folder, const RunRecord& record, ResultWriter& results) {
+  const auto write = [&](const char* name, const auto& write_rows, const auto& rows) {
+    results.write(folder / name, [&](const fs::path& file) {
+      write_output(file, [&](std::ostream& out) { write_rows(out, rows); });
+    });
   };
   write("odometry.tum", write_poses, record.odometry());
   write("optimized.tum", write_poses, record.optimized());
-  write_g2o(folder / "pose_graph.g2o", graph_of(record));
+  results.write(folder / "pose_graph.g2o",
+                [&](const fs::path& file) { write_g2o(file, graph_of(record)); });
   write("keyframes.csv", write_keyframes, record);
   write("loop_closures.csv", write_closures, record);
   write("optimizer.csv", write_rounds, record);

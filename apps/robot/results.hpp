@@ -2,13 +2,15 @@
 
 #include <filesystem>
 
+#include "apps/result_writer.hpp"
 #include "apps/robot/run_record.hpp"
 
 namespace km {
 
 /// odometry.tum, optimized.tum, pose_graph.g2o, keyframes.csv, loop_closures.csv and optimizer.csv
-/// into `folder`. Throws std::runtime_error naming the file if one cannot be written.
-void write_results(const std::filesystem::path& folder, const RunRecord& record);
+/// into `folder`.
+void write_results(const std::filesystem::path& folder, const RunRecord& record,
+                   ResultWriter& results);
 
 /// As far as the record knows: its other fields are those of the process and its network.
 [[nodiscard]] RunSummary summary_of(const RunRecord& record);

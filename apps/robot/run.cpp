@@ -1,18 +1,24 @@
 #include "apps/robot/run.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
-#include <fstream>
+#include <cerrno>
 #include <map>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
+#include <system_error>
 
-#include "apps/output_file.hpp"
 #include "apps/result_files.hpp"
+#include "apps/result_writer.hpp"
+#include "apps/robot/growing_file.hpp"
 #include "apps/robot/process_usage.hpp"
 #include "apps/robot/results.hpp"
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/wiring.hpp"
 #include "modules/core/text_table.hpp"
+#include "modules/core/write_file.hpp"
 #include "modules/mesh/ply_file.hpp"
 #include "modules/sensors/euroc_reader.hpp"
 #include "runtime/clock.hpp"
@@ -46,10 +52,21 @@ RobotInput open_input(const RobotOptions& options, const RobotConfig& config,
   return graph;
 }
 
-void make_output_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw std::runtime_error(folder.string() + ": " + error.message());
+bool is_fault_of_disk(const std::error_code& error) {
+  return error == std::errc::no_space_on_device || error == std::errc::read_only_file_system ||
+         error == std::errc::io_error;
+}
+
+// A disk that fails does not keep a robot from its team; a mistake on the command line is told.
+void prepare_output(const fs::path& folder, ResultWriter& results) try {
+  fs::create_directories(folder);
+  remove_results(folder);
+  if (access(folder.c_str(), W_OK) != 0)
+    throw fs::filesystem_error("", std::error_code(errno, std::generic_category()));
+} catch (const fs::filesystem_error& error) {
+  if (!is_fault_of_disk(error.code()))
+    throw std::runtime_error(folder.string() + ": " + error.code().message());
+  results.note(folder, error.code().message());
 }
 
 void log_network(const RobotConfig& config, const NetworkInterface& interface) {
@@ -58,12 +75,6 @@ void log_network(const RobotConfig& config, const NetworkInterface& interface) {
   log::info("dds") << "domain " << config.dds.domain << " on " << interface.name << " ("
                    << interface.address << "), link " << config.run.link << ", peers by "
                    << discovery;
-}
-
-std::ofstream open_result(const fs::path& file) {
-  std::ofstream stream(file);
-  if (!stream) throw std::runtime_error(file.string() + ": cannot be written");
-  return stream;
 }
 
 const char* to_word(PeerState state) {
@@ -146,14 +157,14 @@ std::string status_text(double dataset_time_s, const RunRecord& record,
 // What happens beside the modules while they run: phase, status line, traffic and memory over time.
 class Watch {
  public:
-  Watch(const RobotOptions& options, const RobotConfig& config, Robot& robot)
+  Watch(const RobotOptions& options, const RobotConfig& config, Robot& robot, ResultWriter& results)
       : robot_(robot),
         departure_(config.run.settle_s, options.serve_limit_s),
         start_s_(steady_now_s()),
-        traffic_file_(open_result(options.output / "traffic.csv")),
-        traffic_csv_(traffic_file_),
-        process_file_(open_result(options.output / "process.csv")),
-        process_csv_(process_file_) {}
+        traffic_file_(options.output / "traffic.csv", results),
+        traffic_csv_(traffic_file_.rows()),
+        process_file_(options.output / "process.csv", results),
+        process_csv_(process_file_.rows()) {}
 
   /// True when the robot may leave, or must: its id is another's. Called ten times a second.
   bool poll() {
@@ -224,7 +235,7 @@ class Watch {
 
   void write(double now_s, const TrafficSnapshot& traffic) {
     traffic_csv_.append(now_s, traffic);
-    traffic_file_.flush();  // what is recorded survives a crash
+    traffic_file_.flush();
     process_csv_.append(now_s, process_usage());
     process_file_.flush();
     written_s_ = now_s;
@@ -233,9 +244,9 @@ class Watch {
   Robot& robot_;
   Departure departure_;
   double start_s_;
-  std::ofstream traffic_file_;
+  GrowingFile traffic_file_;
   TrafficCsv traffic_csv_;
-  std::ofstream process_file_;
+  GrowingFile process_file_;
   ProcessCsv process_csv_;
   double written_s_ = 0.0;
   double said_s_ = -kInterval_s;
@@ -243,7 +254,8 @@ class Watch {
   StatusLine status_line_;
 };
 
-void write_timings(std::ostream& out, const Robot& robot) {
+std::string timings(const Robot& robot) {
+  std::ostringstream out;
   out << "module,calls,median_ms,p95_ms,max_ms,total_s\n";
   for (const Node* node : robot.nodes()) {
     const DurationHistogram timing = node->timing();
@@ -252,12 +264,13 @@ void write_timings(std::ostream& out, const Robot& robot) {
         << 1e3 * timing.quantile_s(0.95) << ',' << 1e3 * timing.max_s() << ',' << timing.total_s()
         << '\n';
   }
+  return out.str();
 }
 
 // Call when the robot has stopped.
 RunEnd end_of(const RobotOptions& options, Robot& robot, const RunResult& result,
               const char* departure) {
-  RunEnd end{options.robot, result, robot.id_taken(), departure, {}};
+  RunEnd end{options.robot, result, robot.id_taken(), departure, {}, {}};
   if (const SensorsNode* sensors = robot.sensors())
     end.images = ImageCounts{
         sensors->listed(), sensors->published(), sensors->skipped(),
@@ -286,11 +299,13 @@ std::map<std::string, std::uint64_t> sent_bytes(Robot& robot) {
 }
 
 // What the others sent of their maps, as far as it arrived.
-void write_peer_meshes(const fs::path& folder, const TeamMeshNode& peers) {
+void write_peer_meshes(const fs::path& folder, const TeamMeshNode& peers, ResultWriter& results) {
   for (const RobotMesh& peer : peers.snapshot()) {
     if (peer.mesh.faces.empty()) continue;
-    make_output_folder(folder);
-    write_ply(folder / ("robot" + std::to_string(peer.robot) + ".ply"), peer.mesh);
+    results.write(folder / ("robot" + std::to_string(peer.robot) + ".ply"), [&](const auto& file) {
+      fs::create_directories(folder);
+      write_ply(file, peer.mesh);
+    });
     log::info("robot") << "mesh of robot " << peer.robot << ": " << peer.mesh.faces.size()
                        << " faces, in the frame of robot " << peer.anchor;
   }
@@ -303,27 +318,26 @@ int run_robot(const RobotOptions& options, SignalWatch& signals) {
   const std::optional<MappingPlan> mapping =
       plan_mapping(config.mapping, config.stereo_depth, config.segmentation, options.dataset);
   RobotInput input = open_input(options, config, mapping);
-  Robot robot(options, config, std::move(input), mapping, signals);
+  ResultWriter results;
+  Robot robot(options, config, std::move(input), mapping, results, signals);
   log_network(config, robot.interface());
   if (mapping && mapping->sensor.labels == LabelsFrom::kImages &&
       !config.segmentation.palette.empty())
     log::warn("robot") << "segmentation.palette is not used: labels are recorded, and with them "
                           "their label_palette.csv";
-  make_output_folder(options.output);
-  remove_results(options.output);
-  const auto write = [&](const char* file, const auto& text) {
-    write_output(options.output / file, [&](std::ostream& out) { out << text; });
+  prepare_output(options.output, results);
+  const auto write = [&](const char* name, const std::string& text) {
+    results.write(options.output / name, [&text](const auto& file) { write_file(file, text); });
   };
   write("config.yaml", config.effective);
   if (mapping && !mapping->palette.classes().empty())
     write(kLabelPalette, to_csv(mapping->palette));
 
   std::optional<Watch> watch;
-  watch.emplace(options, config, robot);
+  watch.emplace(options, config, robot, results);
   const RunResult result = robot.run([&watch] { return watch->poll(); });
   watch->finish();
-  const RunEnd end = end_of(options, robot, result, watch->reason());
-  const Verdict verdict = verdict_of(end);
+  RunEnd end = end_of(options, robot, result, watch->reason());
   RunSummary summary = robot.recorder().with_record(summary_of);
   summary.name = options.name;
   summary.frames = end.images.value_or(ImageCounts{}).read;
@@ -331,17 +345,20 @@ int run_robot(const RobotOptions& options, SignalWatch& signals) {
   summary.traffic = sent_bytes(robot);
   summary.process = watch->process();
   summary.seconds = watch->seconds();
-  summary.exit_reason = verdict.reason;
   watch.reset();  // the status line ends before the last log lines
   robot.recorder().with_record([&](const RunRecord& record) {
-    write_results(options.output, record);
-    write_summary(options.output / "summary.json", summary);
+    write_results(options.output, record, results);
     if (robot.mesh_files() != nullptr) robot.mesh_files()->finish(record.trajectory());
   });
   if (robot.peer_meshes() != nullptr)
-    write_peer_meshes(options.output / kPeerMeshes, *robot.peer_meshes());
-  write_output(options.output / "timing.csv",
-               [&](std::ostream& out) { write_timings(out, robot); });
+    write_peer_meshes(options.output / kPeerMeshes, *robot.peer_meshes(), results);
+  write("timing.csv", timings(robot));
+  end.lost_results = results.lost();
+  summary.exit_reason = verdict_of(end).reason;
+  results.write(options.output / "summary.json",  // last: it tells what was lost before
+                [&summary](const auto& file) { write_summary(file, summary); });
+  end.lost_results = results.lost();
+  const Verdict verdict = verdict_of(end);
   say(options, end, verdict);
   return verdict.exit_code;
 }

@@ -7,6 +7,7 @@ namespace {
 
 constexpr int kNothingEstimated = 1;  // as for input that cannot be used
 constexpr int kFailed = 3;
+constexpr int kResultsLost = 4;
 
 // Each image is in one of the counts.
 std::string why_no_pose(const ImageCounts& images) {
@@ -61,7 +62,9 @@ std::string to_string(const ImageCounts& images) {
          " images have a pose";
 }
 
-Verdict verdict_of(const RunEnd& end) {
+namespace {
+
+Verdict verdict_of_run(const RunEnd& end) {
   if (end.result.failure)
     return {kFailed, end.result.failure->node + ": " + end.result.failure->message};
   if (end.id_taken)
@@ -71,6 +74,21 @@ Verdict verdict_of(const RunEnd& end) {
   if (end.images && end.images->with_pose == 0)
     return {kNothingEstimated, why_no_pose(*end.images)};
   return {0, end.departure != nullptr ? end.departure : "unknown"};
+}
+
+}  // namespace
+
+Verdict verdict_of(const RunEnd& end) {
+  Verdict verdict = verdict_of_run(end);
+  if (end.lost_results.empty()) return verdict;
+  if (verdict.exit_code == 0) verdict.exit_code = kResultsLost;
+  const std::size_t lost = end.lost_results.size();
+  verdict.reason += "; " + std::to_string(lost) + (lost == 1 ? " result lost" : " results lost");
+  for (const char* separator = ": "; const auto& [file, why] : end.lost_results) {
+    verdict.reason += separator + why;
+    separator = "; ";
+  }
+  return verdict;
 }
 
 }  // namespace km

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -66,6 +67,8 @@ struct RunEnd {
   bool id_taken = false;              ///< Another living robot had the same id first.
   const char* departure = nullptr;    ///< Why the robot left its team, if it did.
   std::optional<ImageCounts> images;  ///< Absent for a robot without sensors.
+  /// Why each result that could not be written is lost, by file.
+  std::map<std::string, std::string> lost_results = {};
 };
 
 /// What the robot says of its run, to people and to the process that started it.
@@ -75,7 +78,8 @@ struct Verdict {
 };
 
 /// 3 if a module failed, or another robot claimed the id: whose data the team then used is
-/// anybody's guess. 1 if the run came to its end and not one image has a pose. 0 otherwise.
+/// anybody's guess. 1 if the run came to its end and not one image has a pose. 4 if results could
+/// not be written. 0 otherwise.
 [[nodiscard]] Verdict verdict_of(const RunEnd& end);
 
 /// "2910 of 2912 images have a pose".

@@ -40,7 +40,7 @@ NodeType& Robot::add(bool feeds, Arguments&&... arguments) {
 }
 
 Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput input,
-             const std::optional<MappingPlan>& mapping, SignalWatch& signals)
+             const std::optional<MappingPlan>& mapping, ResultWriter& results, SignalWatch& signals)
     : identity_{.robot = options.robot, .name = options.name, .boot = random_boot_id()},
       seal_(make_team_seal(options.security, identity_)),
       participant_(config.dds, identity_, seal_),
@@ -52,7 +52,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   else
     add_playback(config, options.rate, std::get<RecordedGraph>(std::move(input)));
   add_back_end(config);
-  if (mapping) add_mesh_correction(config, options.output);
+  if (mapping) add_mesh_correction(config, options.output, results);
   add_network(share_meshes(config.mesh_chunks));
   add_records();
   if (seal_ != nullptr)
@@ -112,7 +112,8 @@ void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig&
                                                  .progress = topics_.mapping_progress});
 }
 
-void Robot::add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder) {
+void Robot::add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder,
+                                ResultWriter& results) {
   mesh_deformation_ =
       &add<MeshDeformationNode>(false, config.mesh_deformation, identity_.robot,
                                 MeshDeformationTopics{.maps = topics_.maps,
@@ -120,7 +121,7 @@ void Robot::add_mesh_correction(const RobotConfig& config, const std::filesystem
                                                       .trajectory = topics_.trajectory,
                                                       .optimized = topics_.optimized_meshes,
                                                       .superseded = topics_.superseded_surface});
-  mesh_files_ = &add<MeshFilesNode>(false, folder,
+  mesh_files_ = &add<MeshFilesNode>(false, folder, results,
                                     MeshFilesTopics{.keyframes = topics_.keyframe_odometry,
                                                     .trajectory = topics_.trajectory,
                                                     .maps = topics_.maps,

@@ -76,10 +76,10 @@ using RobotInput = std::variant<std::unique_ptr<DatasetReader>, RecordedGraph>;
 /// All nodes of one robot and how they are joined: the system on one page (wiring.cpp).
 class Robot {
  public:
-  /// Builds and joins everything; nothing runs yet. Without `mapping` there is no map. Throws
-  /// ConfigError and DdsError.
+  /// Builds and joins everything; nothing runs yet. Without `mapping` there is no map. `results`,
+  /// which outlives this, takes the meshes. Throws ConfigError and DdsError.
   Robot(const RobotOptions& options, const RobotConfig& config, RobotInput input,
-        const std::optional<MappingPlan>& mapping, SignalWatch& signals);
+        const std::optional<MappingPlan>& mapping, ResultWriter& results, SignalWatch& signals);
 
   /// Runs until the robot may leave its team, a node fails, or a signal.
   [[nodiscard]] RunResult run(const Supervisor::Finished& finished) {
@@ -117,7 +117,8 @@ class Robot {
                    const std::optional<MappingPlan>& mapping);
   void add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
                    const MappingPlan& plan);
-  void add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder);
+  void add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder,
+                           ResultWriter& results);
   [[nodiscard]] CrossingEnds share_meshes(const MeshChunksConfig& config);
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_back_end(const RobotConfig& config);

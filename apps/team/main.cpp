@@ -4,12 +4,13 @@
 #include <iostream>
 #include <random>
 
-#include "apps/output_file.hpp"
 #include "apps/program_folder.hpp"
 #include "apps/result_files.hpp"
+#include "apps/result_writer.hpp"
 #include "apps/team/run_team.hpp"
 #include "apps/team/team_report.hpp"
 #include "apps/team/team_results.hpp"
+#include "modules/core/write_file.hpp"
 #include "modules/mesh/ply_file.hpp"
 #include "runtime/unblocked_output.hpp"
 
@@ -24,8 +25,8 @@ constexpr const char* kAbout =
     "the\n"
     "trajectories and how many closures are true (see kimera_multi_evaluate closures --help), "
     "with\ntruth_mesh also how far the robots' meshes are from it.\n\n"
-    "Exit code: 0 if every robot ended well, 1 for input that cannot be used, 3 if a robot "
-    "failed.\n"
+    "Exit code: 0 if every robot ended well, 1 for input that cannot be used and results that "
+    "cannot\nbe written, 3 if a robot failed.\n"
     "Ctrl-C asks the robots to end in order and prints what there is; a second one ends them. If "
     "this\nprogram is killed, the robots end in order and write their results.\n\n"
     "Examples:\n"
@@ -118,28 +119,37 @@ void copy_palette(const km::TeamPlan& plan) {
   }
 }
 
+// The JSON, the plot and the mesh of the whole team; `told` hears where the latter two are.
+void write_results(const TeamOptions& options, const km::TeamPlan& plan, const km::TeamResult& team,
+                   km::ResultWriter& results, std::ostream& told) {
+  if (!options.json.empty())
+    results.write(options.json, [&](const fs::path& file) { km::write_json(file, team); });
+  if (!team.plot.empty())
+    results.write(plan.output / "trajectories.svg", [&](const fs::path& file) {
+      km::write_file(file, team.plot);
+      told << "\nSeen from above: " << file.string() << '\n';
+    });
+  if (!team.meshes.merged.empty())
+    results.write(plan.output / "team_mesh.ply", [&](const fs::path& file) {
+      km::write_ply(file, team.meshes.merged);
+      copy_palette(plan);
+      told << "The mesh of all robots" << (team.optimized ? ", in the frame of the truth: " : ": ")
+           << file.string() << '\n';
+    });
+}
+
 int run(const TeamOptions& options) {
   const km::TeamPlan plan = make_plan(options);
   const km::TeamResult team = km::collect_results(
       plan, options.report ? km::finished_runs(plan) : run_robots(options, plan));
   std::ostream& told = km::unblocked_stdout();
   told << to_table(team);
-  if (!options.json.empty()) km::write_json(options.json, team);
-  if (!team.plot.empty()) {
-    const fs::path path = plan.output / "trajectories.svg";
-    km::write_output(path, [&](std::ostream& out) { out << team.plot; });
-    told << "\nSeen from above: " << path.string() << '\n';
-  }
-  if (!team.meshes.merged.empty()) {
-    const fs::path path = plan.output / "team_mesh.ply";
-    km::write_ply(path, team.meshes.merged);
-    copy_palette(plan);
-    told << "The mesh of all robots" << (team.optimized ? ", in the frame of the truth: " : ": ")
-         << path.string() << '\n';
-  }
+  km::ResultWriter results;
+  write_results(options, plan, team, results, told);
   const bool ok = std::all_of(team.robots.begin(), team.robots.end(),
                               [](const km::RobotResult& robot) { return robot.run.exit.ok(); });
-  return ok ? 0 : 3;
+  if (!ok) return 3;
+  return results.lost().empty() ? 0 : 1;
 }
 
 }  // namespace

@@ -15,6 +15,8 @@
 #include <system_error>
 #include <vector>
 
+#include "modules/core/write_file.hpp"
+
 namespace km {
 namespace {
 
@@ -339,19 +341,11 @@ LabelledMesh read_ply(const std::filesystem::path& file) {
 }
 
 void write_ply(const std::filesystem::path& file, const LabelledMesh& mesh) {
-  std::filesystem::path partial = file;
-  partial += ".part";
-  const std::string bytes = encode(mesh);
-  std::ofstream stream(partial, std::ios::binary);
-  stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  stream.close();
-  std::error_code error;
-  if (stream) std::filesystem::rename(partial, file, error);
-  if (stream && !error) return;
-  std::error_code ignored;
-  std::filesystem::remove(partial, ignored);
-  throw MeshFileError(file.string() + ": cannot be written" +
-                      (error ? ": " + error.message() : " (no such folder, or the disk is full)"));
+  try {
+    write_file(file, encode(mesh));
+  } catch (const std::system_error& error) {
+    throw MeshFileError(error.what());
+  }
 }
 
 }  // namespace km

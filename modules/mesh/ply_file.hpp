@@ -21,8 +21,8 @@ struct MeshFileError : std::runtime_error {
 [[nodiscard]] LabelledMesh read_ply(const std::filesystem::path& file);
 
 /// Writes binary little endian PLY, read back unchanged by read_ply(): vertices as float, then
-/// uchar red, green, blue and label where the mesh has them. The file appears under its name only
-/// when it is whole.
+/// uchar red, green, blue and label where the mesh has them. See write_file(): whole or not at all.
+/// Throws MeshFileError.
 void write_ply(const std::filesystem::path& file, const LabelledMesh& mesh);
 
 }  // namespace km

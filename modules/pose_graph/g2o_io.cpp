@@ -6,10 +6,12 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <sstream>
 #include <stdexcept>
 #include <unordered_set>
 
 #include "modules/core/lie.hpp"
+#include "modules/core/write_file.hpp"
 #include "modules/pose_graph/text_fields.hpp"
 
 namespace km {
@@ -290,10 +292,9 @@ void write_g2o(std::ostream& out, const G2oGraph& graph) {
 }
 
 void write_g2o(const std::filesystem::path& file, const G2oGraph& graph) {
-  std::ofstream out(file);
+  std::ostringstream out;
   write_g2o(out, graph);
-  out.close();
-  if (!out) throw std::runtime_error(file.string() + ": cannot be written");
+  write_file(file, out.view());
 }
 
 }  // namespace km

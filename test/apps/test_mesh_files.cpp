@@ -3,6 +3,7 @@
 #include "apps/robot/mesh_files_node.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/mesh/ply_file.hpp"
+#include "test/support/captured_log.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -23,8 +24,10 @@ struct Bench {
   Topic<Trajectory> trajectory;
   Topic<MapMesh> maps;
   Topic<OptimizedMesh> optimized;
+  ResultWriter results;
   MeshFilesNode node{
       folder.path(),
+      results,
       {.keyframes = keyframes, .trajectory = trajectory, .maps = maps, .optimized = optimized}};
 
   [[nodiscard]] LabelledMesh written(const char* file) const {
@@ -62,14 +65,25 @@ TEST_CASE("A mesh goes to where its first keyframe belongs", "[robot][mapping]")
   CHECK(bench.written("mesh_optimized.ply").vertices == triangle().mesh.vertices);
 }
 
-TEST_CASE("A mesh that cannot be written ends the node", "[robot][mapping]") {
+TEST_CASE("A mesh that cannot be written is named, and no end of the run", "[robot][mapping]") {
   Bench bench;
-  std::filesystem::create_directory(bench.folder.path() / "mesh.ply");
+  const CapturedLog log;
+  const std::filesystem::path file = bench.folder.path() / "mesh.ply";
+  std::filesystem::create_directory(file);
   bench.node.start();
   bench.maps.publish(triangle());
+  bench.optimized.publish({.mesh = triangle().mesh, .report = {}});
   bench.node.stop();
-  REQUIRE(bench.node.error() != nullptr);
-  CHECK_THROWS_WITH(std::rethrow_exception(bench.node.error()), Catch::Contains("mesh.ply"));
+  CHECK(bench.node.error() == nullptr);
+  CHECK(bench.written("mesh_optimized.ply").vertices == triangle().mesh.vertices);
+  const std::string why = file.string() + ": cannot be written: Is a directory";
+  CHECK(bench.results.lost() == std::map<std::string, std::string>{{file.string(), why}});
+  CHECK_THAT(log.text(), Catch::Contains("error results: " + why));
+
+  std::filesystem::remove(file);
+  bench.node.finish({});
+  CHECK(bench.results.lost().empty());
+  CHECK(bench.written("mesh.ply").vertices == triangle().mesh.vertices);
 }
 
 }  // namespace

@@ -146,6 +146,21 @@ TEST_CASE("Without sensors, or interrupted, no pose is no failure", "[run_end]")
   CHECK(verdict_of(interrupted).reason == "interrupted");
 }
 
+TEST_CASE("Lost results are told with their reasons and have an exit code, the least of all",
+          "[run_end]") {
+  RunEnd end = usual_end();
+  end.lost_results = {{"out/a", "out/a: cannot be written: No space left on device"},
+                      {"out/b", "out/b: cannot be written: Is a directory"}};
+  CHECK(verdict_of(end).exit_code == 4);
+  CHECK(verdict_of(end).reason ==
+        "all present robots have settled; 2 results lost: out/a: cannot be written: No space left "
+        "on device; out/b: cannot be written: Is a directory");
+  end.images->with_pose = 0;
+  CHECK(verdict_of(end).exit_code == 1);
+  end.result.failure = RunResult::Failure{"vio", "out of memory"};
+  CHECK(verdict_of(end).exit_code == 3);
+}
+
 TEST_CASE("A second robot of the same id is a failure, a failed module a greater one",
           "[run_end]") {
   RunEnd end = usual_end();

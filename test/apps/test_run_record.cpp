@@ -75,7 +75,9 @@ TEST_CASE("a closure is the same from whichever end it was found", "[robot]") {
   CHECK(record.closures_per_peer().at(1).inliers == 1);
 
   const TemporaryFolder folder;
-  write_results(folder.path(), record);
+  ResultWriter results;
+  write_results(folder.path(), record, results);
+  CHECK(results.lost().empty());
   CHECK_THAT(folder.read("loop_closures.csv"),
              Catch::Contains("\n1,4,2,3,0,inlier,0,0,-1.000000,-2.000000,-3.000000,"));
 }

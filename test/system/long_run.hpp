@@ -71,14 +71,16 @@ class Child {
   [[nodiscard]] pid_t pid() const { return pid_; }
   void kill(int signal) const { ::kill(pid_, signal); }
 
-  /// Its exit code, minus the signal that ended it, or -1000 if it runs on.
+  static constexpr int kRunsOn = -1000;
+
+  /// Its exit code, minus the signal that ended it, or kRunsOn.
   int wait(std::chrono::seconds patience = kPatience) {
     const auto end = std::chrono::steady_clock::now() + patience;
     int status = 0;
     pid_t ended = 0;
     while ((ended = waitpid(pid_, &status, WNOHANG)) == 0 && std::chrono::steady_clock::now() < end)
       poll(nullptr, 0, 20);
-    if (ended == 0) return -1000;
+    if (ended == 0) return kRunsOn;
     pid_ = 0;
     return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
   }

@@ -1,4 +1,8 @@
+#include <sched.h>
+#include <sys/mount.h>
+
 #include <catch2/catch.hpp>
+#include <iostream>
 
 #include "apps/robot/run_summary.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -34,6 +38,107 @@ TEST_CASE("A robot whose output nobody reads ends on a signal with its results",
   CHECK(robot.wait() == 0);
   CHECK(fs::file_size(output / "pose_graph.g2o") > 0);
   CHECK(read_summary(output / "summary.json").exit_reason == "interrupted");
+}
+
+// A file system of its own for this thread and what it starts, that holds `size` bytes.
+class SmallDisk {
+ public:
+  explicit SmallDisk(fs::path folder, const char* size) : folder_(std::move(folder)) {
+    fs::create_directory(folder_);
+    mounted_ = unshare(CLONE_NEWNS) == 0 &&
+               mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+               mount("tmpfs", folder_.c_str(), "tmpfs", 0, size) == 0;
+    if (!mounted_) std::cout << "SKIPPED: no file system can be mounted here (run as root)\n";
+  }
+  ~SmallDisk() {
+    if (mounted_) umount2(folder_.c_str(), MNT_DETACH);
+  }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+
+  [[nodiscard]] bool mounted() const { return mounted_; }
+  void fill() const {
+    std::ofstream out(folder_ / "fill", std::ios::binary);
+    const std::string block(4096, 'x');
+    while (out.write(block.data(), 4096).flush()) {
+    }
+  }
+  // Waits for the moment at which no file is being written.
+  [[nodiscard]] bool make_read_only() const {
+    constexpr unsigned long kReadOnly = MS_REMOUNT | MS_RDONLY;
+    for (int i = 0; i < 1000; ++i) {
+      if (mount(nullptr, folder_.c_str(), nullptr, kReadOnly, nullptr) == 0) return true;
+      poll(nullptr, 0, 5);
+    }
+    return false;
+  }
+
+ private:
+  fs::path folder_;
+  bool mounted_ = false;
+};
+
+// A robot on a walk whose output is on a small disk, and what it says in a log elsewhere.
+struct RobotOnSmallDisk {
+  TemporaryFolder folder;
+  SmallDisk disk{folder.path() / "disk", "size=256k"};
+  fs::path output = folder.path() / "disk" / "out";
+  int log = open((folder.path() / "log").c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+  std::optional<Child> robot = {};
+
+  ~RobotOnSmallDisk() { close(log); }
+
+  void start() {
+    robot.emplace(robot_on_walk(long_walk(folder.path(), 0), output), log);
+    REQUIRE(wait_for_lines(output / "process.csv", 3));
+  }
+  [[nodiscard]] bool told(const std::string& file, const std::string& why) const {
+    const std::string line = (output / file).string() + ": cannot be written: " + why;
+    return folder.read("log").find(line) != std::string::npos;
+  }
+};
+
+TEST_CASE("On a full or read-only disk a robot goes on, names what is lost, and ends with 4",
+          "[system]") {
+  const bool full = GENERATE(true, false);
+  CAPTURE(full);
+  RobotOnSmallDisk run;
+  if (!run.disk.mounted()) return;
+  run.start();
+  if (full)
+    run.disk.fill();
+  else
+    REQUIRE(run.disk.make_read_only());
+  const char* const why = full ? "No space left on device" : "Read-only file system";
+  REQUIRE(run.robot->wait(std::chrono::seconds(3)) == Child::kRunsOn);
+  run.robot->kill(SIGTERM);
+  CHECK(run.robot->wait() == 4);
+  for (const char* file : {"optimized.tum", "pose_graph.g2o", "keyframes.csv", "optimizer.csv",
+                           "loop_closures.csv", "timing.csv", "summary.json"}) {
+    CAPTURE(file);
+    CHECK(run.told(file, why));
+    CHECK_FALSE(fs::exists(run.output / file));
+  }
+  for (const auto& entry : fs::directory_iterator(run.output))
+    CHECK(entry.path().extension() != ".part");
+}
+
+TEST_CASE("One result that cannot be written leaves the others whole", "[system]") {
+  const TemporaryFolder folder;
+  const fs::path output = folder.path() / "out";
+  const int quiet = open("/dev/null", O_WRONLY | O_CLOEXEC);
+  Child robot(robot_on_walk(long_walk(folder.path(), 0), output), quiet);
+  close(quiet);
+  REQUIRE(wait_for_lines(output / "process.csv", 2));
+  fs::create_directory(output / "optimized.tum");  // the second of all
+  robot.kill(SIGTERM);
+  CHECK(robot.wait() == 4);
+  for (const char* file : {"odometry.tum", "pose_graph.g2o", "keyframes.csv", "loop_closures.csv",
+                           "optimizer.csv", "timing.csv"})
+    CHECK(fs::is_regular_file(output / file));
+  CHECK(read_summary(output / "summary.json").exit_reason ==
+        "interrupted; 1 result lost: " + (output / "optimized.tum").string() +
+            ": cannot be written: Is a directory");
 }
 
 // A team of two robots that walk for long; results in `folder`/robot0 and robot1.

@@ -1,0 +1,65 @@
+#include "modules/core/write_file.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::system_error cannot_write(const fs::path& file, int error) {
+  return {error, std::generic_category(), file.string() + ": cannot be written"};
+}
+
+// What is written and the error that ended it, or 0.
+struct Written {
+  std::size_t bytes = 0;
+  int error = 0;
+};
+
+Written write_to(const fs::path& file, int how, std::string_view bytes) {
+  constexpr mode_t kMode = 0666;  // less the umask
+  const int descriptor = open(file.c_str(), how | O_WRONLY | O_CREAT | O_CLOEXEC, kMode);
+  if (descriptor < 0) return {0, errno};
+  Written written;
+  while (written.bytes < bytes.size() && written.error == 0) {
+    const ssize_t n =
+        ::write(descriptor, bytes.data() + written.bytes, bytes.size() - written.bytes);
+    if (n > 0)
+      written.bytes += static_cast<std::size_t>(n);
+    else if (n == 0 || errno != EINTR)
+      written.error = n == 0 ? ENOSPC : errno;
+  }
+  if (close(descriptor) != 0 && written.error == 0) written.error = errno;
+  return written;
+}
+
+}  // namespace
+
+void write_file(const fs::path& file, std::string_view bytes) {
+  std::error_code unknown;
+  const fs::file_status there = fs::symlink_status(file, unknown);
+  if (fs::exists(there) && !fs::is_regular_file(there)) {
+    if (const int error = write_to(file, O_TRUNC, bytes).error) throw cannot_write(file, error);
+    return;
+  }
+  fs::path partial = file;
+  partial += ".part";
+  int error = write_to(partial, O_TRUNC, bytes).error;
+  if (error == 0 && std::rename(partial.c_str(), file.c_str()) != 0) error = errno;
+  if (error == 0) return;
+  unlink(partial.c_str());
+  throw cannot_write(file, error);
+}
+
+std::size_t append_to_file(const fs::path& file, std::string_view bytes) {
+  const Written written = write_to(file, O_APPEND, bytes);
+  if (written.error != 0 && written.bytes == 0) throw cannot_write(file, written.error);
+  return written.bytes;
+}
+
+}  // namespace km

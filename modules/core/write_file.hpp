@@ -1,0 +1,17 @@
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+
+namespace km {
+
+/// Writes `bytes` to `file`, which appears under its name only when it is whole: until then what
+/// was there before stays. What is no plain file (a device, a pipe, a link) is written in place.
+/// Throws std::system_error with one line that names the file and why, and leaves nothing behind.
+void write_file(const std::filesystem::path& file, std::string_view bytes);
+
+/// Likewise, but appends `bytes` to a file that need not exist. The number of bytes written: fewer
+/// than there are, where the disk is full. Throws if not one could be written.
+std::size_t append_to_file(const std::filesystem::path& file, std::string_view bytes);
+
+}  // namespace km

@@ -1,0 +1,67 @@
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <string>
+
+#include "apps/robot/growing_file.hpp"
+#include "test/support/captured_log.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST_CASE("Rows are in the file after a flush", "[robot]") {
+  const TemporaryFolder folder;
+  ResultWriter results;
+  GrowingFile file(folder.path() / "a.csv", results);
+  file.rows() << "time\n" << 1 << '\n';
+  file.flush();
+  file.rows() << 2 << '\n';
+  CHECK(folder.read("a.csv") == "time\n1\n");
+  file.flush();
+  CHECK(folder.read("a.csv") == "time\n1\n2\n");
+  CHECK(results.lost().empty());
+}
+
+TEST_CASE("Rows for which there was no room come when there is", "[robot]") {
+  const CapturedLog log;
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.csv";
+  fs::create_symlink("/dev/full", path);
+  ResultWriter results;
+  GrowingFile file(path, results);
+  for (int i = 0; i < 3; ++i) {
+    file.rows() << i << '\n';
+    file.flush();
+  }
+  const std::string why = path.string() + ": cannot be written: No space left on device";
+  CHECK(results.lost() == std::map<std::string, std::string>{{path.string(), why}});
+  CHECK(log.lines().size() == 1);  // not one a second
+
+  fs::remove(path);
+  file.flush();
+  CHECK(folder.read("a.csv") == "0\n1\n2\n");
+  CHECK(results.lost().empty());
+}
+
+TEST_CASE("A disk that is full for too long costs rows, and the file is told to lack them",
+          "[robot]") {
+  const CapturedLog log;
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.csv";
+  fs::create_symlink("/dev/full", path);
+  ResultWriter results;
+  GrowingFile file(path, results);
+  for (int i = 0; i < 2; ++i) {
+    file.rows() << std::string(GrowingFile::kMaxWaiting_bytes - 1, 'x') << '\n';
+    file.flush();
+  }
+  fs::remove(path);
+  file.flush();
+  CHECK(fs::file_size(path) == GrowingFile::kMaxWaiting_bytes);
+  CHECK_THAT(results.lost().at(path.string()), Catch::Contains("rows are missing"));
+}
+
+}  // namespace
+}  // namespace km

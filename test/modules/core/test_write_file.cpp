@@ -1,0 +1,61 @@
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <string>
+
+#include "modules/core/write_file.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST_CASE("A file is written anew as a whole and nothing is left beside it", "[files]") {
+  const TemporaryFolder folder;
+  folder.write("a", "what was there before is longer");
+  write_file(folder.path() / "a", "new");
+  CHECK(folder.read("a") == "new");
+  CHECK(std::distance(fs::directory_iterator(folder.path()), {}) == 1);
+}
+
+TEST_CASE("What cannot be written is named with the reason, and what was there stays", "[files]") {
+  const TemporaryFolder folder;
+  const fs::path taken = folder.path() / "taken";
+  fs::create_directory(taken);
+  CHECK_THROWS_WITH(write_file(taken, "x"), taken.string() + ": cannot be written: Is a directory");
+  const fs::path nowhere = folder.path() / "none" / "a";
+  CHECK_THROWS_WITH(write_file(nowhere, "x"),
+                    nowhere.string() + ": cannot be written: No such file or directory");
+  folder.write("a", "old");
+  fs::create_directory(folder.path() / "a.part");  // in the way
+  CHECK_THROWS(write_file(folder.path() / "a", "new"));
+  CHECK(folder.read("a") == "old");
+}
+
+TEST_CASE("A device is written in place, and a full one says so", "[files]") {
+  CHECK_NOTHROW(write_file("/dev/null", "x"));
+  CHECK(fs::is_character_file("/dev/null"));
+  CHECK_THROWS_WITH(write_file("/dev/full", "x"),
+                    "/dev/full: cannot be written: No space left on device");
+  CHECK_THROWS_WITH(append_to_file("/dev/full", "x"),
+                    "/dev/full: cannot be written: No space left on device");
+}
+
+TEST_CASE("A link stays one and its file is written", "[files]") {
+  const TemporaryFolder folder;
+  folder.write("file", "old");
+  fs::create_symlink("file", folder.path() / "link");
+  write_file(folder.path() / "link", "new");
+  CHECK(fs::is_symlink(folder.path() / "link"));
+  CHECK(folder.read("file") == "new");
+}
+
+TEST_CASE("What is appended follows what is there", "[files]") {
+  const TemporaryFolder folder;
+  CHECK(append_to_file(folder.path() / "a", "one\n") == 4);
+  CHECK(append_to_file(folder.path() / "a", "two\n") == 4);
+  CHECK(folder.read("a") == "one\ntwo\n");
+}
+
+}  // namespace
+}  // namespace km
