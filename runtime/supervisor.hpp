@@ -3,6 +3,7 @@
 #include <csignal>
 #include <exception>
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +12,8 @@
 #include <vector>
 
 #include "runtime/node.hpp"
+#include "runtime/periodic.hpp"
+#include "runtime/watchdog.hpp"
 
 namespace km {
 
@@ -46,21 +49,30 @@ struct RunResult {
   struct Failure {
     std::string node;
     std::string message;
+    bool hung = false;  ///< It did not fail but did not get on: see Watchdog.
   };
   std::optional<Failure> failure;  ///< Of the first node that failed.
   bool interrupted = false;        ///< By a signal.
+  /// Nodes that could not be stopped: their threads still run. Neither they nor what they use may
+  /// be destroyed.
+  std::vector<std::string> left_behind = {};
+
+  [[nodiscard]] bool is_left_behind(std::string_view node) const;
 };
 
 /// Owns the nodes of a robot and runs them: starts them in order, watches them, and stops them in
-/// the same order, sources first, so that what is in flight is still processed downstream.
+/// the same order, sources first, so that what is in flight is still processed downstream. A node
+/// that does not get on is named, given up (see Watchdog), and keeps no other from ending.
 class Supervisor {
  public:
   /// Asks for the state of the run now and then; true ends it. Runs on the supervisor's thread.
   using Finished = std::function<bool()>;
 
-  /// `signals` outlives this.
-  explicit Supervisor(SignalWatch& signals) : signals_(signals) {}
-  ~Supervisor() { stop_all(); }
+  /// `signals` outlives this. `patience` multiplies the time after which nodes are given up.
+  explicit Supervisor(SignalWatch& signals, double patience = 1.0)
+      : signals_(signals), patience_(patience) {}
+  /// Waits for nodes that were left behind, however long that takes.
+  ~Supervisor();
   Supervisor(const Supervisor&) = delete;
   Supervisor& operator=(const Supervisor&) = delete;
 
@@ -81,12 +93,28 @@ class Supervisor {
   /// begins the orderly end; a second one ends the process at once. Call once.
   [[nodiscard]] RunResult run(const Finished& finished, double poll_interval_s = 0.1);
 
+  /// Stops nodes in turn without waiting for them; true once all have stopped or were given up. To
+  /// be asked again and again, by `finished`.
+  bool have_stopped(const std::vector<Node*>& nodes);
+
+  /// Destroys a node. Call after run(), for one that was not left behind.
+  void remove(const Node& node);
+
  private:
+  struct Entry {
+    std::unique_ptr<Node> node;
+    std::future<void> stopped = {};  // its stop() runs on a thread of its own, once
+  };
+  void start_all();
+  void begin_stop(Entry& entry);
+  bool wait_for_end(Entry& entry);
   std::optional<RunResult::Failure> first_failure() const;
-  void stop_all() noexcept;
 
   SignalWatch& signals_;
-  std::vector<std::unique_ptr<Node>> nodes_;
+  const double patience_;
+  std::vector<Entry> nodes_;
+  std::optional<Watchdog> watchdog_;    // while nodes run
+  std::unique_ptr<Periodic> lookouts_;  // last member: stops before what it looks at
 };
 
 /// Text of an exception: what(), or a remark if it has none.

@@ -37,7 +37,7 @@ mesh_optimized.ply and label_palette.csv.
 Ctrl-C, SIGTERM and SIGHUP end the run in order with everything written; a second Ctrl-C or SIGTERM ends it at once.
 Exit codes: 0 done; 1 bad input or configuration, or a recording that gave no pose; 2 bad command line;
 3 a module failed while running, or another robot claimed this robot's id; 4 results could not be written: the log
-names each and why.)";
+names each and why; 5 a module did not get on (see run.patience): what the others recorded is written.)";
 
 double parse_rate(const std::string& text) {
   if (text == "max") return std::numeric_limits<double>::infinity();

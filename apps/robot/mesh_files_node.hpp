@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "apps/result_writer.hpp"
 #include "modules/core/odometry.hpp"
@@ -40,6 +41,9 @@ class MeshFilesNode final : public Node {
   void start() override { worker_.start(); }
   void stop() noexcept override { worker_.stop(); }
   std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
+  /// A disk may stand still for long, and nobody waits for it meanwhile.
+  double step_limit_s() const override { return 300.0; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
   /// Handles one input synchronously, as the thread does.

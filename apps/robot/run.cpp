@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdlib>
 #include <map>
 #include <optional>
 #include <sstream>
@@ -24,6 +25,7 @@
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 #include "runtime/metrics.hpp"
+#include "runtime/unblocked_output.hpp"
 
 namespace km {
 namespace {
@@ -171,7 +173,8 @@ class Watch {
     const double now_s = steady_now_s() - start_s_;
     const TrafficSnapshot traffic = robot_.bridge().traffic();
     const bool ended = robot_.input_ended();
-    robot_.recorder().with_record([&](const RunRecord& record) {
+    // If it is at work, the next time will do: this thread waits for no other.
+    (void)robot_.recorder().try_with_record([&](const RunRecord& record) {
       say(now_s, record, traffic);
       if (leaving_since_s_) return;
       const std::map<RobotId, Departure::Present> peers = present_peers();
@@ -267,14 +270,13 @@ std::string timings(const Robot& robot) {
   return out.str();
 }
 
-// Call when the robot has stopped.
-RunEnd end_of(const RobotOptions& options, Robot& robot, const RunResult& result,
-              const char* departure) {
+// Call when the robot has stopped; `record` is what it has recorded.
+RunEnd end_of(const RobotOptions& options, const Robot& robot, const RunResult& result,
+              const char* departure, const RunRecord& record) {
   RunEnd end{options.robot, result, robot.id_taken(), departure, {}, {}};
   if (const SensorsNode* sensors = robot.sensors())
-    end.images = ImageCounts{
-        sensors->listed(), sensors->published(), sensors->skipped(),
-        robot.recorder().with_record([](const auto& record) { return record.odometry().size(); })};
+    end.images = ImageCounts{sensors->listed(), sensors->published(), sensors->skipped(),
+                             record.odometry().size()};
   return end;
 }
 
@@ -311,15 +313,55 @@ void write_peer_meshes(const fs::path& folder, const TeamMeshNode& peers, Result
   }
 }
 
+// All but the summary. What a module that hangs was at cannot be read.
+void write_all(const RobotOptions& options, Robot& robot, const RunRecord& record,
+               const RunResult& result, ResultWriter& results) {
+  write_results(options.output, record, results);
+  if (result.is_left_behind("mesh_files"))
+    results.note(options.output / "mesh.ply", "not as at the end of the run: mesh_files hangs");
+  else if (robot.mesh_files() != nullptr)
+    robot.mesh_files()->finish(record.trajectory());
+  if (robot.peer_meshes() != nullptr && !result.is_left_behind("team_mesh"))
+    write_peer_meshes(options.output / kPeerMeshes, *robot.peer_meshes(), results);
+  results.write(options.output / "timing.csv",
+                [&robot](const auto& file) { write_file(file, timings(robot)); });
+}
+
+// Writes what the run leaves; the exit code.
+int conclude(const RobotOptions& options, Robot& robot, std::optional<Watch>& watch,
+             const RunResult& result, const RunRecord& record, ResultWriter& results) {
+  watch->finish();
+  RunEnd end = end_of(options, robot, result, watch->reason(), record);
+  RunSummary summary = summary_of(record);
+  summary.name = options.name;
+  summary.frames = end.images.value_or(ImageCounts{}).read;
+  summary.frames_skipped = end.images.value_or(ImageCounts{}).skipped;
+  summary.traffic = sent_bytes(robot);
+  summary.process = watch->process();
+  summary.seconds = watch->seconds();
+  watch.reset();  // the status line ends before the last log lines
+  write_all(options, robot, record, result, results);
+  end.lost_results = results.lost();
+  summary.exit_reason = verdict_of(end).reason;
+  results.write(options.output / "summary.json",  // last: it tells what was lost before
+                [&summary](const auto& file) { write_summary(file, summary); });
+  end.lost_results = results.lost();
+  const Verdict verdict = verdict_of(end);
+  say(options, end, verdict);
+  return verdict.exit_code;
+}
+
 }  // namespace
 
-int run_robot(const RobotOptions& options, SignalWatch& signals) {
+int run_robot(const RobotOptions& options, SignalWatch& signals,
+              const std::function<void(Topics&)>& listen) {
   const RobotConfig config = load_robot_config(options);
   const std::optional<MappingPlan> mapping =
       plan_mapping(config.mapping, config.stereo_depth, config.segmentation, options.dataset);
   RobotInput input = open_input(options, config, mapping);
   ResultWriter results;
   Robot robot(options, config, std::move(input), mapping, results, signals);
+  if (listen) listen(robot.topics());
   log_network(config, robot.interface());
   if (mapping && mapping->sensor.labels == LabelsFrom::kImages &&
       !config.segmentation.palette.empty())
@@ -336,31 +378,18 @@ int run_robot(const RobotOptions& options, SignalWatch& signals) {
   std::optional<Watch> watch;
   watch.emplace(options, config, robot, results);
   const RunResult result = robot.run([&watch] { return watch->poll(); });
-  watch->finish();
-  RunEnd end = end_of(options, robot, result, watch->reason());
-  RunSummary summary = robot.recorder().with_record(summary_of);
-  summary.name = options.name;
-  summary.frames = end.images.value_or(ImageCounts{}).read;
-  summary.frames_skipped = end.images.value_or(ImageCounts{}).skipped;
-  summary.traffic = sent_bytes(robot);
-  summary.process = watch->process();
-  summary.seconds = watch->seconds();
-  watch.reset();  // the status line ends before the last log lines
-  robot.recorder().with_record([&](const RunRecord& record) {
-    write_results(options.output, record, results);
-    if (robot.mesh_files() != nullptr) robot.mesh_files()->finish(record.trajectory());
-  });
-  if (robot.peer_meshes() != nullptr)
-    write_peer_meshes(options.output / kPeerMeshes, *robot.peer_meshes(), results);
-  write("timing.csv", timings(robot));
-  end.lost_results = results.lost();
-  summary.exit_reason = verdict_of(end).reason;
-  results.write(options.output / "summary.json",  // last: it tells what was lost before
-                [&summary](const auto& file) { write_summary(file, summary); });
-  end.lost_results = results.lost();
-  const Verdict verdict = verdict_of(end);
-  say(options, end, verdict);
-  return verdict.exit_code;
+  const auto end = [&](const RunRecord& record) {
+    return conclude(options, robot, watch, result, record, results);
+  };
+  if (result.is_left_behind("recorder"))
+    results.note(options.output, "what was recorded is lost with the recorder, which hangs");
+  const int exit_code = result.is_left_behind("recorder") ? end(RunRecord(options.robot))
+                                                          : robot.recorder().with_record(end);
+  if (result.left_behind.empty()) return exit_code;
+  // The threads left behind use what a return would destroy. The others see the robot leave.
+  if (!result.is_left_behind(robot.bridge().name())) robot.leave();
+  drain_standard_output();
+  std::_Exit(exit_code);
 }
 
 }  // namespace km

@@ -13,6 +13,7 @@ struct RunConfig {
   std::string vocabulary = "vocabulary/indoor.kmvoc";
   std::string link = "wired";
   double settle_s = 3.0;
+  double patience = 1.0;
 
   void visit_fields(auto& visitor) {
     visitor.field("vocabulary", vocabulary,
@@ -21,6 +22,10 @@ struct RunConfig {
     visitor.field(
         "settle_s", settle_s, {0.1, 600.0},
         "[s] the robot leaves when it and all present peers have had nothing to do for so long");
+    visitor.field("patience", patience, {0.1, 100.0},
+                  "on slow computers more: times 30 s (pose graph and map: 120 s, mesh files: 300 "
+                  "s) that a module may take "
+                  "for one step before it is taken for hung and the robot ends without it");
   }
 };
 

@@ -8,6 +8,7 @@ namespace {
 constexpr int kNothingEstimated = 1;  // as for input that cannot be used
 constexpr int kFailed = 3;
 constexpr int kResultsLost = 4;
+constexpr int kHung = 5;
 
 // Each image is in one of the counts.
 std::string why_no_pose(const ImageCounts& images) {
@@ -66,7 +67,8 @@ namespace {
 
 Verdict verdict_of_run(const RunEnd& end) {
   if (end.result.failure)
-    return {kFailed, end.result.failure->node + ": " + end.result.failure->message};
+    return {end.result.failure->hung ? kHung : kFailed,
+            end.result.failure->node + ": " + end.result.failure->message};
   if (end.id_taken)
     return {kFailed, "another robot has this robot's id " + std::to_string(end.robot) +
                          ": give every robot its own --robot, and run again"};

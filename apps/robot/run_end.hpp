@@ -77,9 +77,9 @@ struct Verdict {
   std::string reason;  ///< One line.
 };
 
-/// 3 if a module failed, or another robot claimed the id: whose data the team then used is
-/// anybody's guess. 1 if the run came to its end and not one image has a pose. 4 if results could
-/// not be written. 0 otherwise.
+/// 5 if a module hung. 3 if one failed, or another robot claimed the id: whose data the team then
+/// used is anybody's guess. 1 if the run came to its end and not one image has a pose. 4 if results
+/// could not be written. 0 otherwise.
 [[nodiscard]] Verdict verdict_of(const RunEnd& end);
 
 /// "2910 of 2912 images have a pose".

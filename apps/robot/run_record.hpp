@@ -151,10 +151,19 @@ class RecorderNode final : public Node {
     return read(record_);
   }
 
+  /// Likewise, but not while the recorder is at work: then false, and `read` is not called.
+  template <typename Reader>
+  [[nodiscard]] bool try_with_record(const Reader& read) const {
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (lock.owns_lock()) read(record_);
+    return lock.owns_lock();
+  }
+
   std::string_view name() const override { return "recorder"; }
   void start() override { worker_.start(); }
   void stop() noexcept override { worker_.stop(); }
   std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
  private:

@@ -44,7 +44,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     : identity_{.robot = options.robot, .name = options.name, .boot = random_boot_id()},
       seal_(make_team_seal(options.security, identity_)),
       participant_(config.dds, identity_, seal_),
-      supervisor_(signals) {
+      supervisor_(signals, config.run.patience) {
   auto bridge = std::make_unique<DdsBridge>(participant_);
   bridge_ = bridge.get();
   if (auto* reader = std::get_if<std::unique_ptr<DatasetReader>>(&input))
@@ -251,10 +251,11 @@ void Robot::freeze_record() {
 }
 
 bool Robot::input_ended() {
-  if (!source_ended_) return false;
-  if (!std::exchange(drained_, true))
-    for (Node* node : feeding_) node->stop();
-  return true;
+  return source_ended_ && supervisor_.have_stopped(feeding_);
+}
+
+void Robot::leave() {
+  supervisor_.remove(*std::exchange(bridge_, nullptr));
 }
 
 }  // namespace km

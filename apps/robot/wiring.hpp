@@ -86,9 +86,13 @@ class Robot {
     return supervisor_.run(finished);
   }
 
-  /// True once the input is over; then, the first time, what was in flight before the recorder is
-  /// waited for: after it no more keyframes come.
+  /// True once the input is over and what was in flight before the recorder has been processed: no
+  /// more keyframes come. Does not wait.
   bool input_ended();
+
+  /// Takes the robot from the network, as its destructor does. For a robot that cannot be
+  /// destroyed, call after run() and end the process.
+  void leave();
 
   [[nodiscard]] const RecorderNode& recorder() const { return *recorder_; }
   [[nodiscard]] DdsBridge& bridge() { return *bridge_; }
@@ -110,6 +114,8 @@ class Robot {
   /// Nothing is recorded from now on, and the mesh is corrected by what is known now.
   void freeze_record();
   [[nodiscard]] double dataset_time_s() const { return dataset_time_s_; }
+  /// For tests: what the nodes publish.
+  [[nodiscard]] Topics& topics() { return topics_; }
   [[nodiscard]] const std::vector<const Node*>& nodes() const { return nodes_; }
 
  private:
@@ -141,7 +147,6 @@ class Robot {
   std::atomic<std::uint32_t> keyframes_ = 0;
   std::atomic<RobotPhase> phase_ = RobotPhase::kRunning;
   std::atomic<std::uint8_t> settled_links_ = 0;
-  bool drained_ = false;
   std::vector<Node*> feeding_;  // from the source to the last that makes keyframes
   std::vector<const Node*> nodes_;
   SensorsNode* sensors_ = nullptr;

@@ -3,6 +3,7 @@
 #include <exception>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "modules/core/dense_frame.hpp"
 #include "modules/core/odometry.hpp"
@@ -35,6 +36,7 @@ class DenseSensingNode final : public Node {
   /// Finishes queued frames and says in the log what was wrong with frames, if anything.
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return sensing_.histogram(); }
 
   /// Handles one frame synchronously. The thread calls only this; so can tests and replay.

@@ -4,6 +4,7 @@
 #include <exception>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/odometry.hpp"
@@ -34,6 +35,7 @@ class KeyframeFeaturesNode final : public Node {
   void start() override { worker_.start(); }
   void stop() noexcept override { worker_.stop(); }
   std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
 
   /// Handle one input synchronously. The thread calls only these; so can tests and replay. Throw
   /// std::invalid_argument for an index that does not follow the one before, and for images of a

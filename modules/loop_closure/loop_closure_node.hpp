@@ -66,6 +66,7 @@ class LoopClosureNode final : public Node {
   void start() override;
   void stop() noexcept override;
   std::exception_ptr error() const override;
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
   /// Handle one input synchronously. The thread calls only these; so can tests and replay.

@@ -40,6 +40,7 @@ class MeshChunksNode final : public Node {
   void start() override;
   void stop() noexcept override;  ///< What has not been sent by then is not sent.
   std::exception_ptr error() const override;
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
   /// Chunks that wait for their turn. Thread-safe.
@@ -78,6 +79,7 @@ class TeamMeshNode final : public Node {
   void start() override { worker_.start(); }
   void stop() noexcept override { worker_.stop(); }
   std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
  private:

@@ -42,6 +42,9 @@ class MeshDeformationNode final : public Node {
   void start() override;
   void stop() noexcept override;  ///< After finish().
   std::exception_ptr error() const override;
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
+  /// A correction takes the longer the larger the mesh is.
+  double step_limit_s() const override { return 120.0; }
 
   /// Of the corrections.
   DurationHistogram timing() const override { return timing_.histogram(); }

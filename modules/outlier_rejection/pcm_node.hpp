@@ -47,6 +47,7 @@ class PcmNode final : public Node {
   /// Publishes what is left to publish.
   void stop() noexcept override;
   std::exception_ptr error() const override;
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
   /// Handles one closure synchronously. The thread calls only this, the other step() and

@@ -50,6 +50,7 @@ class PlaceRecognitionNode final : public Node {
   void start() override { worker_.start(); }
   void stop() noexcept override { worker_.stop(); }
   std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
   /// Handle one input synchronously. The thread calls only these; so can tests and replay.

@@ -69,6 +69,7 @@ void GraphPlaybackNode::play(std::size_t index) {
 void GraphPlaybackNode::wait_until_due(std::size_t index) {
   if (std::isinf(rate_)) return;
   const double due_s = static_cast<double>(index) / poses_per_second_ / rate_;
+  const Heartbeat::Waiting waiting;
   std::mutex unshared;  // the stop token is all there is to wait for
   std::condition_variable_any never;
   std::unique_lock lock(unshared);

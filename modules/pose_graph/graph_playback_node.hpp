@@ -53,6 +53,7 @@ class GraphPlaybackNode final : public Node {
   /// Ends at once: what is not yet due has not happened.
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
 
   /// Publishes keyframe `index` and what it makes known, without waiting; the end after the last.
   /// Call with 0, 1, ... in turn. The thread calls only this and waits.

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "modules/pose_graph/parcel_codec.hpp"
 #include "modules/pose_graph/team_agent.hpp"
@@ -44,6 +45,9 @@ class TeamNode final : public Node {
   void start() override;
   void stop() noexcept override;
   std::exception_ptr error() const override;
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
+  /// A round takes the longer the larger the graph is.
+  double step_limit_s() const override { return 120.0; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
   /// Time passes. Always null: as a plain struct among pointers it sets off a false alarm of

@@ -3,6 +3,7 @@
 #include <exception>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "modules/core/dense_frame.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
@@ -37,6 +38,9 @@ class SemanticMappingNode final : public Node {
   /// Finishes queued frames and publishes the final mesh.
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
+  /// A mesh of the whole map is made in one step: it takes the longer the larger the map is.
+  double step_limit_s() const override { return 120.0; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
   /// Handles one frame synchronously, after dropping what has become superseded. The thread calls

@@ -67,6 +67,7 @@ void SensorsNode::decode() {
   try {
     while (!stopped_) {
       auto packet = [this] {
+        const Heartbeat::Step step(decoding_);
         const auto scope = reading_.measure();
         return reader_->next();
       }();
@@ -81,8 +82,13 @@ void SensorsNode::decode() {
   }
 }
 
+bool SensorsNode::wait_until_due(Stamp stamp) {
+  const Heartbeat::Waiting waiting;
+  return clock_.wait_until(stamp);
+}
+
 void SensorsNode::step(const Packet& packet) {
-  if (!clock_.wait_until(packet->frame->stamp)) return;
+  if (!wait_until_due(packet->frame->stamp)) return;
   if (const Packet due = filter_.take(packet, clock_.lag_s())) {
     topics_.packets.publish(due);
     ++published_;

@@ -66,6 +66,7 @@ class SensorsNode final : public Node {
   /// Ends at once: what is decoded but not yet due has not happened.
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat(), &decoding_}; }
   /// Reading and decoding a packet.
   DurationHistogram timing() const override { return reading_.histogram(); }
 
@@ -83,6 +84,7 @@ class SensorsNode final : public Node {
   using Input = std::variant<Packet, EndOfData, std::exception_ptr>;
 
   void decode();
+  bool wait_until_due(Stamp stamp);
   void step(const Packet& packet);
   void step(const EndOfData& end);
   void step(const std::exception_ptr& failure) { std::rethrow_exception(failure); }
@@ -96,6 +98,7 @@ class SensorsNode final : public Node {
   std::atomic<std::size_t> skipped_ = 0;
   std::atomic<bool> stopped_ = false;
   Timing reading_;
+  Heartbeat decoding_;  // a step reads one packet
   std::thread decoder_;
   Worker<Input> worker_;  // last member: stops first
 };

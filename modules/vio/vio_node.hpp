@@ -2,6 +2,7 @@
 
 #include <exception>
 #include <string_view>
+#include <vector>
 
 #include "modules/vio/vio.hpp"
 #include "runtime/node.hpp"
@@ -31,6 +32,7 @@ class VioNode final : public Node {
   /// Finishes queued packets and says in the log what odometry met with.
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
   /// Handles one packet synchronously. The thread calls only this; so can tests and replay.

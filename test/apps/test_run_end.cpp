@@ -167,6 +167,8 @@ TEST_CASE("A second robot of the same id is a failure, a failed module a greater
   end.id_taken = true;
   CHECK(verdict_of(end).exit_code == 3);
   CHECK_THAT(verdict_of(end).reason, Catch::Contains("another robot has this robot's id 7"));
+  end.result.failure = RunResult::Failure{"vio", "has not finished one step for 30 s", true};
+  CHECK(verdict_of(end).exit_code == 5);
   end.result.failure = RunResult::Failure{"vio", "out of memory"};
   CHECK(verdict_of(end).exit_code == 3);
   CHECK(verdict_of(end).reason == "vio: out of memory");

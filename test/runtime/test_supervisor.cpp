@@ -3,6 +3,8 @@
 
 #include <catch2/catch.hpp>
 #include <csignal>
+#include <future>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -82,6 +84,104 @@ TEST_CASE("A node that fails while it finishes its work is still reported", "[su
     return true;
   });
   REQUIRE(result.failure.has_value());
+}
+
+// Hangs in its first step until it is released.
+class HangingNode final : public Node {
+ public:
+  std::string_view name() const override { return "hanging"; }
+  void start() override { worker_.start(); }
+  void stop() noexcept override { worker_.stop(); }
+  std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
+  double step_limit_s() const override { return 0.5; }
+
+  bool post() { return worker_.post(0); }
+  void release() { released_.set_value(); }
+
+ private:
+  std::promise<void> released_;
+  Worker<int> worker_{1, Overflow::kBlock, [this](int) { released_.get_future().wait(); }};
+};
+
+// Posts to a node without end.
+class FeedingNode final : public Node {
+ public:
+  explicit FeedingNode(HangingNode& next) : next_(next) {}
+  std::string_view name() const override { return "feeding"; }
+  void start() override {
+    worker_.start();
+    worker_.post(0);
+  }
+  void stop() noexcept override { worker_.stop(); }
+  std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
+  double step_limit_s() const override { return 0.25; }  // it would be the first to be blamed
+
+ private:
+  HangingNode& next_;
+  Worker<int> worker_{1, Overflow::kBlock, [this](int) {
+                        while (next_.post()) {
+                        }
+                      }};
+};
+
+TEST_CASE("A node that hangs is given up, and keeps no other from ending", "[supervisor]") {
+  Run run;
+  auto& [log, diary, signals, supervisor] = run;
+  auto next = std::make_unique<HangingNode>();
+  HangingNode& hanging = *next;
+  supervisor.emplace<FeedingNode>(hanging);
+  supervisor.add(std::move(next));
+  supervisor.emplace<ToyNode>("last", diary);
+  const RunResult result = supervisor.run([] { return false; }, 0.001);
+  REQUIRE(result.failure.has_value());
+  CHECK(result.failure->node == "hanging");
+  CHECK(result.failure->hung);
+  CHECK_THAT(result.failure->message, Catch::StartsWith("has not finished one step for"));
+  CHECK(result.left_behind == std::vector<std::string>{"hanging"});
+  CHECK(result.is_left_behind("hanging"));
+  CHECK(diary.back() == "stop last");
+  hanging.release();  // else the supervisor would wait for it
+}
+
+TEST_CASE("A node that hangs does not keep a signal from ending the run", "[supervisor]") {
+  Run run;
+  auto& [log, diary, signals, supervisor] = run;
+  HangingNode& hanging = supervisor.emplace<HangingNode>();
+  hanging.post();
+  bool sent = false;
+  const RunResult result = supervisor.run([&] {
+    if (!std::exchange(sent, true)) kill(getpid(), SIGTERM);
+    return false;
+  });
+  CHECK(result.interrupted);
+  CHECK(result.left_behind == std::vector<std::string>{"hanging"});
+  hanging.release();
+}
+
+TEST_CASE("Nodes are stopped during the run without waiting for them", "[supervisor]") {
+  Run run;
+  auto& [log, diary, signals, supervisor] = run;
+  HangingNode& slow = supervisor.emplace<HangingNode>();
+  ToyNode& after = supervisor.emplace<ToyNode>("after", diary);
+  supervisor.emplace<ToyNode>("other", diary);
+  slow.post();
+  bool asked = false;
+  const RunResult result = supervisor.run(
+      [&] {
+        const bool ended = supervisor.have_stopped({&slow, &after});
+        if (!std::exchange(asked, true)) {
+          CHECK_FALSE(ended);
+          CHECK(diary.back() == "start other");  // it is the turn of none after the slow one
+          slow.release();
+        }
+        return ended;
+      },
+      0.001);
+  CHECK_FALSE(result.failure.has_value());
+  CHECK(diary ==
+        std::vector<std::string>{"start after", "start other", "stop after", "stop other"});
 }
 
 TEST_CASE("Two nodes of one name are refused", "[supervisor]") {

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <utility>
+
+namespace km {
+
+/// Shows a watchdog whether a thread gets on with its steps. A step that waits, for room in the
+/// queue of another worker or for its time to come, is not stuck: the other one may be. What waits
+/// in a circle is therefore not found. Thread-safe.
+class Heartbeat {
+ public:
+  /// `give_up` is called, from another thread, when nobody waits for the step any more: it frees
+  /// those who wait for this thread.
+  explicit Heartbeat(std::function<void()> give_up = {}) : give_up_(std::move(give_up)) {}
+  Heartbeat(const Heartbeat&) = delete;
+  Heartbeat& operator=(const Heartbeat&) = delete;
+
+  /// One step of the calling thread, from here to the end of the scope.
+  class Step {
+   public:
+    explicit Step(Heartbeat& heartbeat)
+        : heartbeat_(heartbeat), outer_(std::exchange(current_, &heartbeat)) {
+      ++heartbeat_.beats_;
+    }
+    ~Step() {
+      ++heartbeat_.beats_;
+      current_ = outer_;
+    }
+    Step(const Step&) = delete;
+    Step& operator=(const Step&) = delete;
+
+   private:
+    Heartbeat& heartbeat_;
+    Heartbeat* const outer_;
+  };
+
+  /// The calling thread's step, if it is in one, waits to the end of the scope.
+  class Waiting {
+   public:
+    Waiting() : step_(current_) {
+      if (step_ != nullptr) step_->waiting_ = true;
+    }
+    ~Waiting() {
+      if (step_ != nullptr) step_->waiting_ = false;
+    }
+    Waiting(const Waiting&) = delete;
+    Waiting& operator=(const Waiting&) = delete;
+
+   private:
+    Heartbeat* const step_;
+  };
+
+  /// Grows with the beginning and with the end of every step.
+  [[nodiscard]] std::uint64_t beats() const { return beats_; }
+  [[nodiscard]] bool in_step() const { return beats_ % 2 == 1; }
+  [[nodiscard]] bool waiting() const { return waiting_; }
+
+  void give_up() const {
+    if (give_up_) give_up_();
+  }
+
+ private:
+  static inline thread_local Heartbeat* current_ = nullptr;
+
+  const std::function<void()> give_up_;
+  std::atomic<std::uint64_t> beats_ = 0;
+  std::atomic<bool> waiting_ = false;
+};
+
+}  // namespace km

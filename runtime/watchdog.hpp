@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "runtime/node.hpp"
+
+namespace km {
+
+/// Tells which nodes do not get on: one that has not finished a step for kNotice_s is named in the
+/// log, one that has not for its step_limit_s() is given up. Thread-safe.
+class Watchdog {
+ public:
+  static constexpr double kNotice_s = 4.0;
+  /// Of a node without heartbeats to end: it may have much to send over a thin link.
+  static constexpr double kStopLimit_s = 120.0;
+
+  /// `nodes` outlive this. `patience` multiplies all limits of giving up.
+  Watchdog(const std::vector<Node*>& nodes, double patience);
+
+  /// Looks at all nodes; `dt_s` have passed since the last time. Time in which nobody looked, as in
+  /// a process that was stopped, should not be in it.
+  void tick(double dt_s);
+
+  /// `node` is to end: from now on it gets on only as long as it makes steps.
+  void expect_end(const Node& node);
+
+  /// `node` has ended: it is no more looked at.
+  void has_ended(const Node& node);
+
+  [[nodiscard]] bool has_given_up(const Node& node) const;
+
+  /// A node that was given up, the first in the order of the data flow.
+  struct GivenUp {
+    std::string node;
+    std::string why;  ///< "has not finished one step for 30 s"
+  };
+  [[nodiscard]] std::optional<GivenUp> given_up() const;
+
+ private:
+  /// One heartbeat of a node, or the node itself if it has none.
+  struct Watched {
+    Node* node = nullptr;
+    const Heartbeat* heartbeat = nullptr;
+    double limit_s = 0.0;
+    std::uint64_t beats = 0;
+    double stuck_s = 0.0;
+    bool named = false;
+    bool ending = false;
+    std::string why = {};  // it was given up; empty: it was not
+  };
+  [[nodiscard]] static bool is_stuck(const Watched& watched);
+  static void look_at(Watched& watched, double dt_s);
+
+  mutable std::mutex mutex_;  // guards watched_
+  std::vector<Watched> watched_;
+};
+
+}  // namespace km

@@ -1,0 +1,122 @@
+#include <sys/stat.h>
+
+#include <catch2/catch.hpp>
+#include <fstream>
+
+#include "apps/robot/run_summary.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/temporary_folder.hpp"
+#include "test/system/long_run.hpp"
+#include "test/system/team_run.hpp"
+
+// Modules that fail or hang inside a robot.
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+// With less patience than by default, so that the tests take less time: 9 s, or 36 s.
+constexpr const char* kPatience03 = "run.patience=0.3";
+
+// A robot that says all into `folder`/log.
+struct FaultyRobot {
+  TemporaryFolder folder;
+  fs::path output = folder.path() / "out";
+  int log = open((folder.path() / "log").c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+  int domain = random_domain();
+  std::optional<Child> process = {};
+
+  ~FaultyRobot() { close(log); }
+
+  void start(const std::string& module, const std::string& how, const fs::path& input,
+             const std::vector<std::string>& settings = {}) {
+    std::vector<std::string> command = {
+        KM_BIN_DIR "/test_faulty_robot", module,         how,        output.string(),
+        std::to_string(domain),          input.string(), kPatience03};
+    command.insert(command.end(), settings.begin(), settings.end());
+    process.emplace(command, log);
+  }
+  [[nodiscard]] std::string told() const { return folder.read("log"); }
+};
+
+void check_end(FaultyRobot& robot, const std::string& module, const std::string& how) {
+  CAPTURE(module, how);
+  const int exit_code = robot.process->wait(3 * kPatience);
+  CAPTURE(robot.told());
+  CHECK(exit_code == (how == "hang" ? 5 : 3));
+  CHECK_THAT(robot.told(), Catch::Contains(how == "hang" ? "supervisor: " + module + " has not"
+                                                         : module + " failed: injected"));
+  for (const char* file : {"odometry.tum", "optimized.tum", "pose_graph.g2o", "keyframes.csv",
+                           "loop_closures.csv", "optimizer.csv", "timing.csv", "process.csv"})
+    CHECK(fs::is_regular_file(robot.output / file));
+  const RunSummary summary = read_summary(robot.output / "summary.json");
+  CHECK_THAT(summary.exit_reason, Catch::StartsWith(module + ": "));
+}
+
+TEST_CASE("A module that throws or hangs is named, and what was recorded is written",
+          "[system][faults]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const std::string module = GENERATE(as<std::string>(), "sensors", "vio", "keyframe_features",
+                                      "place_recognition", "loop_closure", "pcm", "pose_graph");
+  const std::string how = GENERATE(as<std::string>(), "throw", "hang");
+  FaultyRobot robot;
+  robot.start(module, how, *dataset);
+  check_end(robot, module, how);
+}
+
+TEST_CASE("Likewise a module of the map", "[system][faults][slow]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const std::string module =
+      GENERATE(as<std::string>(), "dense_sensing", "semantic_mapping", "mesh_deformation");
+  const std::string how = GENERATE(as<std::string>(), "throw", "hang");
+  FaultyRobot robot;
+  robot.start(module, how, *dataset, {"mapping.mode=metric"});
+  check_end(robot, module, how);
+}
+
+TEST_CASE("A disk that stands still under the map leaves the other results", "[system][faults]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  FaultyRobot robot;
+  robot.start("none", "hang", *dataset, {"mapping.mode=metric", "run.patience=0.1"});
+  REQUIRE(wait_for_lines(robot.output / "process.csv", 1));
+  // To open a pipe that nobody reads takes for ever.
+  REQUIRE(mkfifo((robot.output / "mesh.ply.part").c_str(), 0600) == 0);
+  CHECK(robot.process->wait(3 * kPatience) == 5);
+  CAPTURE(robot.told());
+  CHECK_THAT(robot.told(), Catch::Contains("mesh_files has not"));
+  CHECK(fs::is_regular_file(robot.output / "pose_graph.g2o"));
+  CHECK_THAT(read_summary(robot.output / "summary.json").exit_reason,
+             Catch::StartsWith("mesh_files: ") && Catch::Contains("1 result lost") &&
+                 Catch::Contains("mesh.ply"));
+}
+
+TEST_CASE("The team goes on without a robot whose module hangs, and sees it leave",
+          "[system][faults]") {
+  FaultyRobot faulty;
+  const fs::path output = faulty.folder.path() / "sound";
+  const int log =
+      open((faulty.folder.path() / "sound.log").c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+  Child sound({std::string(KM_BIN_DIR) + "/kimera_multi_robot", "--robot", "0", "--graph",
+               long_walk(faulty.folder.path(), 0).string(), "--output", output.string(), "--domain",
+               std::to_string(faulty.domain)},
+              log);
+  close(log);
+  REQUIRE(wait_for_lines(output / "process.csv", 2));
+  faulty.start("pose_graph", "hang", long_walk(faulty.folder.path(), 1));
+  check_end(faulty, "pose_graph", "hang");
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (faulty.folder.read("sound.log").find("faulty left") == std::string::npos &&
+         std::chrono::steady_clock::now() < end)
+    poll(nullptr, 0, 50);
+  CHECK_THAT(faulty.folder.read("sound.log"),
+             Catch::Contains("faulty alive") && Catch::Contains("faulty left"));
+  sound.kill(SIGTERM);
+  CHECK(sound.wait() == 0);
+}
+
+}  // namespace
+}  // namespace km
