@@ -1,5 +1,7 @@
 #include "modules/core/text_rows.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <charconv>
 
 namespace km {
@@ -46,7 +48,6 @@ std::optional<T> parse_whole(std::string_view field) {
 }  // namespace
 
 std::vector<TextRow> split_rows(std::string_view text) {
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   std::vector<TextRow> rows;
   for (int number = 1; !text.empty(); ++number) {
@@ -67,6 +68,15 @@ std::optional<double> parse_double(std::string_view field) {
 
 std::optional<std::int64_t> parse_int64(std::string_view field) {
   return parse_whole<std::int64_t>(field);
+}
+
+std::string readable(std::string_view text, std::size_t max_size) {
+  constexpr std::string_view kCut = " ...";
+  std::string shown(text.substr(0, max_size));
+  if (text.size() > max_size) shown.replace(shown.size() - kCut.size(), kCut.size(), kCut);
+  std::replace_if(
+      shown.begin(), shown.end(), [](unsigned char c) { return std::iscntrl(c) != 0; }, '?');
+  return shown;
 }
 
 }  // namespace km

@@ -1,11 +1,16 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
 namespace km {
+
+/// What some editors put in front of UTF-8.
+inline constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 /// One line of a table, cut into fields.
 struct TextRow {
@@ -21,5 +26,8 @@ struct TextRow {
 /// The number that the whole of `field` spells, or nullopt. NaN and infinities are numbers here.
 [[nodiscard]] std::optional<double> parse_double(std::string_view field);
 [[nodiscard]] std::optional<std::int64_t> parse_int64(std::string_view field);
+
+/// `text` as messages show it: control characters as '?', and no more than `max_size` bytes.
+[[nodiscard]] std::string readable(std::string_view text, std::size_t max_size = 200);
 
 }  // namespace km

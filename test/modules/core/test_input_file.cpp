@@ -1,0 +1,51 @@
+#include <catch2/catch.hpp>
+
+#include "modules/core/input_file.hpp"
+#include "modules/core/text_rows.hpp"
+#include "test/support/spoilt_input.hpp"
+
+namespace km {
+
+TEST_CASE("The bytes of a file come as they are", "[core]") {
+  const TemporaryFolder folder;
+  const std::string bytes("a\0\r\n\xFF", 5);
+  CHECK(read_input_file(folder.write("some", bytes)) == bytes);
+  CHECK(read_input_file(folder.write("none", "")).empty());
+  const std::string large(3'000'000, 'x');
+  CHECK(read_input_file(folder.write("large", large)) == large);
+  CHECK(read_input_file("/proc/self/stat").size() > 10);  // of no size until it is read
+}
+
+TEST_CASE("What is no file is refused with what it is", "[core]") {
+  check_no_files<InputFileError>(".txt", [](const auto& file) { (void)read_input_file(file); });
+  const TemporaryFolder folder;
+  const auto places = no_files(folder, "");
+  const char* const problems[] = {"no such file", "Too many levels of symbolic links",
+                                  "Too many levels of symbolic links", "a folder, not a file",
+                                  "File name too long"};
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    CHECK(problem_of_file(places[i]) == problems[i]);
+    CHECK_FALSE(is_file(places[i]));
+    CHECK(is_folder(places[i]) == (i == 3));
+    CHECK(is_there(places[i]) == (i == 3));
+    CHECK(is_absent(places[i]) == (i == 0));
+  }
+  CHECK(problem_of_file("/dev/zero") == "not a file");
+}
+
+TEST_CASE("A file beyond the limit is not read", "[core]") {
+  const TemporaryFolder folder;
+  const auto file = folder.write("some", "12345");
+  CHECK(read_input_file(file, 5) == "12345");
+  CHECK_THROWS_WITH(read_input_file(file, 4), Catch::Contains("some: larger than"));
+  std::filesystem::resize_file(file, std::uintmax_t{1} << 40U);  // a hole: takes no room
+  CHECK_THROWS_WITH(read_input_file(file), Catch::Contains("larger than 8192 MiB"));
+}
+
+TEST_CASE("Text in messages is printable and short", "[core]") {
+  CHECK(readable("10 m, \xC3\xA4") == "10 m, \xC3\xA4");
+  CHECK(readable("a\x1b[2J\n\x7f") == "a?[2J??");
+  CHECK(readable("0123456789", 8) == "0123 ...");
+}
+
+}  // namespace km

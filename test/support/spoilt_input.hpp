@@ -1,0 +1,180 @@
+#pragma once
+
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <random>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+
+/// Spoils the bytes of a file in the ways in which files of people and programs are spoilt: numbers
+/// that none can be, lines lost, repeated, exchanged or cut, garbage, other line ends. The same
+/// seed, the same faults.
+class InputSpoiler {
+ public:
+  explicit InputSpoiler(unsigned seed) : rng_(seed) {}
+
+  [[nodiscard]] std::string operator()(std::string text) {
+    const int faults = below(3) + 1;
+    for (int i = 0; i < faults; ++i) spoil(text);
+    return text;
+  }
+
+ private:
+  static constexpr std::array kNumbers = {"nan",
+                                          "-inf",
+                                          "1e300",
+                                          "-1e300",
+                                          "1e-300",
+                                          "1e400",
+                                          "1e30",
+                                          "-1",
+                                          "0",
+                                          "0.5",
+                                          "1e9",
+                                          "",
+                                          "9223372036854775807",
+                                          "-9223372036854775808",
+                                          "99999999999999999999",
+                                          "86400000000000",
+                                          "x"};
+
+  int below(std::size_t n) {
+    return static_cast<int>(std::uniform_int_distribution<std::size_t>(0, n - 1)(rng_));
+  }
+  std::size_t place_in(const std::string& text) {
+    return static_cast<std::size_t>(below(text.size() + 1));
+  }
+
+  void spoil(std::string& text) {
+    switch (below(12)) {
+      case 0:
+      case 1:
+      case 2:
+        return replace_number(text);
+      case 3:
+      case 4:
+        return shuffle_lines(text);
+      case 5:
+        text.erase(place_in(text), static_cast<std::size_t>(below(40)));
+        return;
+      case 6:
+        text.resize(place_in(text));
+        return;
+      case 7:
+        for (int i = below(30); i >= 0; --i)
+          text.insert(place_in(text), 1, static_cast<char>(below(256)));
+        return;
+      case 8:
+        if (!text.empty()) text[place_in(text) % text.size()] ^= static_cast<char>(1 << below(8));
+        return;
+      case 9:
+        text.insert(place_in(text), std::string(100'000, "0 ,x\0"[below(5)]));
+        return;
+      case 10:
+        for (std::size_t at = 0; (at = text.find('\n', at)) != text.npos; at += 2)
+          text.replace(at, 1, "\r\n");
+        return;
+      default:
+        text.insert(0, "\xEF\xBB\xBF");
+    }
+  }
+
+  // A run of digits, signs and points becomes another number, or becomes it in addition.
+  void replace_number(std::string& text) {
+    constexpr std::string_view kDigits = "0123456789.+-";
+    const std::size_t begin = text.find_first_of(kDigits, place_in(text));
+    if (begin == text.npos) return;
+    const std::size_t end = std::min(text.find_first_not_of(kDigits, begin), text.size());
+    const auto number = static_cast<std::size_t>(below(kNumbers.size()));
+    text.replace(begin, below(4) == 0 ? 0 : end - begin, kNumbers[number]);
+  }
+
+  void shuffle_lines(std::string& text) {
+    std::vector<std::string> lines;
+    for (std::size_t begin = 0; begin < text.size();) {
+      const std::size_t end = std::min(text.find('\n', begin), text.size() - 1);
+      lines.push_back(text.substr(begin, end + 1 - begin));
+      begin = end + 1;
+    }
+    if (lines.empty()) return;
+    const auto a = static_cast<std::size_t>(below(lines.size()));
+    const auto b = static_cast<std::size_t>(below(lines.size()));
+    const int kind = below(3);
+    if (kind == 0) lines.insert(lines.begin() + static_cast<std::ptrdiff_t>(a), lines[b]);
+    if (kind == 1) std::swap(lines[a], lines[b]);
+    if (kind == 2) lines.erase(lines.begin() + static_cast<std::ptrdiff_t>(a));
+    text.clear();
+    for (const std::string& line : lines) text += line;
+  }
+
+  std::mt19937 rng_;
+};
+
+/// How many spoilt files of a kind a test reads; KIMERA_MULTI_SPOILT_FILES makes it longer.
+[[nodiscard]] inline unsigned spoilt_files() {
+  const char* const wanted = std::getenv("KIMERA_MULTI_SPOILT_FILES");
+  return wanted == nullptr ? 300U : static_cast<unsigned>(std::atoi(wanted));
+}
+
+/// Hands `read` the good text, which it must accept, and many spoilt ones. It may throw an `Error`
+/// of a few lines that names `name`, and no other exception; what it accepts it has to check.
+template <typename Error, typename Read>
+void check_spoilt(const std::string& good, const std::string& name, const Read& read) {
+  REQUIRE_NOTHROW(read(good));
+  unsigned refused = 0;
+  for (unsigned seed = 0; seed < spoilt_files(); ++seed) {
+    CAPTURE(seed);
+    try {
+      read(InputSpoiler(seed)(good));
+    } catch (const Error& error) {
+      ++refused;
+      const std::string_view message = error.what();
+      CHECK(message.find(name) != message.npos);
+      CHECK(message.size() < 5000);
+    } catch (const std::exception& error) {
+      FAIL_CHECK("not an error of input: " << error.what());
+    }
+  }
+  CHECK(refused < spoilt_files());  // or nothing that is accepted was looked at
+}
+
+/// Places where there is no file to read.
+[[nodiscard]] inline std::vector<std::filesystem::path> no_files(const TemporaryFolder& folder,
+                                                                 const std::string& extension) {
+  namespace fs = std::filesystem;
+  const fs::path loop = folder.path() / ("loop" + extension);
+  fs::create_symlink(loop.filename(), loop);
+  const fs::path place = folder.path() / ("folder" + extension);
+  fs::create_directory(place);
+  return {folder.path() / ("missing" + extension), loop, loop / ("below" + extension), place,
+          folder.path() / (std::string(300, 'n') + extension)};
+}
+
+/// `read` refuses each of them with an `Error` that names it.
+template <typename Error, typename Read>
+void check_no_files(const std::string& extension, const Read& read) {
+  const TemporaryFolder folder;
+  for (const std::filesystem::path& place : no_files(folder, extension)) {
+    CAPTURE(place);
+    try {
+      read(place);
+      FAIL_CHECK("was read");
+    } catch (const Error& error) {
+      CHECK_THAT(error.what(), Catch::Contains(place.string().substr(0, 150)));
+    } catch (const std::exception& error) {
+      FAIL_CHECK("not an error of input: " << error.what());
+    }
+  }
+}
+
+}  // namespace km
