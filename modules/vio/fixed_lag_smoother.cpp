@@ -50,7 +50,7 @@ std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
   window_.prior = {};
   Stamp last_keyframe = 0;
   for (std::size_t k = 0; k < frames.size(); ++k) {
-    append(frames[k], guess[k]);
+    if (!append(frames[k], guess[k])) return std::nullopt;
     observe(window_, frames[k].tracked);
     const Stamp stamp = frames[k].tracked.stamp;
     if (k > 0 && k + 1 < frames.size() && seconds_between(last_keyframe, stamp) < kStartKeyframe_s)
@@ -71,8 +71,8 @@ std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
 }
 
 SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame) {
-  slide();
-  append(frame, window_.frames.back().state);
+  SmootherUpdate update;
+  if (!slide() || !append(frame, window_.frames.back().state)) return update;
   WindowFrame& newest = window_.frames.back();
   const OdometryState predicted = predict(window_.frames[window_.frames.size() - 2].state,
                                           newest.imu->imu(), config_.gravity_mps2);
@@ -81,7 +81,6 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame) {
   observe(window_, frame.tracked);
   decide_keyframe();
   locate_landmarks();
-  SmootherUpdate update;
   update.solution = optimize(window_, config_.iterations);
   update.outliers = reject_outliers();
   update.state = newest.state;
@@ -91,24 +90,23 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame) {
   return update;
 }
 
-void FixedLagSmoother::append(const InertialFrame& frame, OdometryState state) {
+bool FixedLagSmoother::append(const InertialFrame& frame, OdometryState state) {
   WindowFrame& added = window_.frames.emplace_back();
   added.id = next_id_++;
   added.state = state;
   added.state.stamp = frame.tracked.stamp;
-  if (window_.frames.size() == 1) return;
+  if (window_.frames.size() == 1) return true;
   added.samples = frame.samples;
-  set_imu(window_.frames.size() - 1);
+  return set_imu(window_.frames.size() - 1);
 }
 
-void FixedLagSmoother::set_imu(std::size_t frame) {
+bool FixedLagSmoother::set_imu(std::size_t frame) {
   const OdometryState& before = window_.frames[frame - 1].state;
   WindowFrame& f = window_.frames[frame];
   ImuPreintegration imu(noise_, before.gyro_bias, before.accel_bias);
-  if (!imu.add(f.samples, before.stamp, f.state.stamp))
-    throw std::invalid_argument("FixedLagSmoother: inertial samples do not cover the image at " +
-                                std::to_string(f.state.stamp) + " ns");
-  f.imu.emplace(imu, config_.gravity_mps2);
+  const bool covered = imu.add(f.samples, before.stamp, f.state.stamp);
+  f.imu = covered ? ImuFactor::of(imu, config_.gravity_mps2) : std::nullopt;
+  return f.imu.has_value();
 }
 
 std::size_t FixedLagSmoother::keyframes() const {
@@ -233,11 +231,11 @@ void FixedLagSmoother::hold_first() {
   prior.J.block<3, 3>(7, 12).diagonal().setConstant(1.0 / config_.accel_bias_sigma);
 }
 
-void FixedLagSmoother::slide() {
+bool FixedLagSmoother::slide() {
   for (std::size_t k = window_.frames.size(); k-- > 1;) {
     const bool recent =
         k + static_cast<std::size_t>(config_.window_recent) >= window_.frames.size();
-    if (!recent && !window_.frames[k].keyframe) merge_out(k);
+    if (!recent && !window_.frames[k].keyframe && !merge_out(k)) return false;
   }
   while (keyframes() > static_cast<std::size_t>(config_.window_keyframes))
     marginalize_oldest(window_);
@@ -245,16 +243,17 @@ void FixedLagSmoother::slide() {
     return landmark.observations.size() < 2 && !tracked_now(window_, landmark);
   };
   std::erase_if(window_.landmarks, gone);
+  return true;
 }
 
-void FixedLagSmoother::merge_out(std::size_t frame) {
+bool FixedLagSmoother::merge_out(std::size_t frame) {
   std::vector<ImuSample> samples = std::move(window_.frames[frame].samples);
   std::vector<ImuSample>& later = window_.frames[frame + 1].samples;
   for (const ImuSample& sample : later)
     if (sample.stamp > samples.back().stamp) samples.push_back(sample);
   later = std::move(samples);
   forget_frame(window_, frame);
-  set_imu(frame);
+  return set_imu(frame);
 }
 
 }  // namespace km

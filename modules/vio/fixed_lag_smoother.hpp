@@ -46,12 +46,14 @@ class FixedLagSmoother {
 
   /// Starts from guessed states of consecutive images, one for each of `frames`; what was before is
   /// forgotten. The first position and heading are held, the biases weakly kept at their guess.
-  /// Returns the refined states, or nullopt if the optimisation failed.
+  /// Returns the refined states, or nullopt if the optimisation failed or the samples between two
+  /// images make no inertial factor.
   [[nodiscard]] std::optional<std::vector<OdometryState>> start(
       std::span<const InertialFrame> frames, std::span<const OdometryState> guess);
 
-  /// Adds the next image. Precondition: start() succeeded, and frame.samples cover the time since
-  /// the image before.
+  /// Adds the next image. Precondition: start() succeeded. Where frame.samples do not cover the
+  /// time since the image before or make no inertial factor, the solution is not usable, and only
+  /// start() may follow.
   [[nodiscard]] SmootherUpdate add(const InertialFrame& frame);
 
   /// States now in the window, in order of time.
@@ -68,13 +70,15 @@ class FixedLagSmoother {
   [[nodiscard]] bool leaving(Stamp stamp) const;
 
  private:
-  void append(const InertialFrame& frame, OdometryState state);  // by value: it may be the window's
+  // These are false where an inertial factor cannot be made. The state is taken by value: it may be
+  // the window's.
+  [[nodiscard]] bool append(const InertialFrame& frame, OdometryState state);
+  [[nodiscard]] bool slide();
+  [[nodiscard]] bool merge_out(std::size_t frame);
+  [[nodiscard]] bool set_imu(std::size_t frame);
   void decide_keyframe();
   int reject_outliers();
   void locate_landmarks();
-  void slide();
-  void merge_out(std::size_t frame);
-  void set_imu(std::size_t frame);
   void hold_first();
   [[nodiscard]] std::size_t keyframes() const;
 

@@ -232,6 +232,10 @@ LinearAlignment align_gravity(const std::vector<SE3>& poses, const Preintegratio
   return result;
 }
 
+bool is_gravity(double length_mps2, double gravity_mps2) {  // false for NaN
+  return std::abs(length_mps2 / gravity_mps2 - 1.0) < kMaxGravityError;
+}
+
 std::vector<OdometryState> states_at_rest(std::span<const InertialFrame> frames,
                                           const InertialMean& mean) {
   OdometryState state;
@@ -257,7 +261,8 @@ StartGuess guess_start(std::span<const InertialFrame> frames, const SensorRig& r
   const double focal_px = rig.stereo.cameras[0].fx;
   const auto motion_px = image_motion(frames.front().tracked, frames.back().tracked, focal_px);
   guess.image_motion_px = motion_px.value_or(0.0);
-  if (motion_px && *motion_px < config.rest_parallax_px &&
+  const bool weighs = is_gravity(mean.accel.norm(), config.gravity_mps2);
+  if (motion_px && weighs && *motion_px < config.rest_parallax_px &&
       mean.accel_change < config.rest_accel_mps2 && mean.gyro_change < config.rest_gyro_radps) {
     guess.status = StartStatus::kAtRest;
     guess.states = states_at_rest(frames, mean);
@@ -279,9 +284,10 @@ StartGuess guess_start(std::span<const InertialFrame> frames, const SensorRig& r
       solve_alignment(*poses, *imus, config.accel_bias_sigma, Eigen::Vector3d::Zero(),
                       Eigen::MatrixXd::Identity(3, 3));
   guess.gravity_mps2 = free.gravity.norm();
-  if (!(std::abs(guess.gravity_mps2 / config.gravity_mps2 - 1.0) < kMaxGravityError)) return guess;
+  if (!is_gravity(guess.gravity_mps2, config.gravity_mps2)) return guess;
   const LinearAlignment aligned =
       align_gravity(*poses, *imus, config.accel_bias_sigma, config.gravity_mps2, free.gravity);
+  if (!is_gravity(aligned.gravity.norm(), config.gravity_mps2)) return guess;
   const Eigen::Matrix3d R_odom_first = upright(-aligned.gravity);
   for (std::size_t k = 0; k < frames.size(); ++k) {
     OdometryState& state = guess.states.emplace_back();

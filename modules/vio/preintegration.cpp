@@ -77,8 +77,17 @@ bool ImuPreintegration::add(std::span<const ImuSample> samples, Stamp from, Stam
     const Stamp begin = std::max(a.stamp, from);
     const Stamp end = std::min(b.stamp, to);
     if (begin >= end) continue;
-    add(begin == a.stamp ? a : interpolate(a, b, begin),
-        end == b.stamp ? b : interpolate(a, b, end));
+    const ImuSample first = begin == a.stamp ? a : interpolate(a, b, begin);
+    const ImuSample last = end == b.stamp ? b : interpolate(a, b, end);
+    // Noise held over a single step leaves position a multiple of velocity: a covariance of rank 6.
+    if (const Stamp middle = begin + (end - begin) / 2;
+        begin == from && end == to && begin < middle) {
+      const ImuSample half = interpolate(a, b, middle);
+      add(first, half);
+      add(half, last);
+    } else {
+      add(first, last);
+    }
   }
   return true;
 }

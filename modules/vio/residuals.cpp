@@ -2,8 +2,6 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 #include "modules/core/lie.hpp"
 
@@ -59,18 +57,23 @@ OdometryState FirstEstimate::applied_to(const OdometryState& state) const {
   return result;
 }
 
-ImuFactor::ImuFactor(const ImuPreintegration& imu, double gravity_mps2)
-    : imu_(imu), gravity_odom_(0.0, 0.0, -gravity_mps2) {
+std::optional<ImuFactor> ImuFactor::of(const ImuPreintegration& imu, double gravity_mps2) {
   const Eigen::LLT<Matrix9> llt(imu.covariance());
   const ImuNoise& noise = imu.noise();
-  if (imu.dt_s() <= 0.0 || llt.info() != Eigen::Success || noise.gyro_random_walk <= 0.0 ||
-      noise.accel_random_walk <= 0.0)
-    throw std::invalid_argument("ImuFactor: preintegration over " + std::to_string(imu.dt_s()) +
-                                " s has no positive definite covariance");
-  sqrt_information_ = llt.matrixL().solve(Matrix9::Identity());
+  if (!(imu.dt_s() > 0.0) || llt.info() != Eigen::Success || !(noise.gyro_random_walk > 0.0) ||
+      !(noise.accel_random_walk > 0.0))
+    return std::nullopt;
+  const Matrix9 sqrt_information = llt.matrixL().solve(Matrix9::Identity());
+  if (!sqrt_information.allFinite()) return std::nullopt;
+  return ImuFactor(imu, gravity_mps2, sqrt_information);
+}
+
+ImuFactor::ImuFactor(const ImuPreintegration& imu, double gravity_mps2,
+                     const Matrix9& sqrt_information)
+    : imu_(imu), gravity_odom_(0.0, 0.0, -gravity_mps2), sqrt_information_(sqrt_information) {
   const double sqrt_dt = std::sqrt(imu.dt_s());
-  gyro_walk_weight_ = 1.0 / (noise.gyro_random_walk * sqrt_dt);
-  accel_walk_weight_ = 1.0 / (noise.accel_random_walk * sqrt_dt);
+  gyro_walk_weight_ = 1.0 / (imu.noise().gyro_random_walk * sqrt_dt);
+  accel_walk_weight_ = 1.0 / (imu.noise().accel_random_walk * sqrt_dt);
 }
 
 Vector15 ImuFactor::error(const OdometryState& i, const OdometryState& j) const {

@@ -68,8 +68,10 @@ struct FirstEstimate {
 /// (Sec. VI-E, Eq. (47) and (48)).
 class ImuFactor {
  public:
-  /// Throws std::invalid_argument if `imu` is empty or has no noise: it cannot be whitened.
-  ImuFactor(const ImuPreintegration& imu, double gravity_mps2);
+  /// nullopt if `imu` cannot be whitened: it is empty, or its covariance is not positive definite
+  /// to the digits of a double.
+  [[nodiscard]] static std::optional<ImuFactor> of(const ImuPreintegration& imu,
+                                                   double gravity_mps2);
 
   [[nodiscard]] const ImuPreintegration& imu() const { return imu_; }
 
@@ -82,6 +84,8 @@ class ImuFactor {
                                   const OdometryState& lin_i, const OdometryState& lin_j) const;
 
  private:
+  ImuFactor(const ImuPreintegration& imu, double gravity_mps2, const Matrix9& sqrt_information);
+
   ImuPreintegration imu_;
   Eigen::Vector3d gravity_odom_;
   Matrix9 sqrt_information_;

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "modules/core/covariance.hpp"
 #include "modules/core/depth_lookup.hpp"
+#include "modules/core/imu_limits.hpp"
 #include "modules/core/lie.hpp"
 
 namespace km {
@@ -18,6 +20,17 @@ constexpr double kRestartRotation = 0.3;
 constexpr double kRestartTranslation = 1.0;
 
 constexpr double kLeastTiltSigma = 1e-4;  // [rad]; no inertial sensor knows better
+constexpr double kMostTiltSigma = 1.5;    // who is off by a right angle knows nothing
+
+// Of a relative pose between keyframes, each axis, in [rad^2] and [m^2]: no inertial sensor knows
+// one better than to a microradian and a micrometre, and what is worse than the most is no
+// estimate.
+constexpr double kLeastVariance = 1e-12;
+constexpr double kMostVariance = 1e6;
+
+bool is_usable(const Matrix6& covariance) {
+  return is_covariance(covariance) && covariance.diagonal().maxCoeff() <= kMostVariance;
+}
 
 Matrix6 restart_covariance() {
   Vector6 sigma;
@@ -78,7 +91,7 @@ int Vio::take_samples(const SensorPacket& packet) {
     if (repeated) continue;  // the border sample of two packets
     const bool future =
         packet.frame != nullptr && seconds_between(packet.frame->stamp, sample.stamp) > kMaxAhead_s;
-    if (future || !sample.gyro.allFinite() || !sample.accel.allFinite() ||
+    if (future || !is_plausible(sample) ||
         (!samples_.empty() && sample.stamp < samples_.back().stamp))
       ++refused;
     else
@@ -223,9 +236,9 @@ bool Vio::due(const OdometryState& state, const StereoFrame& frame) const {
 }
 
 std::optional<Vertical> Vio::vertical_at(const OdometryState& state) const {
-  if (config_.tilt_sigma < kLeastTiltSigma) return std::nullopt;
-  return Vertical{state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ(),
-                  config_.tilt_sigma * std::sqrt(config_.tilt_keyframes)};
+  const double sigma_rad = config_.tilt_sigma * std::sqrt(config_.tilt_keyframes);
+  if (config_.tilt_sigma < kLeastTiltSigma || sigma_rad > kMostTiltSigma) return std::nullopt;
+  return Vertical{state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ(), sigma_rad};
 }
 
 void Vio::hand_on_first(const OdometryState& state, VioResult& result) {
@@ -254,13 +267,13 @@ void Vio::hand_on(const OdometryState& state, VioResult& result) {
       relative ? relative->T
                : last_keyframe_->T_odom_kf.inverse() * T_chain_odom_ * state.T_odom_body;
   keyframe.covariance = restart_covariance();
-  if (relative) {
+  if (relative && is_usable(relative->Sigma)) {
     const double dt = seconds_between(last_keyframe_->stamp, state.stamp);
     Vector6 drift;  // variance
     drift.head<3>().setConstant(dt * config_.drift_rotation * config_.drift_rotation);
     drift.tail<3>().setConstant(dt * config_.drift_translation * config_.drift_translation);
     keyframe.covariance = relative->Sigma;
-    keyframe.covariance.diagonal() += drift;
+    keyframe.covariance.diagonal() += (drift.array() + kLeastVariance).matrix();
   }
   keyframe.T_odom_kf = last_keyframe_->T_odom_kf * keyframe.T_previous_kf;
   last_keyframe_ = keyframe;

@@ -19,7 +19,7 @@ enum class VioProblem {
   kNone,
   kNoImage,         ///< The packet has none that fit the rig: inertial samples are kept.
   kUnorderedImage,  ///< Not later than the image before: dropped.
-  kBadSamples,      ///< Some inertial samples are not finite or not in order: those are dropped.
+  kBadSamples,      ///< Some inertial samples are implausible or not in order: those are dropped.
   kInertialGap,     ///< Too long without inertial samples: a new start from the last pose.
   kDiverged,        ///< The estimate was impossible: a new start from the last pose.
   kStartTimeout,    ///< Could not start: the oldest images held back are given up, without a pose.

@@ -95,7 +95,8 @@ struct VioConfig {
     visitor.field(
         "tilt_keyframes", tilt_keyframes, {1, 100000},
         "in a row have one error of the vertical in common, from biases that hardly change; who "
-        "uses them takes errors for independent: each gets sqrt(tilt_keyframes) times tilt_sigma");
+        "uses them takes errors for independent: each gets sqrt(tilt_keyframes) times tilt_sigma, "
+        "and beyond 1.5 rad none are handed on");
     visitor.field(
         "max_imu_gap_s", max_imu_gap_s, {1e-3, 1.0},
         "[s] longest between two inertial samples that is interpolated; longer: a new start");

@@ -16,7 +16,7 @@ const char* text(VioProblem problem) {
     case VioProblem::kUnorderedImage:
       return "image not later than the one before, refused";
     case VioProblem::kBadSamples:
-      return "inertial samples out of order or not finite, refused";
+      return "inertial samples out of order or beyond what sensors measure, refused";
     case VioProblem::kInertialGap:
       return "gap in the inertial samples, starting anew";
     case VioProblem::kDiverged:
