@@ -26,7 +26,7 @@ void require_storable(const std::string& name) {
   if (name.empty() || name.find_first_of(",#\n\r") != std::string::npos ||
       kBlanks.find(name.front()) != kBlanks.npos || kBlanks.find(name.back()) != kBlanks.npos) {
     throw std::invalid_argument(
-        "label palette: the name '" + name +
+        "label palette: the name '" + readable(name) +
         "' is empty, has blanks around it, or a comma, # or line end in it");
   }
 }
@@ -38,7 +38,7 @@ bool by_id(const LabelClass& a, const LabelClass& b) {
 std::uint8_t parse_byte(std::string_view field, const char* what, const std::string& place) {
   const std::optional<std::int64_t> value = parse_int64(field);
   if (!value || *value < 0 || *value > 255) {
-    throw std::invalid_argument(place + what + " '" + std::string(field) +
+    throw std::invalid_argument(place + what + " '" + readable(field) +
                                 "' is no integer from 0 to 255");
   }
   return static_cast<std::uint8_t>(*value);
@@ -46,7 +46,7 @@ std::uint8_t parse_byte(std::string_view field, const char* what, const std::str
 
 LabelClass parse_entry(const TextRow& row, const std::string& place) {
   if (row.fields.size() != kFields) {
-    throw std::invalid_argument(place + "'" + std::string(row.fields[0]) + "' with " +
+    throw std::invalid_argument(place + "'" + readable(row.fields[0]) + "' with " +
                                 std::to_string(row.fields.size()) + " fields, needed are " +
                                 std::string(kHeader));
   }
@@ -71,8 +71,9 @@ LabelPalette::LabelPalette(const std::vector<LabelClass>& entries) {
     const bool color_known = known != id_by_color_.end() && known->first == key.first;
     if (color_known && known->second != entry.id) {
       throw std::invalid_argument("label palette: the colour " + text_of(entry.color) + " of '" +
-                                  entry.name + "' stands for id " + std::to_string(known->second) +
-                                  " and id " + std::to_string(entry.id));
+                                  readable(entry.name) + "' stands for id " +
+                                  std::to_string(known->second) + " and id " +
+                                  std::to_string(entry.id));
     }
     if (color_known) continue;
     id_by_color_.insert(known, key);
@@ -118,10 +119,10 @@ LabelPalette parse_label_palette(std::string_view csv, std::string_view source) 
     const LabelClass& entry = entries.back();
     const auto [use, is_new] = first_use.try_emplace(packed(entry.color), entry.id, line);
     if (use->second.first != entry.id) {
-      throw std::invalid_argument(place + "the colour " + text_of(entry.color) + " of '" +
-                                  entry.name + "' stands for id " + std::to_string(entry.id) +
-                                  ", but for id " + std::to_string(use->second.first) +
-                                  " in line " + std::to_string(use->second.second));
+      throw std::invalid_argument(
+          place + "the colour " + text_of(entry.color) + " of '" + readable(entry.name) +
+          "' stands for id " + std::to_string(entry.id) + ", but for id " +
+          std::to_string(use->second.first) + " in line " + std::to_string(use->second.second));
     }
   }
   return LabelPalette(entries);

@@ -1,6 +1,13 @@
 #include "modules/sensors/dataset_reader.hpp"
 
+#include "modules/core/text_rows.hpp"
+
 namespace km {
+namespace {
+
+constexpr std::size_t kMaxExample = 500;  // room for the paths of two files
+
+}  // namespace
 
 const char* to_string(ReaderFault fault) {
   switch (fault) {
@@ -8,10 +15,14 @@ const char* to_string(ReaderFault fault) {
       return "malformed rows";
     case ReaderFault::kNotFinite:
       return "inertial samples with NaN or infinity";
+    case ReaderFault::kImplausible:
+      return "inertial samples beyond what sensors measure";
     case ReaderFault::kUnorderedStamp:
       return "stamps out of order";
     case ReaderFault::kRepeatedStamp:
       return "repeated stamps";
+    case ReaderFault::kJumpingStamp:
+      return "stamps that jump";
     case ReaderFault::kLeftWithoutRight:
       return "left images without a right one";
     case ReaderFault::kRightWithoutLeft:
@@ -38,7 +49,7 @@ const char* to_string(ReaderFault fault) {
 
 void ReaderReport::add(ReaderFault fault, const std::string& example) {
   Entry& entry = entries_[fault];
-  if (entry.count++ == 0) entry.first = example;
+  if (entry.count++ == 0) entry.first = readable(example, kMaxExample);
 }
 
 std::size_t ReaderReport::count(ReaderFault fault) const {

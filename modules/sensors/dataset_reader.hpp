@@ -17,8 +17,10 @@ namespace km {
 enum class ReaderFault {
   kMalformedRow,       ///< Too few fields, or a stamp or value that is not a number.
   kNotFinite,          ///< NaN or infinity in an inertial sample.
-  kUnorderedStamp,     ///< Earlier than the row before.
-  kRepeatedStamp,      ///< Equal to the row before.
+  kImplausible,        ///< An inertial sample beyond what sensors measure.
+  kUnorderedStamp,     ///< Earlier than rows before, or later than rows after it.
+  kRepeatedStamp,      ///< Equal to a row before.
+  kJumpingStamp,       ///< More than an hour away from most rows.
   kLeftWithoutRight,   ///< No right image within the tolerance.
   kRightWithoutLeft,   ///< No left image within the tolerance.
   kMissingImage,       ///< Listed, but not on disk.

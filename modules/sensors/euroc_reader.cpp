@@ -5,7 +5,10 @@
 #include <memory>
 #include <sstream>
 #include <string>
+#include <variant>
 
+#include "modules/core/imu_limits.hpp"
+#include "modules/core/input_file.hpp"
 #include "modules/sensors/euroc_rig.hpp"
 #include "modules/sensors/text_file.hpp"
 
@@ -15,12 +18,9 @@ namespace {
 constexpr double kGapPeriods = 2.5;  // one lost sample is no gap
 
 std::filesystem::path find_mav0(const std::filesystem::path& folder) {
-  if (!std::filesystem::is_directory(folder))
-    throw DatasetError(folder.string() + ": no such folder");
-  if (std::filesystem::is_directory(folder / "mav0")) return folder / "mav0";
-  const auto has = [&folder](const char* sensor) {
-    return std::filesystem::is_directory(folder / sensor);
-  };
+  if (!is_folder(folder)) throw DatasetError(folder.string() + ": no such folder");
+  if (is_folder(folder / "mav0")) return folder / "mav0";
+  const auto has = [&folder](const char* sensor) { return is_folder(folder / sensor); };
   for (const char* sensor : {"cam0", "cam1", "imu0"})
     if (!has(sensor) && !(sensor == std::string_view("cam1") && has("depth0")))
       throw DatasetError(folder.string() + ": neither a folder mav0 nor " + sensor +
@@ -28,22 +28,30 @@ std::filesystem::path find_mav0(const std::filesystem::path& folder) {
   return folder;
 }
 
+std::variant<ImuSample, RowFault> parse_imu(const TextRow& row) {
+  Vector6 values;
+  for (int i = 0; i < 6; ++i) {
+    const std::string_view field = row.fields[static_cast<std::size_t>(i) + 1];
+    const auto value = parse_double(field);
+    if (!value)
+      return RowFault{ReaderFault::kMalformedRow, std::string(field) + " is not a number"};
+    values[i] = *value;
+  }
+  const ImuSample sample{0, values.head<3>(), values.tail<3>()};
+  if (!values.allFinite()) return RowFault{ReaderFault::kNotFinite, "not finite"};
+  if (is_plausible(sample)) return sample;
+  std::ostringstream why;
+  why << sample.gyro.stableNorm() << " rad/s (at most " << kMaxAngularRate_radps << "), "
+      << sample.accel.stableNorm() << " m/s^2 (at most " << kMaxSpecificForce_mps2 << ')';
+  return RowFault{ReaderFault::kImplausible, why.str()};
+}
+
 std::vector<ImuSample> read_imu(const std::filesystem::path& file, ReaderReport& report) {
   std::vector<ImuSample> samples;
-  read_ordered_rows(file, 7, report, [&](Stamp stamp, const TextRow& row) -> std::string {
-    Vector6 values;
-    for (int i = 0; i < 6; ++i) {
-      const std::string_view field = row.fields[static_cast<std::size_t>(i) + 1];
-      const auto value = parse_double(field);
-      if (!value) return std::string(field) + " is not a number";
-      values[i] = *value;
-    }
-    if (values.allFinite())
-      samples.push_back({stamp, values.head<3>(), values.tail<3>()});
-    else
-      report.add(ReaderFault::kNotFinite, at_line(file, row.line));
-    return {};
-  });
+  for (const auto& row : read_ordered_rows<ImuSample>(file, 7, report, parse_imu)) {
+    samples.push_back(row.value);
+    samples.back().stamp = row.stamp;
+  }
   if (samples.empty()) throw DatasetError(file.string() + ": holds no inertial sample");
   return samples;
 }

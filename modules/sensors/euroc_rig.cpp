@@ -11,7 +11,9 @@
 #include <utility>
 #include <vector>
 
+#include "modules/core/config.hpp"
 #include "modules/core/geometry.hpp"
+#include "modules/core/input_file.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/text_file.hpp"
@@ -20,6 +22,23 @@ namespace km {
 namespace {
 
 constexpr double kMaxNonOrthonormality = 1e-3;
+
+// What calibrations of sensors say. Beyond, numbers overflow or lose their digits further on: the
+// limits lie some orders of magnitude outside what is sold. Ring-laser gyroscopes have a noise of
+// 3e-7 rad/s/sqrt(Hz), those of telephones 3e-4; simulators write smaller ones.
+constexpr Bounds<double> kGyroNoise{1e-9, 1.0};    // [rad/s/sqrt(Hz)]
+constexpr Bounds<double> kGyroWalk{1e-10, 1.0};    // [rad/s^2/sqrt(Hz)]
+constexpr Bounds<double> kAccelNoise{1e-8, 10.0};  // [m/s^2/sqrt(Hz)]
+constexpr Bounds<double> kAccelWalk{1e-10, 10.0};  // [m/s^3/sqrt(Hz)]
+constexpr Bounds<double> kImuRate_hz{1.0, 1e5};
+constexpr Bounds<double> kFocal_px{1.0, 1e6};
+constexpr Bounds<double> kCenter_px{-1e6, 1e6};
+constexpr Bounds<double> kDistortion{-1e3, 1e3};
+constexpr Bounds<double> kLever_m{-1e3, 1e3};  // of a sensor on a robot
+constexpr Bounds<double> kDepthScale_m{1e-6, 1.0};
+constexpr Bounds<double> kDepthRange_m{1e-3, 1e4};
+constexpr Bounds<double> kDepthBaseline_m{1e-3, 100.0};
+constexpr double kMaxSide_px = 65536.0, kMaxArea_px = 1e8;
 
 std::optional<double> finite_number(const YAML::Node& node) {
   double value = 0.0;
@@ -33,11 +52,12 @@ class SensorYaml {
  public:
   explicit SensorYaml(std::filesystem::path file) : file_(std::move(file)) {
     std::string text = read_file(file_);
+    if (text.starts_with(kByteOrderMark)) text.erase(0, kByteOrderMark.size());
     if (text.starts_with('%')) text.front() = '#';  // OpenCV's "%YAML:1.0" is not YAML
     try {
       root_ = YAML::Load(text);
     } catch (const YAML::Exception& e) {
-      throw DatasetError(at_line(file_, e.mark.line + 1) + ": not YAML: " + e.msg);
+      throw DatasetError(at_line(file_, e.mark.line + 1) + ": not YAML: " + readable(e.msg));
     }
     if (!root_.IsMap()) throw DatasetError(file_.string() + ": no keys found");
   }
@@ -58,16 +78,17 @@ class SensorYaml {
     return finite_number(child(root_, key));
   }
 
-  // Positive and finite.
-  [[nodiscard]] double positive(const char* key) const {
+  [[nodiscard]] double number(const char* key, const Bounds<double>& bounds) const {
     const std::optional<double> value = number(key);
-    if (!value || *value <= 0.0) fail(key, std::string(key) + " is not a positive number");
+    if (!value || !bounds.contains(*value))
+      fail(key, std::string(key) + " is not a number within " + bounds.text());
     return *value;
   }
 
   // The same, or `otherwise` without the key.
-  [[nodiscard]] double positive(const char* key, double otherwise) const {
-    return has(key) ? positive(key) : otherwise;
+  [[nodiscard]] double number(const char* key, const Bounds<double>& bounds,
+                              double otherwise) const {
+    return has(key) ? number(key, bounds) : otherwise;
   }
 
   // `count` finite numbers. `meaning` is said where there are not as many.
@@ -92,7 +113,7 @@ class SensorYaml {
   }
 
   [[noreturn]] void fail(const YAML::Node& node, const std::string& problem) const {
-    throw DatasetError(at_line(file_, node.Mark().line + 1) + ": " + problem);
+    throw DatasetError(at_line(file_, node.Mark().line + 1) + ": " + readable(problem));
   }
 
   [[nodiscard]] std::vector<double> numbers(const YAML::Node& node, const std::string& key,
@@ -127,6 +148,10 @@ SE3 SensorYaml::extrinsics() const {
     fail(data, "T_BS is not a rotation: |R R^T - I| = " + std::to_string(error) + ", at most " +
                    std::to_string(kMaxNonOrthonormality) + " is accepted");
   if (R.determinant() < 0.0) fail(data, "T_BS is a reflection: det R = -1");
+  for (const double lever_m : T.topRightCorner<3, 1>())
+    if (!kLever_m.contains(lever_m))
+      fail(data,
+           "T_BS: a translation of " + shortest_text(lever_m) + " m is outside " + kLever_m.text());
   return make_pose(nearest_rotation(R), T.topRightCorner<3, 1>());
 }
 
@@ -146,21 +171,34 @@ void require_model(const SensorYaml& yaml, const char* key, const std::string& m
 void read_resolution(const SensorYaml& yaml, PinholeCamera& camera) {
   const auto resolution = yaml.numbers("resolution", 2, "width and height");
   for (const double side : resolution)
-    if (side < 1.0 || side > 65536.0 || side != std::floor(side))
+    if (side < 1.0 || side > kMaxSide_px || side != std::floor(side))
       yaml.fail("resolution", "resolution: sides are whole numbers of pixels from 1 to 65536");
+  if (resolution[0] * resolution[1] > kMaxArea_px)
+    yaml.fail("resolution", "resolution: more than " + shortest_text(kMaxArea_px) + " pixels");
   camera.width = static_cast<int>(resolution[0]);
   camera.height = static_cast<int>(resolution[1]);
 }
 
 void read_intrinsics(const SensorYaml& yaml, PinholeCamera& camera) {
   const auto K = yaml.numbers("intrinsics", 4, "fu, fv, cu, cv");
-  if (K[0] <= 0.0 || K[1] <= 0.0)
-    yaml.fail("intrinsics", "intrinsics: a focal length is not positive");
+  for (const std::size_t i : {0U, 1U})
+    if (!kFocal_px.contains(K[i]))
+      yaml.fail("intrinsics", "intrinsics: a focal length of " + shortest_text(K[i]) +
+                                  " px is outside " + kFocal_px.text());
+  for (const std::size_t i : {2U, 3U})
+    if (!kCenter_px.contains(K[i]))
+      yaml.fail("intrinsics", "intrinsics: a principal point at " + shortest_text(K[i]) +
+                                  " px is outside " + kCenter_px.text());
   camera.fx = K[0], camera.fy = K[1], camera.cx = K[2], camera.cy = K[3];
 }
 
 void read_distortion(const SensorYaml& yaml, PinholeCamera& camera) {
   const auto distortion = yaml.numbers("distortion_coefficients", 4, "k1, k2, p1, p2");
+  for (const double coefficient : distortion)
+    if (!kDistortion.contains(coefficient))
+      yaml.fail("distortion_coefficients",
+                "distortion_coefficients: " + shortest_text(coefficient) + " is outside " +
+                    kDistortion.text());
   std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
 }
 
@@ -177,11 +215,11 @@ PinholeCamera read_camera(const std::filesystem::path& file) {
 }
 
 ImuNoise read_imu_noise(const SensorYaml& yaml) {
-  return {.gyro_noise_density = yaml.positive("gyroscope_noise_density"),
-          .gyro_random_walk = yaml.positive("gyroscope_random_walk"),
-          .accel_noise_density = yaml.positive("accelerometer_noise_density"),
-          .accel_random_walk = yaml.positive("accelerometer_random_walk"),
-          .rate_hz = yaml.positive("rate_hz")};
+  return {.gyro_noise_density = yaml.number("gyroscope_noise_density", kGyroNoise),
+          .gyro_random_walk = yaml.number("gyroscope_random_walk", kGyroWalk),
+          .accel_noise_density = yaml.number("accelerometer_noise_density", kAccelNoise),
+          .accel_random_walk = yaml.number("accelerometer_random_walk", kAccelWalk),
+          .rate_hz = yaml.number("rate_hz", kImuRate_hz)};
 }
 
 // Throws unless a depth pixel is the left pixel of the same place.
@@ -208,7 +246,7 @@ void check_alignment(const SensorYaml& yaml, const PinholeCamera& left) {
 
 DepthRange read_depth_range(const SensorYaml& yaml) {
   DepthRange range;
-  range.max_m = yaml.positive("max_range_m", range.max_m);
+  range.max_m = yaml.number("max_range_m", kDepthRange_m, range.max_m);
   if (!yaml.has("min_range_m")) return range;
   const std::optional<double> min_m = yaml.number("min_range_m");
   if (!min_m || *min_m < 0.0 || *min_m >= range.max_m)
@@ -219,7 +257,7 @@ DepthRange read_depth_range(const SensorYaml& yaml) {
 
 StereoRig read_stereo(const std::filesystem::path& mav0, const PinholeCamera& left) {
   const std::filesystem::path file = mav0 / "cam1" / "sensor.yaml";
-  if (!std::filesystem::exists(mav0 / "cam1"))
+  if (!is_there(mav0 / "cam1"))
     throw DatasetError(file.string() + ": no such file (nor depth0, which RGB-D has instead)");
   const StereoRig stereo{{left, read_camera(file)}};
   if (stereo.baseline_m() < kMinBaseline_m)
@@ -234,14 +272,15 @@ SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth) {
   const SensorYaml imu(mav0 / "imu0" / "sensor.yaml");
   rig.imu = read_imu_noise(imu);
   const PinholeCamera left = read_camera(mav0 / "cam0" / "sensor.yaml");
-  const bool rgbd =
-      !std::filesystem::exists(mav0 / "cam1") && std::filesystem::exists(mav0 / "depth0");
+  const bool rgbd = !is_there(mav0 / "cam1") && is_there(mav0 / "depth0");
   if (!rgbd) rig.stereo = read_stereo(mav0, left);
   if (rgbd || with_depth) {
     const SensorYaml depth(mav0 / "depth0" / "sensor.yaml");
     check_alignment(depth, left);
     rig.depth = read_depth_range(depth);
-    if (rgbd) rig.stereo = rgbd_rig(left, depth.positive("baseline_m", kDefaultDepthBaseline_m));
+    if (rgbd)
+      rig.stereo =
+          rgbd_rig(left, depth.number("baseline_m", kDepthBaseline_m, kDefaultDepthBaseline_m));
   }
   const SE3 T_imu_body = imu.extrinsics().inverse();  // `body` here: the one the files refer to
   for (PinholeCamera& camera : rig.stereo.cameras)
@@ -250,7 +289,8 @@ SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth) {
 }
 
 double read_depth_scale(const std::filesystem::path& mav0) {
-  return SensorYaml(mav0 / "depth0" / "sensor.yaml").positive("depth_scale", kDefaultDepthScale_m);
+  return SensorYaml(mav0 / "depth0" / "sensor.yaml")
+      .number("depth_scale", kDepthScale_m, kDefaultDepthScale_m);
 }
 
 }  // namespace km

@@ -4,7 +4,9 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <variant>
 
+#include "modules/core/input_file.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/euroc_rig.hpp"
 #include "modules/sensors/image_file.hpp"
@@ -22,16 +24,18 @@ struct ListedImage {
 std::vector<ListedImage> list_images(const std::filesystem::path& camera, ReaderReport& report) {
   std::vector<ListedImage> images;
   const std::filesystem::path list = camera / "data.csv";
-  read_ordered_rows(list, 2, report, [&](Stamp stamp, const TextRow& row) {
-    images.push_back({stamp, row.line, camera / "data" / row.fields[1]});
-    return std::string();
-  });
+  using Parsed = std::variant<std::filesystem::path, RowFault>;
+  const auto file_of = [&](const TextRow& row) -> Parsed {
+    return camera / "data" / row.fields[1];
+  };
+  for (auto& row : read_ordered_rows<std::filesystem::path>(list, 2, report, file_of))
+    images.push_back({row.stamp, row.line, std::move(row.value)});
   if (images.empty()) throw DatasetError(list.string() + ": lists no image");
   return images;
 }
 
 LabelPalette read_palette(const std::filesystem::path& file) {
-  if (!std::filesystem::exists(file)) return {};
+  if (is_absent(file)) return {};
   try {
     return parse_label_palette(read_file(file), file.string());
   } catch (const std::invalid_argument& error) {
@@ -98,10 +102,12 @@ std::vector<StereoPairFile> list_keyframe_pairs(const std::filesystem::path& fol
                                                 ReaderReport& report) {
   std::vector<StereoPairFile> pairs;
   const std::filesystem::path list = folder / "pairs.csv";
-  read_ordered_rows(list, 3, report, [&](Stamp stamp, const TextRow& row) {
-    pairs.push_back({stamp, folder / row.fields[1], folder / row.fields[2], row.line, {}, {}});
-    return std::string();
-  });
+  using Files = std::pair<std::filesystem::path, std::filesystem::path>;
+  const auto files_of = [&](const TextRow& row) -> std::variant<Files, RowFault> {
+    return Files(folder / row.fields[1], folder / row.fields[2]);
+  };
+  for (const auto& [stamp, line, files] : read_ordered_rows<Files>(list, 3, report, files_of))
+    pairs.push_back({stamp, files.first, files.second, line, {}, {}});
   if (pairs.empty()) throw DatasetError(list.string() + ": lists no stereo pair");
   return pairs;
 }

@@ -2,26 +2,19 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
-#include <iterator>
+#include <cstdint>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <string_view>
 #include <utility>
-#include <vector>
+
+#include "modules/core/input_file.hpp"
 
 namespace km {
 namespace {
 
-std::vector<char> read_bytes(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::error_code ignored;  // a size that cannot be had reads as an empty file, which is refused
-  const auto size = std::filesystem::file_size(file, ignored);
-  std::vector<char> bytes(ignored ? 0 : size);
-  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(stream.gcount()));
-  return bytes;
-}
+// No image of a camera that a rig may have is larger, whatever the format.
+constexpr std::uintmax_t kMaxEncoded_bytes = std::uintmax_t{256} << 20U;
 
 // The marker must lie near the end: embedded thumbnails have one of their own.
 bool is_truncated(std::string_view bytes) {
@@ -30,6 +23,37 @@ bool is_truncated(std::string_view bytes) {
   if (bytes.starts_with("\xFF\xD8")) return tail.find("\xFF\xD9") == tail.npos;
   if (bytes.starts_with("\x89PNG")) return tail.find("IEND") == tail.npos;
   return false;
+}
+
+int big_endian(std::string_view bytes) {
+  int value = 0;
+  for (const char byte : bytes) value = value << 8 | static_cast<unsigned char>(byte);
+  return value;
+}
+
+// The size in the frame header of a JPEG file: that of the first marker SOF0 to SOF15, of which
+// three are something else (ITU T.81, table B.1).
+std::optional<cv::Size> jpeg_size(std::string_view bytes) {
+  for (std::size_t at = 2; at + 9 <= bytes.size() && bytes[at] == '\xFF';) {
+    const int marker = static_cast<unsigned char>(bytes[at + 1]);
+    if (marker == 0xFF) {  // fills
+      ++at;
+      continue;
+    }
+    if (marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC)
+      return cv::Size(big_endian(bytes.substr(at + 7, 2)), big_endian(bytes.substr(at + 5, 2)));
+    at += 2 + static_cast<std::size_t>(big_endian(bytes.substr(at + 2, 2)));
+  }
+  return std::nullopt;
+}
+
+// The size that a PNG or JPEG file says it has: a decoder makes room for it before it looks
+// further, and OpenCV throws beyond 2^30 pixels. nullopt for what does not say.
+std::optional<cv::Size> stated_size(std::string_view bytes) {
+  if (bytes.starts_with("\xFF\xD8")) return jpeg_size(bytes);
+  constexpr std::size_t kWidth = 16, kHeight = 20, kEnd = 24;  // of the chunk IHDR, the first
+  if (!bytes.starts_with("\x89PNG") || bytes.size() < kEnd) return std::nullopt;
+  return cv::Size(big_endian(bytes.substr(kWidth, 4)), big_endian(bytes.substr(kHeight, 4)));
 }
 
 LoadedImage<cv::Mat> failure(ImageStatus status, const std::filesystem::path& file,
@@ -85,24 +109,37 @@ ImageResult load_gray_image(const std::filesystem::path& file, int width, int he
 
 LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file, int flags,
                                   const cv::Size& size) {
-  if (!std::filesystem::is_regular_file(file))
-    return failure(ImageStatus::kMissing, file, "no such image");
-  std::vector<char> bytes = read_bytes(file);
-  if (bytes.empty()) return failure(ImageStatus::kUnreadable, file, "empty or unreadable file");
-  if (is_truncated({bytes.data(), bytes.size()}))
-    return failure(ImageStatus::kUnreadable, file, "truncated image");
+  if (!is_file(file))
+    return failure(ImageStatus::kMissing, file,
+                   "no such image" + (is_absent(file) ? "" : ": " + problem_of_file(file)));
+  std::string bytes;
+  try {
+    bytes = read_input_file(file, kMaxEncoded_bytes);
+  } catch (const InputFileError& error) {
+    return {ImageStatus::kUnreadable, error.what(), {}};
+  }
+  if (bytes.empty()) return failure(ImageStatus::kUnreadable, file, "empty file");
+  if (is_truncated(bytes)) return failure(ImageStatus::kUnreadable, file, "truncated image");
+  const auto wrong_size = [&](const cv::Size& found) {
+    return failure(ImageStatus::kWrongSize, file,
+                   text(found) + " px, the calibration says " + text(size));
+  };
+  if (const auto stated = stated_size(bytes); stated && *stated != size) return wrong_size(*stated);
 
   const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8UC1, bytes.data());
   // IMREAD_UNCHANGED is -1, orientation included: a flag more would make it another mode.
   const int mode = flags == cv::IMREAD_UNCHANGED
                        ? flags
                        : flags | static_cast<int>(cv::IMREAD_IGNORE_ORIENTATION);
-  cv::Mat decoded = cv::imdecode(encoded, mode);
+  cv::Mat decoded;
+  try {
+    decoded = cv::imdecode(encoded, mode);
+  } catch (const cv::Exception& error) {
+    return failure(ImageStatus::kUnreadable, file, "cannot be decoded: " + error.err);
+  }
   if (decoded.empty())
     return failure(ImageStatus::kUnreadable, file, "not an image that can be decoded");
-  if (decoded.size() != size)
-    return failure(ImageStatus::kWrongSize, file,
-                   text(decoded.size()) + " px, the calibration says " + text(size));
+  if (decoded.size() != size) return wrong_size(decoded.size());
   return {ImageStatus::kOk, {}, std::move(decoded)};
 }
 

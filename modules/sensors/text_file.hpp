@@ -1,9 +1,11 @@
 #pragma once
 
-#include <cctype>
 #include <cstddef>
 #include <filesystem>
 #include <string>
+#include <utility>
+#include <variant>
+#include <vector>
 
 #include "modules/core/stamp.hpp"
 #include "modules/core/text_rows.hpp"
@@ -11,48 +13,72 @@
 
 namespace km {
 
-/// The bytes of `file`. Throws DatasetError if it does not exist or cannot be read.
+/// The bytes of `file`. Throws DatasetError if it is not a regular file or cannot be read.
 [[nodiscard]] std::string read_file(const std::filesystem::path& file);
 
 /// "FILE line N", the start of every message about a row.
 [[nodiscard]] std::string at_line(const std::filesystem::path& file, int line);
 
-/// Calls `accept(stamp, row)` for every row of `file` that starts with a stamp [ns], has at least
-/// `fields` fields and comes later than the last row accepted; `accept` returns why it refuses the
-/// row for values that are not numbers, or an empty string. Everything else is counted in `report`.
-/// A first row that starts with a letter is a header. Throws DatasetError without `file`.
-template <typename Accept>
-void read_ordered_rows(const std::filesystem::path& file, std::size_t fields, ReaderReport& report,
-                       const Accept& accept) {
+/// Why a row is left out.
+struct RowFault {
+  ReaderFault fault = ReaderFault::kMalformedRow;
+  std::string why;
+};
+
+/// A row that counts, and what was made of it.
+template <typename Value>
+struct StampedRow {
+  Stamp stamp = 0;
+  int line = 0;
+  Value value;
+};
+
+/// Rows of `text` without a header: a first row that starts with a letter.
+[[nodiscard]] std::vector<TextRow> rows_below_header(const std::string& text);
+
+/// The stamp of a row that starts with one [ns] and has at least `fields` fields.
+[[nodiscard]] std::variant<Stamp, RowFault> stamp_of(const TextRow& row, std::size_t fields);
+
+/// Which of the stamps, of rows at `lines` of `file`, count (see judge_stamps()); the others go
+/// into `report`.
+[[nodiscard]] std::vector<bool> in_order(const std::vector<Stamp>& stamps,
+                                         const std::vector<int>& lines,
+                                         const std::filesystem::path& file, ReaderReport& report);
+
+/// The rows of `file` that start with a stamp, have at least `fields` fields and are in order of
+/// time, with what `parse(row)`, a std::variant<Value, RowFault>, makes of them. All others are
+/// counted in `report`. Throws DatasetError without `file`.
+template <typename Value, typename Parse>
+[[nodiscard]] std::vector<StampedRow<Value>> read_ordered_rows(const std::filesystem::path& file,
+                                                               std::size_t fields,
+                                                               ReaderReport& report,
+                                                               const Parse& parse) {
   const std::string text = read_file(file);
-  bool first = true;
-  Stamp last = 0;
-  for (const TextRow& row : split_rows(text)) {
-    const auto count = [&](ReaderFault fault, const std::string& why) {
-      report.add(fault, at_line(file, row.line) + ": " + why);
+  std::vector<StampedRow<Value>> rows;
+  std::vector<Stamp> stamps;
+  std::vector<int> lines;
+  for (const TextRow& row : rows_below_header(text)) {
+    const auto count = [&](const RowFault& fault) {
+      report.add(fault.fault, at_line(file, row.line) + ": " + fault.why);
     };
-    const std::string_view head = row.fields.front();
-    const bool is_header =
-        first && !head.empty() && std::isalpha(static_cast<unsigned char>(head.front())) != 0;
-    first = false;
-    if (is_header) continue;
-    const auto stamp = parse_int64(head);
-    if (row.fields.size() < fields) {
-      count(ReaderFault::kMalformedRow,
-            std::to_string(row.fields.size()) + " fields, expected " + std::to_string(fields));
-    } else if (!stamp || *stamp <= 0) {
-      count(ReaderFault::kMalformedRow, std::string(head) + " is not a stamp in nanoseconds");
-    } else if (*stamp == last) {
-      count(ReaderFault::kRepeatedStamp, std::string(head));
-    } else if (*stamp < last) {
-      count(ReaderFault::kUnorderedStamp,
-            std::string(head) + " comes after " + std::to_string(last));
-    } else if (const std::string why = accept(*stamp, row); !why.empty()) {
-      count(ReaderFault::kMalformedRow, why);
-    } else {
-      last = *stamp;
+    const std::variant<Stamp, RowFault> stamp = stamp_of(row, fields);
+    if (const auto* fault = std::get_if<RowFault>(&stamp)) {
+      count(*fault);
+      continue;
     }
+    std::variant<Value, RowFault> value = parse(row);
+    if (const auto* fault = std::get_if<RowFault>(&value)) {
+      count(*fault);
+      continue;
+    }
+    stamps.push_back(std::get<Stamp>(stamp));
+    lines.push_back(row.line);
+    rows.push_back({stamps.back(), row.line, std::get<Value>(std::move(value))});
   }
+  const std::vector<bool> counts = in_order(stamps, lines, file, report);
+  std::size_t row = 0;
+  std::erase_if(rows, [&](const auto&) { return !counts[row++]; });
+  return rows;
 }
 
 }  // namespace km

@@ -209,9 +209,9 @@ TEST_CASE("Depth that is not aligned with the left camera is refused", "[sensors
       Case{"0, -1, 0, 0.0", "0, -1, 0, 0.1", "line 3: T_BS: not that of cam0"},
       Case{"min_range_m: 0.4", "min_range_m: 40", "line 15: min_range_m is not a number from 0"},
       Case{"min_range_m: 0.4", "min_range_m: .nan", "line 15: min_range_m is not a number from 0"},
-      Case{"max_range_m: 20.0", "max_range_m: .inf", "line 16: max_range_m is not a positive"},
-      Case{"baseline_m: 0.08", "baseline_m: -0.08", "line 17: baseline_m is not a positive number"},
-      Case{"depth_scale: 0.001", "depth_scale: 0", "line 14: depth_scale is not a positive"});
+      Case{"max_range_m: 20.0", "max_range_m: .inf", "line 16: max_range_m is not a number within"},
+      Case{"baseline_m: 0.08", "baseline_m: -0.08", "line 17: baseline_m is not a number within"},
+      Case{"depth_scale: 0.001", "depth_scale: 0", "line 14: depth_scale is not a number within"});
   CAPTURE(c.from, c.to);
   const EurocFolder folder;
   folder.make_rgbd();

@@ -1,0 +1,248 @@
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+
+#include "modules/core/imu_limits.hpp"
+#include "modules/sensors/euroc_rig.hpp"
+#include "modules/sensors/image_file.hpp"
+#include "test/modules/sensors/euroc_folder.hpp"
+#include "test/support/spoilt_input.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kDay = 86'400'000'000'000;
+
+// Bytes of a PNG file whose header says `width` x `height`; what follows it is too little.
+std::string png_of(std::uint32_t width, std::uint32_t height) {
+  std::vector<std::uint8_t> encoded;
+  cv::imencode(".png", cv::Mat(24, 32, CV_8UC1, cv::Scalar(7)), encoded);
+  std::string bytes(encoded.begin(), encoded.end());
+  for (std::size_t i = 0; i < 4; ++i) {
+    bytes[16 + i] = static_cast<char>(width >> (24 - 8 * i));
+    bytes[20 + i] = static_cast<char>(height >> (24 - 8 * i));
+  }
+  return bytes;
+}
+
+void check_rig(const SensorRig& rig) {
+  for (const PinholeCamera& camera : rig.stereo.cameras) {
+    CHECK(camera.T_body_cam.matrix().allFinite());
+    CHECK(std::isfinite(camera.fx * camera.fy * camera.cx * camera.cy));
+    CHECK(camera.width * camera.height > 0);
+  }
+  CHECK(std::isnormal(rig.imu.gyro_noise_density * rig.imu.gyro_noise_density));
+  CHECK(std::isnormal(rig.imu.accel_noise_density * rig.imu.accel_noise_density));
+}
+
+// What a reader promises, whatever the files.
+void check_recording(EurocReader& reader) {
+  check_rig(reader.rig());
+  Stamp last = 0;
+  for (const SensorPacket& packet : packets_of(reader)) {
+    CHECK(packet.frame->stamp > last);
+    last = packet.frame->stamp;
+    CHECK(packet.frame->left.pixels.size() == 32 * 24);
+    for (std::size_t i = 0; i < packet.imu.size(); ++i) {
+      CHECK(is_plausible(packet.imu[i]));
+      if (i > 0) CHECK(packet.imu[i - 1].stamp < packet.imu[i].stamp);
+    }
+  }
+  for (const auto& [fault, entry] : reader.report().entries()) {
+    CAPTURE(to_string(fault), entry.first);
+    CHECK(entry.first.find("/mav0/") != entry.first.npos);
+    CHECK(entry.first.size() < 1000);
+  }
+}
+
+struct Row {
+  const char* what;
+  const char* file;
+  int line;            // of the list
+  std::string values;  // for the row; "+N" and "-N" move its stamp
+  ReaderFault fault;
+  std::size_t packets;
+};
+
+// Changes one row of a list.
+void spoil_row(const EurocFolder& folder, const Row& row) {
+  const std::string text = folder.read(row.file);
+  std::size_t begin = 0;
+  for (int line = 1; line < row.line; ++line) begin = text.find('\n', begin) + 1;
+  const std::size_t end = text.find('\n', begin);
+  std::string line = text.substr(begin, end - begin);
+  const std::size_t comma = line.find(',');
+  if (row.values.starts_with('+') || row.values.starts_with('-'))
+    line = std::to_string(std::stoll(line.substr(0, comma)) + std::stoll(row.values)) +
+           line.substr(comma);
+  else
+    line.replace(comma + 1, line.npos, row.values);
+  folder.write(row.file, text.substr(0, begin) + line + text.substr(end));
+}
+
+}  // namespace
+
+TEST_CASE("A bad row is lost and counted with its line, and no other", "[sensors]") {
+  const std::string day = std::to_string(kDay);
+  const Row row = GENERATE_COPY(
+      Row{"gyro 1e300", "imu0/data.csv", 300, "1e300,0,0,0,0,9.8", ReaderFault::kImplausible, 8},
+      Row{"gyro 150", "imu0/data.csv", 300, "0,0,150,0,0,9.8", ReaderFault::kImplausible, 8},
+      Row{"accel -1e300", "imu0/data.csv", 300, "0,0,0,-1e300,0,9.8", ReaderFault::kImplausible, 8},
+      Row{"infinite", "imu0/data.csv", 300, "0,0,0,inf,0,9.8", ReaderFault::kNotFinite, 8},
+      Row{"beyond a double", "imu0/data.csv", 300, "0,0,0,1e400,0,9", ReaderFault::kMalformedRow,
+          8},
+      Row{"imu a day ahead", "imu0/data.csv", 300, '+' + day, ReaderFault::kUnorderedStamp, 8},
+      Row{"imu at once", "imu0/data.csv", 2, '+' + day, ReaderFault::kUnorderedStamp, 8},
+      Row{"imu at last", "imu0/data.csv", 502, '+' + day, ReaderFault::kJumpingStamp, 8},
+      Row{"imu a second behind", "imu0/data.csv", 300, "-1000000001", ReaderFault::kUnorderedStamp,
+          8},
+      Row{"image at last", "cam0/data.csv", 9, '+' + day, ReaderFault::kJumpingStamp, 7},
+      Row{"image a day ahead", "cam0/data.csv", 4, '+' + day, ReaderFault::kUnorderedStamp, 7},
+      Row{"image at once", "cam0/data.csv", 2, '+' + day, ReaderFault::kUnorderedStamp, 7},
+      Row{"folder for an image", "cam0/data.csv", 4, ".", ReaderFault::kMissingImage, 7},
+      Row{"a name too long", "cam0/data.csv", 4, std::string(5000, 'n'), ReaderFault::kMissingImage,
+          7});
+  CAPTURE(row.what);
+  const EurocFolder folder;
+  spoil_row(folder, row);
+  EurocReader reader(folder.root());
+  CHECK(packets_of(reader).size() == row.packets);
+  REQUIRE(reader.report().count(row.fault) == 1);
+  CHECK_THAT(reader.report().entries().at(row.fault).first,
+             Catch::Contains(std::string(row.file) + " line " + std::to_string(row.line)));
+  CHECK(reader.report().count(ReaderFault::kImuGap) == 0);
+}
+
+TEST_CASE("An image that lies or cannot be reached costs its pair", "[sensors]") {
+  const EurocFolder folder;
+  const fs::path image = folder.image("cam1", 3);
+  fs::remove(image);
+  const std::string relative = fs::relative(image, folder.mav0()).string();
+  ReaderFault fault = ReaderFault::kWrongImageSize;
+  std::string why;
+  SECTION("65535 x 65535") {
+    folder.write(relative, png_of(65535, 65535));
+    why = "65535x65535 px, the calibration says 32x24";
+  }
+  SECTION("4294967295 x 1") {
+    folder.write(relative, png_of(0xffffffffU, 1));
+    why = "px, the calibration says";
+  }
+  SECTION("0 x 0") {
+    folder.write(relative, png_of(0, 0));
+    why = "0x0 px, the calibration says";
+  }
+  SECTION("a symbolic link to itself") {
+    fs::create_symlink(image.filename(), image);
+    fault = ReaderFault::kMissingImage;
+    why = "no such image: Too many levels of symbolic links";
+  }
+  SECTION("larger than memory") {
+    folder.write(relative, "");
+    fs::resize_file(image, std::uintmax_t{1} << 40U);
+    fault = ReaderFault::kUnreadableImage;
+    why = "larger than 256 MiB";
+  }
+  const Outcome outcome = read(folder);
+  CHECK(outcome.packets.size() == EurocFolder::kPairs - 1);
+  REQUIRE(outcome.report.count(fault) == 1);
+  CHECK_THAT(outcome.report.entries().at(fault).first,
+             Catch::Contains("cam0/data.csv line 5") && Catch::Contains(why));
+}
+
+TEST_CASE("A PNG of 16 bits is read as grey", "[sensors]") {
+  const EurocFolder folder;
+  folder.write_pixels(EurocFolder::side_image("cam0", 2),
+                      cv::Mat(24, 32, CV_16UC1, cv::Scalar(0x1234)));
+  const Outcome outcome = read(folder);
+  REQUIRE(outcome.packets.size() == EurocFolder::kPairs);
+  CHECK(outcome.packets[2].frame->left.pixels[5] == 0x12);
+}
+
+TEST_CASE("Spoilt lists and calibrations are refused, or give what a reader promises",
+          "[sensors]") {
+  const std::string file = GENERATE("imu0/data.csv", "cam0/data.csv", "cam1/data.csv",
+                                    "imu0/sensor.yaml", "cam0/sensor.yaml", "cam1/sensor.yaml");
+  CAPTURE(file);
+  const EurocFolder folder;
+  const std::string good = folder.read(file);
+  check_spoilt<DatasetError>(good, folder.root().string(), [&](const std::string& text) {
+    folder.write(file, text);
+    EurocReader reader(folder.root());
+    check_recording(reader);
+  });
+}
+
+TEST_CASE("Spoilt depth calibrations are refused, or give what a reader promises", "[sensors]") {
+  const EurocFolder folder;
+  folder.make_rgbd();
+  check_spoilt<DatasetError>(EurocFolder::depth_yaml(), folder.root().string(),
+                             [&](const std::string& text) {
+                               folder.write("depth0/sensor.yaml", text);
+                               EurocReader reader(folder.root());
+                               check_recording(reader);
+                             });
+}
+
+TEST_CASE("A spoilt image is an image of the right size or none", "[sensors]") {
+  const std::string extension = GENERATE(".png", ".jpg", ".bmp", ".tiff", ".webp");
+  CAPTURE(extension);
+  std::vector<std::uint8_t> encoded;
+  cv::Mat pixels(24, 32, CV_8UC1);
+  cv::randu(pixels, 0, 255);
+  REQUIRE(cv::imencode(extension, pixels, encoded));
+  const TemporaryFolder folder;
+  check_spoilt<DatasetError>({encoded.begin(), encoded.end()}, "", [&](const std::string& bytes) {
+    const ImageResult loaded = load_gray_image(folder.write("image" + extension, bytes), 32, 24);
+    const bool ok = loaded.status == ImageStatus::kOk;
+    CHECK(loaded.image.pixels.size() == (ok ? 32 * 24 : 0));
+    CHECK(loaded.problem.empty() == ok);
+  });
+}
+
+TEST_CASE("A file of a recording that is none is refused by name", "[sensors]") {
+  const std::string file = GENERATE("imu0/data.csv", "cam0/data.csv", "imu0/sensor.yaml");
+  const EurocFolder folder;
+  const fs::path place = folder.mav0() / file;
+  fs::remove(place);
+  const bool loop = GENERATE(true, false);
+  loop ? fs::create_symlink(place.filename(), place)
+       : static_cast<void>(fs::create_directory(place));
+  CHECK_THROWS_WITH(
+      EurocReader(folder.root()),
+      place.string() + (loop ? ": Too many levels of symbolic links" : ": a folder, not a file"));
+}
+
+TEST_CASE("A folder that is a loop is refused by name", "[sensors]") {
+  const TemporaryFolder folder;
+  fs::create_symlink("mav0", folder.path() / "mav0");
+  CHECK_THROWS_WITH(EurocReader(folder.path()), Catch::Contains("not a EuRoC recording"));
+  CHECK_THROWS_WITH(EurocReader(folder.path() / "mav0"), Catch::Contains("no such folder"));
+}
+
+TEST_CASE("Noise and optics that no sensor has are refused with line and value", "[sensors]") {
+  struct Case {
+    std::string file, from, to, message;
+  };
+  const Case c = GENERATE(
+      Case{"imu0", "1.6e-04", "1e-300", "line 5: gyroscope_noise_density is not a number within"},
+      Case{"imu0", "1.9e-05", "1e300", "line 6: gyroscope_random_walk is not a number within"},
+      Case{"imu0", "2.0e-3", "-1", "line 7: accelerometer_noise_density"},
+      Case{"imu0", "3.0e-3", ".nan", "line 8: accelerometer_random_walk"},
+      Case{"imu0", "rate_hz: 200", "rate_hz: 1e300", "line 4: rate_hz is not a number within 1"},
+      Case{"cam0", "[30.0,", "[1e300,", "line 11: intrinsics: a focal length of 1e+300 px"},
+      Case{"cam0", "12.0]", "-1e9]", "line 11: intrinsics: a principal point at -1e+09 px"},
+      Case{"cam0", "[-0.2,", "[1e300,", "line 13: distortion_coefficients: 1e+300 is outside"},
+      Case{"cam0", "[32, 24]", "[65536, 65536]", "line 9: resolution: more than 1e+08 pixels"},
+      Case{"cam0", "0.2, 0", "1e300, 0", "T_BS: a translation of 1e+300 m is outside"});
+  CAPTURE(c.from, c.to);
+  const EurocFolder folder;
+  folder.replace(c.file + "/sensor.yaml", c.from, c.to);
+  CHECK_THROWS_WITH(read_euroc_rig(folder.mav0()),
+                    Catch::Contains(c.file + "/sensor.yaml ") && Catch::Contains(c.message));
+}
+
+}  // namespace km

@@ -1,0 +1,76 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <random>
+
+#include "modules/sensors/stamp_order.hpp"
+
+namespace km {
+namespace {
+
+constexpr StampVerdict kGood = StampVerdict::kGood, kRepeated = StampVerdict::kRepeated,
+                       kUnordered = StampVerdict::kUnordered, kJump = StampVerdict::kJump;
+constexpr Stamp kDay = 86'400'000'000'000;
+using Verdicts = std::vector<StampVerdict>;
+
+TEST_CASE("One wrong stamp costs itself, wherever it stands", "[sensors]") {
+  const std::size_t place = GENERATE(0U, 1U, 5U, 8U, 9U);
+  const Stamp offset = GENERATE(values<Stamp>({kDay, -kDay, 25, -25}));
+  std::vector<Stamp> stamps;
+  for (int i = 0; i < 10; ++i) stamps.push_back(2 * kDay + 10 * i);
+  stamps[place] += offset;
+  CAPTURE(place, offset);
+  const Verdicts verdicts = judge_stamps(stamps);
+  const bool still_in_order = (place == 0 && offset == -25) || (place == 9 && offset == 25);
+  CHECK(std::count(verdicts.begin(), verdicts.end(), kGood) == (still_in_order ? 10 : 9));
+  CHECK((verdicts[place] == kGood) == still_in_order);
+}
+
+TEST_CASE("Of equal stamps the first counts", "[sensors]") {
+  CHECK(judge_stamps(std::vector<Stamp>{1, 2, 2, 2, 3}) ==
+        Verdicts{kGood, kGood, kRepeated, kRepeated, kGood});
+}
+
+TEST_CASE("A clock that was set leaves the part with the most stamps", "[sensors]") {
+  CHECK(judge_stamps(std::vector<Stamp>{1, 2, kDay, kDay + 1, kDay + 2}) ==
+        Verdicts{kJump, kJump, kGood, kGood, kGood});
+  CHECK(judge_stamps(std::vector<Stamp>{kDay, kDay + 1, 1, 2, 3}) ==
+        Verdicts{kUnordered, kUnordered, kGood, kGood, kGood});
+  CHECK(judge_stamps(std::vector<Stamp>{1, kDay}) == Verdicts{kGood, kJump});
+}
+
+TEST_CASE("A pause of a minute belongs to a recording", "[sensors]") {
+  const Stamp minute = 60'000'000'000;
+  CHECK(judge_stamps(std::vector<Stamp>{1, 2, minute, minute + 1}) == Verdicts(4, kGood));
+}
+
+TEST_CASE("No choice of stamps in order keeps more", "[sensors]") {
+  CHECK(judge_stamps({}).empty());
+  const unsigned seed = GENERATE(range(0U, 50U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  std::vector<Stamp> stamps(10);
+  for (Stamp& stamp : stamps) stamp = std::uniform_int_distribution<Stamp>(1, 12)(rng);
+  int most = 0;
+  for (unsigned subset = 0; subset < 1U << stamps.size(); ++subset) {
+    Stamp last = 0;
+    int size = 0;
+    for (std::size_t i = 0; i < stamps.size() && size >= 0; ++i) {
+      if ((subset >> i & 1U) == 0) continue;
+      size = stamps[i] > last ? size + 1 : -1;
+      last = stamps[i];
+    }
+    most = std::max(most, size);
+  }
+  const Verdicts verdicts = judge_stamps(stamps);
+  Stamp last = 0;
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    if (verdicts[i] != kGood) continue;
+    CHECK(stamps[i] > last);
+    last = stamps[i];
+  }
+  CHECK(std::count(verdicts.begin(), verdicts.end(), kGood) == most);
+}
+
+}  // namespace
+}  // namespace km
