@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "modules/core/input_file.hpp"
 #include "modules/pgo_study/team_graph_file.hpp"
 
 namespace km {
@@ -18,7 +19,7 @@ void GraphInput::define(CLI::App& app) {
 }
 
 TeamGraph GraphInput::read(const CLI::App& app) const {
-  const bool folder = std::filesystem::is_directory(file);
+  const bool folder = is_folder(file);
   const bool contiguous = partition == "contiguous";
   if (folder && !contiguous)
     throw std::runtime_error("--partition is for a single file, " + file.string() +

@@ -1,14 +1,15 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <fstream>
 #include <iostream>
 #include <memory>
+#include <sstream>
 #include <stdexcept>
 
 #include "apps/evaluate/stage_progress.hpp"
 #include "apps/pgo/commands.hpp"
 #include "apps/pgo/pcm_report.hpp"
 #include "apps/pgo/pcm_run.hpp"
+#include "modules/core/input_file.hpp"
 
 namespace km {
 namespace {
@@ -109,16 +110,14 @@ void check(const CLI::App& app, const PcmCommand& command) {
                                " is a consistency graph");
 }
 
-std::ifstream opened(const fs::path& file) {
-  std::ifstream in(file);
-  if (!in) throw std::runtime_error(file.string() + ": cannot be opened");
-  return in;
+std::istringstream opened(const fs::path& file) {
+  return std::istringstream(read_input_file(file));
 }
 
 KeyframePairs labels_beside(const fs::path& file) {
   const fs::path labels = file.string() + ".labels";
-  if (!fs::exists(labels)) return {};
-  std::ifstream in = opened(labels);
+  if (is_absent(labels)) return {};
+  std::istringstream in = opened(labels);
   KeyframePairs pairs = read_outlier_labels(in, labels.string());
   std::cout << labels.filename().string() << ": " << pairs.size() << " false closures\n";
   return pairs;
@@ -142,7 +141,7 @@ std::vector<PcmRun> run_searches(const auto& vertices, const PcmCommand& command
 
 std::vector<PcmRun> run_file(const PcmCommand& command) {
   if (command.file.extension() == ".txt") {
-    std::ifstream in = opened(command.file);
+    std::istringstream in = opened(command.file);
     return run_searches(read_consistency_rows(in, command.file.string()), command);
   }
   const auto [closures, indefinite] =

@@ -204,6 +204,10 @@ void run(const CLI::App& app, SolveCommand& command) {
   TeamGraph graph = command.input.read(app);
   if (command.no_vertical) graph.verticals.clear();
   const Solution solution = solve(graph, command.solver, command.optimum, cpu_meter());
+  for (const SE3& T_world_kf : solution.T_world_kf)
+    if (!T_world_kf.matrix().allFinite())
+      throw std::runtime_error(command.input.file.string() + ": " + command.solver.name() +
+                               " found no finite poses: do steps and weights make sense?");
   std::cout << solution_text(graph, solution);
   command.files.write([&](std::ostream& out) { write_solution_json(out, graph, solution); },
                       [&] { return gap_plot(solution); });

@@ -2,12 +2,11 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <numeric>
 #include <set>
 #include <stdexcept>
 
+#include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/pose_graph/recorded_graph.hpp"
 
@@ -33,6 +32,15 @@ std::set<KeyframeId> poses_of(const G2oGraph& graph, const std::string& file) {
         throw std::runtime_error(file + ": edge " + to_string(e.from) + " -> " + to_string(e.to) +
                                  " names vertex " + to_string(id) + ", which the file lacks");
   return poses;
+}
+
+Precision weight_of(const RelativePose& e, EdgeWeights weights, int dimension,
+                    const std::string& file) try {
+  return weights == EdgeWeights::kAsTheTeam ? precision_of(e.covariance)
+                                            : precision_of_blocks(e.covariance, dimension);
+} catch (const std::invalid_argument&) {
+  throw std::runtime_error(file + ": the information matrix of edge " + to_string(e.from) + " -> " +
+                           to_string(e.to) + " is not positive definite to the digits of a double");
 }
 
 void check_connected(const TeamGraph& graph, const std::string& file) {
@@ -63,8 +71,7 @@ void add_vertical(TeamGraph& team, const std::map<KeyframeId, Eigen::Index>& num
 }
 
 std::filesystem::path nonempty_folder(const std::filesystem::path& folder) {
-  if (!std::filesystem::is_directory(folder))
-    throw std::runtime_error(folder.string() + ": is not a folder");
+  if (!is_folder(folder)) throw std::runtime_error(folder.string() + ": is not a folder");
   return folder;
 }
 
@@ -78,7 +85,7 @@ PartFiles part_files(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> results, files;
   for (const auto& entry : std::filesystem::directory_iterator(nonempty_folder(folder))) {
     const auto extension = entry.path().extension();
-    if (std::filesystem::exists(entry.path() / "pose_graph.g2o"))
+    if (is_there(entry.path() / "pose_graph.g2o"))
       results.push_back(entry.path() / "pose_graph.g2o");
     else if ((extension == ".csv" || extension == ".g2o") && entry.path().stem() != "fullGraph")
       files.push_back(entry.path());
@@ -179,9 +186,7 @@ TeamGraph deal(const G2oGraph& graph, const std::map<KeyframeId, std::size_t>& r
     team.first.push_back(static_cast<Eigen::Index>(team.ids.size()));
   }
   for (const RelativePose& e : graph.edges) {
-    const Precision weight = weights == EdgeWeights::kAsTheTeam
-                                 ? precision_of(e.covariance)
-                                 : precision_of_blocks(e.covariance, graph.dimension);
+    const Precision weight = weight_of(e, weights, graph.dimension, file);
     team.edges.push_back(
         {number_of.at(e.from), number_of.at(e.to), e.T_from_to, weight.kappa, weight.tau});
   }
@@ -193,14 +198,12 @@ TeamGraph deal(const G2oGraph& graph, const std::map<KeyframeId, std::size_t>& r
 }
 
 std::map<KeyframeId, std::size_t> read_partition(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  if (!in || std::filesystem::is_directory(file))
-    throw std::runtime_error(file.string() + ": cannot be opened");
-  const std::string text(std::istreambuf_iterator<char>(in), {});
+  const std::string text = read_input_file(file);
   std::map<KeyframeId, std::size_t> robot_of;
   for (const TextRow& row : split_rows(text)) {
     const auto fail = [&](const std::string& what) {
-      throw std::runtime_error(file.string() + ':' + std::to_string(row.line) + ": " + what);
+      throw std::runtime_error(file.string() + ':' + std::to_string(row.line) + ": " +
+                               readable(what));
     };
     if (row.fields.size() != 2) fail("not two fields, vertex and robot");
     const auto key = parse_int64(row.fields[0]);

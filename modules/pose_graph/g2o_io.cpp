@@ -10,8 +10,10 @@
 #include <stdexcept>
 #include <unordered_set>
 
+#include "modules/core/input_file.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/core/write_file.hpp"
+#include "modules/pose_graph/measurement_limits.hpp"
 #include "modules/pose_graph/text_fields.hpp"
 
 namespace km {
@@ -27,11 +29,14 @@ KeyframeId read_id(TextFields& fields) {
   return *id;
 }
 
-SE3 read_pose(TextFields& fields, int dimension) {
+constexpr Bounds<double> kAngle_rad{-1e6,
+                                    1e6};  // some count turns; beyond, no digits of one are left
+
+SE3 read_pose(TextFields& fields, int dimension, const Bounds<double>& bounds_m) {
   Eigen::Vector3d t = Eigen::Vector3d::Zero();
-  for (int i = 0; i < dimension; ++i) t(i) = fields.number("translation");
+  for (int i = 0; i < dimension; ++i) t(i) = fields.number("translation", bounds_m);
   if (dimension == 2) {
-    const Eigen::AngleAxisd R(fields.number("angle"), Eigen::Vector3d::UnitZ());
+    const Eigen::AngleAxisd R(fields.number("angle", kAngle_rad), Eigen::Vector3d::UnitZ());
     return make_pose(R.toRotationMatrix(), t);
   }
   Eigen::Quaterniond q;
@@ -90,8 +95,15 @@ template <int N>
 EdgeCovariance<N> read_covariance(TextFields& fields) {
   const Eigen::Matrix<double, N, N> information = read_information<N>(fields);
   const Eigen::LLT<Eigen::Matrix<double, N, N>> llt(information);
-  if (llt.info() != Eigen::Success) return covariance_of_blocks<N>(information, fields);
-  return {llt.solve(Eigen::Matrix<double, N, N>::Identity())};
+  const EdgeCovariance<N> edge =
+      llt.info() != Eigen::Success
+          ? covariance_of_blocks<N>(information, fields)
+          : EdgeCovariance<N>{llt.solve(Eigen::Matrix<double, N, N>::Identity())};
+  for (const double variance : edge.Sigma.diagonal())
+    if (!kAxisVariance.contains(variance))
+      fields.fail("information matrix: its inverse has a variance of " + shortest_text(variance) +
+                  ", outside " + kAxisVariance.text());
+  return edge;
 }
 
 // What the prior of a vertical knows, [translation; rotation], in units of 1 / sigma^2.
@@ -151,7 +163,7 @@ class Reader {
   void read_vertex(TextFields& fields) {
     const KeyframeId id = read_id(fields);
     if (!seen_.insert(id).second) fields.fail("vertex " + to_string(id) + " is given twice");
-    graph.vertices.push_back({id, read_pose(fields, graph.dimension)});
+    graph.vertices.push_back({id, read_pose(fields, graph.dimension, kPosition_m)});
   }
 
   void read_edge(TextFields& fields) {
@@ -159,7 +171,7 @@ class Reader {
     edge.from = read_id(fields);
     edge.to = read_id(fields);
     if (edge.from == edge.to) fields.fail("edge from " + to_string(edge.from) + " to itself");
-    edge.T_from_to = read_pose(fields, graph.dimension);
+    edge.T_from_to = read_pose(fields, graph.dimension, kStep_m);
     if (graph.dimension == 2) {
       const EdgeCovariance<3> read = read_covariance<3>(fields);
       edge.covariance = lift(read.Sigma);
@@ -173,7 +185,7 @@ class Reader {
 
   void read_offset(TextFields& fields) {
     const std::uint64_t offset = fields.integer("offset id");
-    if (!read_pose(fields, 3).isApprox(SE3::Identity(), kUnitTolerance))
+    if (!read_pose(fields, 3, kStep_m).isApprox(SE3::Identity(), kUnitTolerance))
       fields.fail("offset " + std::to_string(offset) +
                   " is not the identity: priors are read of poses, not of sensors on them");
     offsets_.insert(offset);
@@ -184,7 +196,7 @@ class Reader {
     const std::uint64_t offset = fields.integer("offset id");
     if (!offsets_.contains(offset))
       fields.fail("no PARAMS_SE3OFFSET " + std::to_string(offset) + " before");
-    const Eigen::Vector3d up = read_pose(fields, 3).linear().row(2);
+    const Eigen::Vector3d up = read_pose(fields, 3, kStep_m).linear().row(2);
     const Matrix6 information = read_information<6>(fields);
     const double weight = 0.5 * information.bottomRightCorner<3, 3>().trace();
     const Matrix6 error = information - weight * tilt_information(up);
@@ -193,7 +205,11 @@ class Reader {
                   " is not a vertical: its information must be k (I - u u^T) on the rotation, u "
                   "the world's z axis seen from the pose, and zero on the translation");
     if (!upright_.insert(id).second) fields.fail("second prior on " + to_string(id));
-    graph.verticals.push_back({id, {up, 1.0 / std::sqrt(weight)}});
+    const double sigma_rad = 1.0 / std::sqrt(weight);
+    if (!kTiltSigma_rad.contains(sigma_rad))
+      fields.fail("prior on " + to_string(id) + ": a tilt known to " + shortest_text(sigma_rad) +
+                  " rad, outside " + kTiltSigma_rad.text());
+    graph.verticals.push_back({id, {up, sigma_rad}});
   }
 
   std::unordered_set<KeyframeId> seen_;
@@ -259,9 +275,9 @@ std::uint64_t key_of_keyframe(const KeyframeId& id) {
   return (robot << 32U) | id.index;
 }
 
-G2oGraph read_g2o(std::istream& in, const std::string& file) {
-  const std::string text(std::istreambuf_iterator<char>(in), {});
-  if (in.bad()) throw std::runtime_error(file + ": cannot be read to its end");
+namespace {
+
+G2oGraph parse_g2o(const std::string& text, const std::string& file) {
   Reader reader;
   for (const TextRow& row : split_rows(text)) {
     TextFields fields(row, file);
@@ -271,10 +287,16 @@ G2oGraph read_g2o(std::istream& in, const std::string& file) {
   return std::move(reader.graph);
 }
 
+}  // namespace
+
+G2oGraph read_g2o(std::istream& in, const std::string& file) {
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  if (in.bad()) throw std::runtime_error(file + ": cannot be read to its end");
+  return parse_g2o(text, file);
+}
+
 G2oGraph read_g2o(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  if (!in) throw std::runtime_error(file.string() + ": cannot be opened");
-  return read_g2o(in, file.string());
+  return parse_g2o(read_input_file(file), file.string());
 }
 
 void write_g2o(std::ostream& out, const G2oGraph& graph) {

@@ -64,9 +64,9 @@ struct G2oGraph {
 ///
 /// Throws std::runtime_error "file:line: what" for any other deviation: unknown tags, missing or
 /// surplus fields, numbers that are not finite, quaternions not of unit length within 1e-3,
-/// information matrices without positive weights, vertices given twice, edges from a pose to
-/// itself, priors of any other kind, two on one pose. Edges and priors may name vertices that the
-/// file does not have (those of another robot).
+/// information matrices without positive weights, numbers beyond measurement_limits.hpp, vertices
+/// given twice, edges from a pose to itself, priors of any other kind, two on one pose. Edges and
+/// priors may name vertices that the file does not have (those of another robot).
 [[nodiscard]] G2oGraph read_g2o(std::istream& in, const std::string& file);
 [[nodiscard]] G2oGraph read_g2o(const std::filesystem::path& file);
 

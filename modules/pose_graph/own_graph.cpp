@@ -8,6 +8,7 @@
 
 #include "modules/core/bytes.hpp"
 #include "modules/core/config.hpp"
+#include "modules/pose_graph/measurement_limits.hpp"
 
 namespace km {
 namespace {
@@ -30,10 +31,9 @@ EdgeSetId identify(std::uint32_t version, const std::vector<PoseEdge>& edges) {
 }
 
 VerticalPrior vertical_prior(const KeyframeId& keyframe, const Vertical& vertical) {
-  constexpr Bounds<double> kSigma{1e-4, 1.6};
   constexpr double kUnit = 1e-3;
   const double norm = vertical.up_body.norm();
-  if (!(std::abs(norm - 1.0) < kUnit) || !kSigma.contains(vertical.sigma_rad))
+  if (!(std::abs(norm - 1.0) < kUnit) || !kTiltSigma_rad.contains(vertical.sigma_rad))
     throw std::invalid_argument("OwnGraph: the vertical of keyframe " + to_string(keyframe) +
                                 " is not a direction with a usable sigma");
   return {Eigen::Index{keyframe.index}, vertical.up_body / norm,

@@ -2,7 +2,7 @@
 
 #include <tuple>
 
-#include "modules/core/config.hpp"
+#include "modules/pose_graph/measurement_limits.hpp"
 
 namespace km {
 namespace {
@@ -18,8 +18,9 @@ auto rank_of(const PoseEdge& e) {
 std::optional<PoseEdge> pose_edge(const RelativePose& measured) {
   const double rotation = measured.covariance.topLeftCorner<3, 3>().trace();
   const double translation = measured.covariance.bottomRightCorner<3, 3>().trace();
-  constexpr Bounds<double> kVariance{1e-12, 1e12};
-  if (!measured.T_from_to.matrix().allFinite() || !kVariance.contains(rotation) ||
+  const Eigen::Vector3d& t = measured.T_from_to.translation();
+  if (!measured.T_from_to.matrix().allFinite() || !kStep_m.contains(t.minCoeff()) ||
+      !kStep_m.contains(t.maxCoeff()) || !kVariance.contains(rotation) ||
       !kVariance.contains(translation))
     return std::nullopt;
   return PoseEdge{measured.from, measured.to, measured.T_from_to,

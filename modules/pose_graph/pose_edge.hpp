@@ -29,7 +29,8 @@ struct PoseEdge {
   }
 };
 
-/// nullopt for measurements that would spoil the numbers of everyone: weights are bounded.
+/// nullopt for measurements that would spoil the numbers of everyone: beyond
+/// measurement_limits.hpp.
 [[nodiscard]] std::optional<PoseEdge> pose_edge(const RelativePose& measured);
 
 /// Of two measurements of one pair of keyframes, whether `a` is the one that counts: the one with

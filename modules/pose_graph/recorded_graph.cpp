@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
 #include <istream>
 #include <iterator>
 #include <limits>
@@ -13,9 +12,11 @@
 #include <stdexcept>
 
 #include "modules/core/covariance.hpp"
+#include "modules/core/input_file.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/core/precision.hpp"
 #include "modules/pose_graph/g2o_io.hpp"
+#include "modules/pose_graph/measurement_limits.hpp"
 #include "modules/pose_graph/text_fields.hpp"
 
 namespace km {
@@ -40,11 +41,14 @@ RelativePose read_row(TextFields& fields) {
   if (!(std::abs(q.norm() - 1.0) <= kUnitTolerance))
     fields.fail("quaternion has length " + std::to_string(q.norm()));
   Eigen::Vector3d t;
-  for (double& c : t) c = fields.number("translation");
+  for (double& c : t) c = fields.number("translation", kStep_m);
   row.T_from_to = make_pose(q.normalized().toRotationMatrix(), t);
   const Precision precision{fields.number("kappa"), fields.number("tau")};
   if (!(precision.kappa > 0.0 && precision.tau > 0.0))
     fields.fail("kappa and tau must be positive");
+  if (!kVariance.contains(1.5 / precision.kappa) || !kVariance.contains(3.0 / precision.tau))
+    fields.fail("kappa " + shortest_text(precision.kappa) + " and tau " +
+                shortest_text(precision.tau) + " mean variances outside " + kVariance.text());
   row.covariance = covariance_of(precision);
   // Columns after tau, such as weight, are not used; a row that broke there is not to be trusted.
   while (!fields.at_end()) fields.number("column after tau");
@@ -86,8 +90,20 @@ std::size_t chain_length(const std::vector<RelativePose>& edges, RobotId robot,
                            to_string({robot, static_cast<std::uint32_t>(last)}));
 }
 
+// What a robot's optimiser takes is narrower than what a file may hold.
+void check_variances(const std::vector<RelativePose>& edges, const std::string& file) {
+  for (const RelativePose& edge : edges)
+    for (const double trace : {edge.covariance.topLeftCorner<3, 3>().trace(),
+                               edge.covariance.bottomRightCorner<3, 3>().trace()})
+      if (!kVariance.contains(trace))
+        throw std::runtime_error(file + ": edge " + to_string(edge.from) + " -> " +
+                                 to_string(edge.to) + " has a variance of " + shortest_text(trace) +
+                                 ", outside " + kVariance.text());
+}
+
 RecordedGraph make_recorded_graph(const G2oGraph& g2o, const std::string& file) {
   if (g2o.dimension != 3) throw std::runtime_error(file + ": the graph is not 3D");
+  check_variances(g2o.edges, file);
   RecordedGraph graph = make_recorded_graph(g2o.edges, file);
   graph.indefinite_edges = g2o.indefinite_edges;
   for (const G2oVertical& prior : g2o.verticals) {
@@ -141,10 +157,12 @@ RecordedGraph make_recorded_graph(const std::vector<RelativePose>& edges, const 
   return graph;
 }
 
-std::vector<RelativePose> read_measurements_csv(std::istream& in, const std::string& file) {
-  const std::string text(std::istreambuf_iterator<char>(in), {});
-  if (in.bad()) throw std::runtime_error(file + ": cannot be read to its end");
-  if (!text.starts_with(kColumns))
+namespace {
+
+std::vector<RelativePose> parse_measurements(const std::string& text, const std::string& file) {
+  std::string_view content = text;
+  if (content.starts_with(kByteOrderMark)) content.remove_prefix(kByteOrderMark.size());
+  if (!content.starts_with(kColumns))
     throw std::runtime_error(file + ":1: the first line must name the columns " +
                              std::string(kColumns));
   const std::vector<TextRow> table = split_rows(text);
@@ -156,13 +174,20 @@ std::vector<RelativePose> read_measurements_csv(std::istream& in, const std::str
   return rows;
 }
 
+}  // namespace
+
+std::vector<RelativePose> read_measurements_csv(std::istream& in, const std::string& file) {
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  if (in.bad()) throw std::runtime_error(file + ": cannot be read to its end");
+  return parse_measurements(text, file);
+}
+
 RecordedGraph read_recorded_graph(const std::filesystem::path& file) {
   if (file.extension() == ".g2o") return make_recorded_graph(read_g2o(file), file.string());
   if (file.extension() != ".csv")
     throw std::runtime_error(file.string() + ": neither .g2o nor .csv");
-  std::ifstream in(file);
-  if (!in) throw std::runtime_error(file.string() + ": cannot be opened");
-  return make_recorded_graph(read_measurements_csv(in, file.string()), file.string());
+  return make_recorded_graph(parse_measurements(read_input_file(file), file.string()),
+                             file.string());
 }
 
 }  // namespace km

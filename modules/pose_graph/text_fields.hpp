@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "modules/core/config.hpp"
 #include "modules/core/text_rows.hpp"
 
 namespace km {
@@ -23,7 +24,7 @@ class TextFields {
   TextFields(const TextRow& row, const std::string& file) : row_(row), file_(file) {}
 
   [[noreturn]] void fail(const std::string& what) const {
-    throw std::runtime_error(file_ + ':' + std::to_string(row_.line) + ": " + what);
+    throw std::runtime_error(file_ + ':' + std::to_string(row_.line) + ": " + readable(what));
   }
 
   [[nodiscard]] bool at_end() const { return next_ == row_.fields.size(); }
@@ -41,6 +42,14 @@ class TextFields {
     if (!value) fail(std::string(what) + " is not a number: '" + std::string(field) + '\'');
     if (!std::isfinite(*value)) fail(std::string(what) + " is not finite");
     return *value;
+  }
+
+  /// The next field as a number within `bounds`.
+  double number(const char* what, const Bounds<double>& bounds) {
+    const double value = number(what);
+    if (!bounds.contains(value))
+      fail(std::string(what) + ' ' + shortest_text(value) + " is outside " + bounds.text());
+    return value;
   }
 
   /// The next field as an integer in [0, max].

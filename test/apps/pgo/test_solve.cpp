@@ -139,6 +139,9 @@ TEST_CASE("What cannot be done is told with the reason", "[pgo]") {
   (void)folder.write("lone.g2o", "VERTEX_SE2 0 0 0 0\n");
   (void)folder.write("others", "0 0\n1 0\n2 0\n3 0\n4 1\n5 1\n6 1\n7 1\n8 1\n");
   (void)folder.write("halves", "0 0\n1 0\n2 0\n3 0\n4 1\n5 1\n6 1\n7 1\n");
+  const std::string unit = " 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
+  (void)folder.write("far.g2o", "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1" + unit +
+                                    "EDGE_SE3:QUAT 1 2 1e308 0 0 0 0 0 1" + unit);
   // FILE and PLACE stand for the graph and its folder.
   const auto [pattern, message] = GENERATE(table<std::string, std::string>(
       {{"FILE --robots 9", "8 poses, which cannot be dealt out to 9 robots"},
@@ -157,8 +160,9 @@ TEST_CASE("What cannot be done is told with the reason", "[pgo]") {
        {"FILE --method rbcd-asynchronous --loss 1", "--loss"},
        {"FILE --json /nowhere/out.json", "there is no folder /nowhere"},
        {"FILE --json PLACE", "it is a folder"},
-       {"FILE --partition PLACE", "cannot be opened"},
+       {"FILE --partition PLACE", "a folder, not a file"},
        {"PLACE/lone.g2o", "lone.g2o: no edge"},
+       {"PLACE/far.g2o", "far.g2o:2: translation 1e+308 is outside -1e+06 .. 1e+06"},
        {"FILE --output poses.txt", "--output writes *.tum or *.g2o"},
        {"FILE --partition FILE", "not two fields"},
        {"FILE --robots 3 --partition PLACE/halves", "--robots 3: there are 2 robots"},

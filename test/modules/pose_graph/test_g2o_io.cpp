@@ -199,6 +199,13 @@ TEST_CASE("A bad g2o file is refused with its line and the reason", "[g2o]") {
       {"EDGE_SE3:QUAT 0 1" + kPose + " 1 0 0 0 0 0 1 0 0 0 0 -0.4 0 0 0 1 0 0 1 0 1",
        "weigh rotation by 1.000000 and translation by -6.0"},
       {"EDGE_SE3:QUAT 0 1" + kPose, "line ends before information"},
+      {"EDGE_SE3:QUAT 0 1 1e308 0 0 0 0 0 1" + kUnit,
+       "translation 1e+308 is outside -1e+06 .. 1e+06"},
+      {"VERTEX_SE3:QUAT 1 0 1e300 0 0 0 0 1", "translation 1e+300 is outside"},
+      {"EDGE_SE3:QUAT 0 1" + kPose + " 1e308 0 0 0 0 0 1e308 0 0 0 0 1e308 0 0 0 1 0 0 1 0 1",
+       "its inverse has a variance of 1e-308, outside 1e-15 .. 1e+12"},
+      {"EDGE_SE3:QUAT 0 1" + kPose + " 1e-13 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1",
+       "outside 1e-15 .. 1e+12"},
   }));
   CAPTURE(line);
   CHECK_THROWS_WITH(read(kVertex + "# comment\n\nFIX 0\n" + line + '\n'),
@@ -226,8 +233,13 @@ TEST_CASE("An edge with indefinite information weighs what its blocks say", "[g2
 
 TEST_CASE("A g2o file without content or that is not there is refused", "[g2o]") {
   CHECK_THROWS_WITH(read("# nothing\n"), "test.g2o: no vertex and no edge");
-  CHECK_THROWS_WITH(read_g2o(std::filesystem::path("no/such.g2o")),
-                    "no/such.g2o: cannot be opened");
+  CHECK_THROWS_WITH(read_g2o(std::filesystem::path("no/such.g2o")), "no/such.g2o: no such file");
+}
+
+TEST_CASE("A message about a broken line is short and printable", "[g2o]") {
+  std::string line = "VERTEX\x1b[2J";
+  line.resize(100'000, 'x');
+  CHECK_THROWS_WITH(read(line), Catch::Contains("VERTEX?[2Jxxx") && Catch::EndsWith("xx ..."));
 }
 
 TEST_CASE("A covariance without inverse is not written", "[g2o]") {

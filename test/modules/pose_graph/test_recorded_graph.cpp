@@ -87,6 +87,9 @@ TEST_CASE("A bad row is refused with its line and the reason", "[recorded]") {
       {"0,0,0,1,0,0,0,2,0,0,0,1,1", "quaternion has length"},
       {"0,0,0,1,0,0,0,1,inf,0,0,1,1", "translation is not finite"},
       {"0,0,0,1,0,0,0,1,0,0,0,0,1", "kappa and tau must be positive"},
+      {"0,0,0,1,0,0,0,1,0,1e308,0,1,1", "translation 1e+308 is outside -1e+06 .. 1e+06"},
+      {"0,0,0,1,0,0,0,1,0,0,0,1e-300,1", "kappa 1e-300 and tau 1 mean variances outside"},
+      {"0,0,0,1,0,0,0,1,0,0,0,1,1e20", "kappa 1 and tau 1e+20 mean variances outside"},
       {"0,0,0,1,0,0,0,1,0,0,0,1,1,1,much", "column after tau is not a number: 'much'"},
   }));
   CAPTURE(row);
@@ -154,6 +157,17 @@ TEST_CASE("A robot's verticals come with its part of the graph", "[recorded][ver
   CHECK_THROWS_WITH(read_recorded_graph(file),
                     Catch::EndsWith("7.g2o: the prior on " + to_string(elsewhere) +
                                     " is on no keyframe of robot 7"));
+}
+
+TEST_CASE("A weight that no robot optimises is refused with its edge", "[recorded]") {
+  const double information = GENERATE(1e14, 2e-12);
+  const TemporaryFolder folder;
+  G2oGraph graph;
+  graph.edges.push_back(edge({7, 0}, {7, 1}));
+  graph.edges[0].covariance /= information;
+  write_g2o(folder.path() / "7.g2o", graph);
+  CHECK_THROWS_WITH(read_recorded_graph(folder.path() / "7.g2o"),
+                    Catch::Contains("7.g2o: edge 7:0 -> 7:1 has a variance of"));
 }
 
 TEST_CASE("Files that are not one robot's drive are refused by name", "[recorded]") {
