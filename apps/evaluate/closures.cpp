@@ -8,6 +8,7 @@
 
 #include "apps/evaluate/commands.hpp"
 #include "apps/output_file.hpp"
+#include "modules/core/input_file.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/sensors/euroc_rig.hpp"
@@ -26,7 +27,7 @@ struct ClosuresCommand {
 };
 
 fs::path mav0_of(const fs::path& dataset) {
-  return fs::is_directory(dataset / "mav0") ? dataset / "mav0" : dataset;
+  return is_folder(dataset / "mav0") ? dataset / "mav0" : dataset;
 }
 
 void run(const ClosuresCommand& command) {

@@ -1,10 +1,9 @@
 #include "apps/evaluate/inputs.hpp"
 
 #include <deque>
-#include <fstream>
-#include <sstream>
 #include <stdexcept>
 
+#include "modules/core/input_file.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 
@@ -34,13 +33,9 @@ LabelPalette read_palette(std::filesystem::path file, const std::filesystem::pat
                           std::span<const MeshInput> meshes) {
   if (file.empty()) {
     file = mesh.parent_path() / "label_palette.csv";
-    if (!std::filesystem::exists(file)) return {};
+    if (is_absent(file)) return {};
   }
-  std::ifstream stream(file);
-  std::ostringstream text;
-  if (!stream || !(text << stream.rdbuf()))
-    throw std::runtime_error(file.string() + ": cannot be read");
-  LabelPalette palette = parse_label_palette(text.str(), file.string());
+  LabelPalette palette = parse_label_palette(read_input_file(file), file.string());
   for (const MeshInput& input : meshes)
     check_labels(input.mesh, input.name, palette, file.string());
   return palette;

@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <cctype>
 #include <cstring>
-#include <fstream>
 #include <iostream>
-#include <iterator>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
 
 namespace km {
@@ -28,8 +27,7 @@ bool is_image(const fs::path& path) {
 }
 
 std::vector<fs::path> listed_in(const fs::path& list, const fs::path& folder) {
-  std::ifstream file(list, std::ios::binary);
-  const std::string text(std::istreambuf_iterator<char>(file), {});
+  const std::string text = read_input_file(list);
   std::vector<fs::path> images;
   for (const TextRow& row : split_rows(text)) images.push_back(folder / row.fields.back());
   return images;
@@ -38,16 +36,16 @@ std::vector<fs::path> listed_in(const fs::path& list, const fs::path& folder) {
 std::vector<fs::path> images_in(const fs::path& folder) {
   std::vector<fs::path> images;
   for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.is_regular_file() && is_image(entry.path())) images.push_back(entry.path());
+    if (is_file(entry.path()) && is_image(entry.path())) images.push_back(entry.path());
   std::sort(images.begin(), images.end());
   return images;
 }
 
 std::vector<fs::path> expand(const fs::path& input) {
-  if (!fs::exists(input)) throw std::runtime_error(input.string() + " does not exist");
-  if (fs::is_directory(input)) {
+  if (!is_there(input)) throw std::runtime_error(input.string() + " does not exist");
+  if (is_folder(input)) {
     for (const fs::path& camera : {input / "mav0" / "cam0", input / "cam0"})
-      if (fs::exists(camera / "data.csv")) return listed_in(camera / "data.csv", camera / "data");
+      if (is_there(camera / "data.csv")) return listed_in(camera / "data.csv", camera / "data");
     return images_in(input);
   }
   if (has_extension(input, {".txt", ".csv"})) return listed_in(input, input.parent_path());
@@ -69,8 +67,7 @@ std::vector<fs::path> list_images(const std::vector<std::string>& inputs, int st
       if ((first + i) % static_cast<std::size_t>(stride) == 0) images.push_back(expanded[i]);
   }
   for (const fs::path& image : images)
-    if (!fs::is_regular_file(image))
-      throw std::runtime_error(image.string() + " does not exist or is no file");
+    if (!is_file(image)) throw std::runtime_error(image.string() + " does not exist or is no file");
   return images;
 }
 
@@ -83,7 +80,11 @@ Stamp stamp_of_image(const std::filesystem::path& image) {
 }
 
 std::vector<OrbDescriptor> orb_descriptors(const std::filesystem::path& image, int features) {
-  const cv::Mat grey = cv::imread(image.string(), cv::IMREAD_GRAYSCALE);
+  cv::Mat grey;
+  try {
+    grey = cv::imread(image.string(), cv::IMREAD_GRAYSCALE);
+  } catch (const cv::Exception&) {  // a header that promises more pixels than OpenCV takes
+  }
   if (grey.empty()) throw std::runtime_error(image.string() + " cannot be decoded as an image");
   std::vector<cv::KeyPoint> keypoints;
   cv::Mat descriptors;

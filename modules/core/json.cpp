@@ -1,8 +1,10 @@
 #include "modules/core/json.hpp"
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+
+#include "modules/core/input_file.hpp"
+#include "modules/core/text_rows.hpp"
 
 namespace km {
 
@@ -12,12 +14,9 @@ std::string json_text(const Json& json) {
 }
 
 Json read_json(const std::filesystem::path& file) try {
-  if (!std::filesystem::is_regular_file(file))
-    throw std::runtime_error(file.string() + ": no such file");
-  std::ifstream in(file, std::ios::binary);
-  return Json::parse(in);
-} catch (const Json::parse_error& error) {
-  throw std::runtime_error(file.string() + ": " + error.what());
+  return Json::parse(read_input_file(file));
+} catch (const Json::exception& error) {
+  throw std::runtime_error(file.string() + ": " + readable(error.what()));
 }
 
 std::optional<double> number_at(const Json& json, const char* pointer) {

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <utility>
 
+#include "modules/core/config.hpp"
+#include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/evaluation/association.hpp"
@@ -214,6 +214,8 @@ constexpr double kMaxTruthGap_s = 0.1;  // as for trajectories: between poses fu
 constexpr double kMaxTruthDifference_s = 0.01;
 constexpr double kMaxClosureNormError = 0.01;  // of a quaternion
 constexpr std::size_t kPoseColumn = 8;
+constexpr Stamp kMaxKeyframeStamp = std::numeric_limits<Stamp>::max() / 2;  // differences fit
+constexpr double kMaxNumber = 1e9;  // no column of a run's results comes near
 
 constexpr std::array<std::pair<const char*, ClosureStage>, 5> kStages = {
     {{"candidate", ClosureStage::kCandidate},
@@ -223,10 +225,11 @@ constexpr std::array<std::pair<const char*, ClosureStage>, 5> kStages = {
      {"inlier", ClosureStage::kInlier}}};
 
 std::string content_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream || !fs::is_regular_file(file))
-    throw ClosureFileError(file.string() + ": no such file");
-  return {std::istreambuf_iterator<char>(stream), {}};
+  try {
+    return read_input_file(file);
+  } catch (const InputFileError& error) {
+    throw ClosureFileError(error.what());
+  }
 }
 
 std::string quoted(std::string_view text) {
@@ -243,14 +246,16 @@ class Fields {
   }
 
   [[noreturn]] void fail(const std::string& why) const {
-    throw ClosureFileError(file_.string() + " line " + std::to_string(row_.line) + ": " + why);
+    throw ClosureFileError(file_.string() + " line " + std::to_string(row_.line) + ": " +
+                           readable(why));
   }
 
   [[nodiscard]] std::string_view text(std::size_t i) const { return row_.fields[i]; }
 
   [[nodiscard]] double number(std::size_t i) const {
     const auto value = parse_double(text(i));
-    if (!value || !std::isfinite(*value)) fail(quoted(text(i)) + " is not a number");
+    if (!value || !(std::abs(*value) <= kMaxNumber))
+      fail(quoted(text(i)) + " is not a number up to " + shortest_text(kMaxNumber));
     return *value;
   }
 
@@ -299,8 +304,8 @@ ClosureStage stage_of(const Fields& fields, std::size_t i) {
 std::vector<KeyframeRecord> read_keyframes(const fs::path& file) {
   std::vector<KeyframeRecord> keyframes;
   for_each_row(file, 4, [&](const Fields& fields) {
-    keyframes.push_back({fields.keyframe(0), fields.integer(2, std::numeric_limits<Stamp>::max()),
-                         fields.number(3)});
+    keyframes.push_back(
+        {fields.keyframe(0), fields.integer(2, kMaxKeyframeStamp), fields.number(3)});
   });
   return keyframes;
 }

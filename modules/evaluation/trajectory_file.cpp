@@ -4,11 +4,12 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <fstream>
-#include <iterator>
+#include <limits>
 #include <optional>
 #include <string>
 
+#include "modules/core/config.hpp"
+#include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
 
 namespace km {
@@ -16,6 +17,8 @@ namespace {
 
 constexpr std::size_t kFields = 8;
 constexpr double kMaxNormError = 0.01;
+constexpr double kMaxCoordinate_m = 1e9;  // far beyond the earth; squares keep their digits
+constexpr Stamp kMaxStamp = std::numeric_limits<Stamp>::max() / 2;  // 146 years; differences fit
 
 // Seconds to nanoseconds without the rounding of a double, which is 240 ns today.
 std::optional<Stamp> parse_seconds(std::string_view field) {
@@ -37,7 +40,7 @@ class RowParser {
                   : " (TUM: t[s], p x y z, q x y z w)"));
     const std::string_view head = row_.fields.front();
     const auto stamp = euroc ? parse_int64(head) : parse_seconds(head);
-    if (!stamp)
+    if (!stamp || *stamp > kMaxStamp || *stamp < -kMaxStamp)
       fail(std::string(head) + " is not a stamp in " + (euroc ? "nanoseconds" : "seconds"));
 
     std::array<double, kFields> v{};
@@ -47,11 +50,16 @@ class RowParser {
     if (std::abs(q.norm() - 1.0) > kMaxNormError)
       fail("the quaternion's norm is " + std::to_string(q.norm()));
     q.normalize();
+    for (const double coordinate : {v[1], v[2], v[3]})
+      if (std::abs(coordinate) > kMaxCoordinate_m)
+        fail("a coordinate of " + shortest_text(coordinate) + " m is beyond " +
+             shortest_text(kMaxCoordinate_m));
     return {*stamp, make_pose(q.toRotationMatrix(), {v[1], v[2], v[3]})};
   }
 
   [[noreturn]] void fail(const std::string& problem) const {
-    throw TrajectoryFileError(name_ + " line " + std::to_string(row_.line) + ": " + problem);
+    throw TrajectoryFileError(name_ + " line " + std::to_string(row_.line) + ": " +
+                              readable(problem));
   }
 
  private:
@@ -96,16 +104,24 @@ std::vector<StampedPose> parse_trajectory(std::string_view text, const std::stri
 
 std::optional<std::filesystem::path> find_trajectory(const std::filesystem::path& place) {
   for (const auto& file : {place, place / "data.csv", place / "groundtruth_tum.txt"})
-    if (std::filesystem::is_regular_file(file)) return file;
+    if (is_file(file)) return file;
   return std::nullopt;
 }
 
 std::vector<StampedPose> read_trajectory(const std::filesystem::path& place) {
   const auto file = find_trajectory(place);
-  if (!file) throw TrajectoryFileError(place.string() + ": no such file");
-  std::ifstream stream(*file, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  return parse_trajectory(text, file->string());
+  if (!file) {
+    const std::string problem = problem_of_file(place);
+    throw TrajectoryFileError(place.string() + ": " +
+                              (is_folder(place)  ? "no data.csv or groundtruth_tum.txt in it"
+                               : problem.empty() ? "not a file"
+                                                 : problem));
+  }
+  try {
+    return parse_trajectory(read_input_file(*file), file->string());
+  } catch (const InputFileError& error) {
+    throw TrajectoryFileError(error.what());
+  }
 }
 
 }  // namespace km

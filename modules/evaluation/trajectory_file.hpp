@@ -25,8 +25,8 @@ struct TrajectoryFileError : std::runtime_error {
 /// pz, qw, qx, qy, qz, ...`, with blanks TUM's `t[s] px py pz qx qy qz qw`. Comments and one header
 /// row are skipped. Throws TrajectoryFileError for a file that is missing or empty, and for a row
 /// with too few fields, a field that is not a finite number, a quaternion whose norm is off by more
-/// than 1 %, or a stamp before the last. Of rows with the same stamp, which published truths have,
-/// the first counts.
+/// than 1 %, a coordinate beyond 1e9 m, a stamp beyond 146 years, or a stamp before the last. Of
+/// rows with the same stamp, which published truths have, the first counts.
 [[nodiscard]] std::vector<StampedPose> read_trajectory(const std::filesystem::path& file);
 
 /// The same for the text of a file; `name` stands for it in messages.

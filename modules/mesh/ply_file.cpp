@@ -15,10 +15,15 @@
 #include <system_error>
 #include <vector>
 
+#include "modules/core/config.hpp"
+#include "modules/core/input_file.hpp"
+#include "modules/core/text_rows.hpp"
 #include "modules/core/write_file.hpp"
 
 namespace km {
 namespace {
+
+constexpr double kMaxCoordinate_m = 1e9;  // squares of floats stay finite
 
 enum class PlyFormat { kAscii, kLittleEndian, kBigEndian };
 enum class PlyType { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
@@ -228,6 +233,9 @@ void read_vertices(const PlyElement& element, Body& body, LabelledMesh& mesh) {
     const Eigen::Vector3d point(value_of(row, x), value_of(row, y), value_of(row, z));
     if (!point.allFinite())
       throw std::runtime_error("vertex " + std::to_string(i) + " is not finite");
+    if (point.cwiseAbs().maxCoeff() > kMaxCoordinate_m)
+      throw std::runtime_error("vertex " + std::to_string(i) + " is beyond " +
+                               shortest_text(kMaxCoordinate_m) + " m");
     mesh.vertices.push_back(point.cast<float>());
     if (red >= 0 && green >= 0 && blue >= 0)
       mesh.colors.push_back({as_byte(value_of(row, red), "red"),
@@ -331,12 +339,15 @@ std::string encode(const LabelledMesh& mesh) {
 }  // namespace
 
 LabelledMesh read_ply(const std::filesystem::path& file) {
+  const std::string problem = problem_of_file(file);
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw MeshFileError(file.string() + ": cannot be opened");
+  if (!stream || !problem.empty())
+    throw MeshFileError(file.string() + ": cannot be opened" +
+                        (problem.empty() ? "" : ": " + problem));
   try {
     return read(stream);
   } catch (const std::runtime_error& error) {
-    throw MeshFileError(file.string() + ": " + error.what());
+    throw MeshFileError(file.string() + ": " + readable(error.what()));
   }
 }
 

@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <cstring>
 #include <fstream>
-#include <sstream>
 #include <stdexcept>
+#include <string>
+
+#include "modules/core/input_file.hpp"
 
 namespace km {
 namespace {
@@ -122,11 +124,11 @@ VocabularyData deserialize(const std::string& bytes, const std::string& name) {
 }
 
 Vocabulary load_vocabulary(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream bytes;
-  if (!std::filesystem::is_regular_file(path) || !file || !(bytes << file.rdbuf()))
-    throw std::runtime_error("vocabulary " + path.string() + ": cannot be read");
-  return Vocabulary(deserialize(std::move(bytes).str(), path.string()));
+  try {
+    return Vocabulary(deserialize(read_input_file(path), path.string()));
+  } catch (const InputFileError& error) {
+    throw std::runtime_error(std::string("vocabulary ") + error.what());
+  }
 }
 
 void save_vocabulary(const VocabularyData& data, const std::filesystem::path& path) {

@@ -85,7 +85,7 @@ TEST_CASE("mesh refuses what it cannot compare, by name", "[evaluate]") {
   const Meshes meshes;
   const std::string truth = kTool + "mesh --truth " + meshes.truth.string() + " --estimate ";
   CHECK(run_command(truth + "/none.ply").output ==
-        "kimera_multi_evaluate: /none.ply: cannot be opened\n");
+        "kimera_multi_evaluate: /none.ply: cannot be opened: no such file\n");
   const auto palette =
       meshes.folder.write("few.csv", "name,red,green,blue,alpha,id\nfloor,1,2,3,255,1\n");
   const auto mismatch = run_command(truth + meshes.b.string() + " --palette " + palette.string());
@@ -93,7 +93,7 @@ TEST_CASE("mesh refuses what it cannot compare, by name", "[evaluate]") {
   CHECK_THAT(mismatch.output,
              Catch::Contains("world.ply: label 2 is not in") && Catch::Contains("few.csv"));
   CHECK_THAT(run_command(truth + meshes.b.string() + " --palette /none.csv").output,
-             Catch::Contains("/none.csv: cannot be read"));
+             Catch::Contains("/none.csv: no such file"));
   LabelledMesh cloud = room();
   cloud.faces.clear();
   write_ply(meshes.a, cloud);

@@ -16,6 +16,7 @@
 #include "test/modules/place_recognition/synthetic_orb.hpp"
 #include "test/support/command.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/spoilt_input.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -287,9 +288,42 @@ TEST_CASE("A malformed tree is refused although its checksum fits", "[place_reco
                     Contains("offset 40: node 0 has 5 children, branching is 4"));
 }
 
+TEST_CASE("A spoilt vocabulary is refused by name", "[place_recognition]") {
+  check_spoilt<std::runtime_error>(
+      serialize(small_vocabulary()), "spoilt.kmvoc",
+      [](const std::string& bytes) { (void)deserialize(bytes, "spoilt.kmvoc"); });
+  check_no_files<std::runtime_error>(".kmvoc",
+                                     [](const auto& place) { (void)load_vocabulary(place); });
+}
+
+TEST_CASE("A spoilt tree with a checksum that fits is refused, or finds words",
+          "[place_recognition]") {
+  const VocabularyData good = small_vocabulary();
+  unsigned refused = 0;
+  for (unsigned seed = 0; seed < spoilt_files(); ++seed) {
+    CAPTURE(seed);
+    std::mt19937 rng(seed);
+    VocabularyData data = good;
+    const auto spoil = [&](auto& values, auto value) {
+      values[std::uniform_int_distribution<std::size_t>(0, values.size() - 1)(rng)] = value;
+    };
+    if (seed % 3 == 0) spoil(data.children, static_cast<std::uint8_t>(rng() % 6));
+    if (seed % 3 == 1) spoil(data.idf, std::bit_cast<float>(static_cast<std::uint32_t>(rng())));
+    if (seed % 3 == 2) data.depth = static_cast<int>(rng() % 12);
+    try {
+      const Vocabulary vocabulary(deserialize(serialize(data), "forged"));
+      for (const float idf : data.idf) CHECK((std::isfinite(idf) && idf >= 0.0F));
+    } catch (const std::runtime_error& error) {
+      ++refused;
+      CHECK_THAT(error.what(), Contains("forged"));
+    }
+  }
+  CHECK(refused > 0);
+}
+
 TEST_CASE("A file that is not there is named", "[place_recognition]") {
   CHECK_THROWS_WITH(load_vocabulary("/nowhere/at.all"), Contains("/nowhere/at.all"));
-  CHECK_THROWS_WITH(load_vocabulary("config"), Contains("cannot be read"));  // a folder
+  CHECK_THROWS_WITH(load_vocabulary("config"), Contains("config: a folder, not a file"));
   CHECK_THROWS_WITH(save_vocabulary(small_vocabulary(), "/nowhere/at.all"),
                     Contains("cannot be written"));
 }
