@@ -1,16 +1,18 @@
 #include "runtime/yaml_config.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <fstream>
+#include <cstdint>
 #include <numeric>
-#include <system_error>
+
+#include "modules/core/input_file.hpp"
+#include "modules/core/text_rows.hpp"
 
 namespace km {
 namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::uintmax_t kMaxYaml_bytes = std::uintmax_t{16} << 20U;  // people write less
 constexpr std::string_view kDataset = "${DATASET}";
 
 // Levenshtein distance, by its recurrence over the rows of the table.
@@ -35,6 +37,14 @@ std::string one_line(const YAML::Node& node) {
   return emitter.c_str();
 }
 
+// Of all problems together, and of one: a file that is no configuration makes a million.
+constexpr std::size_t kMaxMessage = 4000, kMaxProblem = 500;
+
+// A problem: what files say in it may be long, or not printable.
+std::string line_of(const std::string& problem) {
+  return readable(problem, kMaxProblem) + '\n';
+}
+
 std::string joined(const std::string& name, const std::string& key) {
   return name.empty() ? key : name + '.' + key;
 }
@@ -51,15 +61,24 @@ void apply_quick(ConfigSection& section, const std::string& name, const ConfigCo
 }  // namespace
 
 void ConfigProblems::finish() const {
-  const std::string all = unknown + others;
-  if (!all.empty()) throw ConfigError(all.substr(0, all.size() - 1));  // without the last newline
+  std::string all = unknown + others;
+  if (all.empty()) return;
+  all.pop_back();  // the last newline
+  if (all.size() > kMaxMessage) {
+    const std::size_t end = std::min(all.rfind('\n', kMaxMessage), kMaxMessage);
+    const auto cut = std::count(all.begin() + static_cast<std::ptrdiff_t>(end), all.end(), '\n');
+    all.resize(end);
+    all += "\n... and " + std::to_string(cut) + " more problems";
+  }
+  throw ConfigError(all);
 }
 
-YAML::Node load_yaml(const fs::path& file) {
-  std::ifstream input(file);
-  if (!input)
-    throw ConfigError(file.string() + ": cannot open: " + std::generic_category().message(errno));
-  return parse_yaml({std::istreambuf_iterator<char>(input), {}}, file.string());
+YAML::Node load_yaml(const fs::path& file) try {
+  if (const std::string problem = problem_of_file(file); !problem.empty())
+    throw ConfigError(file.string() + ": cannot open: " + problem);
+  return parse_yaml(read_input_file(file, kMaxYaml_bytes), file.string());
+} catch (const InputFileError& error) {
+  throw ConfigError(error.what());
 }
 
 YAML::Node parse_yaml(const std::string& text, const std::string& origin) try {
@@ -91,7 +110,7 @@ ConfigSection read_section(const YAML::Node& node, const std::string& name, cons
   ConfigSection section{place_of(node, file), {}, {}};
   const std::string called = name.empty() ? "the file" : name;
   const auto problem = [&](const std::string& where, const std::string& text) {
-    context.problems.others += where + ": " + text + '\n';
+    context.problems.others += line_of(where + ": " + text);
   };
   if (node.IsNull()) return section;
   if (!node.IsMap()) {
@@ -135,8 +154,9 @@ std::string YamlFields::decode(const YAML::Node& node, fs::path& value, Input in
     name.replace(variable, kDataset.size(), fs::absolute(context_.dataset).string());
   }
   value = name.empty() ? fs::path() : (context_.folder / name).lexically_normal();
-  const bool is_there = value.empty() || fs::exists(value);
-  return is_there || !input.must_exist ? "" : "is no file or folder: there is no " + value.string();
+  return value.empty() || is_there(value) || !input.must_exist
+             ? ""
+             : "is no file or folder: there is no " + value.string();
 }
 
 void YamlFields::required(std::initializer_list<const char*> keys) {
@@ -164,7 +184,7 @@ void YamlFields::finish() {
     for (const auto& [key, value] : *values)
       if (!known_.contains(key))
         context_.problems.unknown +=
-            value.where + ": unknown key " + full_name(key) + suggestion(key, known_) + '\n';
+            line_of(value.where + ": unknown key " + full_name(key) + suggestion(key, known_));
 }
 
 std::string YamlFields::full_name(const std::string& key) const {
@@ -178,7 +198,7 @@ const ConfigValue* YamlFields::find(const char* key) {
 }
 
 void YamlFields::add(const std::string& where, const char* key, const std::string& problem) {
-  context_.problems.others += where + ": " + full_name(key) + ' ' + problem + '\n';
+  context_.problems.others += line_of(where + ": " + full_name(key) + ' ' + problem);
 }
 
 }  // namespace km

@@ -43,8 +43,10 @@ double parse_rate(const std::string& text) {
   if (text == "max") return std::numeric_limits<double>::infinity();
   char* end = nullptr;
   const double rate = std::strtod(text.c_str(), &end);
-  if (end == text.c_str() || *end != '\0' || !(rate > 0.0))
-    throw CLI::ValidationError("--rate", text + " is neither a positive number nor max");
+  constexpr Bounds<double> kRate{1e-3, 1e6};  // a clock counts no longer waits
+  if (end == text.c_str() || *end != '\0' || !kRate.contains(rate))
+    throw CLI::ValidationError(
+        "--rate", text + " is neither a positive number nor max (" + kRate.text() + ")");
   return rate;
 }
 

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "modules/core/input_file.hpp"
 #include "modules/sensors/text_file.hpp"
 
 namespace km {
@@ -12,12 +13,12 @@ namespace {
 namespace fs = std::filesystem;
 
 fs::path sensor_folder(const fs::path& dataset) {
-  return fs::is_directory(dataset / "mav0") ? dataset / "mav0" : dataset;
+  return is_folder(dataset / "mav0") ? dataset / "mav0" : dataset;
 }
 
 DepthFrom depth_source(DenseSource wanted, const fs::path& sensors) {
-  const bool recorded = fs::is_directory(sensors / "depth0");
-  const bool stereo = fs::is_directory(sensors / "cam1");
+  const bool recorded = is_folder(sensors / "depth0");
+  const bool stereo = is_folder(sensors / "cam1");
   if (wanted == DenseSource::kRecorded && !recorded)
     throw ConfigError("mapping.depth: recorded, but there is no depth0 in " + sensors.string() +
                       "; stereo computes it");
@@ -27,7 +28,7 @@ DepthFrom depth_source(DenseSource wanted, const fs::path& sensors) {
 }
 
 LabelsFrom label_source(DenseSource wanted, bool has_network, const fs::path& sensors) {
-  const bool recorded = fs::is_directory(sensors / "label0");
+  const bool recorded = is_folder(sensors / "label0");
   if (wanted == DenseSource::kRecorded && !recorded)
     throw ConfigError("mapping.labels: recorded, but there is no label0 in " + sensors.string());
   if (wanted == DenseSource::kComputed && !has_network)
@@ -40,7 +41,7 @@ LabelsFrom label_source(DenseSource wanted, bool has_network, const fs::path& se
 }
 
 LabelPalette read_palette(const fs::path& file) {
-  if (!fs::is_regular_file(file))
+  if (!is_file(file))
     throw ConfigError(file.string() +
                       ": no such file; mapping.mode: semantic needs a table of the labels there, "
                       "or as segmentation.palette");

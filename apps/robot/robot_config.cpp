@@ -4,6 +4,7 @@
 #include <type_traits>
 
 #include "apps/program_folder.hpp"
+#include "modules/core/input_file.hpp"
 #include "runtime/config_layers.hpp"
 
 namespace km {
@@ -46,7 +47,7 @@ fs::path find_shipped_file(const std::string& name) {
                                           program / "../share/kimera_multi" / name};
   std::string tried;
   for (const fs::path& place : places) {
-    if (fs::is_regular_file(place)) return place;
+    if (is_file(place)) return place;
     tried += "\n  " + place.lexically_normal().string();
   }
   throw ConfigError("no file " + name + "; looked for" + tried);

@@ -7,6 +7,7 @@
 #include <map>
 #include <utility>
 
+#include "modules/core/input_file.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/evaluation/trajectory_report.hpp"
 #include "modules/mesh/ply_file.hpp"
@@ -35,7 +36,7 @@ Meshes read_meshes(const TeamPlan& plan, const char* file, std::vector<std::stri
   Meshes meshes;
   for (const RobotPlan& robot : plan.robots) {
     const fs::path path = plan.output / robot.name / file;
-    if (!fs::exists(path)) continue;
+    if (!is_there(path)) continue;
     auto mesh = attempt(notes, [&] { return read_ply(path); });
     if (mesh && mesh->faces.empty())
       notes.push_back(path.string() + ": the mesh is empty");

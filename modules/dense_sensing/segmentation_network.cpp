@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/images/image_view.hpp"
 
@@ -48,8 +49,7 @@ std::string reason(const cv::Exception& error) {
 }
 
 cv::dnn::Net read_network(const std::string& file) {
-  if (!std::filesystem::is_regular_file(file))
-    throw ConfigError("segmentation.network: no such file: " + file + "\n");
+  if (!is_file(file)) throw ConfigError("segmentation.network: no such file: " + file + "\n");
   try {
     cv::dnn::Net net = cv::dnn::readNetFromONNX(file);
     net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);

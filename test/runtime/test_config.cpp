@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "runtime/config_layers.hpp"
+#include "test/support/spoilt_input.hpp"
 
 using Catch::Matchers::Contains;
 
@@ -97,6 +98,43 @@ TEST_CASE("A file that is not YAML is reported where it breaks", "[config]") {
   ConfigLayers layers;
   layers.add_file("no/such/file.yaml");
   CHECK_THROWS_WITH(layers.finish(), Contains("no/such/file.yaml: cannot open"));
+}
+
+TEST_CASE("A spoilt configuration is refused by name, or keeps the bounds", "[config]") {
+  const TemporaryFolder folder;
+  check_spoilt<ConfigError>(
+      "# a toy\ntoy:\n  count: 5\n  length_m: 0.75  # [m]\n  flag: true\n  colour: green\n"
+      "  hosts: [a, b]\n  name: \"some\"\n",
+      "spoilt.yaml", [&](const std::string& text) {
+        ConfigLayers layers;
+        layers.add_file(folder.write("spoilt.yaml", text));
+        const auto toy = layers.load<ToyConfig>();
+        layers.finish();
+        CHECK_NOTHROW(checked(toy));
+      });
+}
+
+TEST_CASE("YAML that refers to itself or grows without end is refused or ends", "[config]") {
+  CHECK_THAT(complaint("toy: {count: &a [*a]}"), Contains("a.yaml:1"));
+  CHECK_THAT(complaint("toy: &a\n  count: *a\n"), Contains("a.yaml"));
+  CHECK_THAT(complaint("toy: {count: " + std::string(100'000, '[') + "}"), Contains("not YAML"));
+  std::string laughs = "a0: &a0 [x, x]\n";
+  for (int i = 1; i < 40; ++i)
+    laughs += 'a' + std::to_string(i) + ": &a" + std::to_string(i) + " [*a" +
+              std::to_string(i - 1) + ", *a" + std::to_string(i - 1) + "]\n";
+  CHECK_THAT(complaint(laughs + "toy: {count: *a39}\n"), Contains("toy.count"));
+}
+
+TEST_CASE("A thousand problems are told by the first and a count", "[config]") {
+  std::string yaml = "toy:\n";
+  for (int i = 0; i < 1000; ++i) yaml += "  key" + std::to_string(i) + ": 1\n";
+  const std::string text = complaint(yaml);
+  CHECK_THAT(text, Contains("a.yaml:2: unknown key toy.key0") && Contains(" more problems"));
+  CHECK(text.size() < 5000);
+}
+
+TEST_CASE("What is no configuration file is refused by name", "[config]") {
+  check_no_files<ConfigError>(".yaml", [](const auto& place) { (void)load_yaml(place); });
 }
 
 TEST_CASE("Later layers win key by key, the command line last", "[config]") {

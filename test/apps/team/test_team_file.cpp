@@ -4,6 +4,7 @@
 
 #include "apps/team/run_team.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/spoilt_input.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -34,6 +35,26 @@ std::string problems_of(const fs::path& file, const fs::path& dataset) {
 }
 
 }  // namespace
+
+TEST_CASE("A spoilt team file is refused by name, or plans robots", "[team]") {
+  const Inputs inputs;
+  check_spoilt<ConfigError>(
+      "config: common.yaml\ntruth: truth.csv\nrate: max\ndomain: 7\ntime_limit_s: 12.5\nrobots:\n"
+      "  - {id: 3, name: a, dataset: \"${DATASET}\", from: 0, to: 7.5}\n"
+      "  - {id: 300, graph: \"${DATASET}/g.csv\", arguments: --verbose}\n",
+      "team.yaml", [&](const std::string& text) {
+        const TeamPlan plan = read_team_file(inputs.team(text), inputs.dataset);
+        CHECK_FALSE(plan.robots.empty());
+        for (const RobotPlan& robot : plan.robots) CHECK(is_folder_name(robot.name));
+      });
+}
+
+TEST_CASE("A team file's input that is a loop of links is refused with its line", "[team]") {
+  const Inputs inputs;
+  fs::create_symlink("loop", inputs.folder.path() / "loop");
+  CHECK_THAT(problems_of(inputs.team("robots:\n  - {id: 1, dataset: loop}\n"), ""),
+             Catch::Contains("team.yaml:2") && Catch::Contains("is no file or folder"));
+}
 
 TEST_CASE("A team file gives the robots their inputs", "[team]") {
   const Inputs inputs;
@@ -167,7 +188,7 @@ TEST_CASE("A team file without robots or dataset is refused", "[team]") {
   CHECK_THAT(problems_of(inputs.team("robots:\n  - {id: 1, dataset: \"${DATASET}\"}\n"), {}),
              Catch::Contains(":2: robots.dataset = ${DATASET} needs --dataset"));
   CHECK_THAT(problems_of(inputs.team("robots: [\n"), {}), Catch::Contains("team.yaml:2: not YAML"));
-  CHECK_THAT(problems_of("/no/team.yaml", {}), Catch::Contains("No such file"));
+  CHECK_THAT(problems_of("/no/team.yaml", {}), Catch::Contains("no such file"));
   CHECK_THAT(problems_of(inputs.team("just text\n"), {}),
              Catch::Contains("is not a map of keys and values"));
 }
