@@ -170,10 +170,9 @@ void FrontalCholesky::backward(MatrixXd& X) const {
 
 double FrontalCholesky::magnitude(const Eigen::VectorXd& b) const {
   double sum = 0.0;
-  Eigen::VectorXd rows;
   for (std::size_t f = 0; f < factors_.size(); ++f) {
     const EliminationPlan::Front& front = plan_->fronts()[f];
-    rows.resize(factors_[f].rows());
+    Eigen::VectorXd rows(factors_[f].rows());
     for (std::size_t k = 0; k < front.nodes.size(); ++k)
       rows.segment(block_ * static_cast<Index>(k), block_) =
           b.segment(block_ * front.nodes[k], block_);
