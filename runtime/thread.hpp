@@ -3,6 +3,8 @@
 #include <pthread.h>
 #include <sys/resource.h>
 #include <unistd.h>
+
+#include <algorithm>
 #include <string>
 
 namespace km {
@@ -16,9 +18,11 @@ inline void name_this_thread(const std::string& name) {
 /// then gives it about a tenth of what a thread of ordinary priority gets. For handlers of work
 /// that may be late, so that it does not slow down what may not. Later calls do nothing.
 inline void work_in_background() {
-  constexpr int kNiceness = 10;
-  static thread_local const int outcome =
-      setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNiceness);
+  static thread_local const int outcome = [] {
+    constexpr int kNiceness = 10;
+    const auto self = static_cast<id_t>(gettid());
+    return setpriority(PRIO_PROCESS, self, std::max(kNiceness, getpriority(PRIO_PROCESS, self)));
+  }();
   static_cast<void>(outcome);  // where it is not allowed, the thread competes as before
 }
 
