@@ -21,13 +21,15 @@ SignalWatch::SignalWatch() {
   sigaddset(&watched_, SIGTERM);
   struct sigaction on_hangup {};
   sigaction(SIGHUP, nullptr, &on_hangup);
-  if (on_hangup.sa_handler != SIG_IGN) sigaddset(&watched_, SIGHUP);
+  previous_hangup_ = on_hangup.sa_handler;
+  if (previous_hangup_ != SIG_IGN) sigaddset(&watched_, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &watched_, &previous_);
   previous_pipe_ = std::signal(SIGPIPE, SIG_IGN);
 }
 
 SignalWatch::~SignalWatch() {
   std::signal(SIGPIPE, previous_pipe_);
+  std::signal(SIGHUP, previous_hangup_);  // which give_up() ignores
   pthread_sigmask(SIG_SETMASK, &previous_, nullptr);
 }
 

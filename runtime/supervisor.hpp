@@ -42,6 +42,7 @@ class SignalWatch {
   sigset_t watched_{};
   sigset_t previous_{};
   void (*previous_pipe_)(int) = nullptr;  // what SIGPIPE did before
+  void (*previous_hangup_)(int) = nullptr;  // likewise
 };
 
 /// Why a robot stopped.

@@ -61,8 +61,10 @@ std::map<fs::path, fs::file_time_type> written(const Step& step) {
   std::map<fs::path, fs::file_time_type> times;
   std::error_code error;  // of folders and files that are not there (any more)
   for (const fs::path& output : step.outputs)
-    for (const auto& file : fs::directory_iterator(fs::absolute(output).parent_path(), error))
+    for (const auto& file : fs::directory_iterator(fs::absolute(output).parent_path(), error)) {
+      if (!file.is_regular_file(error)) continue;  // records are written in a folder beside them
       if (const auto time = file.last_write_time(error); !error) times[file.path()] = time;
+    }
   return times;
 }
 

@@ -121,6 +121,12 @@ std::exception_ptr DdsBridge::error() const {
   return peers_.error();
 }
 
+std::vector<Heartbeat*> DdsBridge::heartbeats() {
+  std::vector<Heartbeat*> all{&receiving_, &sender_.heartbeat()};
+  for (const auto& topic : incoming_) all.push_back(&topic->heartbeat());
+  return all;
+}
+
 void DdsBridge::receive_until_stopped() try {
   name_this_thread("dds_receive");
   std::vector<dds_attach_t> triggered(incoming_.size() + 3);
@@ -129,6 +135,7 @@ void DdsBridge::receive_until_stopped() try {
     const dds_return_t count =
         check_dds(dds_waitset_wait(waitset_.handle(), triggered.data(), triggered.size(), kWakeUp),
                   "cannot wait for messages");
+    const Heartbeat::Step step(receiving_);
     dds_read_guardcondition(stop_request_.handle(), &stop);
     // Who is there comes before what they say.
     const double now_s = steady_now_s();

@@ -106,6 +106,9 @@ class DdsBridge final : public Node {
   void stop() noexcept override;
   std::exception_ptr error() const override;
   DurationHistogram timing() const override { return sender_.timing(); }
+  std::vector<Heartbeat*> heartbeats() override;
+  /// A thin link may hold up the socket for as long.
+  double step_limit_s() const override { return 120.0; }
 
  private:
   using Job = std::function<void()>;
@@ -127,6 +130,7 @@ class DdsBridge final : public Node {
   DdsEntity waitset_;
   DdsEntity stop_request_;  // guard condition
   bool stopped_ = false;
+  Heartbeat receiving_;
   std::exception_ptr receive_error_;
   std::atomic<bool> receive_failed_ = false;
   std::thread receiver_;

@@ -241,6 +241,7 @@ void IncomingTopic::deliver_until_stopped() try {
     if (retry) retried_s = now_s;
     if (auto filed = filed_.pop(now_s); filed || retry) {
       lock.unlock();
+      const Heartbeat::Step step(delivering_);
       if (retry) deliver_again(now_s);
       if (filed && deliver(*filed) == Verdict::kNotYet) sealed_.push_back(std::move(*filed));
       lock.lock();

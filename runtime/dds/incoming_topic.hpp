@@ -19,6 +19,7 @@
 #include "runtime/dds/fair_queue.hpp"
 #include "runtime/dds/outgoing_topic.hpp"
 #include "runtime/dds/sequence_tracker.hpp"
+#include "runtime/heartbeat.hpp"
 
 namespace km {
 
@@ -73,6 +74,8 @@ class IncomingTopic {
   /// What is still filed is dropped. Idempotent.
   void stop() noexcept;
   [[nodiscard]] std::exception_ptr error() const { return failed_ ? error_ : nullptr; }
+
+  [[nodiscard]] Heartbeat& heartbeat() { return delivering_; }
 
   /// Thread-safe.
   void add_to(TrafficSnapshot& snapshot) const;
@@ -136,6 +139,7 @@ class IncomingTopic {
   std::map<std::string, std::uint64_t> refused_;
 
   std::shared_ptr<InFlight> in_flight_ = std::make_shared<InFlight>();
+  Heartbeat delivering_;
   std::exception_ptr error_;
   std::atomic<bool> failed_ = false;
   std::thread delivery_;

@@ -193,6 +193,7 @@ TEST_CASE("Two nodes of one name are refused", "[supervisor]") {
 
 TEST_CASE("The first signal ends the run in order", "[supervisor]") {
   const int signal = GENERATE(SIGINT, SIGTERM, SIGHUP);
+  const auto before = std::signal(SIGHUP, SIG_DFL);  // the tests may run under nohup
   Run run;
   auto& [log, diary, signals, supervisor] = run;
   supervisor.emplace<ToyNode>("camera", diary);
@@ -201,6 +202,7 @@ TEST_CASE("The first signal ends the run in order", "[supervisor]") {
     if (!std::exchange(sent, true)) kill(getpid(), signal);
     return false;
   });
+  std::signal(SIGHUP, before);
   CHECK(result.interrupted);
   CHECK(diary.back() == "stop camera");
 }

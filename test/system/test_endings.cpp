@@ -28,7 +28,8 @@ std::vector<std::string> robot_on_walk(const fs::path& walk, const fs::path& out
           std::to_string(random_domain())};
 }
 
-TEST_CASE("A robot whose output nobody reads ends on a signal with its results", "[system]") {
+TEST_CASE("A robot whose output nobody reads ends on a signal with its results",
+          "[system][endings]") {
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "out";
   const FullPipe blocked;
@@ -99,7 +100,7 @@ struct RobotOnSmallDisk {
 };
 
 TEST_CASE("On a full or read-only disk a robot goes on, names what is lost, and ends with 4",
-          "[system]") {
+          "[system][endings]") {
   const bool full = GENERATE(true, false);
   CAPTURE(full);
   RobotOnSmallDisk run;
@@ -123,7 +124,7 @@ TEST_CASE("On a full or read-only disk a robot goes on, names what is lost, and 
     CHECK(entry.path().extension() != ".part");
 }
 
-TEST_CASE("One result that cannot be written leaves the others whole", "[system]") {
+TEST_CASE("One result that cannot be written leaves the others whole", "[system][endings]") {
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "out";
   const int quiet = open("/dev/null", O_WRONLY | O_CLOEXEC);
@@ -153,7 +154,8 @@ std::vector<std::string> team_on_walks(const TemporaryFolder& folder) {
           folder.path().string()};
 }
 
-TEST_CASE("A team whose output nobody reads ends on a signal with the results of all", "[system]") {
+TEST_CASE("A team whose output nobody reads ends on a signal with the results of all",
+          "[system][endings]") {
   const TemporaryFolder folder;
   const FullPipe blocked;
   Child team(team_on_walks(folder), blocked.writer());
@@ -165,7 +167,7 @@ TEST_CASE("A team whose output nobody reads ends on a signal with the results of
     CHECK(read_summary(folder.path() / robot / "summary.json").exit_reason == "interrupted");
 }
 
-TEST_CASE("A hung-up terminal and a closed pipe end a robot in order", "[system]") {
+TEST_CASE("A hung-up terminal and a closed pipe end a robot in order", "[system][endings]") {
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "out";
   std::array<int, 2> ends{};
@@ -180,7 +182,7 @@ TEST_CASE("A hung-up terminal and a closed pipe end a robot in order", "[system]
   CHECK(read_summary(output / "summary.json").exit_reason == "interrupted");
 }
 
-TEST_CASE("Robots whose team is killed end in order with their results", "[system]") {
+TEST_CASE("Robots whose team is killed end in order with their results", "[system][endings]") {
   const TemporaryFolder folder;
   const int quiet = open("/dev/null", O_WRONLY | O_CLOEXEC);
   {
