@@ -41,7 +41,7 @@ class SignalWatch {
  private:
   sigset_t watched_{};
   sigset_t previous_{};
-  void (*previous_pipe_)(int) = nullptr;  // what SIGPIPE did before
+  void (*previous_pipe_)(int) = nullptr;    // what SIGPIPE did before
   void (*previous_hangup_)(int) = nullptr;  // likewise
 };
 
