@@ -1,5 +1,9 @@
 #pragma once
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <map>
@@ -17,10 +21,18 @@
 
 namespace km {
 
-/// A DDS domain that no other test is likely to be in.
+/// A DDS domain that no other test uses while this process runs: tests run side by side, and robots
+/// of two tests with one id are twins.
 inline int random_domain() {
   std::random_device device;
-  return std::uniform_int_distribution<int>(1, 230)(device);
+  for (;;) {
+    const int domain = std::uniform_int_distribution<int>(1, 230)(device);
+    const auto name = "km_test_domain_" + std::to_string(domain);
+    const auto file = std::filesystem::temp_directory_path() / name;
+    const int lock = open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
+    if (lock < 0 || flock(lock, LOCK_EX | LOCK_NB) == 0) return domain;  // kept to the end
+    close(lock);
+  }
 }
 
 /// "robot3".
