@@ -94,7 +94,8 @@ class Splitter {
         last = &faces_of_cell_[cell];
         last_cell = cell;
       }
-      std::ranges::rotate(face, std::ranges::min_element(face));  // lowest first, same orientation
+      std::rotate(face.begin(), std::ranges::min_element(face),
+                  face.end());  // lowest first, same orientation
       last->push_back(face);
     }
   }

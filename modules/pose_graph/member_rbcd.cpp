@@ -95,7 +95,8 @@ QuadraticProblem MemberRbcd::make_problem() {
   fixed_.resize(options_.rank, 4 * slots);
   for (auto& [robot, neighbour] : neighbours_) {
     std::ranges::sort(neighbour.own);
-    neighbour.own.erase(std::ranges::unique(neighbour.own).begin(), neighbour.own.end());
+    neighbour.own.erase(std::unique(neighbour.own.begin(), neighbour.own.end()),
+                        neighbour.own.end());
     for (const auto& [keyframe, slot] : neighbour.slot_of) {
       const KeyframeId id{robot, keyframe};
       const auto told = graph_.told.find(id);

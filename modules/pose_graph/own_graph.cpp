@@ -95,8 +95,9 @@ bool OwnGraph::add(const InlierSet& set) {
   newest = set;
   for (ClosureId& id : newest.closures) id = closure_id(id.from, id.to);
   std::ranges::sort(newest.closures);
-  const auto repeated = std::ranges::unique(newest.closures);
-  newest.closures.erase(repeated.begin(), repeated.end());
+  // Not std::ranges::unique(): Clang 14 cannot read what libstdc++ 12 returns.
+  const auto repeated = std::unique(newest.closures.begin(), newest.closures.end());
+  newest.closures.erase(repeated, newest.closures.end());
   sets->second.changed = true;
   complete_sets();
   return true;
