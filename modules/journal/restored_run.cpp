@@ -1,0 +1,115 @@
+#include "modules/journal/restored_run.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "modules/core/input_file.hpp"
+
+namespace km {
+namespace {
+
+bool is_final(const ClosureOutcome& outcome) {
+  return outcome.stage >= ClosureStage::kVerified ||
+         (outcome.stage == ClosureStage::kReceived && !outcome.reason.empty());
+}
+
+}  // namespace
+
+void RunRestorer::take(JournalEntry entry) {
+  if (!started_ && !std::holds_alternative<JournalStart>(entry))
+    throw std::invalid_argument("nothing says whose run it is");
+  std::visit([this](auto& value) { add(std::move(value)); }, entry);
+}
+
+void RunRestorer::add(JournalStart start) {
+  if (started_ && start.robot != run_.robot)
+    throw std::invalid_argument("begun by robot " + std::to_string(run_.robot) +
+                                ", taken up by robot " + std::to_string(start.robot));
+  cut_to_full_keyframes();
+  started_ = true;
+  run_.robot = start.robot;
+  run_.boot = start.boot;
+  run_.input = std::move(start.input);
+}
+
+void RunRestorer::add(OdometryState state) {
+  if (!run_.states.empty() && state.stamp <= run_.states.back().stamp)
+    throw std::invalid_argument("a pose is not later than the one before");
+  run_.states.push_back(std::move(state));
+}
+
+void RunRestorer::add(KeyframeOdometry keyframe) {
+  if (keyframe.id != KeyframeId{run_.robot, static_cast<KeyframeIndex>(run_.odometry.size())})
+    throw std::invalid_argument("keyframe " + to_string(keyframe.id) + " does not follow");
+  run_.odometry.push_back(std::move(keyframe));
+}
+
+void RunRestorer::add(Keyframe keyframe) {
+  const KeyframeId& id = keyframe.odometry.id;
+  if (id != KeyframeId{run_.robot, static_cast<KeyframeIndex>(run_.keyframes.size())})
+    throw std::invalid_argument("features of keyframe " + to_string(id) + " do not follow");
+  run_.keyframes.push_back(std::move(keyframe));
+}
+
+void RunRestorer::add(Closure closure) {
+  closures_.emplace(std::pair(closure.from.id, closure.to.id), std::move(closure));
+}
+
+void RunRestorer::add(ClosureOutcome outcome) {
+  outcomes_[outcome.id] = std::move(outcome);
+}
+
+void RunRestorer::cut_to_full_keyframes() {
+  const std::size_t full = std::min(run_.odometry.size(), run_.keyframes.size());
+  run_.odometry.resize(full);
+  run_.keyframes.resize(full);
+  const auto later = [&](const OdometryState& state) {
+    return full == 0 || state.stamp > run_.odometry.back().stamp;
+  };
+  std::erase_if(run_.states, later);
+  const auto lacks = [&](const KeyframeId& id) {
+    return id.robot == run_.robot && id.index >= full;
+  };
+  std::erase_if(closures_, [&](const auto& entry) {
+    return lacks(entry.first.first) || lacks(entry.first.second);
+  });
+  std::erase_if(outcomes_, [&](const auto& entry) {
+    return lacks(entry.first.from) || lacks(entry.first.to);
+  });
+}
+
+RestoredRun RunRestorer::finish() {
+  cut_to_full_keyframes();
+  std::set<ClosureId> known;
+  for (auto& [ends, closure] : closures_) {
+    known.insert(closure.id());
+    run_.closures.push_back(std::move(closure));
+  }
+  for (auto& [id, outcome] : outcomes_) {
+    const bool verified = outcome.stage >= ClosureStage::kVerified;
+    const bool has_closure = known.contains(closure_id(id.from, id.to));
+    if (is_final(outcome) && (!verified || has_closure))
+      run_.outcomes.push_back(std::move(outcome));
+  }
+  return std::move(run_);
+}
+
+RestoredRun restore_run(const std::filesystem::path& file) {
+  RunRestorer restorer;
+  std::size_t entry = 0;
+  const JournalExtent read = read_journal(file, [&](JournalEntry taken) {
+    ++entry;
+    try {
+      restorer.take(std::move(taken));
+    } catch (const std::invalid_argument& error) {
+      throw InputFileError(file.string() + ": entry " + std::to_string(entry) + ": " +
+                           error.what());
+    }
+  });
+  RestoredRun run = restorer.finish();
+  run.journal = read;
+  return run;
+}
+
+}  // namespace km

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "modules/journal/journal_entry.hpp"
+#include "modules/journal/journal_file.hpp"
+
+namespace km {
+
+/// A run up to the last keyframe that its journal knows in full: from there on odometry goes on.
+struct RestoredRun {
+  RobotId robot = 0;
+  std::uint64_t boot = 0;  ///< Of the last process.
+  std::string input;       ///< See JournalStart.
+
+  std::vector<KeyframeOdometry> odometry;  ///< Index i is keyframe i.
+  std::vector<Keyframe> keyframes;         ///< Likewise, equally many.
+  std::vector<OdometryState> states;       ///< Of images up to the last keyframe's.
+  std::vector<Closure> closures;           ///< Own and of the others, each once from either side.
+  /// Of candidates that nothing more becomes of: those verified, whose closures are there, and
+  /// those refused.
+  std::vector<ClosureOutcome> outcomes;
+
+  JournalExtent journal = {};  ///< Where to go on writing.
+};
+
+/// Puts the entries of a journal together. A process that takes a run up goes on behind the last
+/// full keyframe: what its predecessor wrote beyond that counts no more.
+class RunRestorer {
+ public:
+  /// Throws std::invalid_argument for an entry that cannot follow those before.
+  void take(JournalEntry entry);
+
+  /// Call once, after the last entry.
+  [[nodiscard]] RestoredRun finish();
+
+ private:
+  void add(JournalStart start);
+  void add(OdometryState state);
+  void add(KeyframeOdometry keyframe);
+  void add(Keyframe keyframe);
+  void add(Closure closure);
+  void add(ClosureOutcome outcome);
+  void cut_to_full_keyframes();
+
+  RestoredRun run_;
+  bool started_ = false;
+  std::map<std::pair<KeyframeId, KeyframeId>, Closure> closures_;  // by the ends as measured
+  std::map<ClosureId, ClosureOutcome> outcomes_;
+};
+
+/// Reads the journal of a run. Throws InputFileError, also for entries that contradict each other.
+[[nodiscard]] RestoredRun restore_run(const std::filesystem::path& file);
+
+}  // namespace km

@@ -1,0 +1,292 @@
+#include <sys/resource.h>
+
+#include <catch2/catch.hpp>
+#include <csignal>
+#include <filesystem>
+#include <limits>
+#include <random>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "modules/core/input_file.hpp"
+#include "modules/journal/journal_file.hpp"
+#include "modules/journal/restored_run.hpp"
+#include "test/support/random_pose.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+constexpr RobotId kRobot = 7;
+
+OdometryPose some_pose(const KeyframeId& id, std::mt19937& rng) {
+  return {id, random_pose(rng), random_covariance(rng, 0.1)};
+}
+
+KeyframeOdometry step(KeyframeIndex index, std::mt19937& rng) {
+  KeyframeOdometry keyframe;
+  keyframe.id = {kRobot, index};
+  keyframe.stamp = 1000 + 100 * static_cast<Stamp>(index);
+  keyframe.T_odom_kf = random_pose(rng);
+  keyframe.T_previous_kf = random_pose(rng);
+  keyframe.covariance = random_covariance(rng, 0.1);
+  if (index % 2 == 0) keyframe.vertical = Vertical{random_vector<3>(rng).normalized(), 0.01};
+  return keyframe;
+}
+
+Keyframe features(KeyframeIndex index, std::mt19937& rng) {
+  Keyframe keyframe;
+  keyframe.odometry = some_pose({kRobot, index}, rng);
+  keyframe.stamp = 1000 + 100 * static_cast<Stamp>(index);
+  keyframe.features = {random_pose(rng), 450.0, 0.11, {}, {}};
+  for (int i = 0; i < 20; ++i) {
+    keyframe.features.keypoints.push_back(
+        {random_vector<2>(rng).cast<float>(), 0.5F, static_cast<std::uint8_t>(i % 8)});
+    OrbDescriptor& descriptor = keyframe.features.descriptors.emplace_back();
+    for (std::uint8_t& byte : descriptor) byte = static_cast<std::uint8_t>(rng());
+  }
+  return keyframe;
+}
+
+Closure closure(KeyframeIndex own, std::mt19937& rng) {
+  return {some_pose({kRobot, own}, rng),
+          some_pose({3, 9}, rng),
+          random_pose(rng),
+          random_covariance(rng, 0.1),
+          40,
+          0.7};
+}
+
+ClosureOutcome outcome(const KeyframeId& from, const KeyframeId& to, ClosureStage stage,
+                       const std::string& reason = {}) {
+  return {{from, to}, 0.7, stage, reason, 80, 40};
+}
+
+OdometryState state(Stamp stamp, std::mt19937& rng) {
+  return {stamp, random_pose(rng), random_vector<3>(rng), random_vector<3>(rng),
+          random_vector<3>(rng)};
+}
+
+// Five keyframes with an image between each two, a closure with robot 3 from each.
+std::vector<JournalEntry> some_run() {
+  std::mt19937 rng(1);
+  std::vector<JournalEntry> run{JournalStart{kRobot, 0x123450000, "MH_01_easy"}};
+  for (KeyframeIndex i = 0; i < 5; ++i) {
+    const KeyframeOdometry keyframe = step(i, rng);
+    run.emplace_back(state(keyframe.stamp, rng));
+    run.emplace_back(keyframe);
+    run.emplace_back(state(keyframe.stamp + 50, rng));
+    run.emplace_back(features(i, rng));
+    run.emplace_back(closure(i, rng));
+    run.emplace_back(outcome({kRobot, i}, {3, 9}, ClosureStage::kVerified));
+  }
+  return run;
+}
+
+std::filesystem::path written(const TemporaryFolder& folder,
+                              const std::vector<JournalEntry>& entries) {
+  std::filesystem::path file = folder.path() / "run.journal";
+  JournalFile journal(file);
+  for (const JournalEntry& entry : entries) journal.add(entry);
+  journal.sync();
+  return file;
+}
+
+std::vector<std::vector<std::uint8_t>> bytes_of(const std::vector<JournalEntry>& entries) {
+  std::vector<std::vector<std::uint8_t>> bytes;
+  for (const JournalEntry& entry : entries) bytes.push_back(encode_journal_entry(entry));
+  return bytes;
+}
+
+std::pair<JournalExtent, std::vector<JournalEntry>> read(const std::filesystem::path& file) {
+  std::vector<JournalEntry> entries;
+  const JournalExtent extent =
+      read_journal(file, [&](JournalEntry entry) { entries.push_back(std::move(entry)); });
+  return {extent, std::move(entries)};
+}
+
+TEST_CASE("Every entry comes back to the last bit", "[journal]") {
+  std::mt19937 rng(2);
+  const KeyframeOdometry keyframe = step(4, rng);
+  const auto decoded = decode_journal_entry(encode_journal_entry(keyframe));
+  REQUIRE(decoded.value);
+  const auto& back = std::get<KeyframeOdometry>(*decoded.value);
+  CHECK(back.id == keyframe.id);
+  CHECK(back.stamp == keyframe.stamp);
+  CHECK(back.T_odom_kf.matrix() == keyframe.T_odom_kf.matrix());
+  CHECK(back.T_previous_kf.matrix() == keyframe.T_previous_kf.matrix());
+  CHECK(back.covariance.triangularView<Eigen::Upper>().toDenseMatrix() ==
+        keyframe.covariance.triangularView<Eigen::Upper>().toDenseMatrix());
+  CHECK(back.covariance == back.covariance.transpose());
+  REQUIRE(back.vertical);
+  CHECK(back.vertical->up_body == keyframe.vertical->up_body);
+
+  for (const JournalEntry& entry : some_run()) {
+    const auto bytes = encode_journal_entry(entry);
+    const auto again = decode_journal_entry(bytes);
+    REQUIRE(again.value);
+    CHECK(again.value->index() == entry.index());
+    CHECK(encode_journal_entry(*again.value) == bytes);
+  }
+}
+
+TEST_CASE("What is no entry is refused", "[journal]") {
+  std::mt19937 rng(3);
+  std::vector<std::uint8_t> bytes = encode_journal_entry(features(0, rng));
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    CHECK_FALSE(decode_journal_entry(std::span(bytes).first(size)).value);
+  bytes.push_back(0);
+  CHECK_FALSE(decode_journal_entry(bytes).value);
+  OdometryState nowhere;
+  nowhere.v_odom.x() = std::numeric_limits<double>::quiet_NaN();
+  CHECK_FALSE(decode_journal_entry(encode_journal_entry(nowhere)).value);
+  CHECK_FALSE(decode_journal_entry(std::vector<std::uint8_t>{200}).value);
+}
+
+TEST_CASE("A journal cut anywhere is whole up to its last full entry", "[journal]") {
+  const TemporaryFolder folder;
+  const std::vector<JournalEntry> run = some_run();
+  const std::string text = (written(folder, run), folder.read("run.journal"));
+  const auto expected = bytes_of(run);
+  std::size_t last = 0;
+  for (std::size_t size = 0; size <= text.size(); size += size < 300 ? 1 : 97) {
+    const auto [extent, entries] = read(folder.write("cut", text.substr(0, size)));
+    CAPTURE(size);
+    CHECK(extent.whole_bytes + extent.cut_bytes == size);
+    CHECK(extent.entries == entries.size());
+    REQUIRE(entries.size() >= last);
+    last = entries.size();
+    const auto found = bytes_of(entries);
+    CHECK(std::equal(found.begin(), found.end(), expected.begin()));
+  }
+  CHECK(read(folder.write("cut", text)).second.size() == run.size());
+}
+
+TEST_CASE("A flipped bit ends the journal before the entry it is in", "[journal]") {
+  const TemporaryFolder folder;
+  const std::vector<JournalEntry> run = some_run();
+  const std::string text = (written(folder, run), folder.read("run.journal"));
+  std::mt19937 rng(4);
+  for (int i = 0; i < 200; ++i) {
+    std::string spoilt = text;
+    const std::size_t at = 8 + rng() % (text.size() - 8);
+    spoilt[at] = static_cast<char>(spoilt[at] ^ (1 << (rng() % 8)));
+    const auto [extent, entries] = read(folder.write("spoilt", spoilt));
+    CHECK(entries.size() < run.size());
+    CHECK(extent.whole_bytes <= at);
+    CHECK(extent.cut_bytes > 0);
+  }
+}
+
+TEST_CASE("Files that are no journals are refused by name", "[journal]") {
+  const TemporaryFolder folder;
+  CHECK_THROWS_WITH(restore_run(folder.write("notes.txt", "Dear diary, today...")),
+                    Catch::Contains("notes.txt") && Catch::Contains("no journal"));
+  CHECK_THROWS_AS(restore_run(folder.path() / "missing"), InputFileError);
+  CHECK(restore_run(folder.write("empty", "")).keyframes.empty());
+  CHECK(restore_run(folder.write("begun", "KMJR")).keyframes.empty());
+}
+
+TEST_CASE("A journal taken up loses its torn end and goes on", "[journal]") {
+  const TemporaryFolder folder;
+  const std::vector<JournalEntry> run = some_run();
+  const std::filesystem::path file = written(folder, run);
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) - 3);
+  const auto [extent, entries] = read(file);
+  REQUIRE(entries.size() == run.size() - 1);
+  {
+    JournalFile again(file, extent);
+    again.add(JournalStart{kRobot, 0x123450001, "MH_01_easy"});
+    again.sync();
+    std::mt19937 rng(5);
+    again.add(step(5, rng));
+    again.sync();
+  }
+  const auto [whole, all] = read(file);
+  CHECK(whole.cut_bytes == 0);
+  REQUIRE(all.size() == run.size() + 1);
+  CHECK(std::get<JournalStart>(all[run.size() - 1]).boot == 0x123450001);
+}
+
+TEST_CASE("A disk that is full for a while costs nothing", "[journal]") {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder.path() / "run.journal";
+  const auto before = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit limit{};
+  REQUIRE(getrlimit(RLIMIT_FSIZE, &limit) == 0);
+  const std::vector<JournalEntry> run = some_run();
+  {
+    JournalFile journal(file);
+    for (const JournalEntry& entry : run) journal.add(entry);
+    const rlimit small{1000, limit.rlim_max};
+    REQUIRE(setrlimit(RLIMIT_FSIZE, &small) == 0);
+    CHECK_THROWS_AS(journal.sync(), std::system_error);
+    CHECK_THROWS_WITH(journal.sync(), Catch::Contains("run.journal"));
+    REQUIRE(setrlimit(RLIMIT_FSIZE, &limit) == 0);
+    CHECK(std::filesystem::file_size(file) <= 1000);
+    journal.sync();
+    CHECK(journal.is_whole());
+  }
+  std::signal(SIGXFSZ, before);
+  CHECK(bytes_of(read(file).second) == bytes_of(run));
+}
+
+TEST_CASE("A run is restored up to its last full keyframe", "[journal]") {
+  const TemporaryFolder folder;
+  std::vector<JournalEntry> entries = some_run();
+  std::mt19937 rng(6);
+  entries.emplace_back(step(5, rng));  // whose features did not reach the disk
+  entries.emplace_back(closure(5, rng));
+  entries.emplace_back(outcome({kRobot, 1}, {3, 4}, ClosureStage::kRequested));
+  entries.emplace_back(outcome({kRobot, 2}, {3, 4}, ClosureStage::kReceived, "too few matches"));
+  entries.emplace_back(outcome({kRobot, 3}, {3, 4}, ClosureStage::kVerified));  // no closure
+  const RestoredRun run = restore_run(written(folder, entries));
+  CHECK(run.robot == kRobot);
+  CHECK(run.input == "MH_01_easy");
+  REQUIRE(run.odometry.size() == 5);
+  CHECK(run.keyframes.size() == 5);
+  REQUIRE(run.states.size() == 9);  // the image after the last keyframe comes anew
+  CHECK(run.states.back().stamp == run.odometry.back().stamp);
+  CHECK(run.closures.size() == 5);
+  REQUIRE(run.outcomes.size() == 6);
+  CHECK(run.outcomes[2].reason == "too few matches");
+}
+
+TEST_CASE("A run taken up goes on behind its last full keyframe, as often as it is killed",
+          "[journal]") {
+  const TemporaryFolder folder;
+  std::vector<JournalEntry> entries = some_run();
+  std::mt19937 rng(7);
+  for (std::uint64_t life = 1; life <= 3; ++life) {
+    entries.emplace_back(step(4 + static_cast<KeyframeIndex>(life), rng));  // torn off
+    entries.emplace_back(JournalStart{kRobot, 0x123450000 + life, "MH_01_easy"});
+    const KeyframeOdometry next = step(4 + static_cast<KeyframeIndex>(life), rng);
+    entries.emplace_back(state(next.stamp, rng));
+    entries.emplace_back(next);
+    entries.emplace_back(features(next.id.index, rng));
+    const RestoredRun run = restore_run(written(folder, entries));
+    CHECK(run.boot == 0x123450000 + life);
+    REQUIRE(run.odometry.size() == 5 + life);
+    CHECK(run.odometry.back().T_odom_kf.matrix() == next.T_odom_kf.matrix());
+    CHECK(run.states.size() == 9 + life);
+  }
+}
+
+TEST_CASE("Entries that contradict each other are named", "[journal]") {
+  const TemporaryFolder folder;
+  std::mt19937 rng(8);
+  const JournalStart start{kRobot, 1, "x"};
+  const auto message = Catch::Contains("run.journal: entry 2");
+  CHECK_THROWS_WITH(restore_run(written(folder, {start, step(1, rng)})), message);
+  CHECK_THROWS_WITH(restore_run(written(folder, {start, features(3, rng)})), message);
+  CHECK_THROWS_WITH(restore_run(written(folder, {start, JournalStart{kRobot + 1, 1, "x"}})),
+                    message);
+  CHECK_THROWS_WITH(restore_run(written(folder, {step(0, rng)})),
+                    Catch::Contains("run.journal: entry 1"));
+  CHECK_THROWS_WITH(restore_run(written(folder, {start, state(5, rng), state(5, rng)})),
+                    Catch::Contains("run.journal: entry 3"));
+}
+
+}  // namespace
+}  // namespace km
