@@ -15,11 +15,14 @@ inline constexpr std::array kResultFiles = {
     "optimizer.csv", "traffic.csv",   "process.csv",        "timing.csv",    "config.yaml",
     "summary.json",  "mesh.ply",      "mesh_optimized.ply", kLabelPalette};
 
+/// What a run needs to be taken up, or to be joined as one of the past.
+inline constexpr const char* kJournal = "run.journal";
+
 /// Folder of the meshes that other robots sent, robot<id>.ply each.
 inline constexpr const char* kPeerMeshes = "peer_meshes";
 
-/// Removes a robot's results from `folder`, so that those of an earlier run cannot be taken for
-/// those of one that fails. Throws std::filesystem::filesystem_error naming the file.
+/// Removes a robot's results from `folder`, other than its journal, so that those of an earlier run
+/// cannot be taken for those of one that fails. Throws std::filesystem::filesystem_error naming the file.
 inline void remove_results(const std::filesystem::path& folder) {
   for (const std::string file : kResultFiles)
     for (const char* ending : {"", ".part"})  // that of a file cut short by the process's end

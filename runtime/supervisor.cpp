@@ -105,7 +105,7 @@ void Supervisor::start_all() {
       },
       "watchdog");
   lookouts_->start();
-  for (Node* node : nodes) node->start();
+  for (auto node = nodes.rbegin(); node != nodes.rend(); ++node) (*node)->start();
 }
 
 void Supervisor::begin_stop(Entry& entry) {

@@ -28,11 +28,17 @@ Examples
     hostA$ kimera_multi_robot --config config/datasets/euroc.yaml --robot 7  --name alice --dataset A --output results/a
     hostB$ kimera_multi_robot --config config/datasets/euroc.yaml --robot 12 --name bob   --dataset B --output results/b
   Where multicast is not allowed:   --peers 10.0.0.2,10.0.0.3 --interface wlan0 --link wifi
+  After a crash or a lost battery, the same run goes on (the command as before, --resume for --output):
+    kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --dataset MH_01_easy --resume results/a
+  A robot that finds itself in the map of an earlier run, which takes part as robot 0:
+    kimera_multi_robot --robot 0 --session results/a --output results/yesterday
+    kimera_multi_robot --config config/datasets/euroc.yaml --robot 1 --dataset MH_02_easy --output results/b
   The back-end alone, on a recorded pose graph:
     kimera_multi_robot --config config/datasets/tunnels.yaml --robot 3 --graph robot3.csv --rate max --output results/3
 
 Files written to --output: odometry.tum, optimized.tum, pose_graph.g2o, keyframes.csv, loop_closures.csv,
-optimizer.csv, traffic.csv, process.csv, timing.csv, config.yaml, summary.json; with mapping.mode on also mesh.ply,
+optimizer.csv, traffic.csv, process.csv, timing.csv, config.yaml, summary.json, run.journal (for --resume and
+--session); with mapping.mode on also mesh.ply,
 mesh_optimized.ply and label_palette.csv.
 Ctrl-C, SIGTERM and SIGHUP end the run in order with everything written; a second Ctrl-C or SIGTERM ends it at once.
 Exit codes: 0 done; 1 bad input or configuration, or a recording that gave no pose; 2 bad command line;
@@ -67,6 +73,11 @@ void add_input(CLI::App& app, RobotOptions& options) {
       ->check(CLI::ExistingDirectory);
   group->add_option("--graph", options.graph, "Recorded pose graph of one robot (.g2o or .csv)")
       ->check(CLI::ExistingFile);
+  group
+      ->add_option("--session", options.session,
+                   "Results of a finished run: its robot stands still, and the others find "
+                   "themselves in its map")
+      ->check(CLI::ExistingDirectory);
   group->require_option(1);
   app.add_option("--from", options.from_s, "Start of the part to play [s since the first image]");
   app.add_option("--to", options.to_s, "End of the part to play [s since the first image]");
@@ -96,6 +107,20 @@ void add_network(CLI::App& app, RobotOptions& options) {
       ->check(CLI::ExistingDirectory);
 }
 
+void add_output(CLI::App& app, RobotOptions& options) {
+  auto* group = app.add_option_group("Output", "Where the results go");
+  group->add_option("--output", options.output, "Folder of the results, made if absent");
+  group->add_option_function<std::string>(
+      "--resume",
+      [&options](const std::string& folder) {
+        options.output = folder;
+        options.resume = true;
+      },
+      "In place of --output: the folder of a run that was killed; goes on where it ended (all "
+      "other options as before)");
+  group->require_option(1);
+}
+
 // Exits the process for --help and mistakes, after telling.
 RobotOptions parse_options(int argc, char** argv) {
   RobotOptions options;
@@ -110,7 +135,7 @@ RobotOptions parse_options(int argc, char** argv) {
   app.add_option("--name", options.name, "Name shown to people (default robot<id>)");
   add_input(app, options);
   add_network(app, options);
-  app.add_option("--output", options.output, "Folder of the results, made if absent")->required();
+  add_output(app, options);
   app.add_option("--serve-limit", options.serve_limit_s,
                  "Longest time [s] to serve peers after the own input has ended")
       ->check(CLI::Range(0.0, 1e6))

@@ -36,6 +36,7 @@ struct RobotOptions {
 
   std::filesystem::path dataset;  ///< EuRoC/ASL folder; exclusive with `graph`.
   std::filesystem::path graph;    ///< Recorded pose graph, g2o or CSV.
+  std::filesystem::path session;  ///< Results of a run of the past; exclusive with both.
   std::optional<double> from_s;   ///< Part of the recording [s since its first image].
   std::optional<double> to_s;
   double rate = 1.0;  ///< Times real time; infinity for as fast as possible.
@@ -47,6 +48,7 @@ struct RobotOptions {
   std::filesystem::path security;  ///< Folder of this robot's keys; messages are sealed if given.
 
   std::filesystem::path output;
+  bool resume = false;           ///< Go on with the run whose results are in `output`.
   double serve_limit_s = 120.0;  ///< Longest time to serve peers after the input has ended.
   std::string log_level = "info";
 };

@@ -18,6 +18,7 @@
 #include "apps/robot/results.hpp"
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/wiring.hpp"
+#include "modules/core/input_file.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/core/write_file.hpp"
 #include "modules/mesh/ply_file.hpp"
@@ -32,16 +33,51 @@ namespace {
 
 namespace fs = std::filesystem;
 
-RobotInput open_input(const RobotOptions& options, const RobotConfig& config,
-                      const std::optional<MappingPlan>& mapping) {
-  if (!options.dataset.empty())
-    return std::make_unique<EurocReader>(
-        options.dataset,
-        EurocOptions{.from_s = options.from_s.value_or(0.0),
+// The run to go on with; none where its process had not come to a keyframe yet.
+std::optional<RestoredRun> restore(const RobotOptions& options, const std::string& input) {
+  const fs::path file = options.output / kJournal;
+  if (!options.resume) return std::nullopt;
+  if (is_absent(file)) {
+    log::warn("journal") << file.string() << ": there is none: the run begins anew";
+    return std::nullopt;
+  }
+  RestoredRun run = restore_run(file);
+  if (run.journal.cut_bytes > 0)
+    log::warn("journal") << file.string() << ": the last " << run.journal.cut_bytes
+                         << " bytes are torn: cut after entry " << run.journal.entries;
+  if (run.journal.entries == 0) return std::nullopt;
+  if (run.robot != options.robot || run.input != input)
+    throw std::invalid_argument(file.string() + ": is of robot " + std::to_string(run.robot) +
+                                " on " + run.input + ", this is robot " +
+                                std::to_string(options.robot) + " on " + input +
+                                ": give the options it was started with, or --output");
+  if (run.keyframes.empty()) return std::nullopt;
+  if (!options.dataset.empty() && run.states.empty())
+    throw std::invalid_argument(file.string() + ": has keyframes but no odometry");
+  return run;
+}
+
+RestoredRun open_session(const RobotOptions& options) {
+  const fs::path file = options.session / kJournal;
+  RestoredRun run = restore_run(file);
+  if (run.keyframes.empty())
+    throw std::invalid_argument(file.string() + ": that run has no keyframe");
+  return alone_as(options.robot, std::move(run));
+}
+
+std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const RobotConfig& config,
+                                            const std::optional<MappingPlan>& mapping,
+                                            const std::optional<RestoredRun>& restored) {
+  EurocOptions euroc{.from_s = options.from_s.value_or(0.0),
                      .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
                      .stereo_tolerance_s = config.sensors.stereo_tolerance_s,
                      .depth = config.sensors.depth || (mapping && mapping->reads_depth()),
-                     .labels = config.sensors.labels || (mapping && mapping->reads_labels())});
+                     .labels = config.sensors.labels || (mapping && mapping->reads_labels())};
+  if (restored) euroc.not_before = restored->odometry.back().stamp;
+  return std::make_unique<EurocReader>(options.dataset, euroc);
+}
+
+RecordedGraph open_graph(const RobotOptions& options) {
   RecordedGraph graph = read_recorded_graph(options.graph);
   if (graph.robot != options.robot)
     throw std::invalid_argument(options.graph.string() + " holds robot " +
@@ -54,21 +90,35 @@ RobotInput open_input(const RobotOptions& options, const RobotConfig& config,
   return graph;
 }
 
+RobotInput open_input(const RobotOptions& options, const RobotConfig& config,
+                      const std::optional<MappingPlan>& mapping) {
+  if (!options.session.empty()) return {PastRun(), {}, open_session(options)};
+  const bool is_dataset = !options.dataset.empty();
+  const fs::path& path = is_dataset ? options.dataset : options.graph;
+  const std::string name = (path / "").parent_path().filename();  // wherever it is mounted
+  std::optional<RestoredRun> restored = restore(options, name);
+  if (!is_dataset) return {open_graph(options), name, std::move(restored)};
+  auto reader = open_dataset(options, config, mapping, restored);
+  return {std::move(reader), name, std::move(restored)};
+}
+
 bool is_fault_of_disk(const std::error_code& error) {
   return error == std::errc::no_space_on_device || error == std::errc::read_only_file_system ||
          error == std::errc::io_error;
 }
 
 // A disk that fails does not keep a robot from its team; a mistake on the command line is told.
-void prepare_output(const fs::path& folder, ResultWriter& results) try {
+void prepare_output(const RobotOptions& options, ResultWriter& results) try {
+  const fs::path& folder = options.output;
   fs::create_directories(folder);
   remove_results(folder);
+  if (!options.resume) fs::remove(folder / kJournal);
   if (access(folder.c_str(), W_OK) != 0)
     throw fs::filesystem_error("", std::error_code(errno, std::generic_category()));
 } catch (const fs::filesystem_error& error) {
   if (!is_fault_of_disk(error.code()))
-    throw std::runtime_error(folder.string() + ": " + error.code().message());
-  results.note(folder, error.code().message());
+    throw std::runtime_error(options.output.string() + ": " + error.code().message());
+  results.note(options.output, error.code().message());
 }
 
 void log_network(const RobotConfig& config, const NetworkInterface& interface) {
@@ -161,6 +211,8 @@ class Watch {
  public:
   Watch(const RobotOptions& options, const RobotConfig& config, Robot& robot, ResultWriter& results)
       : robot_(robot),
+        is_past_(!options.session.empty()),
+        serve_limit_s_(options.serve_limit_s),
         departure_(config.run.settle_s, options.serve_limit_s),
         start_s_(steady_now_s()),
         traffic_file_(options.output / "traffic.csv", results),
@@ -172,7 +224,7 @@ class Watch {
   bool poll() {
     const double now_s = steady_now_s() - start_s_;
     const TrafficSnapshot traffic = robot_.bridge().traffic();
-    const bool ended = robot_.input_ended();
+    const bool ended = robot_.input_ended() && !waits_for_company(now_s);
     // If it is at work, the next time will do: this thread waits for no other.
     (void)robot_.recorder().try_with_record([&](const RunRecord& record) {
       say(now_s, record, traffic);
@@ -206,6 +258,11 @@ class Watch {
  private:
   static constexpr double kInterval_s = 1.0;  // between rows of a CSV, and status lines
   static constexpr double kGoodbye_s = 1.5;   // three times the period of the status
+
+  // A run of the past is there for others: it stays until one has come, or none does.
+  bool waits_for_company(double now_s) const {
+    return is_past_ && now_s < serve_limit_s_ && robot_.bridge().peers().list().empty();
+  }
 
   // Tells the others before going, so that they go with the same solution.
   bool said_goodbye(double now_s) {
@@ -245,6 +302,8 @@ class Watch {
   }
 
   Robot& robot_;
+  const bool is_past_;
+  const double serve_limit_s_;
   Departure departure_;
   double start_s_;
   GrowingFile traffic_file_;
@@ -274,9 +333,12 @@ std::string timings(const Robot& robot) {
 RunEnd end_of(const RobotOptions& options, const Robot& robot, const RunResult& result,
               const char* departure, const RunRecord& record) {
   RunEnd end{options.robot, result, robot.id_taken(), departure, {}, {}};
-  if (const SensorsNode* sensors = robot.sensors())
-    end.images = ImageCounts{sensors->listed(), sensors->published(), sensors->skipped(),
-                             record.odometry().size()};
+  if (const SensorsNode* sensors = robot.sensors()) {
+    // The last image of those before comes once more.
+    const std::size_t before = std::max<std::size_t>(robot.restored_images(), 1) - 1;
+    end.images = ImageCounts{before + sensors->listed(), before + sensors->published(),
+                             sensors->skipped(), record.odometry().size()};
+  }
   return end;
 }
 
@@ -367,7 +429,7 @@ int run_robot(const RobotOptions& options, SignalWatch& signals,
       !config.segmentation.palette.empty())
     log::warn("robot") << "segmentation.palette is not used: labels are recorded, and with them "
                           "their label_palette.csv";
-  prepare_output(options.output, results);
+  prepare_output(options, results);
   const auto write = [&](const char* name, const std::string& text) {
     results.write(options.output / name, [&text](const auto& file) { write_file(file, text); });
   };

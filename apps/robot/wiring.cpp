@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "apps/result_files.hpp"
 #include "apps/robot/team_keys_node.hpp"
 #include "modules/dense_sensing/dense_sensing_node.hpp"
 #include "modules/loop_closure/keyframe_features_node.hpp"
@@ -44,13 +45,18 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     : identity_{.robot = options.robot, .name = options.name, .boot = random_boot_id()},
       seal_(make_team_seal(options.security, identity_)),
       participant_(config.dds, identity_, seal_),
+      restored_(std::move(input.restored)),
       supervisor_(signals, config.run.patience) {
   auto bridge = std::make_unique<DdsBridge>(participant_);
   bridge_ = bridge.get();
-  if (auto* reader = std::get_if<std::unique_ptr<DatasetReader>>(&input))
+  if (auto* reader = std::get_if<std::unique_ptr<DatasetReader>>(&input.source))
     add_sensing(config, options.rate, std::move(*reader), mapping);
+  else if (auto* graph = std::get_if<RecordedGraph>(&input.source))
+    add_playback(config, options.rate, std::move(*graph));
   else
-    add_playback(config, options.rate, std::get<RecordedGraph>(std::move(input)));
+    add_past();
+  if (!std::holds_alternative<PastRun>(input.source)) add_journal(options, input.name, results);
+  if (!std::holds_alternative<RecordedGraph>(input.source)) add_place_recognition(config);
   add_back_end(config);
   if (mapping) add_mesh_correction(config, options.output, results);
   add_network(share_meshes(config.mesh_chunks));
@@ -59,6 +65,37 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     add<TeamKeysNode>(false, options.security, *seal_, [this] { bridge_->tell_keys(); });
   nodes_.push_back(bridge_);
   supervisor_.add(std::move(bridge));
+  if (restore_ != nullptr) restore_->set(*std::exchange(restored_, std::nullopt));
+}
+
+void Robot::add_past() {
+  add_restore();
+  source_ended_ = true;
+}
+
+// Behind the source, since it starts before it.
+void Robot::add_restore() {
+  if (!restored_) return;
+  restored_images_ = restored_->states.size();
+  restore_ = &add<RestoreNode>(false, RestoreTopics{.states = topics_.odometry,
+                                                    .odometry = topics_.keyframe_odometry,
+                                                    .keyframes = topics_.keyframes,
+                                                    .own_closures = topics_.own_closures,
+                                                    .peer_closures = topics_.closures,
+                                                    .outcomes = topics_.restored_outcomes});
+}
+
+void Robot::add_journal(const RobotOptions& options, const std::string& input,
+                        ResultWriter& results) {
+  journal_ = &add<JournalNode>(false, options.output / kJournal, results,
+                               JournalStart{identity_.robot, identity_.boot, input},
+                               restored_ ? &*restored_ : nullptr,
+                               JournalTopics{.states = topics_.odometry,
+                                             .odometry = topics_.keyframe_odometry,
+                                             .new_keyframes = topics_.new_keyframes,
+                                             .closures = topics_.closures,
+                                             .outcomes = topics_.outcomes,
+                                             .keyframes = topics_.keyframes});
 }
 
 void Robot::add_sensing(const RobotConfig& config, double rate,
@@ -68,16 +105,25 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
   sensors_ =
       &add<SensorsNode>(true, config.sensors, rate, std::move(reader),
                         SensorsTopics{.packets = topics_.packets, .end = topics_.sensors_end});
-  add<VioNode>(true, identity_.robot, rig, config.tracker, config.vio,
-               VioTopics{.packets = topics_.packets,
-                         .odometry = topics_.odometry,
-                         .keyframes = topics_.keyframe_odometry,
-                         .frames = topics_.located_frames});
+  add_restore();
+  auto& vio = add<VioNode>(true, identity_.robot, rig, config.tracker, config.vio,
+                           VioTopics{.packets = topics_.packets,
+                                     .odometry = topics_.odometry,
+                                     .keyframes = topics_.keyframe_odometry,
+                                     .frames = topics_.located_frames});
   if (mapping) add_mapping(config, rate, rig.stereo, *mapping);
-  add<KeyframeFeaturesNode>(true, config.keyframe_features, rig.stereo,
-                            KeyframeFeaturesTopics{.odometry = topics_.keyframe_odometry,
-                                                   .frames = topics_.located_frames,
-                                                   .keyframes = topics_.keyframes});
+  auto& features =
+      add<KeyframeFeaturesNode>(true, config.keyframe_features, rig.stereo,
+                                KeyframeFeaturesTopics{.odometry = topics_.keyframe_odometry,
+                                                       .frames = topics_.located_frames,
+                                                       .keyframes = topics_.new_keyframes});
+  topics_.sensors_end.subscribe([this](const auto&) { source_ended_ = true; });
+  if (!restored_) return;
+  vio.continue_from({restored_->states.back(), restored_->odometry.back()});
+  features.continue_from(restored_->keyframes.back().odometry);
+}
+
+void Robot::add_place_recognition(const RobotConfig& config) {
   vocabulary_ =
       std::make_shared<const Vocabulary>(load_vocabulary(find_shipped_file(config.run.vocabulary)));
   add<PlaceRecognitionNode>(false, config.place_recognition, identity_.robot, vocabulary_,
@@ -86,7 +132,6 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
                                                    .own_bows = topics_.bows.to_peers(),
                                                    .candidates = topics_.candidates,
                                                    .queries = topics_.place_queries});
-  topics_.sensors_end.subscribe([this](const auto&) { source_ended_ = true; });
 }
 
 // A mapper that is too slow leaves frames out; at --rate max, where no frame is late, it holds the
@@ -143,11 +188,13 @@ CrossingEnds Robot::share_meshes(const MeshChunksConfig& config) {
 }
 
 void Robot::add_playback(const RobotConfig& config, double rate, RecordedGraph graph) {
-  add<GraphPlaybackNode>(true, config.graph_playback, rate, std::move(graph),
-                         GraphPlaybackTopics{.odometry = topics_.keyframe_odometry,
-                                             .keyframes = topics_.keyframes,
-                                             .closures = topics_.measured_closures,
-                                             .end = topics_.playback_end});
+  auto& playback = add<GraphPlaybackNode>(true, config.graph_playback, rate, std::move(graph),
+                                          GraphPlaybackTopics{.odometry = topics_.keyframe_odometry,
+                                                              .keyframes = topics_.new_keyframes,
+                                                              .closures = topics_.measured_closures,
+                                                              .end = topics_.playback_end});
+  if (restored_) playback.continue_after(restored_->keyframes.size());
+  add_restore();
   topics_.playback_end.subscribe([this](const auto&) { source_ended_ = true; });
 }
 
@@ -161,6 +208,7 @@ void Robot::add_back_end(const RobotConfig& config) {
                                          .peer_replies = topics_.replies.from_peers(),
                                          .peer_events = peer_events,
                                          .peer_bows = topics_.bows.from_peers(),
+                                         .restored = topics_.restored_outcomes,
                                          .own_requests = topics_.requests.to_peers(),
                                          .own_replies = topics_.replies.to_peers(),
                                          .own_closures = topics_.own_closures,
@@ -220,6 +268,7 @@ void Robot::add_records() {
   recorder_->record(topics_.keyframes);
   recorder_->record(topics_.closures);
   recorder_->record(topics_.outcomes);
+  recorder_->record(topics_.restored_outcomes);
   recorder_->record(topics_.own_inlier_sets);
   recorder_->record(topics_.shared_inlier_sets.from_peers());
   recorder_->record(topics_.trajectory);
@@ -251,7 +300,8 @@ void Robot::freeze_record() {
 }
 
 bool Robot::input_ended() {
-  return source_ended_ && supervisor_.have_stopped(feeding_);
+  return source_ended_ && supervisor_.have_stopped(feeding_) &&
+         (journal_ == nullptr || !journal_->holds_back());
 }
 
 void Robot::leave() {

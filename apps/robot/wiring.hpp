@@ -6,14 +6,17 @@
 #include <variant>
 #include <vector>
 
+#include "apps/robot/journal_node.hpp"
 #include "apps/robot/mapping_plan.hpp"
 #include "apps/robot/mesh_files_node.hpp"
+#include "apps/robot/restore_node.hpp"
 #include "apps/robot/robot_config.hpp"
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/run_record.hpp"
 #include "modules/core/dense_frame.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
+#include "modules/journal/restored_run.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh/mesh_chunks_node.hpp"
@@ -42,7 +45,7 @@ struct Topics {
   Topic<GraphPlaybackEnd> playback_end;
   Topic<OdometryState> odometry;
   Topic<KeyframeOdometry> keyframe_odometry;
-  Topic<Keyframe> keyframes;
+  Topic<Keyframe> new_keyframes, keyframes;  // the latter: those that are on the disk
   Topic<LocatedFrame> located_frames;
   Topic<DenseFrame> dense_frames;
   Topic<DenseSensingProgress> dense_sensing_progress;
@@ -53,7 +56,7 @@ struct Topics {
   Topic<RelativePose> measured_closures;
   Topic<PlaceQuery> place_queries;
   Topic<LoopCandidate> candidates;
-  Topic<ClosureOutcome> outcomes;
+  Topic<ClosureOutcome> outcomes, restored_outcomes;
   Topic<Closure> own_closures, closures;  // the latter: own and received
   Topic<InlierSet> own_inlier_sets;
   Topic<Trajectory> trajectory;
@@ -70,8 +73,16 @@ struct Topics {
   Crossing<RobotStatus> status;
 };
 
-/// What the robot perceives: a recording of sensors, or a recorded pose graph.
-using RobotInput = std::variant<std::unique_ptr<DatasetReader>, RecordedGraph>;
+/// Nothing: a run of the past, whose robot stands still and serves the others.
+struct PastRun {};
+
+/// What the robot perceives: a recording of sensors, or a recorded pose graph; and what it knows
+/// from before.
+struct RobotInput {
+  std::variant<std::unique_ptr<DatasetReader>, RecordedGraph, PastRun> source;
+  std::string name;  ///< For the journal.
+  std::optional<RestoredRun> restored = {};
+};
 
 /// All nodes of one robot and how they are joined: the system on one page (wiring.cpp).
 class Robot {
@@ -98,6 +109,8 @@ class Robot {
   [[nodiscard]] DdsBridge& bridge() { return *bridge_; }
   [[nodiscard]] const RobotStatusNode& status_node() const { return *status_; }
   [[nodiscard]] const SensorsNode* sensors() const { return sensors_; }  ///< Null without sensors.
+  /// Whose poses come from an earlier process.
+  [[nodiscard]] std::size_t restored_images() const { return restored_images_; }
   /// Null without mapping.
   [[nodiscard]] MeshFilesNode* mesh_files() { return mesh_files_; }
   /// Null unless meshes of the other robots are collected.
@@ -121,6 +134,10 @@ class Robot {
  private:
   void add_sensing(const RobotConfig& config, double rate, std::unique_ptr<DatasetReader> reader,
                    const std::optional<MappingPlan>& mapping);
+  void add_place_recognition(const RobotConfig& config);
+  void add_past();
+  void add_restore();
+  void add_journal(const RobotOptions& options, const std::string& input, ResultWriter& results);
   void add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
                    const MappingPlan& plan);
   void add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder,
@@ -140,6 +157,7 @@ class Robot {
   std::shared_ptr<TeamSeal> seal_;  // null without keys
   DdsParticipant participant_;
   Topics topics_;
+  std::optional<RestoredRun> restored_;           // until the robot is built
   std::shared_ptr<const Vocabulary> vocabulary_;  // null where nothing is perceived
   std::atomic<bool> source_ended_ = false;
   std::atomic<bool> id_taken_ = false;
@@ -150,6 +168,9 @@ class Robot {
   std::vector<Node*> feeding_;  // from the source to the last that makes keyframes
   std::vector<const Node*> nodes_;
   SensorsNode* sensors_ = nullptr;
+  std::size_t restored_images_ = 0;
+  RestoreNode* restore_ = nullptr;
+  JournalNode* journal_ = nullptr;
   RecorderNode* recorder_ = nullptr;
   MeshDeformationNode* mesh_deformation_ = nullptr;
   MeshFilesNode* mesh_files_ = nullptr;

@@ -95,6 +95,20 @@ RestoredRun RunRestorer::finish() {
   return std::move(run_);
 }
 
+RestoredRun alone_as(RobotId robot, RestoredRun run) {
+  const RobotId former = std::exchange(run.robot, robot);
+  const auto is_shared = [former](const KeyframeId& a, const KeyframeId& b) {
+    return a.robot != former || b.robot != former;
+  };
+  std::erase_if(run.closures, [&](const Closure& c) { return is_shared(c.from.id, c.to.id); });
+  std::erase_if(run.outcomes, [&](const auto& o) { return is_shared(o.id.from, o.id.to); });
+  for (KeyframeOdometry& keyframe : run.odometry) keyframe.id.robot = robot;
+  for (Keyframe& keyframe : run.keyframes) keyframe.odometry.id.robot = robot;
+  for (Closure& closure : run.closures) closure.from.id.robot = closure.to.id.robot = robot;
+  for (ClosureOutcome& outcome : run.outcomes) outcome.id.from.robot = outcome.id.to.robot = robot;
+  return run;
+}
+
 RestoredRun restore_run(const std::filesystem::path& file) {
   RunRestorer restorer;
   std::size_t entry = 0;

@@ -30,6 +30,9 @@ struct RestoredRun {
   JournalExtent journal = {};  ///< Where to go on writing.
 };
 
+/// The run under another id, without what it shared with the others of its time.
+[[nodiscard]] RestoredRun alone_as(RobotId robot, RestoredRun run);
+
 /// Puts the entries of a journal together. A process that takes a run up goes on behind the last
 /// full keyframe: what its predecessor wrote beyond that counts no more.
 class RunRestorer {

@@ -26,7 +26,13 @@ KeyframeFeaturesNode::KeyframeFeaturesNode(const KeyframeFeaturesConfig& config,
   topics.frames.subscribe([this](const auto& message) { worker_.post(message); });
 }
 
+void KeyframeFeaturesNode::continue_from(const OdometryPose& last) {
+  chain_ = {last.T_odom_kf, last.covariance};
+  known_ = next_index_ = last.id.index + 1;
+}
+
 void KeyframeFeaturesNode::step(const KeyframeOdometry& odometry) {
+  if (odometry.id.index < known_) return;
   if (odometry.id.index != next_index_)
     throw std::invalid_argument("keyframe " + to_string(odometry.id) + " came where index " +
                                 std::to_string(next_index_) + " was due");

@@ -31,6 +31,9 @@ class KeyframeFeaturesNode final : public Node {
   KeyframeFeaturesNode(const KeyframeFeaturesConfig& config, const StereoRig& rig,
                        const KeyframeFeaturesTopics& topics);
 
+  /// The keyframes up to this one are known: their odometry is ignored. Call before start().
+  void continue_from(const OdometryPose& last);
+
   std::string_view name() const override { return "keyframe_features"; }
   void start() override { worker_.start(); }
   void stop() noexcept override { worker_.stop(); }
@@ -51,6 +54,7 @@ class KeyframeFeaturesNode final : public Node {
   std::deque<Keyframe> without_images_;
   UncertainPose chain_;  // from the first keyframe's odometry frame to the latest keyframe
   std::uint32_t next_index_ = 0;
+  std::uint32_t known_ = 0;  // keyframes with features already
   Worker<Input> worker_;  // last member: stops first
 };
 

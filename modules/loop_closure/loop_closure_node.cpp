@@ -96,6 +96,7 @@ LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
   topics_.peer_requests.subscribe(queue);
   topics_.peer_replies.subscribe(queue);
   topics_.peer_events.subscribe(queue);
+  topics_.restored.subscribe(queue);
   if (vocabulary_) topics_.peer_bows.subscribe(queue);
 }
 
@@ -186,6 +187,12 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeBow>& bow) {
   words.reserve(bow->words.size());
   for (const WordCount& entry : bow->words) words.push_back(entry.word);
   words_.put(bow->id, std::move(words));
+}
+
+void LoopClosureNode::step(const std::shared_ptr<const ClosureOutcome>& restored) {
+  known_.insert(restored->id);
+  if (restored->stage >= ClosureStage::kVerified && restored->id.to.robot != self_)
+    economy_.link(restored->id);
 }
 
 void LoopClosureNode::step(const LoopClosureTick& tick) {

@@ -36,6 +36,7 @@ struct LoopClosureTopics {
   In<KeyframeReply> peer_replies;      ///< To this robot's requests.
   In<PeerEvent> peer_events;           ///< Who comes and goes.
   In<KeyframeBow> peer_bows;           ///< Words of the peers' keyframes.
+  In<ClosureOutcome> restored;         ///< What became of candidates in an earlier process.
   Out<Addressed<KeyframeRequest>> own_requests;
   Out<Addressed<KeyframeReply>> own_replies;
   Out<Closure> own_closures;     ///< Verified.
@@ -77,6 +78,7 @@ class LoopClosureNode final : public Node {
   void step(const std::shared_ptr<const KeyframeReply>& reply);
   void step(const std::shared_ptr<const PeerEvent>& event);
   void step(const std::shared_ptr<const KeyframeBow>& bow);
+  void step(const std::shared_ptr<const ClosureOutcome>& restored);
   void step(const LoopClosureTick& tick);
 
  private:
@@ -84,7 +86,8 @@ class LoopClosureNode final : public Node {
       std::variant<std::shared_ptr<const Keyframe>, std::shared_ptr<const LoopCandidate>,
                    std::shared_ptr<const RelativePose>, std::shared_ptr<const KeyframeRequest>,
                    std::shared_ptr<const KeyframeReply>, std::shared_ptr<const PeerEvent>,
-                   std::shared_ptr<const KeyframeBow>, LoopClosureTick>;
+                   std::shared_ptr<const KeyframeBow>, std::shared_ptr<const ClosureOutcome>,
+                   LoopClosureTick>;
   using KeyframePtr = std::shared_ptr<const Keyframe>;
 
   /// A candidate, or a measured closure, on its way.

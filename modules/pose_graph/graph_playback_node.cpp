@@ -67,8 +67,8 @@ void GraphPlaybackNode::play(std::size_t index) {
 }
 
 void GraphPlaybackNode::wait_until_due(std::size_t index) {
-  if (std::isinf(rate_)) return;
-  const double due_s = static_cast<double>(index) / poses_per_second_ / rate_;
+  if (std::isinf(rate_) || index < known_) return;
+  const double due_s = static_cast<double>(index - known_) / poses_per_second_ / rate_;
   const Heartbeat::Waiting waiting;
   std::mutex unshared;  // the stop token is all there is to wait for
   std::condition_variable_any never;
@@ -96,8 +96,10 @@ void GraphPlaybackNode::step(std::size_t index) {
   Keyframe keyframe;
   keyframe.odometry = {odometry.id, T_odom_kf_.T, T_odom_kf_.Sigma};
   keyframe.stamp = odometry.stamp;
-  topics_.odometry.publish(std::move(odometry));
-  topics_.keyframes.publish(std::move(keyframe));
+  if (index >= known_) {
+    topics_.odometry.publish(std::move(odometry));
+    topics_.keyframes.publish(std::move(keyframe));
+  }
   for (const RelativePose& closure : closures_of_[index]) topics_.closures.publish(closure);
 
   ++published_.keyframes;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <exception>
@@ -46,6 +47,10 @@ class GraphPlaybackNode final : public Node {
   /// Throws ConfigError if `config` is out of bounds, std::invalid_argument for a bad rate.
   GraphPlaybackNode(const GraphPlaybackConfig& config, double rate, RecordedGraph graph,
                     const GraphPlaybackTopics& topics);
+
+  /// The first `keyframes` are known: of those only the closures are played, and at once. Call
+  /// before start().
+  void continue_after(std::size_t keyframes) { known_ = std::min(keyframes, graph_.poses()); }
   ~GraphPlaybackNode() override { stop(); }
 
   std::string_view name() const override { return GraphPlaybackConfig::kSection; }
@@ -72,6 +77,7 @@ class GraphPlaybackNode final : public Node {
   std::vector<std::vector<RelativePose>> closures_of_;  // those that keyframe i makes known
   UncertainPose T_odom_kf_;                             // of the last keyframe published
   GraphPlaybackEnd published_;
+  std::size_t known_ = 0;  // keyframes
   Clock::time_point begin_;
   std::stop_source stop_;
   Worker<std::size_t> worker_;  // last member: stops first; posts itself the next keyframe

@@ -85,7 +85,8 @@ void EurocReader::select(const EurocOptions& options) {
   const double end_s = seconds_between(recording_start_, pairs_.back().stamp);
   std::erase_if(pairs_, [&](const StereoPairFile& pair) {
     const double t_s = seconds_between(recording_start_, pair.stamp);
-    return t_s < options.from_s || t_s >= options.to_s;
+    return t_s < options.from_s || t_s >= options.to_s ||
+           (options.not_before && pair.stamp < *options.not_before);
   });
   if (!pairs_.empty()) return;
   std::ostringstream message;

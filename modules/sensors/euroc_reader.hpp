@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "modules/sensors/dataset_reader.hpp"
@@ -14,6 +15,7 @@ namespace km {
 struct EurocOptions {
   double from_s = 0.0;                                    ///< First instant that belongs to it.
   double to_s = std::numeric_limits<double>::infinity();  ///< First that does not.
+  std::optional<Stamp> not_before = {};  ///< No frame before this instant.
   double stereo_tolerance_s = 1e-3;  ///< Left to right (depth, label) stamp, at most.
   bool depth = false;                ///< Depth images also where a right camera gives depth.
   bool labels = false;               ///< Label images.

@@ -48,6 +48,11 @@ Vio::Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, cons
       tracker_(rig.stereo, tracker),
       smoother_(rig, config) {}
 
+void Vio::continue_from(const VioCheckpoint& checkpoint) {
+  last_ = checkpoint.state;
+  last_keyframe_ = checkpoint.keyframe;
+}
+
 VioResult Vio::process(const SensorPacket& packet) {
   VioResult result;
   const int refused = take_samples(packet);
@@ -144,7 +149,7 @@ void Vio::try_start(VioResult& result) {
       ++statistics_.starts;
       result.states = *states;
       running_ = true;
-      hand_on_first(states->front(), result);
+      take_up_or_hand_on_first(result);
       locate(states->front(), held_.front().frame, result);
       for (std::size_t k = 1; k < held_.size(); ++k) {
         if (smoother_.window().frames[k].keyframe && due((*states)[k], *held_[k].frame))
@@ -152,6 +157,9 @@ void Vio::try_start(VioResult& result) {
         locate((*states)[k], held_[k].frame, result);
       }
       held_.clear();
+      // The pose that the run was left with stands.
+      std::erase_if(result.states,
+                    [this](const auto& s) { return last_ && s.stamp <= last_->stamp; });
       return;
     }
     result.start = StartStatus::kInconsistent;
@@ -239,6 +247,12 @@ std::optional<Vertical> Vio::vertical_at(const OdometryState& state) const {
   const double sigma_rad = config_.tilt_sigma * std::sqrt(config_.tilt_keyframes);
   if (config_.tilt_sigma < kLeastTiltSigma || sigma_rad > kMostTiltSigma) return std::nullopt;
   return Vertical{state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ(), sigma_rad};
+}
+
+// Where the first image is the last keyframe's, that one was handed on already.
+void Vio::take_up_or_hand_on_first(VioResult& result) {
+  const OdometryState& first = result.states.front();
+  if (!last_keyframe_ || last_keyframe_->stamp != first.stamp) hand_on_first(first, result);
 }
 
 void Vio::hand_on_first(const OdometryState& state, VioResult& result) {

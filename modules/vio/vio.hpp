@@ -48,6 +48,13 @@ struct VioResult {
   std::optional<SmootherUpdate> smoother;   ///< Not before the start.
 };
 
+/// Where an earlier process of the robot left off: at a keyframe, whose image is the first that
+/// comes again.
+struct VioCheckpoint {
+  OdometryState state;        ///< At the keyframe's image.
+  KeyframeOdometry keyframe;  ///< The last that was handed on.
+};
+
 /// Stereo-inertial or RGB-D-inertial odometry: one call per image, a pose for every image.
 ///
 /// Images of the first VioConfig::start_s are held back; then all their poses come at once, and
@@ -57,6 +64,10 @@ class Vio {
  public:
   /// Throws ConfigError, and std::invalid_argument for an unusable rig.
   Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, const VioConfig& config);
+
+  /// Goes on from there: the next keyframe follows that one, measured from it like any other where
+  /// odometry starts on its image. Call before the first process().
+  void continue_from(const VioCheckpoint& checkpoint);
 
   [[nodiscard]] VioResult process(const SensorPacket& packet);
 
@@ -78,6 +89,7 @@ class Vio {
   void restart(Held held);
   [[nodiscard]] bool plausible(const SmootherUpdate& update) const;
   void continue_from_last_pose(std::vector<OdometryState>& states) const;
+  void take_up_or_hand_on_first(VioResult& result);
   void hand_on_first(const OdometryState& state, VioResult& result);
   void hand_on(const OdometryState& state, VioResult& result);
   [[nodiscard]] std::optional<Vertical> vertical_at(const OdometryState& state) const;

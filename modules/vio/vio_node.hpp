@@ -25,6 +25,9 @@ class VioNode final : public Node {
   /// Throws ConfigError if a config is out of bounds, std::invalid_argument for an unusable rig.
   VioNode(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker,
           const VioConfig& config, const VioTopics& topics);
+
+  /// See Vio. Call before start().
+  void continue_from(const VioCheckpoint& checkpoint) { vio_.continue_from(checkpoint); }
   ~VioNode() override { stop(); }
 
   std::string_view name() const override { return VioConfig::kSection; }

@@ -50,7 +50,7 @@ struct Run {
   Supervisor supervisor{signals};
 };
 
-TEST_CASE("Nodes are started in order and stopped in order, sources first", "[supervisor]") {
+TEST_CASE("Nodes are started sources last and stopped sources first", "[supervisor]") {
   Run run;
   auto& [log, diary, signals, supervisor] = run;
   supervisor.emplace<ToyNode>("camera", diary);
@@ -60,7 +60,7 @@ TEST_CASE("Nodes are started in order and stopped in order, sources first", "[su
   CHECK_FALSE(result.failure.has_value());
   CHECK_FALSE(result.interrupted);
   CHECK(diary ==
-        std::vector<std::string>{"start camera", "start odometry", "stop camera", "stop odometry"});
+        std::vector<std::string>{"start odometry", "start camera", "stop camera", "stop odometry"});
 }
 
 TEST_CASE("A failed node ends the run with its name and its message", "[supervisor]") {

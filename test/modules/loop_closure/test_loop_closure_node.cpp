@@ -23,6 +23,7 @@ struct Robot {
               .peer_replies = peer_replies,
               .peer_events = peer_events,
               .peer_bows = peer_bows,
+              .restored = restored,
               .own_requests = own_requests,
               .own_replies = own_replies,
               .own_closures = own_closures,
@@ -46,6 +47,7 @@ struct Robot {
   Topic<KeyframeReply> peer_replies;
   Topic<PeerEvent> peer_events;
   Topic<KeyframeBow> peer_bows;
+  Topic<ClosureOutcome> restored;
   Topic<Addressed<KeyframeRequest>> own_requests;
   Topic<Addressed<KeyframeReply>> own_replies;
   Topic<Closure> own_closures;

@@ -1,0 +1,112 @@
+#include "apps/robot/journal_node.hpp"
+
+#include <chrono>
+#include <limits>
+#include <stdexcept>
+
+namespace km {
+namespace {
+
+// A disk that stands still for a minute holds nobody up.
+constexpr std::size_t kQueueCapacity = 16384;
+// Keyframes wait for it: soon, but few enough syncs for flash memory.
+constexpr std::chrono::milliseconds kSyncPeriod{250};
+
+JournalFile begin_or_go_on(const std::filesystem::path& file, const RestoredRun* restored) {
+  return restored == nullptr ? JournalFile(file) : JournalFile(file, restored->journal);
+}
+
+}  // namespace
+
+JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
+                         const JournalStart& start, const RestoredRun* restored,
+                         const JournalTopics& topics)
+    : file_(std::move(file)),
+      results_(results),
+      keyframes_(topics.keyframes),
+      journal_(begin_or_go_on(file_, restored)),
+      known_keyframes_(restored == nullptr ? 0 : restored->keyframes.size()),
+      known_states_(restored == nullptr || restored->states.empty()
+                        ? std::numeric_limits<Stamp>::min()
+                        : restored->states.back().stamp),
+      worker_(
+          kQueueCapacity, Overflow::kBlock,
+          [this](const Input& input) {
+            std::visit([this](const auto& message) { step(message); }, input);
+          },
+          "journal"),
+      ticks_(
+          kSyncPeriod, [this] { worker_.post(Tick()); }, "journal tick") {
+  if (restored != nullptr)
+    for (const Closure& closure : restored->closures)
+      known_closures_.emplace(closure.from.id, closure.to.id);
+  add(start);
+  const auto post = [this](const auto& message) { worker_.post(message); };
+  topics.states.subscribe(post);
+  topics.odometry.subscribe(post);
+  topics.new_keyframes.subscribe([this](const auto& keyframe) {
+    ++new_keyframes_;
+    worker_.post(keyframe);
+  });
+  topics.closures.subscribe(post);
+  topics.outcomes.subscribe(post);
+}
+
+void JournalNode::start() {
+  worker_.start();
+  ticks_.start();
+}
+
+void JournalNode::stop() noexcept {
+  worker_.stop();  // refuses further ticks, so that none waits for room
+  ticks_.stop();
+  if (worker_.error() == nullptr) step(Tick());
+}
+
+std::exception_ptr JournalNode::error() const {
+  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
+}
+
+void JournalNode::add(const JournalEntry& entry) {
+  journal_.add(entry);
+  added_ = true;
+}
+
+void JournalNode::step(Tick /*tick*/) {
+  if (!added_) return;
+  results_.write(file_, [this](const auto& file) {
+    journal_.sync();
+    added_ = false;
+    if (!journal_.is_whole())
+      throw std::runtime_error(file.string() +
+                               ": ends where the disk was full for too long: taken up, the run "
+                               "goes on from there");
+  });
+  for (const auto& keyframe : std::exchange(held_back_, {})) {
+    keyframes_.publish(keyframe);
+    --new_keyframes_;
+  }
+}
+
+void JournalNode::step(const Message<OdometryState>& state) {
+  if (state->stamp > known_states_) add(*state);
+}
+
+void JournalNode::step(const Message<KeyframeOdometry>& odometry) {
+  if (odometry->id.index >= known_keyframes_) add(*odometry);
+}
+
+void JournalNode::step(const Message<Keyframe>& keyframe) {
+  add(*keyframe);
+  held_back_.push_back(keyframe);
+}
+
+void JournalNode::step(const Message<Closure>& closure) {
+  if (known_closures_.emplace(closure->from.id, closure->to.id).second) add(*closure);
+}
+
+void JournalNode::step(const Message<ClosureOutcome>& outcome) {
+  add(*outcome);
+}
+
+}  // namespace km

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <set>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "apps/result_writer.hpp"
+#include "modules/core/keyframe.hpp"
+#include "modules/core/odometry.hpp"
+#include "modules/core/pose_graph.hpp"
+#include "modules/journal/journal_file.hpp"
+#include "modules/journal/restored_run.hpp"
+#include "runtime/node.hpp"
+#include "runtime/periodic.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+
+/// Channels of the journal node; they must outlive it.
+struct JournalTopics {
+  In<OdometryState> states;
+  In<KeyframeOdometry> odometry;
+  In<Keyframe> new_keyframes;
+  In<Closure> closures;  ///< Own and received ones.
+  In<ClosureOutcome> outcomes;
+  Out<Keyframe> keyframes;  ///< The new ones, once they are on the disk.
+};
+
+/// Writes down what a robot must not lose with its process, several times a second, whatever
+/// becomes of the machine. Keyframes are handed on once they are written: what others learn of is
+/// never forgotten, so that an index stands for one keyframe for ever. A disk that is full, or
+/// fails, keeps nothing back: it is told, and the run goes on.
+class JournalNode final : public Node {
+ public:
+  /// Goes on with the journal of `restored`, or begins a new one. `results` outlives this.
+  JournalNode(std::filesystem::path file, ResultWriter& results, const JournalStart& start,
+              const RestoredRun* restored, const JournalTopics& topics);
+  ~JournalNode() override { stop(); }
+
+  /// True while a keyframe waits for the disk. Thread-safe.
+  [[nodiscard]] bool holds_back() const { return new_keyframes_ > 0; }
+
+  std::string_view name() const override { return "journal"; }
+  void start() override;
+  /// Writes what is left.
+  void stop() noexcept override;
+  std::exception_ptr error() const override;
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
+  /// Disks that spin up, or wait for others, take their time.
+  double step_limit_s() const override { return 120.0; }
+  DurationHistogram timing() const override { return worker_.timing(); }
+
+ private:
+  struct Tick {};
+  template <typename T>
+  using Message = typename Topic<T>::Message;
+  using Input = std::variant<Tick, Message<OdometryState>, Message<KeyframeOdometry>,
+                             Message<Keyframe>, Message<Closure>, Message<ClosureOutcome>>;
+
+  void step(Tick tick);
+  void step(const Message<OdometryState>& state);
+  void step(const Message<KeyframeOdometry>& odometry);
+  void step(const Message<Keyframe>& keyframe);
+  void step(const Message<Closure>& closure);
+  void step(const Message<ClosureOutcome>& outcome);
+  void add(const JournalEntry& entry);
+
+  const std::filesystem::path file_;
+  ResultWriter& results_;
+  const Out<Keyframe> keyframes_;
+  JournalFile journal_;
+  // What a journal that is gone on with holds already: it is published once more.
+  const std::size_t known_keyframes_;
+  const Stamp known_states_;  // up to here
+  std::set<std::pair<KeyframeId, KeyframeId>> known_closures_;
+  bool added_ = false;                          // since the last sync
+  std::atomic<std::size_t> new_keyframes_ = 0;  // that are not handed on
+  std::vector<Message<Keyframe>> held_back_;
+  Worker<Input> worker_;
+  Periodic ticks_;  // last member: stops before the worker it posts to
+};
+
+}  // namespace km

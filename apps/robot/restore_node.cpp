@@ -1,0 +1,29 @@
+#include "apps/robot/restore_node.hpp"
+
+#include <cstddef>
+#include <utility>
+
+#include "runtime/log.hpp"
+
+namespace km {
+
+void RestoreNode::start() {
+  RestoredRun run = std::exchange(run_, {});
+  // Before the keyframes: what came of a candidate is known when it is found again.
+  for (ClosureOutcome& outcome : run.outcomes) topics_.outcomes.publish(std::move(outcome));
+  auto state = run.states.begin();
+  for (std::size_t i = 0; i < run.keyframes.size(); ++i) {
+    for (; state != run.states.end() && state->stamp <= run.odometry[i].stamp; ++state)
+      topics_.states.publish(*state);
+    topics_.odometry.publish(std::move(run.odometry[i]));
+    topics_.keyframes.publish(std::move(run.keyframes[i]));
+  }
+  for (Closure& closure : run.closures) {
+    const bool own = closure.from.id.robot == run.robot;
+    (own ? topics_.own_closures : topics_.peer_closures).publish(std::move(closure));
+  }
+  log::info(name()) << run.keyframes.size() << " keyframes, " << run.closures.size()
+                    << " closures restored";
+}
+
+}  // namespace km
