@@ -173,7 +173,7 @@ TEST_CASE("Nodes are stopped during the run without waiting for them", "[supervi
         const bool ended = supervisor.have_stopped({&slow, &after});
         if (!std::exchange(asked, true)) {
           CHECK_FALSE(ended);
-          CHECK(diary.back() == "start other");  // it is the turn of none after the slow one
+          CHECK(diary.back() == "start after");  // it is the turn of none after the slow one
           slow.release();
         }
         return ended;
@@ -181,7 +181,7 @@ TEST_CASE("Nodes are stopped during the run without waiting for them", "[supervi
       0.001);
   CHECK_FALSE(result.failure.has_value());
   CHECK(diary ==
-        std::vector<std::string>{"start after", "start other", "stop after", "stop other"});
+        std::vector<std::string>{"start other", "start after", "stop after", "stop other"});
 }
 
 TEST_CASE("Two nodes of one name are refused", "[supervisor]") {
