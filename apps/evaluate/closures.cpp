@@ -8,10 +8,9 @@
 
 #include "apps/evaluate/commands.hpp"
 #include "apps/output_file.hpp"
-#include "modules/core/input_file.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/sensors/euroc_rig.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 
 namespace km {
 namespace {
@@ -26,10 +25,6 @@ struct ClosuresCommand {
   std::filesystem::path json;  // Not written if empty.
 };
 
-fs::path mav0_of(const fs::path& dataset) {
-  return is_folder(dataset / "mav0") ? dataset / "mav0" : dataset;
-}
-
 void run(const ClosuresCommand& command) {
   if (command.truths.size() != 1 && command.truths.size() != command.results.size())
     throw std::invalid_argument("give one --truth, or as many as there are --results");
@@ -43,7 +38,7 @@ void run(const ClosuresCommand& command) {
     const auto found = read_closures(command.results[i] / "loop_closures.csv");
     closures.insert(closures.end(), found.begin(), found.end());
   }
-  const SensorRig rig = read_euroc_rig(mav0_of(command.dataset));
+  const SensorRig rig = read_euroc_rig(find_mav0(command.dataset));
   const ClosureScores scores =
       score_closures(keyframes, closures, rig.stereo.cameras[0], command.options);
   std::cout << to_table(scores);

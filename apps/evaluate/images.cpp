@@ -12,7 +12,7 @@
 #include "apps/output_file.hpp"
 #include "modules/evaluation/images/image_figure.hpp"
 #include "modules/evaluation/images/image_statistics.hpp"
-#include "modules/sensors/euroc_reader.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 
 namespace km {
 namespace {
@@ -57,11 +57,11 @@ EurocOptions options_of(const RecordingWindow& window) {
 std::vector<ImageFigure> figures_of(const fs::path& dataset, const RecordingWindow& window,
                                     const std::optional<RecordingWindow>& still,
                                     const ImageStatisticsOptions& options) {
-  EurocReader reader(dataset, options_of(window));
+  EurocReader reader = open_euroc(dataset, options_of(window));
   ImageStatistics statistics(reader.rig().stereo, options);
   for_each_pair(reader, dataset.string(), [&](const StereoFrame& frame) { statistics.add(frame); });
   if (still) {
-    EurocReader rest(dataset, options_of(*still));
+    EurocReader rest = open_euroc(dataset, options_of(*still));
     for_each_pair(rest, dataset.string() + ", standing still",
                   [&](const StereoFrame& frame) { statistics.add_still(frame); });
   }
@@ -97,7 +97,8 @@ std::vector<ImageFigure> figures_of_other(const ImagesCommand& command) {
 
 void run(const ImagesCommand& command) {
   // Opened for its errors alone: they come now, not after the minutes the first one takes.
-  if (!command.compare.empty()) EurocReader(command.compare, options_of(window_of_other(command)));
+  if (!command.compare.empty())
+    static_cast<void>(open_euroc(command.compare, options_of(window_of_other(command))));
   const auto figures =
       figures_of(command.dataset, command.window, still_window(command), command.options);
   std::vector<ImageFigure> other;

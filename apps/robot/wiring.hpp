@@ -11,12 +11,12 @@
 #include "apps/robot/mesh_files_node.hpp"
 #include "apps/robot/restore_node.hpp"
 #include "apps/robot/robot_config.hpp"
+#include "apps/robot/robot_input.hpp"
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/run_record.hpp"
 #include "modules/core/dense_frame.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
-#include "modules/journal/restored_run.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh/mesh_chunks_node.hpp"
@@ -28,9 +28,7 @@
 #include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/pose_graph/graph_playback_node.hpp"
 #include "modules/pose_graph/parcel_codec.hpp"
-#include "modules/pose_graph/recorded_graph.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
-#include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/sensors_node.hpp"
 #include "runtime/dds/bridge.hpp"
 #include "runtime/dds/robot_status.hpp"
@@ -71,17 +69,6 @@ struct Topics {
   AddressedCrossing<TeamParcel> parcels;
   Crossing<MeshChunk> chunks;
   Crossing<RobotStatus> status;
-};
-
-/// Nothing: a run of the past, whose robot stands still and serves the others.
-struct PastRun {};
-
-/// What the robot perceives: a recording of sensors, or a recorded pose graph; and what it knows
-/// from before.
-struct RobotInput {
-  std::variant<std::unique_ptr<DatasetReader>, RecordedGraph, PastRun> source;
-  std::string name;  ///< For the journal.
-  std::optional<RestoredRun> restored = {};
 };
 
 /// All nodes of one robot and how they are joined: the system on one page (wiring.cpp).

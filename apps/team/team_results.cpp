@@ -11,7 +11,7 @@
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/evaluation/trajectory_report.hpp"
 #include "modules/mesh/ply_file.hpp"
-#include "modules/sensors/euroc_reader.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 
 namespace km {
 namespace {
@@ -74,14 +74,14 @@ std::optional<TimeWindow> window_of(const RobotPlan& plan) {
   EurocOptions options;
   options.from_s = plan.from_s.value_or(options.from_s);
   options.to_s = plan.to_s.value_or(options.to_s);
-  const EurocReader reader(plan.dataset, options);
+  const EurocReader reader = open_euroc(plan.dataset, options);
   return TimeWindow{reader.first_stamp(), reader.last_stamp()};
 }
 
 // The left camera of the team: that of the first robot that has one.
 std::optional<PinholeCamera> camera_of(const TeamPlan& plan) {
   for (const RobotPlan& robot : plan.robots)
-    if (!robot.dataset.empty()) return EurocReader(robot.dataset).rig().stereo.cameras[0];
+    if (!robot.dataset.empty()) return open_euroc(robot.dataset).rig().stereo.cameras[0];
   return std::nullopt;
 }
 

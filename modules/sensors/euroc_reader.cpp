@@ -5,28 +5,17 @@
 #include <memory>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <variant>
 
 #include "modules/core/imu_limits.hpp"
 #include "modules/core/input_file.hpp"
-#include "modules/sensors/euroc_rig.hpp"
 #include "modules/sensors/text_file.hpp"
 
 namespace km {
 namespace {
 
 constexpr double kGapPeriods = 2.5;  // one lost sample is no gap
-
-std::filesystem::path find_mav0(const std::filesystem::path& folder) {
-  if (!is_folder(folder)) throw DatasetError(folder.string() + ": no such folder");
-  if (is_folder(folder / "mav0")) return folder / "mav0";
-  const auto has = [&folder](const char* sensor) { return is_folder(folder / sensor); };
-  for (const char* sensor : {"cam0", "cam1", "imu0"})
-    if (!has(sensor) && !(sensor == std::string_view("cam1") && has("depth0")))
-      throw DatasetError(folder.string() + ": neither a folder mav0 nor " + sensor +
-                         " in it: not a EuRoC recording");
-  return folder;
-}
 
 std::variant<ImuSample, RowFault> parse_imu(const TextRow& row) {
   Vector6 values;
@@ -66,10 +55,22 @@ bool is_rgbd(const SensorRig& rig) {
 
 }  // namespace
 
-EurocReader::EurocReader(const std::filesystem::path& folder, const EurocOptions& options)
+std::filesystem::path find_mav0(const std::filesystem::path& folder) {
+  if (!is_folder(folder)) throw DatasetError(folder.string() + ": no such folder");
+  if (is_folder(folder / "mav0")) return folder / "mav0";
+  const auto has = [&folder](const char* sensor) { return is_folder(folder / sensor); };
+  for (const char* sensor : {"cam0", "cam1", "imu0"})
+    if (!has(sensor) && !(sensor == std::string_view("cam1") && has("depth0")))
+      throw DatasetError(folder.string() + ": neither a folder mav0 nor " + sensor +
+                         " in it: not a EuRoC recording");
+  return folder;
+}
+
+EurocReader::EurocReader(const std::filesystem::path& folder, EurocCalibration calibration,
+                         const EurocOptions& options)
     : mav0_(find_mav0(folder)),
-      rig_(read_euroc_rig(mav0_, options.depth)),
-      side_images_(mav0_, rig_, options.labels),
+      rig_(std::move(calibration.rig)),
+      side_images_(mav0_, rig_.depth, calibration.depth_scale_m, options.labels),
       pairs_(is_rgbd(rig_) ? list_euroc_lefts(mav0_, report_)
                            : list_euroc_pairs(mav0_, options.stereo_tolerance_s, report_)),
       imu_(read_imu(mav0_ / "imu0" / "data.csv", report_)),

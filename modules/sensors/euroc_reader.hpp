@@ -11,20 +11,30 @@
 
 namespace km {
 
+/// What a recording says of its sensors.
+struct EurocCalibration {
+  SensorRig rig;
+  double depth_scale_m = 1e-3;  ///< Of a unit stored in depth images [m].
+};
+
 /// Part of a recording, in seconds since the first frame of the WHOLE recording, and what is read.
 struct EurocOptions {
   double from_s = 0.0;                                    ///< First instant that belongs to it.
   double to_s = std::numeric_limits<double>::infinity();  ///< First that does not.
   std::optional<Stamp> not_before = {};  ///< No frame before this instant.
   double stereo_tolerance_s = 1e-3;  ///< Left to right (depth, label) stamp, at most.
-  bool depth = false;                ///< Depth images also where a right camera gives depth.
+  bool depth = false;                ///< Depth images also beside a right camera (open_euroc()).
   bool labels = false;               ///< Label images.
 };
 
-/// Reads a EuRoC/ASL folder: mav0/{cam0,cam1,imu0} with data.csv and sensor.yaml, images in any
-/// format OpenCV decodes, as the csv names them. Without cam1 the rig is RGB-D: depth0 in its
-/// place, 16-bit images of one channel. Labels: label0, 8-bit ids, or colours of label_palette.csv
-/// beside it. Both may come at a lower rate than images: a frame then has none.
+/// The folder of a EuRoC recording that holds cam0 and imu0: `folder`/mav0, or `folder` itself.
+/// Throws DatasetError if there is neither.
+[[nodiscard]] std::filesystem::path find_mav0(const std::filesystem::path& folder);
+
+/// Reads a EuRoC/ASL folder: mav0/{cam0,cam1,imu0} with data.csv, images in any format OpenCV
+/// decodes, as the csv names them. An RGB-D rig has depth0 in place of cam1: 16-bit images of one
+/// channel. Labels: label0, 8-bit ids, or colours of label_palette.csv beside it. Both may come at
+/// a lower rate than images: a frame then has none.
 ///
 /// The first packet starts up to kLeadIn_s before its frame, also where that lies before `from_s`:
 /// odometry can begin with what the inertial sensor felt before the first image.
@@ -32,11 +42,12 @@ class EurocReader final : public DatasetReader {
  public:
   static constexpr double kLeadIn_s = 1.0;
 
-  /// `folder` holds `mav0` or is it. Reads the calibration and the lists, no image. Throws
-  /// DatasetError for what is missing or unusable (see read_euroc_rig()), depth and labels asked
-  /// for included, and for a window without a frame; std::invalid_argument for a window that is
-  /// empty or not a number.
-  explicit EurocReader(const std::filesystem::path& folder, const EurocOptions& options = {});
+  /// `folder` as find_mav0() takes it; open_euroc() of the codec reads the calibration from it.
+  /// Reads the lists, no image. Depth images are read if the rig has a depth range. Throws
+  /// DatasetError for what is missing or unusable, labels asked for included, and for a window
+  /// without a frame; std::invalid_argument for a window that is empty or not a number.
+  EurocReader(const std::filesystem::path& folder, EurocCalibration calibration,
+              const EurocOptions& options = {});
 
   [[nodiscard]] const SensorRig& rig() const override { return rig_; }
   [[nodiscard]] std::optional<SensorPacket> next() override;

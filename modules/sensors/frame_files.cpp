@@ -8,7 +8,6 @@
 
 #include "modules/core/input_file.hpp"
 #include "modules/sensors/dataset_reader.hpp"
-#include "modules/sensors/euroc_rig.hpp"
 #include "modules/sensors/image_file.hpp"
 #include "modules/sensors/text_file.hpp"
 
@@ -127,9 +126,9 @@ StereoPairResult load_stereo_pair(const StereoPairFile& files, const StereoRig& 
   return result;
 }
 
-SideImages::SideImages(const std::filesystem::path& mav0, const SensorRig& rig, bool labels)
-    : mav0_(mav0), depth_(rig.depth), labels_(labels) {
-  if (depth_) depth_scale_m_ = read_depth_scale(mav0);
+SideImages::SideImages(const std::filesystem::path& mav0, const std::optional<DepthRange>& depth,
+                       double depth_scale_m, bool labels)
+    : mav0_(mav0), depth_(depth), depth_scale_m_(depth_scale_m), labels_(labels) {
   if (labels_) palette_ = read_palette(mav0 / "label_palette.csv");
 }
 

@@ -58,9 +58,10 @@ struct StereoPairResult {
 /// be used is counted and left out: its frame comes without. Const members are thread-safe.
 class SideImages {
  public:
-  /// Depth if `rig.depth` says so, labels if asked. Throws DatasetError for a depth_scale or a
-  /// palette that cannot be read; ids need no palette.
-  SideImages(const std::filesystem::path& mav0, const SensorRig& rig, bool labels);
+  /// Depth with a range, its images in units of `depth_scale_m`; labels if asked. Throws
+  /// DatasetError for a palette that cannot be read; ids need no palette.
+  SideImages(const std::filesystem::path& mav0, const std::optional<DepthRange>& depth,
+             double depth_scale_m, bool labels);
 
   /// Finds the images of `frames`; see list_beside().
   void list(double tolerance_s, std::vector<StereoPairFile>& frames, ReaderReport& report) const;
@@ -79,8 +80,8 @@ class SideImages {
 
   std::filesystem::path mav0_;
   std::optional<DepthRange> depth_;
+  double depth_scale_m_;
   bool labels_;
-  double depth_scale_m_ = 0.0;
   LabelPalette palette_;
 };
 

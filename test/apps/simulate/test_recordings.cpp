@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-#include "modules/sensors/euroc_reader.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 #include "test/support/command.hpp"
 #include "test/support/patience.hpp"
 #include "test/support/process.hpp"
@@ -71,7 +71,7 @@ TEST_CASE("The ordinary reader reads a recording, and files that went missing ar
   const auto result = simulate(kSmall, output);
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
-  EurocReader reader(output / "robot1");
+  EurocReader reader = open_euroc(output / "robot1");
   std::size_t frames = 0;
   std::size_t samples = 0;
   while (const auto packet = reader.next()) {
@@ -132,7 +132,7 @@ TEST_CASE("A run that is stopped goes on to the same bytes", "[simulate]") {
   CHECK(program.wait() == 130);
   CHECK(program.lines("Stopped; the same command goes on").size() == 1);
   CHECK_FALSE(fs::exists(stopped / "robot0/mav0/cam0/data.csv"));  // not yet a recording
-  CHECK_THROWS_AS(EurocReader(stopped / "robot0"), DatasetError);
+  CHECK_THROWS_AS(open_euroc(stopped / "robot0"), DatasetError);
 
   REQUIRE(run_command(kProgram + arguments + stopped.string()).exit_code == 0);
   REQUIRE(run_command(kProgram + arguments + (folder.path() / "whole").string()).exit_code == 0);

@@ -4,7 +4,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "depth_check.hpp"
-#include "modules/sensors/euroc_reader.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 #include "test/support/shared_data.hpp"
 
 // Time and accuracy of stereo depth on MH_01's pairs, 752 x 480, on one thread: CPU time, which a
@@ -23,7 +23,7 @@ double cpu_ms() {
 }
 
 void measure(const std::filesystem::path& folder, const Case& one) {
-  EurocReader reader(folder, {.from_s = 0.0, .to_s = 15.0});
+  EurocReader reader = open_euroc(folder, {.from_s = 0.0, .to_s = 15.0});
   const StereoRig& rig = reader.rig().stereo;
   StereoDepth stereo(rig, {.downscale = one.downscale, .min_depth_m = one.min_depth_m});
   DepthDifferences differences;

@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include "depth_check.hpp"
-#include "modules/sensors/euroc_rig.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 #include "modules/sensors/frame_files.hpp"
 #include "test/support/shared_data.hpp"
 

@@ -20,7 +20,7 @@
 #include "modules/mesh/ply_file.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
-#include "modules/sensors/euroc_reader.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 
 namespace km {
 namespace {
@@ -133,7 +133,7 @@ class Mapping {
 
 void map_and_correct(const Task& task) {
   const Run run(task.run);
-  EurocReader reader(task.dataset, {.depth = !task.stereo, .labels = true});
+  EurocReader reader = open_euroc(task.dataset, {.depth = !task.stereo, .labels = true});
   DenseSensor sensor(reader.rig().stereo,
                      {.depth = task.stereo ? DepthFrom::kStereo : DepthFrom::kImages,
                       .labels = LabelsFrom::kImages});

@@ -15,7 +15,7 @@
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/mesh/ply_file.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
-#include "modules/sensors/euroc_reader.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 
 namespace km {
 namespace {
@@ -33,7 +33,7 @@ double cpu_s() {
 }
 
 void map_with_true_poses(const Task& task) {
-  EurocReader reader(task.dataset, {.depth = !task.stereo, .labels = true});
+  EurocReader reader = open_euroc(task.dataset, {.depth = !task.stereo, .labels = true});
   const std::vector<StampedPose> truth = read_trajectory(task.truth);
   DenseSensor sensor(reader.rig().stereo,
                      {.depth = task.stereo ? DepthFrom::kStereo : DepthFrom::kImages,

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/sensors/euroc_reader.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -152,7 +152,7 @@ struct Outcome {
 };
 
 inline Outcome read(const EurocFolder& folder, const EurocOptions& options = {}) {
-  EurocReader reader(folder.root(), options);
+  EurocReader reader = open_euroc(folder.root(), options);
   Outcome outcome{packets_of(reader), {}};
   outcome.report = reader.report();
   return outcome;

@@ -1,7 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "modules/sensors/euroc_reader.hpp"
-#include "modules/sensors/euroc_rig.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 #include "modules/sensors/frame_files.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/shared_data.hpp"
@@ -44,7 +43,7 @@ void check_one_pair_less(const EurocFolder& folder, ReaderFault fault, const std
 
 TEST_CASE("A faultless recording gives every pair and every sample between", "[sensors]") {
   const EurocFolder folder(GENERATE(".png", ".jpg"));
-  EurocReader reader(folder.root());
+  EurocReader reader = open_euroc(folder.root());
   const auto packets = packets_of(reader);
   REQUIRE(packets.size() == EurocFolder::kPairs);
   CHECK(reader.pair_count() == EurocFolder::kPairs);
@@ -67,12 +66,12 @@ TEST_CASE("A faultless recording gives every pair and every sample between", "[s
 
 TEST_CASE("The folder mav0 itself will do", "[sensors]") {
   const EurocFolder folder;
-  CHECK(EurocReader(folder.mav0()).pair_count() == EurocFolder::kPairs);
+  CHECK(open_euroc(folder.mav0()).pair_count() == EurocFolder::kPairs);
 }
 
 TEST_CASE("The first packet leads in by one second, also from before the window", "[sensors]") {
   const EurocFolder folder;
-  EurocReader reader(folder.root(), {.from_s = 0.1});
+  EurocReader reader = open_euroc(folder.root(), {.from_s = 0.1});
   const auto packet = reader.next();
   REQUIRE(packet);
   CHECK(packet->frame->stamp == EurocFolder::image_stamp(2));
@@ -82,8 +81,8 @@ TEST_CASE("The first packet leads in by one second, also from before the window"
 
 TEST_CASE("A window is half open and counts from the recording's first image", "[sensors]") {
   const EurocFolder folder;
-  EurocReader first(folder.root(), {.from_s = 0.0, .to_s = 0.2});
-  EurocReader second(folder.root(), {.from_s = 0.2, .to_s = 100.0});
+  EurocReader first = open_euroc(folder.root(), {.from_s = 0.0, .to_s = 0.2});
+  EurocReader second = open_euroc(folder.root(), {.from_s = 0.2, .to_s = 100.0});
   const auto a = packets_of(first);
   const auto b = packets_of(second);
   REQUIRE(a.size() == 4);
@@ -93,9 +92,9 @@ TEST_CASE("A window is half open and counts from the recording's first image", "
   CHECK(second.recording_start() == EurocFolder::kFirstImage);
   CHECK(second.first_stamp() == EurocFolder::image_stamp(4));
   CHECK(second.last_stamp() == EurocFolder::image_stamp(7));
-  CHECK_THROWS_AS(EurocReader(folder.root(), {.from_s = 1.0, .to_s = 1.0}), std::invalid_argument);
-  CHECK_THROWS_AS(EurocReader(folder.root(), {.from_s = std::nan("")}), std::invalid_argument);
-  CHECK_THROWS_WITH(EurocReader(folder.root(), {.from_s = 1.0}),
+  CHECK_THROWS_AS(open_euroc(folder.root(), {.from_s = 1.0, .to_s = 1.0}), std::invalid_argument);
+  CHECK_THROWS_AS(open_euroc(folder.root(), {.from_s = std::nan("")}), std::invalid_argument);
+  CHECK_THROWS_WITH(open_euroc(folder.root(), {.from_s = 1.0}),
                     Catch::Contains("from 0 s to 0.35 s"));
 }
 
@@ -107,7 +106,7 @@ TEST_CASE("Blanks, comments, CRLF and a bare header in the lists are accepted", 
     list += "  " + stamp + " ,  " + stamp + ".png  # note\r\n\r\n";
   }
   folder.write("cam0/data.csv", list);
-  EurocReader reader(folder.root());
+  EurocReader reader = open_euroc(folder.root());
   CHECK(packets_of(reader).size() == EurocFolder::kPairs);
   CHECK(reader.report().empty());
 }
@@ -115,8 +114,8 @@ TEST_CASE("Blanks, comments, CRLF and a bare header in the lists are accepted", 
 TEST_CASE("Stamps of left and right may differ by the tolerance", "[sensors]") {
   const EurocFolder folder;
   folder.replace("cam1/data.csv", "10100000000,", "10100000400,");
-  CHECK(EurocReader(folder.root(), {.stereo_tolerance_s = 1e-6}).pair_count() == 8);
-  EurocReader strict(folder.root(), {.stereo_tolerance_s = 1e-7});
+  CHECK(open_euroc(folder.root(), {.stereo_tolerance_s = 1e-6}).pair_count() == 8);
+  EurocReader strict = open_euroc(folder.root(), {.stereo_tolerance_s = 1e-7});
   CHECK(strict.pair_count() == 7);
   CHECK(strict.report().count(ReaderFault::kLeftWithoutRight) == 1);
   CHECK(strict.report().count(ReaderFault::kRightWithoutLeft) == 1);
@@ -125,7 +124,7 @@ TEST_CASE("Stamps of left and right may differ by the tolerance", "[sensors]") {
 TEST_CASE("MH_01_easy: 320 pairs in 16 s, one step of 100 ms, covered by samples", "[sensors]") {
   const auto folder = shared_data("euroc/MH_01_easy");
   if (!folder) return;
-  EurocReader reader(*folder, {.from_s = 0.0, .to_s = 16.01});
+  EurocReader reader = open_euroc(*folder, {.from_s = 0.0, .to_s = 16.01});
   const auto packets = packets_of(reader);
   REQUIRE(packets.size() == 320);
   CHECK(reader.report().empty());
@@ -147,35 +146,35 @@ TEST_CASE("MH_01_easy: 320 pairs in 16 s, one step of 100 ms, covered by samples
 
 TEST_CASE("Missing files and folders are refused by name", "[sensors]") {
   const EurocFolder folder;
-  CHECK_THROWS_WITH(EurocReader("/nowhere/at/all"), "/nowhere/at/all: no such folder");
+  CHECK_THROWS_WITH(open_euroc("/nowhere/at/all"), "/nowhere/at/all: no such folder");
   for (const std::string file : {"cam0/data.csv", "cam1/data.csv", "imu0/data.csv",
                                  "cam0/sensor.yaml", "cam1/sensor.yaml", "imu0/sensor.yaml"}) {
     CAPTURE(file);
     const EurocFolder spoilt;
     fs::remove(spoilt.mav0() / file);
-    CHECK_THROWS_WITH(EurocReader(spoilt.root()),
+    CHECK_THROWS_WITH(open_euroc(spoilt.root()),
                       (spoilt.mav0() / file).string() + ": no such file");
   }
   fs::remove_all(folder.mav0() / "cam1");
-  CHECK_THROWS_WITH(EurocReader(folder.root()), Catch::Contains("cam1/sensor.yaml: no such file") &&
-                                                    Catch::Contains("nor depth0"));
+  CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::Contains("cam1/sensor.yaml: no such file") &&
+                                                   Catch::Contains("nor depth0"));
   fs::remove_all(folder.mav0());
-  CHECK_THROWS_WITH(EurocReader(folder.root()), Catch::Contains("not a EuRoC recording"));
+  CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::Contains("not a EuRoC recording"));
 }
 
 TEST_CASE("Lists without a usable row are refused", "[sensors]") {
   const EurocFolder folder;
   SECTION("images") {
     folder.write("cam0/data.csv", "#timestamp [ns],filename\n");
-    CHECK_THROWS_WITH(EurocReader(folder.root()), Catch::EndsWith("data.csv: lists no image"));
+    CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::EndsWith("data.csv: lists no image"));
   }
   SECTION("inertial samples") {
     folder.write("imu0/data.csv", "nonsense\n1,2,3\n");
-    CHECK_THROWS_WITH(EurocReader(folder.root()), Catch::EndsWith("holds no inertial sample"));
+    CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::EndsWith("holds no inertial sample"));
   }
   SECTION("no pairs") {
     folder.write("cam1/data.csv", "55,55.png\n");
-    CHECK_THROWS_WITH(EurocReader(folder.root()), Catch::Contains("no image of cam0"));
+    CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::Contains("no image of cam0"));
   }
 }
 

@@ -3,8 +3,7 @@
 #include <cmath>
 
 #include "modules/core/depth_lookup.hpp"
-#include "modules/sensors/euroc_reader.hpp"
-#include "modules/sensors/euroc_rig.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/recorded_kitchen.hpp"
 #include "test/support/shared_data.hpp"
@@ -81,7 +80,7 @@ TEST_CASE("Without a right camera, depth makes an RGB-D rig", "[sensors]") {
     CHECK(packet.frame->depth->height == 24);
     CHECK(packet.frame->depth->millimetres == std::vector<std::uint16_t>(32 * 24, 2000));
   }
-  CHECK(EurocReader(folder.mav0()).pair_count() == EurocFolder::kPairs);
+  CHECK(open_euroc(folder.mav0()).pair_count() == EurocFolder::kPairs);
 }
 
 TEST_CASE("Range, scale and baseline of depth have defaults", "[sensors]") {
@@ -113,7 +112,7 @@ TEST_CASE("Depth and labels beside stereo are read if asked for", "[sensors]") {
   folder.add_labels(2);
   const bool depth = GENERATE(false, true), labels = GENERATE(false, true);
   CAPTURE(depth, labels);
-  EurocReader reader(folder.root(), {.depth = depth, .labels = labels});
+  EurocReader reader = open_euroc(folder.root(), {.depth = depth, .labels = labels});
   CHECK(reader.rig().depth.has_value() == depth);
   CHECK(reader.rig().stereo.depth_source == DepthSource::kRightImage);
   const auto first = reader.next(), second = reader.next();
@@ -125,17 +124,32 @@ TEST_CASE("Depth and labels beside stereo are read if asked for", "[sensors]") {
   CHECK(second->frame->labels == nullptr);
 }
 
+TEST_CASE("A reader holds to the calibration that it is given", "[sensors]") {
+  const EurocFolder folder;
+  folder.add_depth();  // 2000 units everywhere
+  EurocCalibration calibration{.rig = read_euroc_rig(folder.mav0(), true), .depth_scale_m = 0.002};
+  calibration.rig.imu.rate_hz = 100.0;
+  for (const char* sensor : {"cam0", "cam1", "depth0", "imu0"})
+    fs::remove(folder.mav0() / sensor / "sensor.yaml");
+  EurocReader reader(folder.root(), calibration);
+  CHECK(reader.rig().imu.rate_hz == 100.0);
+  const auto packet = reader.next();
+  REQUIRE(packet);
+  REQUIRE(packet->frame->depth);
+  CHECK(packet->frame->depth->millimetres[0] == 4000);
+}
+
 TEST_CASE("What is asked for must be there", "[sensors]") {
   const EurocFolder folder;
-  CHECK_THROWS_WITH(EurocReader(folder.root(), {.depth = true}),
+  CHECK_THROWS_WITH(open_euroc(folder.root(), {.depth = true}),
                     Catch::EndsWith("depth0/sensor.yaml: no such file"));
-  CHECK_THROWS_WITH(EurocReader(folder.root(), {.labels = true}),
+  CHECK_THROWS_WITH(open_euroc(folder.root(), {.labels = true}),
                     Catch::EndsWith("label0/data.csv: no such file"));
   fs::remove_all(folder.mav0() / "cam1");
-  CHECK_THROWS_WITH(EurocReader(folder.root()), Catch::Contains("cam1/sensor.yaml: no such file"));
+  CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::Contains("cam1/sensor.yaml: no such file"));
   folder.add_depth();
   fs::remove(folder.mav0() / "depth0/data.csv");
-  CHECK_THROWS_WITH(EurocReader(folder.root()), Catch::EndsWith("depth0/data.csv: no such file"));
+  CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::EndsWith("depth0/data.csv: no such file"));
 }
 
 TEST_CASE("A depth image that cannot be used costs only itself", "[sensors]") {
@@ -216,7 +230,7 @@ TEST_CASE("Depth that is not aligned with the left camera is refused", "[sensors
   const EurocFolder folder;
   folder.make_rgbd();
   folder.replace("depth0/sensor.yaml", c.from, c.to);
-  CHECK_THROWS_WITH(EurocReader(folder.root()),
+  CHECK_THROWS_WITH(open_euroc(folder.root()),
                     Catch::Contains("depth0/sensor.yaml") && Catch::Contains(c.message));
 }
 
@@ -269,13 +283,13 @@ TEST_CASE("The palette comes with the reader, a broken one is refused", "[sensor
   const EurocFolder folder;
   folder.add_labels();
   folder.write("label_palette.csv", kPalette);
-  EurocReader reader(folder.root(), {.labels = true});
+  EurocReader reader = open_euroc(folder.root(), {.labels = true});
   REQUIRE(reader.label_palette().find(7) != nullptr);
   CHECK(reader.label_palette().find(7)->name == "tree");
-  CHECK(EurocReader(folder.root()).label_palette().classes().empty());
+  CHECK(open_euroc(folder.root()).label_palette().classes().empty());
   folder.write("label_palette.csv", "name,red,green,blue,alpha,id\nroad,128,64,300,255,3\n");
-  CHECK_THROWS_AS(EurocReader(folder.root(), {.labels = true}), DatasetError);
-  CHECK_THROWS_WITH(EurocReader(folder.root(), {.labels = true}),
+  CHECK_THROWS_AS(open_euroc(folder.root(), {.labels = true}), DatasetError);
+  CHECK_THROWS_WITH(open_euroc(folder.root(), {.labels = true}),
                     Catch::Contains("label_palette.csv"));
 }
 

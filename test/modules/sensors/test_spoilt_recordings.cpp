@@ -4,7 +4,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "modules/core/imu_limits.hpp"
-#include "modules/sensors/euroc_rig.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 #include "modules/sensors/image_file.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/spoilt_input.hpp"
@@ -108,7 +108,7 @@ TEST_CASE("A bad row is lost and counted with its line, and no other", "[sensors
   CAPTURE(row.what);
   const EurocFolder folder;
   spoil_row(folder, row);
-  EurocReader reader(folder.root());
+  EurocReader reader = open_euroc(folder.root());
   CHECK(packets_of(reader).size() == row.packets);
   REQUIRE(reader.report().count(row.fault) == 1);
   CHECK_THAT(reader.report().entries().at(row.fault).first,
@@ -171,7 +171,7 @@ TEST_CASE("Spoilt lists and calibrations are refused, or give what a reader prom
   const std::string good = folder.read(file);
   check_spoilt<DatasetError>(good, folder.root().string(), [&](const std::string& text) {
     folder.write(file, text);
-    EurocReader reader(folder.root());
+    EurocReader reader = open_euroc(folder.root());
     check_recording(reader);
   });
 }
@@ -182,7 +182,7 @@ TEST_CASE("Spoilt depth calibrations are refused, or give what a reader promises
   check_spoilt<DatasetError>(EurocFolder::depth_yaml(), folder.root().string(),
                              [&](const std::string& text) {
                                folder.write("depth0/sensor.yaml", text);
-                               EurocReader reader(folder.root());
+                               EurocReader reader = open_euroc(folder.root());
                                check_recording(reader);
                              });
 }
@@ -212,15 +212,15 @@ TEST_CASE("A file of a recording that is none is refused by name", "[sensors]") 
   loop ? fs::create_symlink(place.filename(), place)
        : static_cast<void>(fs::create_directory(place));
   CHECK_THROWS_WITH(
-      EurocReader(folder.root()),
+      open_euroc(folder.root()),
       place.string() + (loop ? ": Too many levels of symbolic links" : ": a folder, not a file"));
 }
 
 TEST_CASE("A folder that is a loop is refused by name", "[sensors]") {
   const TemporaryFolder folder;
   fs::create_symlink("mav0", folder.path() / "mav0");
-  CHECK_THROWS_WITH(EurocReader(folder.path()), Catch::Contains("not a EuRoC recording"));
-  CHECK_THROWS_WITH(EurocReader(folder.path() / "mav0"), Catch::Contains("no such folder"));
+  CHECK_THROWS_WITH(open_euroc(folder.path()), Catch::Contains("not a EuRoC recording"));
+  CHECK_THROWS_WITH(open_euroc(folder.path() / "mav0"), Catch::Contains("no such folder"));
 }
 
 TEST_CASE("Noise and optics that no sensor has are refused with line and value", "[sensors]") {

@@ -10,7 +10,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/sensors/euroc_reader.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 #include "modules/vio/track_motion.hpp"
 
 namespace km {
@@ -109,7 +109,7 @@ Recording read_recording(const std::filesystem::path& folder, double from_s, dou
   EurocOptions options;
   options.from_s = from_s;
   options.to_s = to_s;
-  EurocReader reader(folder, options);
+  EurocReader reader = open_euroc(folder, options);
   Recording result;
   result.rig = reader.rig();
   const auto truth = read_trajectory(folder / "mav0/state_groundtruth_estimate0");

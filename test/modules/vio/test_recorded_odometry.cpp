@@ -4,7 +4,7 @@
 #include <fstream>
 #include <set>
 
-#include "modules/sensors/euroc_reader.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 #include "modules/vio/vio_node.hpp"
 #include "recorded_odometry.hpp"
 #include "test/support/shared_data.hpp"
@@ -117,7 +117,7 @@ TEST_CASE("V1_01_easy: a start at rest, at five images a second", "[vio]") {
   if (!folder) return;
   const TemporaryFolder links;
   link_static_start(*folder, links.path());
-  EurocReader reader(links.path());
+  EurocReader reader = open_euroc(links.path());
   Vio vio(0, reader.rig(), TrackerConfig{}, VioConfig{});
   std::vector<OdometryState> states;
   std::optional<StartStatus> start;

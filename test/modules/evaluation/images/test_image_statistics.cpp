@@ -5,7 +5,7 @@
 
 #include "modules/evaluation/images/image_figure.hpp"
 #include "modules/evaluation/images/image_statistics.hpp"
-#include "modules/sensors/euroc_reader.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 #include "test/modules/evaluation/images/synthetic_images.hpp"
 #include "test/support/shared_data.hpp"
 
@@ -71,7 +71,7 @@ void check_near(const std::vector<ImageFigure>& figures, const std::string& sect
 TEST_CASE("Recorded images give the figures recorded of them", "[image_statistics]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
-  EurocReader reader(*dataset, {.from_s = 0.0, .to_s = 15.0});
+  EurocReader reader = open_euroc(*dataset, {.from_s = 0.0, .to_s = 15.0});
   ImageStatistics statistics(reader.rig().stereo, {.stride = 1});
   for (int i = 0; const auto packet = reader.next(); ++i)
     if (i % 12 == 0) statistics.add(*packet->frame);
@@ -102,7 +102,7 @@ TEST_CASE("Recorded images give the figures recorded of them", "[image_statistic
 TEST_CASE("Recorded corners survive as recorded", "[image_statistics]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
-  EurocReader reader(*dataset, {.from_s = 0.0, .to_s = 7.5});
+  EurocReader reader = open_euroc(*dataset, {.from_s = 0.0, .to_s = 7.5});
   TrackStatistics tracks(30, 0.25);
   std::vector<ImageFigure> figures;
   while (const auto packet = reader.next()) {

@@ -9,7 +9,7 @@
 
 #include "modules/core/lie.hpp"
 #include "modules/core/text_rows.hpp"
-#include "modules/sensors/euroc_rig.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 #include "modules/simulation/dataset/dataset_record.hpp"
 #include "modules/simulation/dataset/image_encoding.hpp"
 #include "modules/simulation/dataset/number_text.hpp"

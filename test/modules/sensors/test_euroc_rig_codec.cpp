@@ -1,4 +1,4 @@
-#include "modules/sensors/euroc_rig.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 
 #include <catch2/catch.hpp>
 

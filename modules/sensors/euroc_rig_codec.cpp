@@ -1,4 +1,4 @@
-#include "modules/sensors/euroc_rig.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
 
 #include <yaml-cpp/yaml.h>
 #include <Eigen/LU>
@@ -291,6 +291,13 @@ SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth) {
 double read_depth_scale(const std::filesystem::path& mav0) {
   return SensorYaml(mav0 / "depth0" / "sensor.yaml")
       .number("depth_scale", kDepthScale_m, kDefaultDepthScale_m);
+}
+
+EurocReader open_euroc(const std::filesystem::path& folder, const EurocOptions& options) {
+  const std::filesystem::path mav0 = find_mav0(folder);
+  EurocCalibration calibration{.rig = read_euroc_rig(mav0, options.depth)};
+  if (calibration.rig.depth) calibration.depth_scale_m = read_depth_scale(mav0);
+  return EurocReader(folder, std::move(calibration), options);
 }
 
 }  // namespace km

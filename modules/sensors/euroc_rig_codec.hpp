@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "modules/core/camera.hpp"
+#include "modules/sensors/euroc_reader.hpp"
 
 namespace km {
 
@@ -21,7 +22,12 @@ namespace km {
 /// and, `with_depth`, for stereo cameras with depth0 beside them.
 [[nodiscard]] SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth = false);
 
-/// `depth_scale` of depth0: metres of one unit stored in its images.
+/// `depth_scale` of depth0: metres of one unit stored in its images. Errors as above.
 [[nodiscard]] double read_depth_scale(const std::filesystem::path& mav0);
+
+/// A reader of the recording in `folder`, calibrated by its own files; depth asked for must be
+/// there. Throws what read_euroc_rig() and EurocReader throw.
+[[nodiscard]] EurocReader open_euroc(const std::filesystem::path& folder,
+                                     const EurocOptions& options = {});
 
 }  // namespace km

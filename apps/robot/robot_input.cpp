@@ -1,0 +1,90 @@
+#include "apps/robot/robot_input.hpp"
+
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "apps/result_files.hpp"
+#include "modules/core/input_file.hpp"
+#include "modules/sensors/euroc_reader.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
+#include "runtime/log.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The run to go on with; none where its process had not come to a keyframe yet.
+std::optional<RestoredRun> restore(const RobotOptions& options, const std::string& input) {
+  const fs::path file = options.output / kJournal;
+  if (!options.resume) return std::nullopt;
+  if (is_absent(file)) {
+    log::warn("journal") << file.string() << ": there is none: the run begins anew";
+    return std::nullopt;
+  }
+  RestoredRun run = restore_run(file);
+  if (run.journal.cut_bytes > 0)
+    log::warn("journal") << file.string() << ": the last " << run.journal.cut_bytes
+                         << " bytes are torn: cut after entry " << run.journal.entries;
+  if (run.journal.entries == 0) return std::nullopt;
+  if (run.robot != options.robot || run.input != input)
+    throw std::invalid_argument(file.string() + ": is of robot " + std::to_string(run.robot) +
+                                " on " + run.input + ", this is robot " +
+                                std::to_string(options.robot) + " on " + input +
+                                ": give the options it was started with, or --output");
+  if (run.keyframes.empty()) return std::nullopt;
+  if (!options.dataset.empty() && run.states.empty())
+    throw std::invalid_argument(file.string() + ": has keyframes but no odometry");
+  return run;
+}
+
+RestoredRun open_session(const RobotOptions& options) {
+  const fs::path file = options.session / kJournal;
+  RestoredRun run = restore_run(file);
+  if (run.keyframes.empty())
+    throw std::invalid_argument(file.string() + ": that run has no keyframe");
+  return alone_as(options.robot, std::move(run));
+}
+
+std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const RobotConfig& config,
+                                            const std::optional<MappingPlan>& mapping,
+                                            const std::optional<RestoredRun>& restored) {
+  EurocOptions euroc{.from_s = options.from_s.value_or(0.0),
+                     .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
+                     .stereo_tolerance_s = config.sensors.stereo_tolerance_s,
+                     .depth = config.sensors.depth || (mapping && mapping->reads_depth()),
+                     .labels = config.sensors.labels || (mapping && mapping->reads_labels())};
+  if (restored) euroc.not_before = restored->odometry.back().stamp;
+  return std::make_unique<EurocReader>(open_euroc(options.dataset, euroc));
+}
+
+RecordedGraph open_graph(const RobotOptions& options) {
+  RecordedGraph graph = read_recorded_graph(options.graph);
+  if (graph.robot != options.robot)
+    throw std::invalid_argument(options.graph.string() + " holds robot " +
+                                std::to_string(graph.robot) + ": start it with --robot " +
+                                std::to_string(graph.robot));
+  if (graph.indefinite_edges > 0)
+    log::warn("graph") << options.graph.string() << ": " << graph.indefinite_edges
+                       << " edges have an information matrix that is not positive definite: "
+                          "weighed by its blocks";
+  return graph;
+}
+
+}  // namespace
+
+RobotInput open_robot_input(const RobotOptions& options, const RobotConfig& config,
+                            const std::optional<MappingPlan>& mapping) {
+  if (!options.session.empty()) return {PastRun(), {}, open_session(options)};
+  const bool is_dataset = !options.dataset.empty();
+  const fs::path& path = is_dataset ? options.dataset : options.graph;
+  const std::string name = (path / "").parent_path().filename();  // wherever it is mounted
+  std::optional<RestoredRun> restored = restore(options, name);
+  if (!is_dataset) return {open_graph(options), name, std::move(restored)};
+  auto reader = open_dataset(options, config, mapping, restored);
+  return {std::move(reader), name, std::move(restored)};
+}
+
+}  // namespace km

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "apps/robot/mapping_plan.hpp"
+#include "apps/robot/robot_config.hpp"
+#include "modules/journal/restored_run.hpp"
+#include "modules/pose_graph/recorded_graph.hpp"
+#include "modules/sensors/dataset_reader.hpp"
+
+namespace km {
+
+/// Nothing: a run of the past, whose robot stands still and serves the others.
+struct PastRun {};
+
+/// What the robot perceives: a recording of sensors, or a recorded pose graph; and what it knows
+/// from before.
+struct RobotInput {
+  std::variant<std::unique_ptr<DatasetReader>, RecordedGraph, PastRun> source;
+  std::string name;  ///< For the journal.
+  std::optional<RestoredRun> restored = {};
+};
+
+/// Opens what the options name, and with --resume the journal of the run to go on with. Throws
+/// DatasetError, InputFileError and std::invalid_argument with one line that names the file and
+/// what helps.
+[[nodiscard]] RobotInput open_robot_input(const RobotOptions& options, const RobotConfig& config,
+                                          const std::optional<MappingPlan>& mapping);
+
+}  // namespace km
