@@ -21,9 +21,9 @@ struct Written {
   int error = 0;
 };
 
-Written write_to(const fs::path& file, int how, std::string_view bytes) {
-  constexpr mode_t kMode = 0666;  // less the umask
-  const int descriptor = open(file.c_str(), how | O_WRONLY | O_CREAT | O_CLOEXEC, kMode);
+Written write_to(const fs::path& file, int how, std::string_view bytes,
+                 const WriteOptions& options = {}) {
+  const int descriptor = open(file.c_str(), how | O_WRONLY | O_CREAT | O_CLOEXEC, options.mode);
   if (descriptor < 0) return {0, errno};
   Written written;
   while (written.bytes < bytes.size() && written.error == 0) {
@@ -34,22 +34,25 @@ Written write_to(const fs::path& file, int how, std::string_view bytes) {
     else if (n == 0 || errno != EINTR)
       written.error = n == 0 ? ENOSPC : errno;
   }
+  if (options.durable && written.error == 0 && fsync(descriptor) != 0) written.error = errno;
   if (close(descriptor) != 0 && written.error == 0) written.error = errno;
   return written;
 }
 
 }  // namespace
 
-void write_file(const fs::path& file, std::string_view bytes) {
+void write_file(const fs::path& file, std::string_view bytes, const WriteOptions& options) {
   std::error_code unknown;
   const fs::file_status there = fs::symlink_status(file, unknown);
-  if (fs::exists(there) && !fs::is_regular_file(there)) {
-    if (const int error = write_to(file, O_TRUNC, bytes).error) throw cannot_write(file, error);
+  if (options.through_links && fs::exists(there) && !fs::is_regular_file(there)) {
+    if (const int error = write_to(file, O_TRUNC, bytes, options).error)
+      throw cannot_write(file, error);
     return;
   }
   fs::path partial = file;
   partial += ".part";
-  int error = write_to(partial, O_TRUNC, bytes).error;
+  if (!options.through_links) unlink(partial.c_str());  // its mode is its own, or it is a link
+  int error = write_to(partial, options.through_links ? O_TRUNC : O_EXCL, bytes, options).error;
   if (error == 0 && std::rename(partial.c_str(), file.c_str()) != 0) error = errno;
   if (error == 0) return;
   unlink(partial.c_str());

@@ -5,10 +5,18 @@
 
 namespace km {
 
+/// How a file is written.
+struct WriteOptions {
+  unsigned mode = 0666;       ///< Permissions of the file, less the umask.
+  bool through_links = true;  ///< Else whatever is there is replaced, never written to.
+  bool durable = false;       ///< Returns once the bytes are on the disk.
+};
+
 /// Writes `bytes` to `file`, which appears under its name only when it is whole: until then what
 /// was there before stays. What is no plain file (a device, a pipe, a link) is written in place.
 /// Throws std::system_error with one line that names the file and why, and leaves nothing behind.
-void write_file(const std::filesystem::path& file, std::string_view bytes);
+void write_file(const std::filesystem::path& file, std::string_view bytes,
+                const WriteOptions& options = {});
 
 /// Likewise, but appends `bytes` to a file that need not exist. The number of bytes written: fewer
 /// than there are, where the disk is full. Throws if not one could be written.

@@ -1,70 +1,35 @@
 #include "modules/security/key_file.hpp"
 
-#include <fcntl.h>
 #include <sodium.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
-#include <cerrno>
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <cstdio>
-#include <cstring>
-#include <limits>
 #include <stdexcept>
+
+#include "modules/core/input_file.hpp"
+#include "modules/core/write_file.hpp"
 
 namespace km {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxFileSize = 1 << 20;
+constexpr std::uintmax_t kMaxFileSize = 1U << 20U;
 
-// What a call of the system left in errno, with the file it was about.
-[[noreturn]] void fail(const fs::path& file, const std::string& what) {
-  const std::string reason = std::strerror(errno);
-  throw std::runtime_error(file.string() + ": " + what + ": " + reason);
+std::string read_text(const fs::path& file) try {
+  return read_input_file(file, kMaxFileSize);
+} catch (const InputFileError& error) {
+  throw std::runtime_error(std::string(error.what()) + "; kimera_multi_keys makes it (--help)");
 }
 
-// A file of the system, closed at the end.
-class OpenFile {
- public:
-  OpenFile(const fs::path& file, int flags, mode_t mode)
-      : file_(file), descriptor_(::open(file.c_str(), flags | O_CLOEXEC, mode)) {}
-  ~OpenFile() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
-
-  [[nodiscard]] int descriptor() const { return descriptor_; }
-
-  [[nodiscard]] std::string read_all() const {
-    std::string text;
-    char buffer[4096];
-    for (ssize_t n = 0; (n = ::read(descriptor_, buffer, sizeof buffer)) != 0;) {
-      if (n < 0) fail(file_, "cannot be read");
-      text.append(buffer, static_cast<std::size_t>(n));
-      if (text.size() > kMaxFileSize)
-        throw std::runtime_error(file_.string() +
-                                 ": is larger than a megabyte, so no file of keys");
-    }
-    sodium_memzero(buffer, sizeof buffer);
-    return text;
-  }
-
- private:
-  fs::path file_;
-  int descriptor_;
-};
-
-void check_access(const fs::path& file, int descriptor) {
-  struct stat status {};
-  if (::fstat(descriptor, &status) != 0) fail(file, "cannot be looked at");
-  if ((status.st_mode & 077U) == 0) return;
-  char mode[8];
-  std::snprintf(mode, sizeof mode, "%04o", status.st_mode & 07777U);
-  throw std::runtime_error(file.string() + ": has mode " + mode +
+void check_access(const fs::path& file) {
+  const fs::perms mode = fs::status(file).permissions();
+  if ((mode & (fs::perms::group_all | fs::perms::others_all)) == fs::perms::none) return;
+  char text[8];
+  std::snprintf(text, sizeof text, "%04o", static_cast<unsigned>(mode & fs::perms::mask));
+  throw std::runtime_error(file.string() + ": has mode " + text +
                            ", so others than its owner can reach a secret; if nobody has read it, "
                            "run: chmod 600 " +
                            file.string() + "; otherwise revoke its certificate");
@@ -79,10 +44,8 @@ std::string_view trimmed(std::string_view text) {
 }  // namespace
 
 KeyFile KeyFile::read(const fs::path& file, std::string_view format, KeyFileAccess access) {
-  const OpenFile stream(file, O_RDONLY, 0);
-  if (stream.descriptor() < 0) fail(file, "cannot be opened (kimera_multi_keys makes it: --help)");
-  if (access == KeyFileAccess::kOwner) check_access(file, stream.descriptor());
-  std::string text = stream.read_all();
+  if (access == KeyFileAccess::kOwner && is_file(file)) check_access(file);
+  std::string text = read_text(file);
 
   KeyFile result;
   result.file_ = file;
@@ -176,17 +139,8 @@ std::int64_t KeyFile::time_s(const Line& line) const {
 }
 
 void write_key_file(const fs::path& file, const std::string& text, KeyFileAccess access) {
-  const mode_t mode = access == KeyFileAccess::kOwner ? 0600 : 0644;
-  const fs::path part = file.string() + ".part";
-  fs::remove(part);
-  {
-    const OpenFile stream(part, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW, mode);
-    if (stream.descriptor() < 0) fail(part, "cannot be written");
-    const ssize_t written = ::write(stream.descriptor(), text.data(), text.size());
-    if (written != static_cast<ssize_t>(text.size()) || ::fsync(stream.descriptor()) != 0)
-      fail(part, "writing failed");
-  }
-  fs::rename(part, file);
+  const unsigned mode = access == KeyFileAccess::kOwner ? 0600 : 0644;
+  write_file(file, text, {.mode = mode, .through_links = false, .durable = true});
 }
 
 std::string to_hex(OctetView octets) {

@@ -82,7 +82,7 @@ TEST_CASE("kimera_multi_keys ends with 1 and says why when it cannot", "[keys]")
       {"make other --robots beta:1,beta:2", "unique in a team"},
       {"make other --robots 'a b:1'", "made of letters"},
       {"add survey --robots beta:0", "revoke it first"},
-      {"add nowhere --robots beta:0", "nowhere/authority/authority.txt: cannot be opened"},
+      {"add nowhere --robots beta:0", "nowhere/authority/authority.txt: no such file"},
       {"revoke survey delta", "never had one of this name or id"},
       {"show nowhere", "nowhere"},
       {"", "subcommand is required"},

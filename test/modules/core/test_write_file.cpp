@@ -50,6 +50,32 @@ TEST_CASE("A link stays one and its file is written", "[files]") {
   CHECK(folder.read("file") == "new");
 }
 
+TEST_CASE("A file for its owner alone is never anyone else's to read", "[files]") {
+  const TemporaryFolder folder;
+  const fs::path secret = folder.path() / "secret";
+  const fs::path elsewhere = folder.write("elsewhere", "old");
+  SECTION("where there is nothing") {}
+  SECTION("where a partial one was left, which everyone can read") {
+    fs::permissions(folder.write("secret.part", "old"), fs::perms::all);
+  }
+  SECTION("where everyone can read the one before") {
+    fs::permissions(folder.write("secret", "old"), fs::perms::all);
+  }
+  SECTION("where a link leads to a file that everyone can read") {
+    fs::create_symlink("elsewhere", secret);
+  }
+  SECTION("where the partial one is such a link") {
+    fs::create_symlink("elsewhere", folder.path() / "secret.part");
+  }
+  write_file(secret, "new", {.mode = 0600, .through_links = false, .durable = true});
+  const fs::file_status there = fs::symlink_status(secret);
+  CHECK(fs::is_regular_file(there));
+  CHECK(there.permissions() == (fs::perms::owner_read | fs::perms::owner_write));
+  CHECK(folder.read("secret") == "new");
+  CHECK(folder.read("elsewhere") == "old");
+  CHECK_FALSE(fs::exists(folder.path() / "secret.part"));
+}
+
 TEST_CASE("What is appended follows what is there", "[files]") {
   const TemporaryFolder folder;
   CHECK(append_to_file(folder.path() / "a", "one\n") == 4);
