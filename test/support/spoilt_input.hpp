@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
@@ -16,17 +17,30 @@
 
 namespace km {
 
-/// Spoils the bytes of a file in the ways in which files of people and programs are spoilt: numbers
-/// that none can be, lines lost, repeated, exchanged or cut, garbage, other line ends. The same
+/// Spoils input in the ways in which that of people, programs and networks is spoilt. The same
 /// seed, the same faults.
 class InputSpoiler {
  public:
+  using Bytes = std::vector<std::uint8_t>;
+
   explicit InputSpoiler(unsigned seed) : rng_(seed) {}
 
+  /// A text: numbers that none can be, lines lost, repeated, exchanged or cut, garbage, other line
+  /// ends.
   [[nodiscard]] std::string operator()(std::string text) {
     const int faults = below(3) + 1;
     for (int i = 0; i < faults; ++i) spoil(text);
     return text;
+  }
+
+  /// One of several messages: counts and indices that none can be, octets lost, changed or added,
+  /// or part of another one of them.
+  [[nodiscard]] Bytes operator()(const std::vector<Bytes>& samples) {
+    const auto one_of = [&] { return static_cast<std::size_t>(below(samples.size())); };
+    Bytes bytes = samples[one_of()];
+    const int faults = below(4) + 1;
+    for (int i = 0; i < faults; ++i) spoil(bytes, samples[one_of()]);
+    return bytes;
   }
 
  private:
@@ -48,11 +62,20 @@ class InputSpoiler {
                                           "86400000000000",
                                           "x"};
 
+  // Lengths, counts and indices at which readers go wrong.
+  static constexpr std::array<std::uint32_t, 8> kWords = {
+      0, 1, 0x7f, 0xff, 0xffff, 0x7fffffff, 0x80000000, 0xffffffff};
+
   int below(std::size_t n) {
     return static_cast<int>(std::uniform_int_distribution<std::size_t>(0, n - 1)(rng_));
   }
-  std::size_t place_in(const std::string& text) {
-    return static_cast<std::size_t>(below(text.size() + 1));
+  template <typename Octets>
+  std::size_t place_in(const Octets& octets) {
+    return static_cast<std::size_t>(below(octets.size() + 1));
+  }
+  template <typename Octets>
+  auto iterator_in(Octets& octets) {
+    return octets.begin() + static_cast<std::ptrdiff_t>(place_in(octets));
   }
 
   void spoil(std::string& text) {
@@ -65,18 +88,10 @@ class InputSpoiler {
       case 4:
         return shuffle_lines(text);
       case 5:
-        text.erase(place_in(text), static_cast<std::size_t>(below(40)));
-        return;
       case 6:
-        text.resize(place_in(text));
-        return;
       case 7:
-        for (int i = below(30); i >= 0; --i)
-          text.insert(place_in(text), 1, static_cast<char>(below(256)));
-        return;
       case 8:
-        if (!text.empty()) text[place_in(text) % text.size()] ^= static_cast<char>(1 << below(8));
-        return;
+        return spoil_octets(text);
       case 9:
         text.insert(place_in(text), std::string(100'000, "0 ,x\0"[below(5)]));
         return;
@@ -87,6 +102,60 @@ class InputSpoiler {
       default:
         text.insert(0, "\xEF\xBB\xBF");
     }
+  }
+
+  void spoil(Bytes& bytes, const Bytes& other) {
+    switch (below(6)) {
+      case 0:
+        return replace_word(bytes);
+      case 1:
+      case 2:
+        return flip_bit(bytes);
+      case 3: {
+        const std::size_t at = place_in(bytes);
+        const std::size_t size = std::min(other.size(), bytes.size() - at);
+        std::copy_n(other.begin(), size, bytes.begin() + static_cast<std::ptrdiff_t>(at));
+        return;
+      }
+      default:
+        return spoil_octets(bytes);
+    }
+  }
+
+  template <typename Octets>
+  void spoil_octets(Octets& octets) {
+    using Octet = typename Octets::value_type;
+    switch (below(4)) {
+      case 0: {
+        const auto at = iterator_in(octets);
+        octets.erase(at, at + std::min<std::ptrdiff_t>(below(40), octets.end() - at));
+        return;
+      }
+      case 1:
+        octets.resize(place_in(octets));
+        return;
+      case 2:
+        for (int i = below(30); i >= 0; --i)
+          octets.insert(iterator_in(octets), static_cast<Octet>(below(256)));
+        return;
+      default:
+        flip_bit(octets);
+    }
+  }
+
+  template <typename Octets>
+  void flip_bit(Octets& octets) {
+    using Octet = typename Octets::value_type;
+    if (!octets.empty())
+      octets[place_in(octets) % octets.size()] ^= static_cast<Octet>(1 << below(8));
+  }
+
+  // Four octets where one may lie, little-endian.
+  void replace_word(Bytes& bytes) {
+    const std::size_t at = place_in(bytes) / 4 * 4;
+    const std::uint32_t word = kWords[static_cast<std::size_t>(below(kWords.size()))];
+    for (std::size_t k = 0; k < 4 && at + k < bytes.size(); ++k)
+      bytes[at + k] = static_cast<std::uint8_t>(word >> (8 * k));
   }
 
   // A run of digits, signs and points becomes another number, or becomes it in addition.

@@ -1,9 +1,9 @@
 #include <catch2/catch.hpp>
 
 #include <functional>
-#include <random>
 
 #include "test/modules/security/toy_team.hpp"
+#include "test/support/spoilt_input.hpp"
 
 // Everything that a stranger can do to what crosses the network: flip any bit, or anything at
 // random.
@@ -18,28 +18,6 @@ struct Pair {
   ToyTeam team;
   ToyMember a{team, 0, "alpha"}, b{team, 1, "beta"};
 };
-
-std::uint32_t draw(std::mt19937& random, std::size_t below) {
-  return std::uniform_int_distribution<std::uint32_t>(
-      0, static_cast<std::uint32_t>(below - 1))(random);
-}
-
-// One to four changes: a bit, an octet, a piece lost, doubled or put elsewhere.
-template <typename Sequence>
-Sequence mutated(Sequence bytes, std::mt19937& random) {
-  using Value = typename Sequence::value_type;
-  for (std::uint32_t changes = 1 + draw(random, 4); changes > 0; --changes) {
-    const std::size_t at = bytes.empty() ? 0 : draw(random, bytes.size());
-    const auto here = bytes.begin() + static_cast<std::ptrdiff_t>(at);
-    const std::uint32_t way = bytes.empty() ? 3 : draw(random, 5);
-    if (way == 0) bytes[at] = static_cast<Value>(bytes[at] ^ (1 << draw(random, 8)));
-    if (way == 1) bytes[at] = static_cast<Value>(draw(random, 256));
-    if (way == 2) bytes.erase(here, here + 1 + draw(random, bytes.size() - at));
-    if (way == 3) bytes.insert(here, 1 + draw(random, 20), static_cast<Value>(draw(random, 256)));
-    if (way == 4) std::rotate(bytes.begin(), here, bytes.end());
-  }
-  return bytes;
-}
 
 TEST_CASE("A sealed message with any bit flipped is refused", "[security]") {
   Pair pair;
@@ -133,7 +111,7 @@ TEST_CASE("A message that is admitted peers' in another context is refused", "[s
 TEST_CASE("Messages changed at random never open", "[security]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
-  std::mt19937 random(seed);
+  InputSpoiler spoiler(seed);
   Pair pair;
   const SealContext for_b = toy_context(pair.a, pair.b.peer());
   const SealContext to_all = toy_context(pair.a);
@@ -142,9 +120,9 @@ TEST_CASE("Messages changed at random never open", "[security]") {
   const Octets key = pair.a.seal.key_message_for(pair.b.peer()).value();
   int accepted = 0;
   for (int i = 0; i < 3000; ++i) {
-    const Octets one = mutated(sealed_for_b, random);
-    const Octets all = mutated(sealed_to_all, random);
-    const Octets keys = mutated(key, random);
+    const Octets one = spoiler(std::vector<Octets>{sealed_for_b});
+    const Octets all = spoiler(std::vector<Octets>{sealed_to_all});
+    const Octets keys = spoiler(std::vector<Octets>{key});
     accepted += one != sealed_for_b && pair.b.seal.open(for_b, one).status == Status::kOpened;
     accepted += all != sealed_to_all && pair.b.seal.open(to_all, all).status == Status::kOpened;
     accepted += keys != key && pair.b.seal.accept_key_message(pair.a.peer(), keys) == nullptr;
@@ -168,10 +146,11 @@ TEST_CASE("Credentials with any bit flipped, or changed at random, are refused",
   }
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
-  std::mt19937 random(seed);
+  InputSpoiler spoiler(seed);
   int admitted = 0;
   for (int i = 0; i < 3000; ++i) {
-    const std::string shown = mutated(genuine, random);
+    const Octets octets = spoiler(std::vector<Octets>{Octets(genuine.begin(), genuine.end())});
+    const std::string shown(octets.begin(), octets.end());
     admitted += shown != genuine && is_admitted(shown);
   }
   CHECK(admitted == 0);
