@@ -1,8 +1,5 @@
-#include <CLI/CLI.hpp>
-#include <exception>
-#include <iostream>
-
 #include "apps/keys/commands.hpp"
+#include "apps/subcommands.hpp"
 
 namespace {
 
@@ -22,20 +19,7 @@ constexpr const char* kAbout =
 
 }  // namespace
 
-int main(int argc, char** argv) try {
-  CLI::App app(kAbout);
-  app.require_subcommand(1);
-  km::add_make(app);
-  km::add_add(app);
-  km::add_revoke(app);
-  km::add_show(app);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 1;
-  }
-  return 0;
-} catch (const std::exception& error) {
-  std::cerr << "kimera_multi_keys: " << error.what() << '\n';
-  return 1;
+int main(int argc, char** argv) {
+  return km::run_subcommands("kimera_multi_keys", kAbout,
+                             {km::add_make, km::add_add, km::add_revoke, km::add_show}, argc, argv);
 }

@@ -1,8 +1,5 @@
-#include <CLI/CLI.hpp>
-#include <exception>
-#include <iostream>
-
 #include "apps/pgo/commands.hpp"
+#include "apps/subcommands.hpp"
 
 namespace {
 
@@ -13,24 +10,7 @@ constexpr const char* kAbout =
 
 }  // namespace
 
-int main(int argc, char** argv) try {
-  CLI::App app(kAbout);
-  app.require_subcommand(1);
-  km::add_solve(app);
-  km::add_pcm(app);
-  km::add_outliers(app);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    if (app.get_subcommands().empty())
-      std::cerr << "kimera_multi_pgo: the first word must be a subcommand\n" << app.help();
-    else
-      app.exit(error);
-    return 1;
-  }
-  return 0;
-} catch (const std::exception& error) {
-  std::cerr << "kimera_multi_pgo: " << error.what() << '\n';
-  return 1;
+int main(int argc, char** argv) {
+  return km::run_subcommands("kimera_multi_pgo", kAbout,
+                             {km::add_solve, km::add_pcm, km::add_outliers}, argc, argv);
 }

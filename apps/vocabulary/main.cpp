@@ -1,7 +1,4 @@
-#include <CLI/CLI.hpp>
-#include <exception>
-#include <iostream>
-
+#include "apps/subcommands.hpp"
 #include "apps/vocabulary/commands.hpp"
 
 namespace {
@@ -18,19 +15,7 @@ constexpr const char* kAbout =
 
 }  // namespace
 
-int main(int argc, char** argv) try {
-  CLI::App app(kAbout);
-  app.require_subcommand(1);
-  km::add_train(app);
-  km::add_inspect(app);
-  km::add_evaluate(app);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 1;
-  }
-  return 0;
-} catch (const std::exception& error) {
-  std::cerr << "kimera_multi_vocabulary: " << error.what() << '\n';
-  return 1;
+int main(int argc, char** argv) {
+  return km::run_subcommands("kimera_multi_vocabulary", kAbout,
+                             {km::add_train, km::add_inspect, km::add_evaluate}, argc, argv);
 }
