@@ -48,7 +48,7 @@ inline constexpr std::size_t kMaxChunkBytes = 32000;
 /// Upper bound on the bytes of a chunk on the wire.
 [[nodiscard]] constexpr std::size_t wire_bytes(std::size_t vertices, std::size_t faces,
                                                bool labelled) {
-  constexpr std::size_t kFixed = 96;  // encoding, header, keys, origin, three lengths, padding
+  constexpr std::size_t kFixed = 96;  // envelope, cell, part, grid, origin, three lengths, padding
   return kFixed + (labelled ? 7 : 6) * vertices + 6 * faces;
 }
 [[nodiscard]] inline std::size_t wire_bytes(const MeshChunk& chunk) {
