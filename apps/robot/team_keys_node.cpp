@@ -19,13 +19,13 @@ std::int64_t now_s() {
 
 }  // namespace
 
-std::shared_ptr<TeamSeal> make_team_seal(const std::filesystem::path& folder,
-                                         const RobotIdentity& own) {
+std::shared_ptr<SharedSeal> make_team_seal(const std::filesystem::path& folder,
+                                           const RobotIdentity& own) {
   if (folder.empty()) return nullptr;
-  return std::make_shared<TeamSeal>(load_robot_keys(folder), own, now_s());
+  return std::make_shared<SharedSeal>(load_robot_keys(folder), own, now_s());
 }
 
-TeamKeysNode::TeamKeysNode(std::filesystem::path folder, TeamSeal& seal,
+TeamKeysNode::TeamKeysNode(std::filesystem::path folder, SharedSeal& seal,
                            std::function<void()> tell_keys)
     : folder_(std::move(folder)),
       seal_(seal),
@@ -34,7 +34,9 @@ TeamKeysNode::TeamKeysNode(std::filesystem::path folder, TeamSeal& seal,
           kPeriod, [this] { step(); }, "team_keys") {}
 
 void TeamKeysNode::step() try {
-  const MembershipChange change = seal_.update(load_revocations(folder_), now_s());
+  const Revocations list = load_revocations(folder_);
+  const MembershipChange change =
+      seal_.with([&](TeamSeal& seal) { return seal.update(list, now_s()); });
   for (const TeamPeer& peer : change.forgotten)
     log::warn("keys") << "robot " << peer.robot << " is a member no more: revoked or expired";
   if (change.new_key) tell_keys_();

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "modules/core/robot_identity.hpp"
-#include "modules/security/team_seal.hpp"
+#include "runtime/dds/shared_seal.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
 
@@ -15,15 +15,15 @@ namespace km {
 /// The seal of this process, from the robot's folder of keys; null without a folder. Throws
 /// std::runtime_error and std::invalid_argument that say what is wrong with the keys and what
 /// helps.
-[[nodiscard]] std::shared_ptr<TeamSeal> make_team_seal(const std::filesystem::path& folder,
-                                                       const RobotIdentity& own);
+[[nodiscard]] std::shared_ptr<SharedSeal> make_team_seal(const std::filesystem::path& folder,
+                                                         const RobotIdentity& own);
 
 /// Looks now and then whether members have expired, or the folder's list of revocations has
 /// changed, and has keys told anew where they have.
 class TeamKeysNode final : public Node {
  public:
   /// `tell_keys` sends this process's new key to the others. `seal` outlives this.
-  TeamKeysNode(std::filesystem::path folder, TeamSeal& seal, std::function<void()> tell_keys);
+  TeamKeysNode(std::filesystem::path folder, SharedSeal& seal, std::function<void()> tell_keys);
 
   void step();
 
@@ -34,7 +34,7 @@ class TeamKeysNode final : public Node {
 
  private:
   const std::filesystem::path folder_;
-  TeamSeal& seal_;
+  SharedSeal& seal_;
   const std::function<void()> tell_keys_;
   Periodic periodic_;  // last member: stops first
 };

@@ -141,7 +141,7 @@ class Robot {
   NodeType& add(bool feeds, Arguments&&... arguments);
 
   const RobotIdentity identity_;
-  std::shared_ptr<TeamSeal> seal_;  // null without keys
+  std::shared_ptr<SharedSeal> seal_;  // null without keys
   DdsParticipant participant_;
   Topics topics_;
   std::optional<RestoredRun> restored_;           // until the robot is built

@@ -13,6 +13,11 @@ AdmittedPeer* AdmittedPeers::find(const TeamPeer& peer) {
   return found == peers_.end() ? nullptr : &found->second.admitted;
 }
 
+const AdmittedPeer* AdmittedPeers::find(const TeamPeer& peer) const {
+  const auto found = peers_.find(peer);
+  return found == peers_.end() ? nullptr : &found->second.admitted;
+}
+
 void AdmittedPeers::add(const TeamPeer& peer, AdmittedPeer admitted) {
   make_room(peers_.lower_bound({peer.robot, 0}),
             peers_.upper_bound({peer.robot, std::numeric_limits<std::uint64_t>::max()}),

@@ -36,6 +36,7 @@ class AdmittedPeers {
  public:
   /// nullptr if it is not admitted. Valid until the next change.
   [[nodiscard]] AdmittedPeer* find(const TeamPeer& peer);
+  [[nodiscard]] const AdmittedPeer* find(const TeamPeer& peer) const;
 
   /// Adds one that is not there yet.
   void add(const TeamPeer& peer, AdmittedPeer admitted);

@@ -3,8 +3,6 @@
 #include <sodium.h>
 
 #include <algorithm>
-#include <limits>
-#include <mutex>
 #include <stdexcept>
 #include <utility>
 
@@ -17,32 +15,12 @@ namespace {
 static_assert(kAddressedSealBytes == kEncryptionBytes);
 static_assert(kTeamSealBytes == sizeof(std::uint32_t) + kEncryptionBytes + Signature().size());
 static_assert(ExchangeKey().size() == crypto_kx_PUBLICKEYBYTES);
+static_assert(Secret<32>::size() == crypto_kx_SECRETKEYBYTES);
 static_assert(SealingKey::size() == crypto_kx_SESSIONKEYBYTES);
 
 // Keys for messages to all that a process tells and remembers of another: what its older ones
 // sealed can still be read by those who come late.
 constexpr std::size_t kTeamKeysKept = 8;
-
-struct ExchangePair {
-  ExchangeKey open{};
-  Secret<crypto_kx_SECRETKEYBYTES> secret;
-};
-
-ExchangePair make_exchange_pair() {
-  start_sodium();
-  ExchangePair pair;
-  crypto_kx_keypair(pair.open.data(), pair.secret.data());
-  return pair;
-}
-
-// The keys in both directions, by X25519 and BLAKE2b over the shared secret and both public keys.
-// False for a public key of small order, which has no secret to share.
-bool agree(const TeamPeer& own, const ExchangePair& pair, const TeamPeer& peer,
-           AdmittedPeer& admitted) {
-  const auto derive = own < peer ? crypto_kx_client_session_keys : crypto_kx_server_session_keys;
-  return derive(admitted.from_peer.data(), admitted.to_peer.data(), pair.open.data(),
-                pair.secret.data(), admitted.exchange.data()) == 0;
-}
 
 void put_peer(ByteWriter& writer, const TeamPeer& peer) {
   writer.u16(peer.robot);
@@ -122,167 +100,106 @@ Opened refused(const char* reason) {
 
 }  // namespace
 
-struct TeamSeal::State {
-  // As it was made; read without the lock.
-  SigningKey secret;
-  std::string team;
-  PublicKey authority{};
-  TeamPeer self;
-  ExchangePair exchange;
-  std::string credentials;
-
-  std::mutex mutex;  // guards what follows; no key is used under it, only copied
-  Revocations revocations;
-  AdmittedPeers peers;
-  std::vector<TeamKey> team_keys;  // own, by number; the last seals
-  // [s since 1970-01-01 UTC] when the first of those who have the newest team key is no longer a
-  // member: it may be gone from `peers` by then.
-  std::int64_t holder_lapses_s = std::numeric_limits<std::int64_t>::max();
-
-  void draw_team_key() {
-    const std::uint32_t number = team_keys.empty() ? 1 : team_keys.back().number + 1;
-    team_keys.push_back({number, make_sealing_key()});
-    if (team_keys.size() > kTeamKeysKept) team_keys.erase(team_keys.begin());
-    holder_lapses_s = std::numeric_limits<std::int64_t>::max();
-  }
-
-  Octets seal_to_all(Octets associated, OctetView content);
-  Opened open_for_self(const SealContext& context, OctetView sealed);
-  Opened open_to_all(const SealContext& context, OctetView sealed);
-};
-
 TeamSeal::TeamSeal(RobotKeys keys, const RobotIdentity& own, std::int64_t now_s)
-    : state_(std::make_unique<State>()) {
+    : secret_(keys.secret),
+      team_(keys.certificate.team),
+      authority_(keys.authority),
+      self_{own.robot, own.boot},
+      revocations_(std::move(keys.revocations)) {
   const Certificate& certificate = keys.certificate;
   if (certificate.robot != own.robot || certificate.name != own.name)
     throw std::invalid_argument("the keys are those of " + certificate.name + " (id " +
                                 std::to_string(certificate.robot) + "), this robot is " + own.name +
                                 " (id " + std::to_string(own.robot) +
                                 "): use its own folder of keys, or its name and id");
-  if (!is_signed_by(keys.authority, keys.revocations))
+  if (!is_signed_by(authority_, revocations_))
     throw std::invalid_argument("the list of revocations is not the authority's");
-  if (const char* why = refusal_of(certificate, keys.authority, keys.revocations, now_s))
+  if (const char* why = refusal_of(certificate, authority_, revocations_, now_s))
     throw std::invalid_argument("the keys of " + own.name + " are of no use: " + why +
                                 "; `kimera_multi_keys add` makes new ones");
-  state_->secret = keys.secret;
-  state_->team = certificate.team;
-  state_->authority = keys.authority;
-  state_->self = {own.robot, own.boot};
-  state_->exchange = make_exchange_pair();
-  state_->credentials = to_text(
-      make_credentials(certificate, keys.authority, keys.secret, own, state_->exchange.open));
-  state_->revocations = std::move(keys.revocations);
-  state_->draw_team_key();
-}
-
-TeamSeal::~TeamSeal() = default;
-
-const std::string& TeamSeal::credentials() const {
-  return state_->credentials;
+  start_sodium();
+  crypto_kx_keypair(exchange_.data(), exchange_secret_.data());
+  credentials_ = to_text(make_credentials(certificate, authority_, secret_, own, exchange_));
+  draw_team_key();
 }
 
 const char* TeamSeal::admit(const RobotIdentity& identity, std::string_view text,
                             std::int64_t now_s) {
-  State& state = *state_;
   const TeamPeer peer{identity.robot, identity.boot};
-  if (peer == state.self) return "these are this process's own credentials";
+  if (peer == self_) return "these are this process's own credentials";
   const Decoded<Credentials> parsed = parse_credentials(text);
   if (!parsed.value) return parsed.refusal;
   const Credentials& shown = *parsed.value;
-  if (!std::ranges::equal(shown.authority,
-                          OctetView(state.authority).first(shown.authority.size())))
+  if (!std::ranges::equal(shown.authority, OctetView(authority_).first(shown.authority.size())))
     return "credentials of another team";
   AdmittedPeer admitted;
-  admitted.certificate = claimed_certificate(shown, identity, state.team);
+  admitted.certificate = claimed_certificate(shown, identity, team_);
   admitted.exchange = shown.exchange;
   if (!is_signed_by_robot(shown, identity))
     return "credentials are not signed by the robot that they name";
-  const Revocations revocations = [&] {
-    const std::lock_guard lock(state.mutex);
-    return state.revocations;
-  }();
-  if (const char* why = refusal_of(admitted.certificate, state.authority, revocations, now_s))
+  if (const char* why = refusal_of(admitted.certificate, authority_, revocations_, now_s))
     return why;
-  if (!agree(state.self, state.exchange, peer, admitted))
-    return "credentials have an exchange key of small order";
-
-  const std::lock_guard lock(state.mutex);
-  if (revocations.number != state.revocations.number)
-    return "the list of revocations changed meanwhile: admit again";
-  if (const AdmittedPeer* known = state.peers.find(peer))
+  if (!agree(peer, admitted)) return "credentials have an exchange key of small order";
+  if (const AdmittedPeer* known = peers_.find(peer))
     return known->exchange == admitted.exchange ? nullptr
                                                 : "credentials have another key for the same boot";
-  state.peers.add(peer, std::move(admitted));
+  peers_.add(peer, std::move(admitted));
   return nullptr;
 }
 
-bool TeamSeal::is_admitted(const TeamPeer& peer) const {
-  const std::lock_guard lock(state_->mutex);
-  return state_->peers.find(peer) != nullptr;
-}
-
-void TeamSeal::forget(const TeamPeer& peer) {
-  const std::lock_guard lock(state_->mutex);
-  state_->peers.erase(peer);
+// The keys in both directions, by X25519 and BLAKE2b over the shared secret and both public keys.
+// False for a public key of small order, which has no secret to share.
+bool TeamSeal::agree(const TeamPeer& peer, AdmittedPeer& admitted) const {
+  const auto derive = self_ < peer ? crypto_kx_client_session_keys : crypto_kx_server_session_keys;
+  return derive(admitted.from_peer.data(), admitted.to_peer.data(), exchange_.data(),
+                exchange_secret_.data(), admitted.exchange.data()) == 0;
 }
 
 MembershipChange TeamSeal::update(const Revocations& revocations, std::int64_t now_s) {
-  State& state = *state_;
-  if (!is_signed_by(state.authority, revocations))
+  if (!is_signed_by(authority_, revocations))
     throw std::invalid_argument("the list of revocations is not the authority's");
-  const std::lock_guard lock(state.mutex);
-  if (revocations.number < state.revocations.number)
+  if (revocations.number < revocations_.number)
     throw std::invalid_argument("the list of revocations has number " +
                                 std::to_string(revocations.number) + ", older than number " +
-                                std::to_string(state.revocations.number) + " that is in use");
-  const bool differs = revocations.revoked != state.revocations.revoked;
-  state.revocations = revocations;
+                                std::to_string(revocations_.number) + " that is in use");
+  const bool differs = revocations.revoked != revocations_.revoked;
+  revocations_ = revocations;
   MembershipChange change;
-  change.forgotten = state.peers.erase_if([&](const Certificate& certificate) {
+  change.forgotten = peers_.erase_if([&](const Certificate& certificate) {
     return lapse_of(certificate, revocations, now_s) != nullptr;
   });
-  change.new_key = differs || !change.forgotten.empty() || now_s > state.holder_lapses_s;
-  if (change.new_key) state.draw_team_key();
+  change.new_key = differs || !change.forgotten.empty() || now_s > holder_lapses_s_;
+  if (change.new_key) draw_team_key();
   return change;
 }
 
+void TeamSeal::draw_team_key() {
+  const std::uint32_t number = team_keys_.empty() ? 1 : team_keys_.back().number + 1;
+  team_keys_.push_back({number, make_sealing_key()});
+  if (team_keys_.size() > kTeamKeysKept) team_keys_.erase(team_keys_.begin());
+  holder_lapses_s_ = std::numeric_limits<std::int64_t>::max();
+}
+
 std::optional<Octets> TeamSeal::key_message_for(const TeamPeer& peer) {
-  State& state = *state_;
-  SealingKey key;
-  Octets keys;
-  {
-    const std::lock_guard lock(state.mutex);
-    const AdmittedPeer* to = state.peers.find(peer);
-    if (to == nullptr) return std::nullopt;
-    key = to->to_peer;
-    keys = to_octets(state.team_keys);
-    state.holder_lapses_s = std::min(state.holder_lapses_s, to->certificate.valid_until_s);
-  }
+  const AdmittedPeer* to = peers_.find(peer);
+  if (to == nullptr) return std::nullopt;
+  holder_lapses_s_ = std::min(holder_lapses_s_, to->certificate.valid_until_s);
+  Octets keys = to_octets(team_keys_);
   Octets message;
-  encrypt(key, random_nonce(), key_message_data(state.self, peer), keys, message);
+  encrypt(to->to_peer, random_nonce(), key_message_data(self_, peer), keys, message);
   sodium_memzero(keys.data(), keys.size());
   return message;
 }
 
 const char* TeamSeal::accept_key_message(const TeamPeer& from, OctetView message) {
-  State& state = *state_;
-  SealingKey key;
-  {
-    const std::lock_guard lock(state.mutex);
-    const AdmittedPeer* sender = state.peers.find(from);
-    if (sender == nullptr) return "key message of a process that is not admitted";
-    key = sender->from_peer;
-  }
-  auto content = decrypt(key, key_message_data(from, state.self), message);
+  AdmittedPeer* sender = peers_.find(from);
+  if (sender == nullptr) return "key message of a process that is not admitted";
+  auto content = decrypt(sender->from_peer, key_message_data(from, self_), message);
   if (!content) return "key message is not its sender's to this process";
   std::vector<TeamKey> keys = team_keys_from(*content);
   sodium_memzero(content->data(), content->size());
   if (keys.empty()) return "key message does not hold keys";
-
-  const std::lock_guard lock(state.mutex);
-  state.peers.heard(from);
-  AdmittedPeer* sender = state.peers.find(from);
-  if (sender == nullptr) return "key message of a process that is not admitted";
+  peers_.heard(from);
   // A recording of an older message must not take the newer keys away.
   if (sender->team_keys.empty() || sender->team_keys.back().number < keys.back().number)
     sender->team_keys = std::move(keys);
@@ -290,39 +207,29 @@ const char* TeamSeal::accept_key_message(const TeamPeer& from, OctetView message
 }
 
 std::optional<Octets> TeamSeal::seal(const SealContext& context, OctetView content) const {
-  State& state = *state_;
-  if (context.sender != state.self)
+  if (context.sender != self_)
     throw std::invalid_argument("a message is sealed in the name of its own sender only");
-  if (context.addressee == state.self)
+  if (context.addressee == self_)
     throw std::invalid_argument("a message is not sealed for its own sender");
-  if (!context.addressee) return state.seal_to_all(associated_data(context), content);
-  SealingKey key;
-  {
-    const std::lock_guard lock(state.mutex);
-    const AdmittedPeer* peer = state.peers.find(*context.addressee);
-    if (peer == nullptr) return std::nullopt;
-    key = peer->to_peer;
-  }
+  if (!context.addressee) return seal_to_all(associated_data(context), content);
+  const AdmittedPeer* peer = peers_.find(*context.addressee);
+  if (peer == nullptr) return std::nullopt;
   Octets sealed;
   sealed.reserve(content.size() + kAddressedSealBytes);
-  encrypt(key, random_nonce(), associated_data(context), content, sealed);
+  encrypt(peer->to_peer, random_nonce(), associated_data(context), content, sealed);
   return sealed;
 }
 
 Opened TeamSeal::open(const SealContext& context, OctetView sealed) {
-  State& state = *state_;
-  if (context.sender == state.self) return refused("message of this process itself");
-  if (!context.addressee) return state.open_to_all(context, sealed);
-  if (*context.addressee != state.self) return refused("message for another process");
-  return state.open_for_self(context, sealed);
+  if (context.sender == self_) return refused("message of this process itself");
+  if (!context.addressee) return open_to_all(context, sealed);
+  if (*context.addressee != self_) return refused("message for another process");
+  return open_for_self(context, sealed);
 }
 
 // Number of the key, nonce, ciphertext, tag, signature.
-Octets TeamSeal::State::seal_to_all(Octets associated, OctetView content) {
-  const TeamKey key = [this] {
-    const std::lock_guard lock(mutex);
-    return team_keys.back();
-  }();
+Octets TeamSeal::seal_to_all(Octets associated, OctetView content) const {
+  const TeamKey& key = team_keys_.back();
   ByteWriter number;
   number.u32(key.number);
   Octets sealed = number.release();
@@ -330,28 +237,22 @@ Octets TeamSeal::State::seal_to_all(Octets associated, OctetView content) {
   sealed.reserve(content.size() + kTeamSealBytes);
   encrypt(key.key, random_nonce(), associated, content, sealed);
   const OctetView encrypted = OctetView(sealed).subspan(sizeof(std::uint32_t));
-  const Signature signature = sign(signed_statement(key.key, associated, encrypted), secret);
+  const Signature signature = sign(signed_statement(key.key, associated, encrypted), secret_);
   sealed.insert(sealed.end(), signature.begin(), signature.end());
   return sealed;
 }
 
-Opened TeamSeal::State::open_for_self(const SealContext& context, OctetView sealed) {
+Opened TeamSeal::open_for_self(const SealContext& context, OctetView sealed) {
   if (sealed.size() < kAddressedSealBytes) return refused("message shorter than its seal");
-  SealingKey key;
-  {
-    const std::lock_guard lock(mutex);
-    const AdmittedPeer* sender = peers.find(context.sender);
-    if (sender == nullptr) return not_yet("its sender is not admitted");
-    key = sender->from_peer;
-  }
-  auto content = decrypt(key, associated_data(context), sealed);
+  const AdmittedPeer* sender = peers_.find(context.sender);
+  if (sender == nullptr) return not_yet("its sender is not admitted");
+  auto content = decrypt(sender->from_peer, associated_data(context), sealed);
   if (!content) return refused("message is not its sender's, or was changed on its way");
-  const std::lock_guard lock(mutex);
-  peers.heard(context.sender);
+  peers_.heard(context.sender);
   return opened(std::move(*content));
 }
 
-Opened TeamSeal::State::open_to_all(const SealContext& context, OctetView sealed) {
+Opened TeamSeal::open_to_all(const SealContext& context, OctetView sealed) {
   if (sealed.size() < kTeamSealBytes) return refused("message shorter than its seal");
   const OctetView number_octets = sealed.first(sizeof(std::uint32_t));
   const OctetView encrypted = sealed.subspan(
@@ -360,29 +261,22 @@ Opened TeamSeal::State::open_to_all(const SealContext& context, OctetView sealed
   Signature signature;
   std::ranges::copy(sealed.last(signature.size()), signature.begin());
 
-  SealingKey key;
-  PublicKey signer;
-  {
-    const std::lock_guard lock(mutex);
-    const AdmittedPeer* sender = peers.find(context.sender);
-    if (sender == nullptr) return not_yet("its sender is not admitted");
-    const std::vector<TeamKey>& keys = sender->team_keys;
-    if (keys.empty() || number > keys.back().number)
-      return not_yet("its sender's key for messages to all is not here");
-    const auto found = std::ranges::find(keys, number, &TeamKey::number);
-    if (found == keys.end()) return refused("message under a key that its sender gave up");
-    key = found->key;
-    signer = sender->certificate.key;
-  }
+  const AdmittedPeer* sender = peers_.find(context.sender);
+  if (sender == nullptr) return not_yet("its sender is not admitted");
+  const std::vector<TeamKey>& keys = sender->team_keys;
+  if (keys.empty() || number > keys.back().number)
+    return not_yet("its sender's key for messages to all is not here");
+  const auto key = std::ranges::find(keys, number, &TeamKey::number);
+  if (key == keys.end()) return refused("message under a key that its sender gave up");
   Octets associated = associated_data(context);
   associated.insert(associated.end(), number_octets.begin(), number_octets.end());
   // The tag first: it is much cheaper to check than a signature, and stops all strangers.
-  auto content = decrypt(key, associated, encrypted);
+  auto content = decrypt(key->key, associated, encrypted);
   if (!content) return refused("message is not its sender's, or was changed on its way");
-  if (!verify(signed_statement(key, associated, encrypted), signature, signer))
+  if (!verify(signed_statement(key->key, associated, encrypted), signature,
+              sender->certificate.key))
     return refused("message is not signed by its sender");
-  const std::lock_guard lock(mutex);
-  peers.heard(context.sender);
+  peers_.heard(context.sender);
   return opened(std::move(*content));
 }
 

@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -75,19 +75,18 @@ struct [[nodiscard]] MembershipChange {
 /// - drops repeated messages. A sealed message can be recorded and shown again and opens again: the
 ///   caller keeps which numbers of (robot, boot) it has taken.
 ///
-/// Thread-safe.
+/// Not thread-safe.
 class TeamSeal {
  public:
   /// For the process `own` at `now_s` [s since 1970-01-01 UTC]. Throws std::invalid_argument if the
   /// keys are another robot's (id or name), lapsed or revoked.
   TeamSeal(RobotKeys keys, const RobotIdentity& own, std::int64_t now_s);
-  ~TeamSeal();
   TeamSeal(const TeamSeal&) = delete;
   TeamSeal& operator=(const TeamSeal&) = delete;
 
   /// What this process shows others: certificate, a key of this start, and a signature over them
   /// and the identity. kCredentialsLength characters.
-  [[nodiscard]] const std::string& credentials() const;
+  [[nodiscard]] const std::string& credentials() const { return credentials_; }
 
   /// Checks what a process shows of itself at `now_s` and remembers its keys. nullptr, or why it is
   /// not a member (a string literal): not understood, another team's authority, lapsed, revoked,
@@ -97,10 +96,12 @@ class TeamSeal {
   [[nodiscard]] const char* admit(const RobotIdentity& identity, std::string_view credentials,
                                   std::int64_t now_s);
 
-  [[nodiscard]] bool is_admitted(const TeamPeer& peer) const;
+  [[nodiscard]] bool is_admitted(const TeamPeer& peer) const {
+    return peers_.find(peer) != nullptr;
+  }
 
   /// A process that is gone: its keys are forgotten. Nothing happens if it is not known.
-  void forget(const TeamPeer& peer);
+  void forget(const TeamPeer& peer) { peers_.erase(peer); }
 
   /// Takes a list of revocations (the same as before, to let time alone work) and the time: forgets
   /// members that are revoked or lapsed, and draws a new key for messages to all if the list is
@@ -125,8 +126,25 @@ class TeamSeal {
   [[nodiscard]] Opened open(const SealContext& context, OctetView sealed);
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  bool agree(const TeamPeer& peer, AdmittedPeer& admitted) const;
+  void draw_team_key();
+  Octets seal_to_all(Octets associated, OctetView content) const;
+  Opened open_for_self(const SealContext& context, OctetView sealed);
+  Opened open_to_all(const SealContext& context, OctetView sealed);
+
+  SigningKey secret_;
+  std::string team_;
+  PublicKey authority_{};
+  TeamPeer self_;
+  ExchangeKey exchange_{};
+  Secret<32> exchange_secret_;
+  std::string credentials_;
+  Revocations revocations_;
+  AdmittedPeers peers_;
+  std::vector<TeamKey> team_keys_;  // own, by number; the last seals
+  // [s since 1970-01-01 UTC] when the first of those who have the newest team key is no longer a
+  // member: it may be gone from peers_ by then.
+  std::int64_t holder_lapses_s_ = std::numeric_limits<std::int64_t>::max();
 };
 
 }  // namespace km

@@ -54,15 +54,17 @@ void DdsBridge::exchange_keys() {
                        .kind = TopicKind::kState,
                        .carries_keys = true};
   keys_ = &add_outgoing(spec);
-  add_incoming(spec, true, {},
-               [seal = participant_.seal()](const TeamPeer& sender, auto content, const auto&) {
-                 return seal->accept_key_message(sender, content);
-               });
+  add_incoming(
+      spec, true, {},
+      [seal = participant_.seal()](const TeamPeer& sender, auto content, const auto&) {
+        return seal->with([&](TeamSeal& team) { return team.accept_key_message(sender, content); });
+      });
 }
 
 void DdsBridge::tell_key(const TeamPeer& peer) {
   post([this, peer] {
-    if (auto message = participant_.seal()->key_message_for(peer))
+    if (auto message =
+            participant_.seal()->with([&](TeamSeal& team) { return team.key_message_for(peer); }))
       keys_->write(peer.robot, message_key({peer.boot}), *std::move(message));
   });
 }

@@ -208,13 +208,13 @@ void IncomingTopic::hear_claim(const ddsi_serdata& serialized, const Guid& write
 Opened IncomingTopic::open(const km_wire_Envelope& envelope, const Guid& writer) const {
   const auto bytes = elements_of(envelope.content, spec_.max_bytes + kTeamSealBytes);
   if (!bytes) return {Opened::Status::kRefused, {}, "larger than its topic allows"};
-  TeamSeal* seal = participant_.seal();
+  SharedSeal* seal = participant_.seal();
   if (seal == nullptr || spec_.carries_keys)
     return {Opened::Status::kOpened, {bytes->begin(), bytes->end()}, nullptr};
   const RobotIdentity& self = participant_.identity();
   const auto addressee = addressed_ ? std::optional(TeamPeer{self.robot, self.boot}) : std::nullopt;
   const SealedEnvelope way(spec_.name, writer, envelope, addressee);
-  return seal->open(way.context(), *bytes);
+  return seal->with([&](TeamSeal& team) { return team.open(way.context(), *bytes); });
 }
 
 void IncomingTopic::start() {

@@ -76,12 +76,13 @@ void OutgoingTopic::write(std::optional<RobotId> to, MessageKey key,
 // Null, or why it cannot be sealed.
 const char* OutgoingTopic::seal(std::optional<RobotId> to, const km_wire_Envelope& head,
                                 std::vector<std::uint8_t>& content) const {
-  const TeamSeal* seal = participant_.seal();
+  SharedSeal* seal = participant_.seal();
   if (seal == nullptr || spec_.carries_keys) return nullptr;
   const auto addressee = to ? peers_.current(*to) : std::nullopt;
   if (to && !addressee) return "the robot that it is for is not there";
   const SealedEnvelope envelope(spec_.name, participant_.guid(), head, addressee);
-  auto sealed = seal->seal(envelope.context(), content);
+  auto sealed =
+      seal->with([&](const TeamSeal& team) { return team.seal(envelope.context(), content); });
   if (!sealed) return "the robot that it is for has shown no keys";
   content = std::move(*sealed);
   return nullptr;

@@ -125,7 +125,7 @@ NetworkInterface choose_interface(const DdsConfig& config) {
 }
 
 dds_entity_t create_participant(const DdsConfig& config, const RobotIdentity& identity,
-                                const TeamSeal* seal) {
+                                const SharedSeal* seal) {
   const std::string user_data =
       to_user_data(identity, seal != nullptr ? seal->credentials() : std::string());
   const DdsQos qos = make_dds_qos();
@@ -205,11 +205,11 @@ DdsDomain::DdsDomain(const DdsConfig& config)
 }
 
 DdsParticipant::DdsParticipant(const DdsConfig& config, const RobotIdentity& identity,
-                               std::shared_ptr<TeamSeal> seal)
+                               std::shared_ptr<SharedSeal> seal)
     : DdsParticipant(std::make_shared<const DdsDomain>(config), identity, std::move(seal)) {}
 
 DdsParticipant::DdsParticipant(std::shared_ptr<const DdsDomain> domain,
-                               const RobotIdentity& identity, std::shared_ptr<TeamSeal> seal)
+                               const RobotIdentity& identity, std::shared_ptr<SharedSeal> seal)
     : domain_(std::move(domain)),
       identity_(identity),
       seal_(std::move(seal)),

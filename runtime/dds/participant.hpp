@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "modules/security/team_seal.hpp"
 #include "runtime/dds/dds_config.hpp"
 #include "runtime/dds/entity.hpp"
 #include "runtime/dds/robot_identity.hpp"
+#include "runtime/dds/shared_seal.hpp"
 
 namespace km {
 
@@ -55,10 +55,10 @@ class DdsParticipant {
  public:
   /// Creates the domain as well: the case of one robot per process.
   DdsParticipant(const DdsConfig& config, const RobotIdentity& identity,
-                 std::shared_ptr<TeamSeal> seal = nullptr);
+                 std::shared_ptr<SharedSeal> seal = nullptr);
   /// Joins a domain that several robots of one process share (tests).
   DdsParticipant(std::shared_ptr<const DdsDomain> domain, const RobotIdentity& identity,
-                 std::shared_ptr<TeamSeal> seal = nullptr);
+                 std::shared_ptr<SharedSeal> seal = nullptr);
 
   [[nodiscard]] const RobotIdentity& identity() const { return identity_; }
   [[nodiscard]] const DdsConfig& config() const { return domain_->config(); }
@@ -66,12 +66,12 @@ class DdsParticipant {
   [[nodiscard]] dds_entity_t handle() const { return participant_.handle(); }
   [[nodiscard]] const Guid& guid() const { return guid_; }
   /// What seals all messages to and from others; null: they go in clear.
-  [[nodiscard]] TeamSeal* seal() const { return seal_.get(); }
+  [[nodiscard]] SharedSeal* seal() const { return seal_.get(); }
 
  private:
   std::shared_ptr<const DdsDomain> domain_;  // outlives the participant
   RobotIdentity identity_;
-  std::shared_ptr<TeamSeal> seal_;
+  std::shared_ptr<SharedSeal> seal_;
   DdsEntity participant_;
   Guid guid_{};
 };

@@ -114,8 +114,9 @@ Peers::Peers(const DdsParticipant& participant)
 // Called with the mutex held, as all of the table is.
 const char* Peers::admit(const RobotIdentity& identity, std::string_view credentials) {
   if (credentials.empty()) return "shows no keys";
+  const auto now_s = static_cast<std::int64_t>(wall_now_s());
   if (const char* reason =
-          seal_->admit(identity, credentials, static_cast<std::int64_t>(wall_now_s())))
+          seal_->with([&](TeamSeal& seal) { return seal.admit(identity, credentials, now_s); }))
     return reason;
   admitted_.push_back({identity.robot, identity.boot});
   return nullptr;

@@ -102,7 +102,7 @@ class Peers {
 
   Topic<PeerEvent> events_;
   const Guid self_;
-  TeamSeal* const seal_;      // may be null
+  SharedSeal* const seal_;    // may be null
   mutable std::mutex mutex_;  // guards what follows, up to changes_
   PeerTable table_;
   std::vector<TeamPeer> admitted_;

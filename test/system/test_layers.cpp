@@ -35,9 +35,6 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"mesh_deformation", {"mesh"}},
 };
 
-// Files that hold a lock: the seal, which every thread of the transport calls.
-const std::set<std::string> kHoldsALock = {"modules/security/team_seal.cpp"};
-
 std::vector<std::string> includes_of(const fs::path& file) {
   static const std::regex pattern(R"(^\s*#\s*include\s*[<"]([^>"]+)[>"])");
   std::vector<std::string> found;
@@ -81,7 +78,6 @@ std::string violation(const fs::path& file, const std::string& header) {
     return used.empty() || used == "core" || used == "security" ? "" : "runtime knows no module";
   if (header.starts_with("runtime/"))
     return joins_runtime(file) ? "" : "only nodes and codecs use runtime";
-  if (header == "mutex" && kHoldsALock.contains(file.generic_string())) return "";
   if (is_process_level(header))
     return joins_runtime(file) ? "" : "algorithms own no threads, DDS, YAML or command lines";
   if (used.empty() || used == "core" || used == own) return "";

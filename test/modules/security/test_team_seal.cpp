@@ -1,8 +1,6 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
-#include <thread>
-#include <vector>
 
 #include "test/modules/security/toy_team.hpp"
 
@@ -154,35 +152,6 @@ TEST_CASE("Keys of a process that is gone are forgotten", "[security]") {
   CHECK_FALSE(a.seal.is_admitted(b.peer()));
   CHECK(a.seal.open(toy_context(b, a.peer()), *sealed).status == Status::kNotYet);
   CHECK_FALSE(a.seal.seal(toy_context(a, b.peer()), toy_content()));
-}
-
-TEST_CASE("Threads may seal, open, admit and update at once", "[security]") {
-  ToyTeam team;
-  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
-  introduce(a, b);
-  constexpr int kMessages = 100;
-  const auto exchange = [&](ToyMember& from, ToyMember& to, std::optional<TeamPeer> addressee,
-                            int& arrived) {
-    const SealContext context = toy_context(from, addressee);
-    for (int i = 0; i < kMessages; ++i) {
-      const auto sealed = from.seal.seal(context, toy_content());
-      arrived += sealed && to.seal.open(context, *sealed).content == toy_content();
-    }
-  };
-  int for_b = 0, for_a = 0, to_all = 0, unchanged = 0;
-  std::vector<std::thread> threads;
-  threads.emplace_back([&] { exchange(a, b, b.peer(), for_b); });
-  threads.emplace_back([&] { exchange(b, a, a.peer(), for_a); });
-  threads.emplace_back([&] { exchange(a, b, std::nullopt, to_all); });
-  threads.emplace_back([&] {
-    for (int i = 0; i < kMessages; ++i)
-      unchanged += a.admit(b) == nullptr && !a.seal.update(team.revocations(), kToyNow_s).new_key;
-  });
-  for (std::thread& thread : threads) thread.join();
-  CHECK(for_b == kMessages);
-  CHECK(for_a == kMessages);
-  CHECK(to_all == kMessages);
-  CHECK(unchanged == kMessages);
 }
 
 }  // namespace

@@ -112,7 +112,7 @@ inline std::string robot_name(RobotId id) {
 
 /// A robot that does nothing but talk: status, pings to all, pings to one.
 struct TestRobot {
-  using MakeSeal = std::function<std::shared_ptr<TeamSeal>(const RobotIdentity&)>;
+  using MakeSeal = std::function<std::shared_ptr<SharedSeal>(const RobotIdentity&)>;
 
   explicit TestRobot(std::shared_ptr<const DdsDomain> domain, RobotId id,
                      TopicKind ping_kind = TopicKind::kEvent,

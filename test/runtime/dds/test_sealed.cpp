@@ -15,8 +15,8 @@ std::int64_t today_s() {
 // Each process of a robot of the team, with keys that hold today.
 TestRobot::MakeSeal member_of(const ToyTeam& team) {
   return [&team](const RobotIdentity& own) {
-    return std::make_shared<TeamSeal>(team.keys_of(own.robot, own.name, today_s() - 3600), own,
-                                      today_s());
+    return std::make_shared<SharedSeal>(team.keys_of(own.robot, own.name, today_s() - 3600), own,
+                                        today_s());
   };
 }
 
