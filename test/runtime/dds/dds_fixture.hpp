@@ -98,6 +98,18 @@ class RawWriter {
     head.key = Codec<Ping>::key_of(ping);
     write_bytes(head, serialize(Codec<Ping>::descriptor(), &encoded.wire));
   }
+  /// True once as many readers are there. What is written before may be lost to those of a status.
+  [[nodiscard]] bool is_read_by(std::uint32_t readers) const {
+    return eventually([&] {
+      dds_publication_matched_status_t status{};
+      dds_get_publication_matched_status(writer_.handle(), &status);
+      return status.current_count >= readers;
+    });
+  }
+  /// True once all of its readers have acknowledged everything; not of a status.
+  [[nodiscard]] bool is_acknowledged() const {
+    return dds_wait_for_acks(writer_.handle(), DDS_SECS(kPatience.count())) == DDS_RETCODE_OK;
+  }
 
  private:
   DdsEntity topic_;
@@ -176,7 +188,15 @@ struct TestRobot {
         return t;
     return {};
   }
-  /// The same, with one peer.
+  /// How many messages of a topic, to all or to it alone, it has refused.
+  std::uint64_t refused(const std::string& topic = Codec<Ping>::kTopic) {
+    std::uint64_t count = 0;
+    for (const TopicTraffic& t : bridge.traffic().topics)
+      if (t.topic == topic)
+        for (const auto& [reason, times] : t.refused) count += times;
+    return count;
+  }
+  /// traffic() with one peer.
   TrafficCount traffic_with(RobotId peer, Direction direction, bool addressed = false) {
     for (const PeerTraffic& t : bridge.traffic().peers)
       if (t.topic == Codec<Ping>::kTopic && t.direction == direction && t.peer == peer &&

@@ -20,12 +20,6 @@ TestRobot::MakeSeal member_of(const ToyTeam& team) {
   };
 }
 
-std::uint64_t refused(TestRobot& robot) {
-  std::uint64_t count = 0;
-  for (const auto& [reason, times] : robot.traffic(Direction::kIn).refused) count += times;
-  return count;
-}
-
 TEST_CASE("Robots of a team with keys talk, to all and to one", "[sealed]") {
   const ToyTeam team;
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
@@ -39,7 +33,7 @@ TEST_CASE("Robots of a team with keys talk, to all and to one", "[sealed]") {
   a.ping_one(4, 7, {9});
   REQUIRE(b.received_addressed.wait_for(1).size() == 1);
   CHECK(b.received_addressed.messages()[0].payload == std::vector<std::uint8_t>{9});
-  CHECK(refused(b) == 0);
+  CHECK(b.refused() == 0);
 
   TestRobot late(domain, 5, member_of(team));
   late.start();
@@ -57,7 +51,7 @@ TEST_CASE("Who has no keys of the team is not heard and hears nothing", "[sealed
   REQUIRE(b.hears(PeerEventKind::kJoined, 3));
   CHECK(b.hears(PeerEventKind::kRefused, 9));
   stranger.ping(1);
-  CHECK(eventually([&] { return refused(b) >= 1; }));
+  CHECK(eventually([&] { return b.refused() >= 1; }));
   a.ping(2, {42});
   REQUIRE(b.received.wait_for(1).size() == 1);
   CHECK(b.received.messages()[0].index == 2);
@@ -123,10 +117,14 @@ TEST_CASE("Recorded credentials and recorded messages make nobody a member", "[s
   RawWriter status(impostor.handle(), domain->config(), TopicKind::kStatus,
                    Codec<RobotStatus>::kTopic);
   RawWriter pings(impostor.handle(), domain->config(), TopicKind::kEvent);
+  REQUIRE(status.is_read_by(1));
+  REQUIRE(pings.is_read_by(1));
   for (std::uint32_t i = 0; i < 20; ++i) {
     status.write_bytes(header(identity, 100 + i), std::vector<std::uint8_t>(200, 1));
     pings.write(header(identity, 100 + i), {3, 100 + i, {}});
   }
+  CHECK(eventually([&] { return b->refused() == 20; }));
+  CHECK(eventually([&] { return b->refused(Codec<RobotStatus>::kTopic) > 0; }));
   TestRobot c(domain, 5, member_of(team));
   c.start();
   REQUIRE(b->hears(PeerEventKind::kJoined, 5));
@@ -136,6 +134,31 @@ TEST_CASE("Recorded credentials and recorded messages make nobody a member", "[s
   CHECK_FALSE(TestRobot::matching(b->peer_events.messages(), PeerEventKind::kReturned, 3) > 0);
   REQUIRE(c.hears(PeerEventKind::kJoined, 4));
   CHECK(c.bridge.peers().list().size() == 1);
+}
+
+TEST_CASE("Of two processes with one robot's keys the later one is told, and not heard",
+          "[sealed]") {
+  const ToyTeam team;
+  const RobotKeys keys = team.keys_of(3, "robot3", today_s() - 3600);
+  const auto with_its_keys = [&](const RobotIdentity& own) {
+    return std::make_shared<SharedSeal>(keys, own, today_s());
+  };
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3, with_its_keys), b(domain, 4, member_of(team));
+  a.start();
+  b.start();
+  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  REQUIRE(eventually([&] { return a.status_count() >= 4; }));
+  TestRobot twin(domain, 3, with_its_keys);
+  twin.start();
+  CHECK(twin.hears(PeerEventKind::kConflict, 3));
+  CHECK(a.hears(PeerEventKind::kRefused, 3));
+  twin.ping(1);
+  CHECK(eventually([&] { return a.refused() == 1 && b.refused() == 1; }));
+  a.ping(2);
+  REQUIRE(b.received.wait_for(1).size() == 1);
+  CHECK(b.received.messages()[0].index == 2);
+  CHECK(TestRobot::matching(a.peer_events.messages(), PeerEventKind::kConflict, 3) == 0);
 }
 
 TEST_CASE("A robot with keys that starts again is known by its new process", "[sealed]") {
