@@ -11,7 +11,6 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kSendQueue = 8192;
 constexpr std::chrono::seconds kAcknowledgementTime{2};
 constexpr double kTellKeys_s = 30.0;  // a robot that was short of memory may have lost one
 constexpr std::size_t kMaxKeyMessageBytes = 512;
@@ -36,6 +35,9 @@ DdsBridge::DdsBridge(const DdsParticipant& participant)
       peers_(participant),
       waitset_(dds_create_waitset(participant.handle()), "wait set"),
       stop_request_(dds_create_guardcondition(participant.handle()), "guard condition"),
+      key_teller_(
+          kMaxAdmitted, Overflow::kDropOldest, [this](const TeamPeer& peer) { tell_key(peer); },
+          "dds_keys"),
       sender_(
           kSendQueue, Overflow::kBlock, [](const Job& job) { job(); }, "dds_send") {
   for (const dds_entity_t condition :
@@ -62,17 +64,16 @@ void DdsBridge::exchange_keys() {
 }
 
 void DdsBridge::tell_key(const TeamPeer& peer) {
-  post([this, peer] {
-    if (auto message =
-            participant_.seal()->with([&](TeamSeal& team) { return team.key_message_for(peer); }))
-      keys_->write(peer.robot, message_key({peer.boot}), *std::move(message));
-  });
+  auto message =
+      participant_.seal()->with([&](TeamSeal& team) { return team.key_message_for(peer); });
+  if (message) keys_->write(peer.robot, message_key({peer.boot}), *std::move(message));
 }
 
 void DdsBridge::tell_keys() {
   if (keys_ == nullptr) return;
   for (const Peer& peer : peers_.list())
-    if (peer.state == PeerState::kAlive) tell_key({peer.identity.robot, peer.identity.boot});
+    if (peer.state == PeerState::kAlive)
+      key_teller_.post({peer.identity.robot, peer.identity.boot});
 }
 
 OutgoingTopic& DdsBridge::add_outgoing(TopicSpec spec) {
@@ -99,6 +100,7 @@ TrafficSnapshot DdsBridge::traffic() const {
 
 void DdsBridge::start() {
   sender_.start();
+  if (keys_ != nullptr) key_teller_.start();
   peers_.start();
   for (const auto& topic : incoming_) topic->start();
   receiver_ = std::thread(&DdsBridge::receive_until_stopped, this);
@@ -107,6 +109,7 @@ void DdsBridge::start() {
 void DdsBridge::stop() noexcept {
   if (std::exchange(stopped_, true)) return;
   sender_.stop();
+  key_teller_.stop();
   if (!receiver_.joinable()) return;
   await_acknowledgements();
   dds_set_guardcondition(stop_request_.handle(), true);
@@ -118,13 +121,14 @@ void DdsBridge::stop() noexcept {
 std::exception_ptr DdsBridge::error() const {
   if (receive_failed_) return receive_error_;
   if (const auto error = sender_.error()) return error;
+  if (const auto error = key_teller_.error()) return error;
   for (const auto& topic : incoming_)
     if (const auto error = topic->error()) return error;
   return peers_.error();
 }
 
 std::vector<Heartbeat*> DdsBridge::heartbeats() {
-  std::vector<Heartbeat*> all{&receiving_, &sender_.heartbeat()};
+  std::vector<Heartbeat*> all{&receiving_, &sender_.heartbeat(), &key_teller_.heartbeat()};
   for (const auto& topic : incoming_) all.push_back(&topic->heartbeat());
   return all;
 }
@@ -142,7 +146,7 @@ void DdsBridge::receive_until_stopped() try {
     // Who is there comes before what they say.
     const double now_s = steady_now_s();
     peers_.poll();
-    for (const TeamPeer& peer : peers_.take_admitted()) tell_key(peer);
+    for (const TeamPeer& peer : peers_.take_admitted()) key_teller_.post(peer);
     if (now_s - told_keys_s_ >= kTellKeys_s) {
       told_keys_s_ = now_s;
       tell_keys();

@@ -81,6 +81,9 @@ struct Pace {
 /// seconds until the peers have acknowledged it.
 class DdsBridge final : public Node {
  public:
+  /// How many messages may wait to be sent; who publishes one more waits.
+  static constexpr std::size_t kSendQueue = 8192;
+
   /// `participant` outlives the bridge.
   explicit DdsBridge(const DdsParticipant& participant);
   ~DdsBridge() override;
@@ -125,7 +128,7 @@ class DdsBridge final : public Node {
   Peers peers_;
   std::vector<std::unique_ptr<OutgoingTopic>> outgoing_;
   std::vector<std::unique_ptr<IncomingTopic>> incoming_;
-  OutgoingTopic* keys_ = nullptr;  // where the team has keys
+  OutgoingTopic* keys_ = nullptr;  // where the team has keys; key_teller_ writes it
   double told_keys_s_ = 0.0;       // receive thread only
   DdsEntity waitset_;
   DdsEntity stop_request_;  // guard condition
@@ -134,7 +137,9 @@ class DdsBridge final : public Node {
   std::exception_ptr receive_error_;
   std::atomic<bool> receive_failed_ = false;
   std::thread receiver_;
-  Worker<Job> sender_;  // last member: stops first
+  // Apart from the sender: the receive thread has keys told, and must not wait for room there.
+  Worker<TeamPeer> key_teller_;
+  Worker<Job> sender_;  // last members: stop first
 };
 
 namespace detail {

@@ -1,11 +1,32 @@
 #include <algorithm>
+#include <atomic>
 #include <catch2/catch.hpp>
+#include <future>
 
 #include "runtime/clock.hpp"
 #include "test/modules/security/toy_team.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 
 namespace km {
+
+// What holds up the sending thread.
+struct Stone {
+  std::shared_future<void> lifted;
+};
+
+template <>
+struct Codec<Stone> : Codec<Ping> {
+  static constexpr const char* kTopic = "stones";
+  static MessageKey key_of(const Stone& /*stone*/) { return 0; }
+  static Encoded encode(const Stone& stone) {
+    stone.lifted.wait();
+    return {};
+  }
+  static Decoded<Stone> decode(const Wire& /*wire*/, const TeamPeer& /*writer*/) {
+    return Decoded<Stone>::refuse("nobody takes it");
+  }
+};
+
 namespace {
 
 std::int64_t today_s() {
@@ -159,6 +180,27 @@ TEST_CASE("Of two processes with one robot's keys the later one is told, and not
   REQUIRE(b.received.wait_for(1).size() == 1);
   CHECK(b.received.messages()[0].index == 2);
   CHECK(TestRobot::matching(a.peer_events.messages(), PeerEventKind::kConflict, 3) == 0);
+}
+
+TEST_CASE("Robots appear and are heard while nothing can be sent", "[sealed]") {
+  const ToyTeam team;
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3, member_of(team));
+  Crossing<Stone> stones;
+  a.bridge.exchange(stones, TopicKind::kEvent, TrafficCategory::kOther, {.receive = false});
+  a.start();
+  std::atomic<std::size_t> queued = 0;
+  std::future<void> feeding;
+  std::promise<void> lift;  // when it goes, too, before who waits for it
+  feeding = std::async(std::launch::async, [&, stone = Stone{lift.get_future().share()}] {
+    for (; queued < DdsBridge::kSendQueue + 1; ++queued) stones.to_peers().publish(stone);
+  });
+  REQUIRE(eventually([&] { return queued == DdsBridge::kSendQueue + 1; }));
+  TestRobot b(domain, 4, member_of(team));
+  b.start();
+  CHECK(a.hears(PeerEventKind::kJoined, 4));
+  b.ping(7);
+  CHECK(a.received.wait_for(1).size() == 1);
 }
 
 TEST_CASE("A robot with keys that starts again is known by its new process", "[sealed]") {
