@@ -21,9 +21,6 @@ constexpr std::size_t kMaxStreams = 4096;  // boots of robots remembered per top
 // For a writer to become known: DDS may tell of its messages before its robot is heard, and a
 // robot that is killed and started again waits for its former self to be missed.
 constexpr double kPatience_s = 8.0;
-constexpr std::size_t kMaxWaitingBytes = 32U << 20U;
-constexpr std::size_t kMaxWaitingBytesOfOne = 8U << 20U;  // a history of some hours
-constexpr std::size_t kMaxSealed = 512;
 constexpr double kRetry_s = 0.1;
 constexpr int kMaxInFlight = 16;
 constexpr std::chrono::milliseconds kMaxStay{100};
@@ -45,6 +42,11 @@ class ReceivedEnvelope {
   km_wire_Envelope envelope_{};
   bool usable_;
 };
+
+// What a message takes while it is kept.
+std::size_t kept_bytes(const ddsi_serdata& serialized) {
+  return ddsi_serdata_size(&serialized) + kFilingBytes;
+}
 
 }  // namespace
 
@@ -120,41 +122,28 @@ void IncomingTopic::arrive(Serdata serialized, dds_instance_handle_t writer, dou
   const auto guid = writers_.participant_of(writer);
   if (!guid) return refuse("from no known writer");
   // What waits comes first.
-  if (!waiting_.contains(*guid) && is_settled(peers_.claim_of(*guid).standing))
-    return admit(std::move(serialized), *guid, now_s);
-  hear_claim(*serialized, *guid, now_s);
-  wait(std::move(serialized), *guid, now_s);
-}
-
-void IncomingTopic::wait(Serdata serialized, const Guid& writer, double now_s) {
-  const std::size_t bytes = ddsi_serdata_size(serialized.get()) + kFilingBytes;
-  WaitingRoom& room = waiting_[writer];
-  if (room.bytes + bytes > kMaxWaitingBytesOfOne || waiting_bytes_ + bytes > kMaxWaitingBytes)
-    return refuse("one too many from a robot that is not known yet");
-  room.bytes += bytes;
-  waiting_bytes_ += bytes;
-  room.messages.push_back({std::move(serialized), now_s});
+  const Peers::Claim claim = peers_.claim_of(*guid);
+  if (!waiting_.contains(*guid) && is_settled(claim.standing))
+    return admit(std::move(serialized), *guid, claim, now_s);
+  hear_claim(*serialized, *guid, claim, now_s);
+  const std::size_t bytes = kept_bytes(*serialized);
+  if (!waiting_.push(*guid, std::move(serialized), bytes, now_s))
+    refuse("one too many from a robot that is not known yet");
 }
 
 void IncomingTopic::recall(double now_s) {
-  for (auto entry = waiting_.begin(); entry != waiting_.end();) {
-    auto& [writer, room] = *entry;
-    const Standing standing = peers_.claim_of(writer).standing;
-    while (!room.messages.empty()) {
-      Waiting& oldest = room.messages.front();
-      const bool settled = is_settled(standing);
-      if (!settled && now_s - oldest.since_s < kPatience_s) break;
-      const std::size_t bytes = ddsi_serdata_size(oldest.serialized.get()) + kFilingBytes;
-      if (settled) {
-        admit(std::move(oldest.serialized), writer, now_s);
-      } else {
-        refuse(standing == Standing::kRival ? "claims another robot's id" : "from no known robot");
-      }
-      room.messages.pop_front();
-      room.bytes -= bytes;
-      waiting_bytes_ -= bytes;
+  const auto take = [&](const Guid& writer, Serdata& serialized, double waited_s) {
+    const Peers::Claim claim = peers_.claim_of(writer);
+    if (is_settled(claim.standing)) {
+      admit(std::move(serialized), writer, claim, now_s);
+      return true;
     }
-    entry = room.messages.empty() ? waiting_.erase(entry) : std::next(entry);
+    if (waited_s < kPatience_s) return false;
+    refuse(claim.standing == Standing::kRival ? "claims another robot's id"
+                                              : "from no known robot");
+    return true;
+  };
+  while (waiting_.serve(now_s, take) > 0) {
   }
 }
 
@@ -165,11 +154,11 @@ bool IncomingTopic::is_settled(Standing standing) const {
   return !is_open || (spec_.carries_keys && standing == Standing::kRival);
 }
 
-void IncomingTopic::admit(Serdata serialized, const Guid& writer, double now_s) {
-  const Peers::Claim claim = peers_.claim_of(writer);
+void IncomingTopic::admit(Serdata serialized, const Guid& writer, const Peers::Claim& claim,
+                          double now_s) {
   if (claim.standing == Standing::kStranger) return refuse("from no known robot");
   if (claim.standing == Standing::kTwin && !spec_.carries_keys) {
-    hear_claim(*serialized, writer, now_s);
+    hear_claim(*serialized, writer, claim, now_s);
     return refuse("claims this robot's id");
   }
   file(std::move(serialized), claim.sender, writer, now_s);
@@ -177,11 +166,11 @@ void IncomingTopic::admit(Serdata serialized, const Guid& writer, double now_s) 
 
 void IncomingTopic::file(Serdata serialized, const TeamPeer& sender, const Guid& writer,
                          double now_s) {
-  const std::size_t bytes = ddsi_serdata_size(serialized.get()) + kFilingBytes;
+  const std::size_t bytes = kept_bytes(*serialized);
   bool fits = true;
   {
     const std::lock_guard lock(mutex_);
-    fits = filed_.push(sender.robot, {std::move(serialized), sender, writer, now_s}, bytes, now_s);
+    fits = filed_.push(sender.robot, {std::move(serialized), sender, writer}, bytes, now_s);
     filed_changed_.notify_one();
   }
   if (!fits) refuse("for want of room");
@@ -189,15 +178,15 @@ void IncomingTopic::file(Serdata serialized, const TeamPeer& sender, const Guid&
 
 // A status of a participant that is not the robot it says it is, or not yet. Of a twin, its number
 // tells how long it has been running; where the team has keys, its seal tells who it is.
-void IncomingTopic::hear_claim(const ddsi_serdata& serialized, const Guid& writer, double now_s) {
+void IncomingTopic::hear_claim(const ddsi_serdata& serialized, const Guid& writer,
+                               const Peers::Claim& claim, double now_s) {
   if (spec_.kind != TopicKind::kStatus) return;
-  const Peers::Claim claim = peers_.claim_of(writer);
   if (claim.standing != Standing::kRival && claim.standing != Standing::kTwin) return;
   const ReceivedEnvelope received(serialized);
   if (!received.usable()) return;
   const km_wire_Envelope& envelope = received.get();
   if (TeamPeer{envelope.robot, envelope.boot} != claim.sender) return;
-  if (open(envelope, writer).status != Opened::Status::kOpened) return;
+  if (open(envelope, writer).how.status != Opened::Status::kOpened) return;
   if (claim.standing == Standing::kTwin) {
     peers_.twin_heard(writer, kStatusPeriod_s * envelope.number, now_s - started_s_);
   } else {
@@ -205,16 +194,19 @@ void IncomingTopic::hear_claim(const ddsi_serdata& serialized, const Guid& write
   }
 }
 
-Opened IncomingTopic::open(const km_wire_Envelope& envelope, const Guid& writer) const {
+IncomingTopic::Readable IncomingTopic::open(const km_wire_Envelope& envelope,
+                                            const Guid& writer) const {
   const auto bytes = elements_of(envelope.content, spec_.max_bytes + kTeamSealBytes);
-  if (!bytes) return {Opened::Status::kRefused, {}, "larger than its topic allows"};
+  if (!bytes) return {{Opened::Status::kRefused, {}, "larger than its topic allows"}, {}};
   SharedSeal* seal = participant_.seal();
   if (seal == nullptr || spec_.carries_keys)
-    return {Opened::Status::kOpened, {bytes->begin(), bytes->end()}, nullptr};
+    return {{Opened::Status::kOpened, {}, nullptr}, *bytes};
   const RobotIdentity& self = participant_.identity();
   const auto addressee = addressed_ ? std::optional(TeamPeer{self.robot, self.boot}) : std::nullopt;
   const SealedEnvelope way(spec_.name, writer, envelope, addressee);
-  return seal->with([&](TeamSeal& team) { return team.open(way.context(), *bytes); });
+  Readable result{seal->with([&](TeamSeal& team) { return team.open(way.context(), *bytes); }), {}};
+  result.content = result.how.content;  // a vector's octets stay where they are when it is moved
+  return result;
 }
 
 void IncomingTopic::start() {
@@ -233,17 +225,16 @@ void IncomingTopic::stop() noexcept {
 
 void IncomingTopic::deliver_until_stopped() try {
   name_this_thread("dds_in");
-  double retried_s = 0.0;
+  double retry_at_s = 0.0;
   std::unique_lock lock(mutex_);
   while (!stopping_) {
     const double now_s = steady_now_s();
-    const bool retry = !sealed_.empty() && now_s - retried_s >= kRetry_s;
-    if (retry) retried_s = now_s;
+    const bool retry = !sealed_.empty() && now_s >= retry_at_s;
     if (auto filed = filed_.pop(now_s); filed || retry) {
       lock.unlock();
       const Heartbeat::Step step(delivering_);
-      if (retry) deliver_again(now_s);
-      if (filed && deliver(*filed) == Verdict::kNotYet) sealed_.push_back(std::move(*filed));
+      if (retry && !deliver_again(now_s)) retry_at_s = now_s + kRetry_s;
+      if (filed && deliver(*filed) == Verdict::kNotYet) await_key(std::move(*filed), now_s);
       lock.lock();
       continue;
     }
@@ -260,15 +251,21 @@ void IncomingTopic::deliver_until_stopped() try {
   failed_ = true;  // after error_: publishes it
 }
 
-// What could not be opened for want of a key.
-void IncomingTopic::deliver_again(double now_s) {
-  const auto is_done = [&](const Filed& filed) {
+void IncomingTopic::await_key(Filed filed, double now_s) {
+  const RobotId sender = filed.sender.robot;
+  const std::size_t bytes = kept_bytes(*filed.serialized);
+  if (!sealed_.push(sender, std::move(filed), bytes, now_s))
+    refuse("one too many under a key that is not known yet");
+}
+
+// Of each robot the oldest that could not be opened for want of a key. False if none opens yet.
+bool IncomingTopic::deliver_again(double now_s) {
+  return sealed_.serve(now_s, [this](RobotId /*from*/, const Filed& filed, double waited_s) {
     if (deliver(filed) == Verdict::kTaken) return true;
-    if (now_s - filed.since_s < kPatience_s && sealed_.size() < kMaxSealed) return false;
+    if (waited_s < kPatience_s) return false;
     refuse("sealed with a key that is not known");
     return true;
-  };
-  std::erase_if(sealed_, is_done);
+  }) > 0;
 }
 
 IncomingTopic::Verdict IncomingTopic::deliver(const Filed& filed) {
@@ -279,11 +276,12 @@ IncomingTopic::Verdict IncomingTopic::deliver(const Filed& filed) {
 }
 
 IncomingTopic::Verdict IncomingTopic::accept(const km_wire_Envelope& envelope, const Filed& filed) {
-  const Opened opened = open(envelope, filed.writer);
-  if (opened.status == Opened::Status::kNotYet) return Verdict::kNotYet;
-  const char* reason = opened.status == Opened::Status::kOpened
-                           ? hand_on(envelope, filed, opened.content)
-                           : opened.reason;
+  const Readable readable = open(envelope, filed.writer);
+  const Opened::Status status = readable.how.status;
+  if (status == Opened::Status::kNotYet) return Verdict::kNotYet;
+  const char* reason = status == Opened::Status::kOpened
+                           ? hand_on(envelope, filed, readable.content)
+                           : readable.how.reason;
   if (reason != nullptr) refuse(reason);
   return Verdict::kTaken;
 }

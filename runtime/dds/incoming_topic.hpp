@@ -5,7 +5,6 @@
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -19,6 +18,7 @@
 #include "runtime/dds/fair_queue.hpp"
 #include "runtime/dds/outgoing_topic.hpp"
 #include "runtime/dds/sequence_tracker.hpp"
+#include "runtime/dds/waiting_rooms.hpp"
 #include "runtime/heartbeat.hpp"
 
 namespace km {
@@ -89,28 +89,25 @@ class IncomingTopic {
     Serdata serialized;
     TeamPeer sender;
     Guid writer{};
-    double since_s = 0.0;
   };
-  struct Waiting {
-    Serdata serialized;
-    double since_s = 0.0;
-  };
-  struct WaitingRoom {  // of one participant
-    std::deque<Waiting> messages;
-    std::size_t bytes = 0;
+  // What a message carries. `content`, if it opened, is the envelope's or that of `how`.
+  struct Readable {
+    Opened how;
+    std::span<const std::uint8_t> content;
   };
   enum class Verdict { kTaken, kNotYet };
 
   DdsEntity make_reader();
   void arrive(Serdata serialized, dds_instance_handle_t writer, double now_s);
-  void wait(Serdata serialized, const Guid& writer, double now_s);
   bool is_settled(Standing standing) const;
-  void admit(Serdata serialized, const Guid& writer, double now_s);
+  void admit(Serdata serialized, const Guid& writer, const Peers::Claim& claim, double now_s);
   void file(Serdata serialized, const TeamPeer& sender, const Guid& writer, double now_s);
-  void hear_claim(const ddsi_serdata& serialized, const Guid& writer, double now_s);
-  [[nodiscard]] Opened open(const km_wire_Envelope& envelope, const Guid& writer) const;
+  void hear_claim(const ddsi_serdata& serialized, const Guid& writer, const Peers::Claim& claim,
+                  double now_s);
+  [[nodiscard]] Readable open(const km_wire_Envelope& envelope, const Guid& writer) const;
   void deliver_until_stopped();
-  void deliver_again(double now_s);
+  void await_key(Filed filed, double now_s);
+  bool deliver_again(double now_s);
   Verdict deliver(const Filed& filed);
   Verdict accept(const km_wire_Envelope& envelope, const Filed& filed);
   const char* hand_on(const km_wire_Envelope& envelope, const Filed& filed,
@@ -124,9 +121,8 @@ class IncomingTopic {
   const bool addressed_;
   Handler handler_;
   WriterBook writers_;
-  std::map<Guid, WaitingRoom> waiting_;  // receive thread only
-  std::size_t waiting_bytes_ = 0;        // likewise
-  std::deque<Filed> sealed_;             // delivery only: for which a key is missing
+  WaitingRooms<Guid, Serdata> waiting_;  // receive thread only: whose writers are not known
+  WaitingRooms<RobotId, Filed> sealed_;  // delivery only: for which a key is missing
   double started_s_ = 0.0;
 
   mutable std::mutex mutex_;  // guards what is filed, and the counts

@@ -182,6 +182,30 @@ TEST_CASE("Of two processes with one robot's keys the later one is told, and not
   CHECK(TestRobot::matching(a.peer_events.messages(), PeerEventKind::kConflict, 3) == 0);
 }
 
+TEST_CASE("Messages under a new key wait for it, however many they are", "[sealed]") {
+  ToyTeam team;
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3, member_of(team)), b(domain, 4, member_of(team));
+  TestRobot c(domain, 5, member_of(team));
+  for (TestRobot* robot : {&a, &b, &c}) robot->start();
+  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  REQUIRE(b.hears(PeerEventKind::kJoined, 5));
+  const Revocations list = team.revoking({team.keys_of(9, "lost").certificate});
+  REQUIRE(a.participant.seal()->with(
+      [&](TeamSeal& seal) { return seal.update(list, today_s()).new_key; }));
+  constexpr std::uint32_t kCount = 1500;
+  for (std::uint32_t i = 0; i < kCount; ++i) a.ping(i);
+  REQUIRE(eventually([&] { return a.traffic(Direction::kOut).count.messages == kCount; }));
+  // b takes from both in turn: once it has all of c's, it has tried all of a's; and then again.
+  for (std::uint32_t i = 0; i < 2 * kCount; ++i) c.ping(i);
+  REQUIRE(b.received.wait_for(2 * kCount).size() == 2 * kCount);
+  const std::uint64_t told = c.status_count();
+  REQUIRE(eventually([&] { return c.status_count() > told + 1; }));
+  a.bridge.tell_keys();
+  CHECK(b.received.wait_for(3 * kCount).size() == 3 * kCount);
+  CHECK(b.refused() == 0);
+}
+
 TEST_CASE("Robots appear and are heard while nothing can be sent", "[sealed]") {
   const ToyTeam team;
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());

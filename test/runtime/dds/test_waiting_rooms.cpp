@@ -1,0 +1,64 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <string>
+#include <vector>
+
+#include "runtime/dds/waiting_rooms.hpp"
+
+namespace km {
+namespace {
+
+using Rooms = WaitingRooms<int, std::string>;
+
+// What is served, in order, of those that `are_known`.
+std::vector<std::string> serve_all(Rooms& rooms, const std::vector<int>& are_known) {
+  std::vector<std::string> served;
+  const auto take = [&](int from, const std::string& message, double /*waited_s*/) {
+    if (std::ranges::count(are_known, from) == 0) return false;
+    served.push_back(message);
+    return true;
+  };
+  while (rooms.serve(0.0, take) > 0) {
+  }
+  return served;
+}
+
+TEST_CASE("What waits is served oldest first, in turn between the rooms", "[rooms]") {
+  Rooms rooms;
+  for (const char* message : {"a1", "a2", "a3"}) REQUIRE(rooms.push(1, message, 1, 0.0));
+  REQUIRE(rooms.push(2, "b1", 1, 0.0));
+  REQUIRE(rooms.push(3, "c1", 1, 0.0));
+  CHECK(serve_all(rooms, {1, 3}) == std::vector<std::string>{"a1", "c1", "a2", "a3"});
+  CHECK(rooms.contains(2));
+  CHECK_FALSE(rooms.contains(1));
+  CHECK(serve_all(rooms, {2}) == std::vector<std::string>{"b1"});
+  CHECK(rooms.empty());
+}
+
+TEST_CASE("A full room refuses what comes, and what has gone makes room", "[rooms]") {
+  Rooms rooms({.bytes = 15, .bytes_of_one = 10});
+  CHECK(rooms.push(1, "a1", 6, 0.0));
+  CHECK_FALSE(rooms.push(1, "a2", 6, 0.0));
+  CHECK(rooms.push(1, "a3", 4, 0.0));
+  CHECK_FALSE(rooms.push(2, "b1", 6, 0.0));  // all rooms together
+  CHECK_FALSE(rooms.contains(2));
+  CHECK(rooms.push(2, "b2", 5, 0.0));
+  CHECK(serve_all(rooms, {1}) == std::vector<std::string>{"a1", "a3"});
+  CHECK(rooms.push(1, "a4", 10, 0.0));
+  CHECK(serve_all(rooms, {1, 2}) == std::vector<std::string>{"a4", "b2"});
+}
+
+TEST_CASE("It is known for how long a message has waited", "[rooms]") {
+  Rooms rooms;
+  REQUIRE(rooms.push(1, "a", 1, 10.0));
+  double waited_s = 0.0;
+  CHECK(rooms.serve(12.5, [&](int, const std::string&, double s) {
+    waited_s = s;
+    return false;
+  }) == 0);
+  CHECK(waited_s == 2.5);
+  CHECK(rooms.contains(1));
+}
+
+}  // namespace
+}  // namespace km
