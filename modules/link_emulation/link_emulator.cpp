@@ -1,0 +1,172 @@
+#include "modules/link_emulation/link_emulator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+#include "modules/core/config.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kHeader_bytes = 14;  // both addresses and the type
+constexpr std::size_t kMaxRobots = 65536;  // the address has two bytes for the number
+
+bool is_possible(const LinkPlan& link) {
+  return link.jitter_s >= 0.0 && std::isfinite(link.jitter_s) && link.loss >= 0.0 &&
+         link.loss <= 1.0 && link.queue_bytes >= 0.0 && link.range_m >= 0.0;
+}
+
+void check_script(const LinkScript& script) {
+  const std::size_t n = script.robots;
+  const auto require = [](bool ok, const char* problem) {
+    if (!ok) throw std::invalid_argument(std::string("LinkEmulator: ") + problem);
+  };
+  require(n <= kMaxRobots, "more robots than addresses");
+  require(script.links.size() == n * n, "a link is needed for each ordered pair");
+  require(std::ranges::all_of(script.links, is_possible), "a link has an impossible number");
+  const bool ranges = std::ranges::any_of(
+      script.links, [](const LinkPlan& link) { return std::isfinite(link.range_m); });
+  require(!ranges || script.paths.size() == n, "a range needs the path of every robot");
+  for (const auto& path : script.paths) {
+    require(!path.empty(), "a path has no position");
+    require(std::ranges::is_sorted(path, {}, &TimedPosition::time_s), "a path goes back in time");
+  }
+  for (const LinkPartition& partition : script.partitions)
+    require(partition.group_of.size() == n, "a partition needs the group of every robot");
+}
+
+}  // namespace
+
+std::array<std::uint8_t, 6> ethernet_address(std::size_t robot) {
+  constexpr std::uint8_t kLocal = 0x02;
+  return {kLocal,
+          'k',
+          'm',
+          0,
+          static_cast<std::uint8_t>(robot >> 8U),
+          static_cast<std::uint8_t>(robot)};
+}
+
+LinkEmulator::LinkEmulator(LinkScript script) : script_(std::move(script)) {
+  check_script(script_);
+  for (std::size_t from = 0; from < script_.robots; ++from)
+    for (std::size_t to = 0; to < script_.robots; ++to) {
+      std::seed_seq seed{script_.seed, static_cast<unsigned>(from), static_cast<unsigned>(to)};
+      states_.push_back({.rng = std::mt19937(seed)});
+    }
+}
+
+void LinkEmulator::send(std::size_t from, double now_s, const EthernetFrame& frame) {
+  if (frame.size() < kHeader_bytes) return;
+  const bool to_many = (static_cast<std::uint8_t>(frame[0]) & 1U) != 0;
+  for (std::size_t to = 0; to < script_.robots; ++to) {
+    const auto address = ethernet_address(to);
+    if (to != from && (to_many || std::memcmp(frame.data(), address.data(), address.size()) == 0))
+      send_over(from, to, now_s, frame);
+  }
+}
+
+void LinkEmulator::send_over(std::size_t from, std::size_t to, double now_s,
+                             const EthernetFrame& frame) {
+  const LinkPlan& link = script_.link(from, to);
+  State& state = states_[from * script_.robots + to];
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  const double chance = uniform(state.rng);
+  const double jitter_s = link.jitter_s * uniform(state.rng);
+  state.counts.in.add(frame);
+  const auto lose = [&](LinkLoss why) {
+    state.counts.lost[static_cast<std::size_t>(why)].add(frame);
+  };
+  if (const auto why = cut(link, from, to, now_s)) return lose(*why);
+  double sent_off_s = now_s;
+  if (link.course.has_limit()) {
+    const double begin = std::max(state.sent_off, link.course.capacity_until(now_s));
+    const double end = begin + static_cast<double>(frame.size());
+    if (end - link.course.capacity_until(now_s) > link.queue_bytes) return lose(LinkLoss::kQueue);
+    state.sent_off = end;
+    sent_off_s = std::max(now_s, link.course.time_of(end));
+  }
+  if (chance < link.loss) return lose(LinkLoss::kChance);
+  const double due_s = sent_off_s + link.course.delay_s(sent_off_s) + jitter_s;
+  on_the_way_.emplace(due_s, LinkDelivery{from, to, now_s, due_s, frame});
+}
+
+std::optional<LinkLoss> LinkEmulator::cut(const LinkPlan& link, std::size_t from, std::size_t to,
+                                          double now_s) const {
+  const auto parts = [&](const LinkPartition& partition) {
+    return partition.when.contains(now_s) && partition.group_of[from] != partition.group_of[to];
+  };
+  if (std::ranges::any_of(script_.partitions, parts)) return LinkLoss::kPartition;
+  const auto is_now = [now_s](const RunSpan& span) { return span.contains(now_s); };
+  if (std::ranges::any_of(link.outages, is_now)) return LinkLoss::kOutage;
+  if (std::isfinite(link.range_m) &&
+      (position(from, now_s) - position(to, now_s)).norm() > link.range_m)
+    return LinkLoss::kRange;
+  return std::nullopt;
+}
+
+Eigen::Vector3d LinkEmulator::position(std::size_t robot, double now_s) const {
+  const std::vector<TimedPosition>& path = script_.paths[robot];
+  const auto after = std::ranges::upper_bound(path, now_s, {}, &TimedPosition::time_s);
+  if (after == path.begin()) return path.front().p_world;
+  if (after == path.end()) return path.back().p_world;
+  const TimedPosition &a = *std::prev(after), &b = *after;
+  const double share = (now_s - a.time_s) / (b.time_s - a.time_s);
+  return a.p_world + share * (b.p_world - a.p_world);
+}
+
+std::vector<LinkDelivery> LinkEmulator::due(double now_s) {
+  std::vector<LinkDelivery> deliveries;
+  const auto end = on_the_way_.upper_bound(now_s);
+  for (auto it = on_the_way_.begin(); it != end; ++it) {
+    LinkDelivery& delivery = it->second;
+    LinkCounts& counts = states_[delivery.from * script_.robots + delivery.to].counts;
+    const double delay_s = now_s - delivery.sent_s;
+    counts.delivered.add(delivery.frame);
+    counts.delay_sum_s += delay_s;
+    counts.delay_max_s = std::max(counts.delay_max_s, delay_s);
+    deliveries.push_back(std::move(delivery));
+  }
+  on_the_way_.erase(on_the_way_.begin(), end);
+  return deliveries;
+}
+
+std::optional<double> LinkEmulator::next_s() const {
+  if (on_the_way_.empty() || std::isinf(on_the_way_.begin()->first)) return std::nullopt;
+  return on_the_way_.begin()->first;
+}
+
+const LinkCounts& LinkEmulator::counts(std::size_t from, std::size_t to) const {
+  return states_.at(from * script_.robots + to).counts;
+}
+
+std::string links_csv(const LinkEmulator& emulator, const std::vector<std::string>& names) {
+  std::ostringstream csv;
+  csv << "from,to,frames_in,bytes_in,frames_delivered,bytes_delivered";
+  for (const char* loss : kLinkLossNames) csv << ",frames_" << loss << ",bytes_" << loss;
+  csv << ",delay_mean_s,delay_max_s\n";
+  for (std::size_t from = 0; from < emulator.robots(); ++from)
+    for (std::size_t to = 0; to < emulator.robots(); ++to) {
+      if (from == to) continue;
+      const LinkCounts& counts = emulator.counts(from, to);
+      csv << names.at(from) << ',' << names.at(to);
+      const auto add = [&csv](const FrameTally& tally) {
+        csv << ',' << tally.frames << ',' << tally.bytes;
+      };
+      add(counts.in);
+      add(counts.delivered);
+      for (const FrameTally& lost : counts.lost) add(lost);
+      if (counts.delivered.frames == 0)
+        csv << ",,\n";
+      else
+        csv << ',' << counts.delay_sum_s / static_cast<double>(counts.delivered.frames) << ','
+            << counts.delay_max_s << '\n';
+    }
+  return csv.str();
+}
+
+}  // namespace km

@@ -1,0 +1,124 @@
+#include "modules/link_emulation/link_trace.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "modules/core/input_file.hpp"
+#include "modules/core/text_rows.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kColumns = 3;
+
+// Why `rows` are no trace, and which of them; empty if they are one.
+std::pair<std::size_t, std::string> problem_of(const std::vector<LinkTraceRow>& rows) {
+  if (rows.empty()) return {0, "holds no row"};
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const LinkTraceRow& row = rows[i];
+    if (!(row.bytes_per_s >= 0.0)) return {i, "bytes_per_s is below zero"};
+    if (std::isinf(row.bytes_per_s) && rows.size() > 1) return {i, "bytes_per_s is infinite"};
+    if (!(row.delay_s >= 0.0) || std::isinf(row.delay_s)) return {i, "delay_s is below zero"};
+    if (!std::isfinite(row.time_s)) return {i, "time_s is not finite"};
+    if (i > 0 && row.time_s <= rows[i - 1].time_s)
+      return {i, "time_s is not after that of the row before"};
+  }
+  return {};
+}
+
+// Bytes from `a` until `dt_s` later, where the rate changes by `slope` [bytes/s^2].
+double carried(const LinkTraceRow& a, double slope, double dt_s) {
+  return dt_s * (a.bytes_per_s + 0.5 * slope * dt_s);
+}
+
+double slope_between(const LinkTraceRow& a, const LinkTraceRow& b) {
+  return (b.bytes_per_s - a.bytes_per_s) / (b.time_s - a.time_s);
+}
+
+LinkTraceRow parse_trace_row(const TextRow& row, const std::string& where) {
+  if (row.fields.size() != kColumns)
+    throw LinkTraceError(where + std::to_string(row.fields.size()) +
+                         " fields, expected time_s, bytes_per_s, delay_s");
+  double values[kColumns] = {};
+  for (std::size_t i = 0; i < kColumns; ++i) {
+    const auto value = parse_double(row.fields[i]);
+    if (!value || !std::isfinite(*value))
+      throw LinkTraceError(where + readable(row.fields[i]) + " is not a finite number");
+    values[i] = *value;
+  }
+  return {values[0], values[1], values[2]};
+}
+
+}  // namespace
+
+LinkTrace::LinkTrace(std::vector<LinkTraceRow> rows) : rows_(std::move(rows)) {
+  if (const auto [row, problem] = problem_of(rows_); !problem.empty())
+    throw std::invalid_argument("link trace, row " + std::to_string(row) + ": " + problem);
+  capacity_ = {0.0};
+  for (std::size_t i = 1; i < rows_.size(); ++i)
+    capacity_.push_back(capacity_.back() + carried(rows_[i - 1],
+                                                   slope_between(rows_[i - 1], rows_[i]),
+                                                   rows_[i].time_s - rows_[i - 1].time_s));
+}
+
+bool LinkTrace::has_limit() const {
+  return std::isfinite(rows_.front().bytes_per_s);
+}
+
+double LinkTrace::delay_s(double time_s) const {
+  const auto after = std::ranges::upper_bound(rows_, time_s, {}, &LinkTraceRow::time_s);
+  if (after == rows_.begin()) return rows_.front().delay_s;
+  if (after == rows_.end()) return rows_.back().delay_s;
+  const LinkTraceRow &a = *std::prev(after), &b = *after;
+  return std::lerp(a.delay_s, b.delay_s, (time_s - a.time_s) / (b.time_s - a.time_s));
+}
+
+double LinkTrace::capacity_until(double time_s) const {
+  const auto after = std::ranges::upper_bound(rows_, time_s, {}, &LinkTraceRow::time_s);
+  if (after == rows_.begin()) return (time_s - rows_.front().time_s) * rows_.front().bytes_per_s;
+  const auto i = static_cast<std::size_t>(after - rows_.begin()) - 1;
+  const double slope = after == rows_.end() ? 0.0 : slope_between(rows_[i], *after);
+  return capacity_[i] + carried(rows_[i], slope, time_s - rows_[i].time_s);
+}
+
+double LinkTrace::time_of(double bytes) const {
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  const LinkTraceRow& first = rows_.front();
+  if (bytes < 0.0)
+    return first.bytes_per_s > 0.0 ? first.time_s + bytes / first.bytes_per_s : kNever;
+  // The last row before which less has been carried.
+  const auto reached = std::ranges::lower_bound(capacity_, bytes);
+  const auto i =
+      static_cast<std::size_t>(std::max<std::ptrdiff_t>(reached - capacity_.begin() - 1, 0));
+  const double missing = bytes - capacity_[i];
+  if (missing <= 0.0) return rows_[i].time_s;
+  const double slope = i + 1 < rows_.size() ? slope_between(rows_[i], rows_[i + 1]) : 0.0;
+  // The root of carried() = missing, in the form that holds where the slope is zero; rounding may
+  // bring what is under the square root below zero where a rate falls to zero.
+  const double rate = rows_[i].bytes_per_s;
+  const double divisor = rate + std::sqrt(std::max(rate * rate + 2.0 * slope * missing, 0.0));
+  return divisor > 0.0 ? rows_[i].time_s + 2.0 * missing / divisor : kNever;
+}
+
+LinkTrace parse_link_trace(std::string_view text, const std::string& name) {
+  std::vector<TextRow> table = split_rows(text);
+  if (!table.empty() && table.front().fields.front() == "time_s") table.erase(table.begin());
+  const auto where = [&](std::size_t row) {
+    return name + (row < table.size() ? ':' + std::to_string(table[row].line) : "") + ": ";
+  };
+  std::vector<LinkTraceRow> rows;
+  for (const TextRow& row : table) rows.push_back(parse_trace_row(row, where(rows.size())));
+  if (const auto [row, problem] = problem_of(rows); !problem.empty())
+    throw LinkTraceError(where(row) + problem);
+  return LinkTrace(std::move(rows));
+}
+
+LinkTrace read_link_trace(const std::filesystem::path& file) try {
+  return parse_link_trace(read_input_file(file), file.string());
+} catch (const InputFileError& error) {
+  throw LinkTraceError(error.what());
+}
+
+}  // namespace km

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace km {
+
+/// A trace file that cannot be used. what() is one line that names file and line.
+struct LinkTraceError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// What a link can do at an instant of the run.
+struct LinkTraceRow {
+  double time_s = 0.0;
+  double bytes_per_s = 0.0;  ///< Infinite: the link has no limit, at any time.
+  double delay_s = 0.0;      ///< Until a frame that has been sent off arrives.
+};
+
+/// Throughput and latency of a link over time: straight lines between rows; before the first row
+/// as there, after the last row as there.
+class LinkTrace {
+ public:
+  /// Throws std::invalid_argument unless there is a row, times increase strictly, nothing is
+  /// negative or NaN, and rates are all finite, or infinite in a single row.
+  explicit LinkTrace(std::vector<LinkTraceRow> rows);
+
+  [[nodiscard]] bool has_limit() const;
+
+  /// [s]
+  [[nodiscard]] double delay_s(double time_s) const;
+
+  /// What the link can carry from the first row until `time_s` [bytes]; negative before that row.
+  /// Needs a limit. O(log rows).
+  [[nodiscard]] double capacity_until(double time_s) const;
+
+  /// The first time at which capacity_until() is `bytes`; infinite if it never is. Needs a limit.
+  [[nodiscard]] double time_of(double bytes) const;
+
+ private:
+  std::vector<LinkTraceRow> rows_;
+  std::vector<double> capacity_;  // until each row
+};
+
+/// A trace from a table with the columns time_s, bytes_per_s, delay_s, which may be named in its
+/// first row. Throws LinkTraceError, with `name` for the file, for a row with another number of
+/// fields, a field that is not a finite number or below zero, times that do not increase, and a
+/// table without rows.
+[[nodiscard]] LinkTrace parse_link_trace(std::string_view text, const std::string& name);
+
+/// The same from a file. Throws LinkTraceError.
+[[nodiscard]] LinkTrace read_link_trace(const std::filesystem::path& file);
+
+}  // namespace km

@@ -1,0 +1,343 @@
+#include "modules/link_emulation/link_emulator.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <set>
+#include <string>
+
+namespace km {
+namespace {
+
+constexpr std::size_t kFrame_bytes = 1000;
+
+LinkScript script_of(std::size_t robots, const LinkPlan& link = {}) {
+  LinkScript script;
+  script.robots = robots;
+  script.links.assign(robots * robots, link);
+  return script;
+}
+
+LinkPlan limited(double bytes_per_s, double delay_s = 0.0) {
+  LinkPlan link;
+  link.course = LinkTrace({{0.0, bytes_per_s, delay_s}});
+  return link;
+}
+
+EthernetFrame frame_to(std::size_t robot, std::size_t bytes = kFrame_bytes) {
+  EthernetFrame frame(bytes, '.');
+  const auto address = ethernet_address(robot);
+  frame.replace(0, address.size(), reinterpret_cast<const char*>(address.data()), address.size());
+  return frame;
+}
+
+EthernetFrame broadcast() {
+  return EthernetFrame(kFrame_bytes, '\xFF');
+}
+
+EthernetFrame multicast() {
+  return std::string("\x01\x00\x5E\x00\x00\x01", 6) + std::string(100, '.');
+}
+
+std::vector<LinkDelivery> all_of(LinkEmulator& emulator) {
+  std::vector<LinkDelivery> all;
+  while (const auto next_s = emulator.next_s())
+    for (LinkDelivery& delivery : emulator.due(*next_s)) all.push_back(std::move(delivery));
+  return all;
+}
+
+std::uint64_t lost(const LinkEmulator& emulator, LinkLoss why) {
+  return emulator.counts(0, 1).lost[static_cast<std::size_t>(why)].frames;
+}
+
+// Whether a frame from 0 to 1 at that time arrives.
+bool passes(LinkEmulator& emulator, double time_s) {
+  emulator.send(0, time_s, frame_to(1));
+  return !emulator.due(time_s).empty();
+}
+
+}  // namespace
+
+TEST_CASE("A perfect link hands on frames at once and unchanged", "[link_emulation]") {
+  LinkEmulator emulator(script_of(3));
+  const EthernetFrame frame = frame_to(2);
+  emulator.send(0, 1.5, frame);
+  const auto deliveries = emulator.due(1.5);
+  REQUIRE(deliveries.size() == 1);
+  CHECK(deliveries[0].from == 0);
+  CHECK(deliveries[0].to == 2);
+  CHECK(deliveries[0].due_s == 1.5);
+  CHECK(deliveries[0].frame == frame);
+  CHECK_FALSE(emulator.next_s());
+  CHECK(emulator.counts(0, 2).delivered == FrameTally{1, kFrame_bytes});
+  CHECK(emulator.counts(0, 1) == LinkCounts{});
+}
+
+TEST_CASE("A frame for many goes to every other robot", "[link_emulation]") {
+  const EthernetFrame frame = GENERATE(broadcast(), multicast());
+  LinkEmulator emulator(script_of(4));
+  emulator.send(2, 0.0, frame);
+  std::set<std::size_t> reached;
+  for (const LinkDelivery& delivery : all_of(emulator)) reached.insert(delivery.to);
+  CHECK(reached == std::set<std::size_t>{0, 1, 3});
+}
+
+TEST_CASE("A frame for nobody vanishes uncounted", "[link_emulation]") {
+  LinkEmulator emulator(script_of(2));
+  emulator.send(0, 0.0, frame_to(7));
+  emulator.send(0, 0.0, frame_to(0));
+  emulator.send(0, 0.0, EthernetFrame(13, '\xFF'));
+  CHECK(all_of(emulator).empty());
+  CHECK(emulator.counts(0, 1) == LinkCounts{});
+}
+
+TEST_CASE("A delay is exact, and jitter stays within its bounds", "[link_emulation]") {
+  LinkPlan link;
+  link.course = LinkTrace({{0.0, std::numeric_limits<double>::infinity(), 0.25}});
+  LinkEmulator exact(script_of(2, link));
+  exact.send(0, 3.0, frame_to(1));
+  CHECK(exact.due(3.2499).empty());
+  CHECK(exact.next_s() == 3.25);
+  CHECK(exact.due(3.25).size() == 1);
+  CHECK(exact.counts(0, 1).delay_sum_s == 0.25);
+
+  link.jitter_s = 0.1;
+  LinkEmulator shaken(script_of(2, link));
+  constexpr int kFrames = 2000;
+  double sum_s = 0.0;
+  for (int i = 0; i < kFrames; ++i) {
+    shaken.send(0, i, frame_to(1));
+    const auto due_s = shaken.next_s();
+    REQUIRE(due_s);
+    CHECK(*due_s >= i + 0.25);
+    CHECK(*due_s <= i + 0.35);
+    sum_s += *due_s - i;
+    CHECK(shaken.due(*due_s).size() == 1);
+  }
+  // Of a uniform distribution; five standard deviations of the mean.
+  CHECK(std::abs(sum_s / kFrames - 0.3) < 5.0 * 0.1 / std::sqrt(12.0 * kFrames));
+}
+
+TEST_CASE("Jitter lets frames overtake others", "[link_emulation]") {
+  LinkPlan link;
+  link.jitter_s = 1.0;
+  LinkEmulator emulator(script_of(2, link));
+  for (int i = 0; i < 20; ++i) emulator.send(0, 1e-3 * i, frame_to(1));
+  const auto arrived = all_of(emulator);
+  REQUIRE(arrived.size() == 20);
+  CHECK(std::ranges::is_sorted(arrived, {}, &LinkDelivery::due_s));
+  CHECK_FALSE(std::ranges::is_sorted(arrived, {}, &LinkDelivery::sent_s));
+}
+
+TEST_CASE("The share of lost frames is the probability", "[link_emulation]") {
+  LinkPlan link;
+  link.loss = GENERATE(0.0, 0.05, 0.3, 1.0);
+  const unsigned seed = GENERATE(1, 2, 3);
+  CAPTURE(link.loss, seed);
+  LinkScript script = script_of(2, link);
+  script.seed = seed;
+  LinkEmulator emulator(script);
+  constexpr int kFrames = 10000;
+  for (int i = 0; i < kFrames; ++i) emulator.send(0, 0.0, frame_to(1));
+  const double deviation = std::sqrt(kFrames * link.loss * (1.0 - link.loss));
+  const auto count = static_cast<double>(lost(emulator, LinkLoss::kChance));
+  CHECK(std::abs(count - kFrames * link.loss) <= 5.0 * deviation);
+  CHECK(emulator.due(0.0).size() == kFrames - static_cast<std::size_t>(count));
+}
+
+TEST_CASE("A link carries its rate and no more", "[link_emulation]") {
+  LinkPlan link = limited(10e3, 0.5);
+  link.queue_bytes = 1e9;
+  LinkEmulator emulator(script_of(2, link));
+  for (int i = 0; i < 50; ++i) emulator.send(0, 2.0, frame_to(1));
+  const auto arrived = all_of(emulator);
+  REQUIRE(arrived.size() == 50);
+  for (std::size_t i = 0; i < arrived.size(); ++i)
+    CHECK(arrived[i].due_s == Approx(2.5 + 0.1 * static_cast<double>(i + 1)).epsilon(1e-12));
+  emulator.send(0, 100.0, frame_to(1));  // an idle link saves nothing up
+  CHECK(*emulator.next_s() == Approx(100.6).epsilon(1e-12));
+}
+
+TEST_CASE("A full queue drops what comes last", "[link_emulation]") {
+  LinkPlan link = limited(10e3);
+  link.queue_bytes = 5.0 * kFrame_bytes;
+  LinkEmulator emulator(script_of(2, link));
+  for (int i = 0; i < 8; ++i) emulator.send(0, 0.0, frame_to(1));
+  CHECK(lost(emulator, LinkLoss::kQueue) == 3);
+  emulator.send(0, 0.05, frame_to(1));  // half a frame has gone: there is no room yet
+  CHECK(lost(emulator, LinkLoss::kQueue) == 4);
+  emulator.send(0, 0.2, frame_to(1));  // room for two
+  emulator.send(0, 0.2, frame_to(1));
+  emulator.send(0, 0.2, frame_to(1));
+  CHECK(lost(emulator, LinkLoss::kQueue) == 5);
+  CHECK(all_of(emulator).size() == 7);
+}
+
+TEST_CASE("A queue waits where a trace falls to zero, and goes on with it", "[link_emulation]") {
+  LinkPlan link;
+  link.course = LinkTrace({{0.0, 1000.0, 0.0},
+                           {1.0, 1000.0, 0.0},
+                           {1.1, 0.0, 0.0},
+                           {4.9, 0.0, 0.0},
+                           {5.0, 1000.0, 0.0}});
+  LinkEmulator emulator(script_of(2, link));
+  for (int i = 0; i < 2; ++i) emulator.send(0, 0.0, frame_to(1));
+  const auto arrived = all_of(emulator);
+  REQUIRE(arrived.size() == 2);
+  CHECK(arrived[0].due_s == Approx(1.0));
+  // 50 bytes on the way down and 50 on the way up, and 900 at the full rate.
+  CHECK(arrived[1].due_s == Approx(5.9));
+}
+
+TEST_CASE("A frame that a trace never sends off stays on its way", "[link_emulation]") {
+  LinkPlan link = limited(0.0);
+  LinkEmulator emulator(script_of(2, link));
+  emulator.send(0, 0.0, frame_to(1));
+  CHECK_FALSE(emulator.next_s());
+  CHECK(emulator.due(1e9).empty());
+  CHECK(emulator.counts(0, 1).in == FrameTally{1, kFrame_bytes});
+}
+
+TEST_CASE("An outage begins and ends as planned, for its direction", "[link_emulation]") {
+  LinkScript script = script_of(2);
+  script.link(0, 1).outages = {{1.0, 2.0}, {5.0, 6.0}};
+  LinkEmulator emulator(script);
+  for (const auto& [time_s, expected] : std::vector<std::pair<double, bool>>{{0.0, true},
+                                                                             {0.999, true},
+                                                                             {1.0, false},
+                                                                             {1.999, false},
+                                                                             {2.0, true},
+                                                                             {5.5, false},
+                                                                             {6.0, true}}) {
+    CAPTURE(time_s);
+    CHECK(passes(emulator, time_s) == expected);
+    emulator.send(1, time_s, frame_to(0));
+    CHECK(emulator.due(time_s).size() == 1);
+  }
+  CHECK(lost(emulator, LinkLoss::kOutage) == 3);
+}
+
+TEST_CASE("What is on its way arrives though the link goes out", "[link_emulation]") {
+  LinkPlan link;
+  link.course = LinkTrace({{0.0, std::numeric_limits<double>::infinity(), 0.5}});
+  link.outages = {{1.0, 2.0}};
+  LinkEmulator emulator(script_of(2, link));
+  emulator.send(0, 0.9, frame_to(1));
+  CHECK(emulator.due(1.4).size() == 1);
+}
+
+TEST_CASE("A partition keeps groups apart while it lasts", "[link_emulation]") {
+  LinkScript script = script_of(4);
+  script.partitions = {{{10.0, 20.0}, {0, 0, 1, 1}}};
+  LinkEmulator emulator(script);
+  const auto reached = [&](double time_s) {
+    emulator.send(0, time_s, broadcast());
+    std::set<std::size_t> to;
+    for (const LinkDelivery& delivery : emulator.due(time_s)) to.insert(delivery.to);
+    return to;
+  };
+  CHECK(reached(9.0) == std::set<std::size_t>{1, 2, 3});
+  CHECK(reached(10.0) == std::set<std::size_t>{1});
+  CHECK(reached(20.0) == std::set<std::size_t>{1, 2, 3});
+  const auto kPartition = static_cast<std::size_t>(LinkLoss::kPartition);
+  CHECK(emulator.counts(0, 2).lost[kPartition] == FrameTally{1, kFrame_bytes});
+  CHECK(emulator.counts(0, 1).lost[kPartition] == FrameTally{});
+}
+
+TEST_CASE("Robots hear each other within range", "[link_emulation]") {
+  LinkPlan link;
+  link.range_m = 5.0;
+  LinkScript script = script_of(2, link);
+  // They meet at 10 s, at 1 m/s each from 20 m, and stay there from 12 s on at 4 m.
+  script.paths = {{{0.0, {0.0, 0.0, 1.0}}, {12.0, {12.0, 0.0, 1.0}}},
+                  {{0.0, {20.0, 0.0, 1.0}}, {12.0, {8.0, 0.0, 1.0}}}};
+  LinkEmulator emulator(script);
+  CHECK_FALSE(passes(emulator, 0.0));
+  CHECK_FALSE(passes(emulator, 7.49));
+  CHECK(passes(emulator, 7.51));
+  CHECK(passes(emulator, 10.0));
+  CHECK(passes(emulator, 1000.0));
+  CHECK(lost(emulator, LinkLoss::kRange) == 2);
+}
+
+TEST_CASE("The same seed and the same frames give the same run", "[link_emulation]") {
+  LinkPlan link = limited(50e3, 0.02);
+  link.jitter_s = 0.05;
+  link.loss = 0.2;
+  LinkScript script = script_of(3, link);
+  const auto run = [&](unsigned seed) {
+    script.seed = seed;
+    LinkEmulator emulator(script);
+    for (int i = 0; i < 300; ++i)
+      emulator.send(static_cast<std::size_t>(i % 3), 0.01 * i, broadcast());
+    std::string all;
+    for (const LinkDelivery& delivery : all_of(emulator))
+      all += std::to_string(delivery.from) + std::to_string(delivery.to) + ' ' +
+             std::to_string(delivery.due_s) + '\n';
+    return all;
+  };
+  CHECK(run(4) == run(4));
+  CHECK(run(4) != run(5));
+}
+
+TEST_CASE("The chance of a pair's frames does not hang on other links", "[link_emulation]") {
+  LinkPlan link;
+  link.loss = 0.5;
+  const auto fates = [&](bool others) {
+    LinkScript script = script_of(3, link);
+    script.link(0, 1).outages = {{others ? 0.0 : 40.0, 50.0}};  // of the same frames, other losses
+    LinkEmulator emulator(script);
+    std::string arrived;
+    for (int i = 0; i < 100; ++i) {
+      if (others) emulator.send(2, i, broadcast());
+      if (others && i % 3 == 0) emulator.send(1, i, frame_to(0));
+      emulator.send(0, i, frame_to(1));
+      bool came = false;
+      for (const LinkDelivery& delivery : emulator.due(i))
+        came = came || (delivery.from == 0 && delivery.to == 1);
+      if (i >= 50) arrived += came ? '+' : '-';
+    }
+    return arrived;
+  };
+  CHECK(fates(true) == fates(false));
+}
+
+TEST_CASE("A script that lacks something is refused", "[link_emulation]") {
+  LinkScript script = script_of(2);
+  SECTION("links") {
+    script.links.pop_back();
+  }
+  SECTION("paths") {
+    script.link(0, 1).range_m = 3.0;
+  }
+  SECTION("positions") {
+    script.paths = {{}, {}};
+  }
+  SECTION("groups") {
+    script.partitions = {{{}, {0}}};
+  }
+  SECTION("a probability") {
+    script.link(0, 1).loss = 1.5;
+  }
+  SECTION("a number") {
+    script.link(1, 0).jitter_s = std::nan("");
+  }
+  CHECK_THROWS_AS(LinkEmulator(script), std::invalid_argument);
+}
+
+TEST_CASE("The table of links has a row for each ordered pair", "[link_emulation]") {
+  LinkScript script = script_of(2);
+  script.link(0, 1).course = LinkTrace({{0.0, std::numeric_limits<double>::infinity(), 0.5}});
+  script.link(1, 0).loss = 1.0;
+  LinkEmulator emulator(script);
+  emulator.send(0, 1.0, frame_to(1));
+  emulator.send(1, 1.0, frame_to(0));
+  REQUIRE(all_of(emulator).size() == 1);
+  CHECK(links_csv(emulator, {"a", "b"}) ==
+        "from,to,frames_in,bytes_in,frames_delivered,bytes_delivered,"
+        "frames_partition,bytes_partition,frames_outage,bytes_outage,frames_range,bytes_range,"
+        "frames_queue,bytes_queue,frames_loss,bytes_loss,delay_mean_s,delay_max_s\n"
+        "a,b,1,1000,1,1000,0,0,0,0,0,0,0,0,0,0,0.5,0.5\n"
+        "b,a,1,1000,0,0,0,0,0,0,0,0,0,0,1,1000,,\n");
+}
+
+}  // namespace km

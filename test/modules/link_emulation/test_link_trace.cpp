@@ -1,0 +1,91 @@
+#include "modules/link_emulation/link_trace.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "test/support/spoilt_input.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
+std::string refusal(const std::string& text) {
+  try {
+    static_cast<void>(parse_link_trace(text, "trace.csv"));
+  } catch (const LinkTraceError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+}  // namespace
+
+TEST_CASE("A link trace is a straight line between its rows", "[link_emulation]") {
+  const LinkTrace trace =
+      parse_link_trace("time_s,bytes_per_s,delay_s\n10,100,0.1\n20,300,0.5\n", "trace.csv");
+  REQUIRE(trace.has_limit());
+  CHECK(trace.delay_s(0.0) == 0.1);
+  CHECK(trace.delay_s(10.0) == 0.1);
+  CHECK(trace.delay_s(15.0) == Approx(0.3));
+  CHECK(trace.delay_s(20.0) == 0.5);
+  CHECK(trace.delay_s(99.0) == 0.5);
+  // 100 B/s before, a mean of 150 B/s over the first half, of 200 over all, 300 after.
+  CHECK(trace.capacity_until(8.0) == Approx(-200.0));
+  CHECK(trace.capacity_until(10.0) == 0.0);
+  CHECK(trace.capacity_until(15.0) == Approx(750.0));
+  CHECK(trace.capacity_until(20.0) == Approx(2000.0));
+  CHECK(trace.capacity_until(22.0) == Approx(2600.0));
+}
+
+TEST_CASE("The time of a capacity is where the capacity is reached", "[link_emulation]") {
+  const LinkTrace trace({{0.0, 50.0, 0.0}, {4.0, 0.0, 0.0}, {6.0, 0.0, 0.0}, {9.0, 80.0, 0.0}});
+  std::mt19937 rng(1);
+  std::uniform_real_distribution<double> time_s(-5.0, 15.0);
+  for (int i = 0; i < 1000; ++i) {
+    const double t = time_s(rng);
+    CAPTURE(t);
+    const double bytes = trace.capacity_until(t);
+    // Times closer than the root of the rounding cannot be told apart where the rate is zero.
+    if (t < 3.99 || t > 6.01) CHECK(trace.time_of(bytes) == Approx(t).margin(1e-9));
+    CHECK(trace.capacity_until(trace.time_of(bytes)) == Approx(bytes).margin(1e-9));
+  }
+  CHECK(trace.time_of(100.0) == Approx(4.0));  // the first time: nothing more until 6 s
+  CHECK(LinkTrace({{0.0, 10.0, 0.0}, {2.0, 0.0, 0.0}}).time_of(10.5) == kInfinite);
+}
+
+TEST_CASE("A link without a limit has no other rows", "[link_emulation]") {
+  CHECK_FALSE(LinkTrace({{0.0, kInfinite, 0.2}}).has_limit());
+  CHECK(LinkTrace({{0.0, kInfinite, 0.2}}).delay_s(7.0) == 0.2);
+  CHECK_THROWS_AS(LinkTrace({{0.0, kInfinite, 0.2}, {1.0, 5.0, 0.2}}), std::invalid_argument);
+  CHECK_THROWS_AS(LinkTrace(std::vector<LinkTraceRow>()), std::invalid_argument);
+}
+
+TEST_CASE("What is wrong with a link trace is told by line", "[link_emulation]") {
+  CHECK(refusal("") == "trace.csv: holds no row");
+  CHECK(refusal("time_s,bytes_per_s,delay_s\n") == "trace.csv: holds no row");
+  CHECK(refusal("0,1,0\n1,2\n") == "trace.csv:2: 2 fields, expected time_s, bytes_per_s, delay_s");
+  CHECK(refusal("0,1,0\n1,x,0\n") == "trace.csv:2: x is not a finite number");
+  CHECK(refusal("0,1,0\n1,inf,0\n") == "trace.csv:2: inf is not a finite number");
+  CHECK(refusal("# as measured\n0,1,0\n\n1,-2,0\n") == "trace.csv:4: bytes_per_s is below zero");
+  CHECK(refusal("0,1,-1\n") == "trace.csv:1: delay_s is below zero");
+  CHECK(refusal("5,1,0\n5,2,0\n") == "trace.csv:2: time_s is not after that of the row before");
+}
+
+TEST_CASE("A link trace that is no file is refused by name", "[link_emulation]") {
+  check_no_files<LinkTraceError>(".csv", [](const auto& file) { (void)read_link_trace(file); });
+}
+
+TEST_CASE("A spoilt link trace is refused by name, or carries bytes", "[link_emulation]") {
+  check_spoilt<LinkTraceError>(
+      "time_s,bytes_per_s,delay_s\n0,125000,0.02\n1.5,60000,0.05\n3,0,0.2\n4,9000,0.1\n",
+      "trace.csv", [](const std::string& text) {
+        const LinkTrace trace = parse_link_trace(text, "trace.csv");
+        CHECK(trace.delay_s(2.0) >= 0.0);
+        CHECK_FALSE(std::isnan(trace.time_of(trace.capacity_until(2.0) + 1500.0)));
+      });
+}
+
+}  // namespace km
