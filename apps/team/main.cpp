@@ -7,6 +7,7 @@
 #include "apps/program_folder.hpp"
 #include "apps/result_files.hpp"
 #include "apps/result_writer.hpp"
+#include "apps/team/links_file.hpp"
 #include "apps/team/run_team.hpp"
 #include "apps/team/team_report.hpp"
 #include "apps/team/team_results.hpp"
@@ -34,10 +35,11 @@ constexpr const char* kAbout =
     "  kimera_multi_team --config config/teams/tunnels.yaml --dataset tunnels_8robots --rate max\n"
     "  kimera_multi_team --config team.yaml -- --set mapping.mode=off   # after --: of every "
     "robot\n"
+    "  kimera_multi_team --config team.yaml --links config/links/lossy.yaml\n"
     "  kimera_multi_team --config team.yaml --output results --report   # robots ran elsewhere";
 
 struct TeamOptions {
-  fs::path config, dataset, output, truth, security, json, robot_binary;
+  fs::path config, dataset, output, truth, security, links, json, robot_binary;
   std::string rate;
   std::optional<std::uint32_t> domain;
   std::optional<double> time_limit_s;
@@ -46,7 +48,10 @@ struct TeamOptions {
 };
 
 void define(CLI::App& app, TeamOptions& options) {
-  app.footer("Keys of a team file, paths relative to it:\n" + km::team_file_keys());
+  app.footer("Keys of a team file, paths relative to it:\n" + km::team_file_keys() +
+             "\nKeys of a file of links, likewise; all but seed, pairs and partitions are those of "
+             "every\nlink, and in pairs of some:\n" +
+             km::links_file_keys());
   options.robot_binary = km::program_folder() / "kimera_multi_robot";
   app.add_option("--config", options.config, "Team file")->required();
   app.add_option("--dataset", options.dataset, "What ${DATASET} stands for in the team file");
@@ -60,6 +65,10 @@ void define(CLI::App& app, TeamOptions& options) {
   app.add_option("--security", options.security,
                  "Team folder of kimera_multi_keys: each robot uses the keys in its folder there")
       ->check(CLI::ExistingDirectory);
+  app.add_option(
+         "--links", options.links,
+         "File of bad links, see below and config/links: each robot gets a network of its own")
+      ->check(CLI::ExistingFile);
   app.add_option("--truth", options.truth, "True poses of all robots, instead of the file's")
       ->check(CLI::ExistingPath);
   app.add_option("--time-limit", options.time_limit_s, "Ask the robots to end after this [s]")
@@ -68,7 +77,8 @@ void define(CLI::App& app, TeamOptions& options) {
   app.add_option("--robot-binary", options.robot_binary, "Program of a robot")
       ->capture_default_str();
   app.add_flag("--report", options.report,
-               "Start nothing: the tables of a run that has ended, from its folders in --output");
+               "Start nothing: the tables of a run that has ended, from its folders in --output")
+      ->excludes("--links");
   app.add_option("arguments", options.arguments, "After --: more arguments of every robot");
 }
 
@@ -93,19 +103,33 @@ km::TeamPlan make_plan(const TeamOptions& options) {
   return plan;
 }
 
-std::vector<km::RobotRun> run_robots(const TeamOptions& options, const km::TeamPlan& plan) {
+// What became of the frames; a run has ended and is told whether or not this can be.
+void write_links(const km::TeamPlan& plan, km::EmulatedLinks& links, km::ResultWriter& results) {
+  std::vector<std::string> names;
+  for (const km::RobotPlan& robot : plan.robots) names.push_back(robot.name);
+  results.write(plan.output / km::kLinksTable, [&](const fs::path& file) {
+    km::write_file(file, km::links_csv(links.finish(), names));
+  });
+}
+
+std::vector<km::RobotRun> run_robots(const TeamOptions& options, const km::TeamPlan& plan,
+                                     km::ResultWriter& results) {
   if (access(options.robot_binary.c_str(), X_OK) != 0)
     throw std::runtime_error(options.robot_binary.string() + ": no such program; build it, or " +
                              "give --robot-binary");
   km::SignalWatch signals;
+  std::optional<km::EmulatedLinks> links;
+  if (!options.links.empty()) links.emplace(km::read_links_file(options.links, plan));
   std::vector<std::string> names;
   for (const km::RobotPlan& robot : plan.robots) names.push_back(robot.name);
   std::ostream& out = km::unblocked_stdout();
   out << names.size() << " robots in DDS domain " << *plan.domain << ", results in "
       << plan.output.string() << std::endl;
   km::TeamDisplay display(names);
-  std::vector<km::RobotRun> runs = km::run_team(options.robot_binary, plan, signals, display);
+  std::vector<km::RobotRun> runs =
+      km::run_team(options.robot_binary, plan, signals, display, links ? &*links : nullptr);
   out << '\n';
+  if (links) write_links(plan, *links, results);
   return runs;
 }
 
@@ -140,11 +164,11 @@ void write_results(const TeamOptions& options, const km::TeamPlan& plan, const k
 
 int run(const TeamOptions& options) {
   const km::TeamPlan plan = make_plan(options);
+  km::ResultWriter results;
   const km::TeamResult team = km::collect_results(
-      plan, options.report ? km::finished_runs(plan) : run_robots(options, plan));
+      plan, options.report ? km::finished_runs(plan) : run_robots(options, plan, results));
   std::ostream& told = km::unblocked_stdout();
   told << to_table(team);
-  km::ResultWriter results;
   write_results(options, plan, team, results, told);
   const bool ok = std::all_of(team.robots.begin(), team.robots.end(),
                               [](const km::RobotResult& robot) { return robot.run.exit.ok(); });

@@ -33,9 +33,21 @@ std::array<int, 2> make_pipe() {
   return ends;
 }
 
+// Says why on standard error, as `errno` has it.
+[[noreturn]] void give_up() {
+  const char* const reason = strerrordesc_np(errno);
+  [[maybe_unused]] ssize_t written = write(STDERR_FILENO, "cannot be started: ", 19);
+  written = write(STDERR_FILENO, reason, std::strlen(reason));
+  _exit(127);
+}
+
 // In the child between fork and exec: async-signal-safe calls only.
 [[noreturn]] void become(char* const* arguments, int out, int err, const sigset_t& blocked,
-                         pid_t parent) {
+                         pid_t parent, const RobotNetwork* network) {
+  dup2(out, STDOUT_FILENO);
+  dup2(err, STDERR_FILENO);
+  // Before the next line: other privileges clear what it sets.
+  if (network != nullptr && !network->enter()) give_up();
   // Not SIGTERM: whoever has asked for the end already would see a second one, which ends at once.
   prctl(PR_SET_PDEATHSIG, SIGHUP);
   if (getppid() != parent) _exit(127);  // it died before the line above
@@ -45,13 +57,8 @@ std::array<int, 2> make_pipe() {
   sigprocmask(SIG_SETMASK, &blocked, nullptr);
   const int nothing = open("/dev/null", O_RDONLY);
   if (nothing >= 0) dup2(nothing, STDIN_FILENO);
-  dup2(out, STDOUT_FILENO);
-  dup2(err, STDERR_FILENO);
   execv(arguments[0], arguments);
-  const char* const reason = strerrordesc_np(errno);
-  [[maybe_unused]] ssize_t written = write(STDERR_FILENO, "cannot be started: ", 19);
-  written = write(STDERR_FILENO, reason, std::strlen(reason));
-  _exit(127);
+  give_up();
 }
 
 }  // namespace
@@ -66,7 +73,7 @@ std::string to_string(const ProcessExit& exit) {
 }
 
 RobotProcess::RobotProcess(const std::vector<std::string>& command, const sigset_t& blocked,
-                           const std::filesystem::path& log)
+                           const std::filesystem::path& log, const RobotNetwork* network)
     : log_(log) {
   if (!log_) throw std::runtime_error(log.string() + ": cannot be written");
   std::vector<char*> arguments;
@@ -79,7 +86,7 @@ RobotProcess::RobotProcess(const std::vector<std::string>& command, const sigset
   const auto err = make_pipe();
   const pid_t parent = getpid();
   pid_ = fork();
-  if (pid_ == 0) become(arguments.data(), out[1], err[1], blocked, parent);
+  if (pid_ == 0) become(arguments.data(), out[1], err[1], blocked, parent, network);
   close(out[1]);
   close(err[1]);
   out_.fd = out[0];

@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/team/robot_network.hpp"
+
 namespace km {
 
 /// How a process ended.
@@ -30,9 +32,10 @@ struct ProcessExit {
 class RobotProcess {
  public:
   /// Starts `command` (the program first), with the signals in `blocked` blocked and all others
-  /// free. What it prints also goes to `log`. Throws std::runtime_error.
+  /// free, in `network` if it is to have one of its own. What it prints also goes to `log`. Throws
+  /// std::runtime_error.
   RobotProcess(const std::vector<std::string>& command, const sigset_t& blocked,
-               const std::filesystem::path& log);
+               const std::filesystem::path& log, const RobotNetwork* network = nullptr);
   /// If it is still running, asks it to end and kills it 20 s later.
   ~RobotProcess();
   RobotProcess(const RobotProcess&) = delete;

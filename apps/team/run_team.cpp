@@ -29,7 +29,7 @@ void remove_earlier_run(const TeamPlan& plan) {
     remove_results(folder);
     fs::remove(folder / "exit_code");
   }
-  for (const char* file : {"trajectories.svg", "team_mesh.ply", kLabelPalette})
+  for (const char* file : {"trajectories.svg", "team_mesh.ply", kLinksTable, kLabelPalette})
     fs::remove(plan.output / file);
 }
 
@@ -37,13 +37,15 @@ void remove_earlier_run(const TeamPlan& plan) {
 class RunningTeam {
  public:
   RunningTeam(const fs::path& binary, const TeamPlan& plan, SignalWatch& signals,
-              TeamDisplay& display)
+              TeamDisplay& display, const EmulatedLinks* links)
       : plan_(plan), signals_(signals), display_(display) {
     remove_earlier_run(plan);
     for (const RobotPlan& robot : plan.robots) {
-      robots_.push_back(std::make_unique<RobotProcess>(robot_command(binary, plan, robot),
-                                                       signals.previous(),
-                                                       plan.output / robot.name / "robot.log"));
+      const RobotNetwork* const network =
+          links == nullptr ? nullptr : &links->network(robots_.size());
+      robots_.push_back(
+          std::make_unique<RobotProcess>(robot_command(binary, plan, robot), signals.previous(),
+                                         plan.output / robot.name / "robot.log", network));
       display_.update(robots_.size() - 1, "started");
     }
   }
@@ -166,8 +168,8 @@ std::vector<std::string> robot_command(const fs::path& binary, const TeamPlan& p
 }
 
 std::vector<RobotRun> run_team(const fs::path& binary, const TeamPlan& plan, SignalWatch& signals,
-                               TeamDisplay& display) {
-  RunningTeam team(binary, plan, signals, display);
+                               TeamDisplay& display, const EmulatedLinks* links) {
+  RunningTeam team(binary, plan, signals, display, links);
   team.wait();
   return team.results();
 }

@@ -5,12 +5,16 @@
 #include <string>
 #include <vector>
 
+#include "apps/team/emulated_links.hpp"
 #include "apps/team/robot_process.hpp"
 #include "apps/team/team_display.hpp"
 #include "apps/team/team_file.hpp"
 #include "runtime/supervisor.hpp"
 
 namespace km {
+
+/// What became of the frames between the robots, in the team's output folder.
+inline constexpr const char* kLinksTable = "links.csv";
 
 /// How one robot's process ended.
 struct RobotRun {
@@ -23,13 +27,15 @@ struct RobotRun {
                                                      const TeamPlan& plan, const RobotPlan& robot);
 
 /// Starts a process per robot and waits for all of them; in the order of the plan, whose domain is
-/// set. Signals are passed on to the robots: the first asks them to end in order, as does the time
-/// limit, the second ends them at once. 30 s after the time limit they are killed. Output folders
-/// are made, and results of an earlier run in them removed. Throws std::runtime_error if a process
-/// cannot be started; none is left then.
+/// set. With `links`, each is in its network there, by its number in the plan. Signals are passed
+/// on to the robots: the first asks them to end in order, as does the time limit, the second ends
+/// them at once. 30 s after the time limit they are killed. Output folders are made, and results of
+/// an earlier run in them removed. Throws std::runtime_error if a process cannot be started; none
+/// is left then.
 [[nodiscard]] std::vector<RobotRun> run_team(const std::filesystem::path& binary,
                                              const TeamPlan& plan, SignalWatch& signals,
-                                             TeamDisplay& display);
+                                             TeamDisplay& display,
+                                             const EmulatedLinks* links = nullptr);
 
 /// How the robots of a run fared that has ended elsewhere, on other hosts or in containers, from
 /// the folders they left below `plan.output`; in the order of the plan. The exit code is that in

@@ -68,16 +68,6 @@ void note_uncorrected(const Meshes& before, const Meshes& after, std::vector<std
     if (!corrected.contains(name)) notes.push_back(name + " left a mesh, but none corrected");
 }
 
-// The part of the recording the robot was given; nullopt for pose graphs.
-std::optional<TimeWindow> window_of(const RobotPlan& plan) {
-  if (plan.dataset.empty()) return std::nullopt;
-  EurocOptions options;
-  options.from_s = plan.from_s.value_or(options.from_s);
-  options.to_s = plan.to_s.value_or(options.to_s);
-  const EurocReader reader = open_euroc(plan.dataset, options);
-  return TimeWindow{reader.first_stamp(), reader.last_stamp()};
-}
-
 // The left camera of the team: that of the first robot that has one.
 std::optional<PinholeCamera> camera_of(const TeamPlan& plan) {
   for (const RobotPlan& robot : plan.robots)
@@ -98,7 +88,7 @@ class Trajectories {
     return attempt(notes, [&] {
       const auto& truth = read(robot.truth);
       const auto& estimate = read(plan_.output / robot.name / file);
-      TrajectoryInput input{robot.name, truth, estimate, window_of(robot)};
+      TrajectoryInput input{robot.name, truth, estimate, recorded_window(robot)};
       static_cast<void>(trajectory_error({&input, 1}));  // throws if it cannot be compared
       return input;
     });
@@ -157,6 +147,15 @@ std::optional<RobotId> frame_of(const RobotResult& robot) {
 }
 
 }  // namespace
+
+std::optional<TimeWindow> recorded_window(const RobotPlan& plan) {
+  if (plan.dataset.empty()) return std::nullopt;
+  EurocOptions options;
+  options.from_s = plan.from_s.value_or(options.from_s);
+  options.to_s = plan.to_s.value_or(options.to_s);
+  const EurocReader reader = open_euroc(plan.dataset, options);
+  return TimeWindow{reader.first_stamp(), reader.last_stamp()};
+}
 
 void find_team_frame(std::vector<RobotResult>& robots) {
   std::map<RobotId, int> sizes;

@@ -44,6 +44,10 @@ struct TeamResult {
   std::vector<std::string> notes;         ///< Why something of the team is absent.
 };
 
+/// The part of the recording that the robot is given; nullopt for pose graphs. Throws what
+/// EurocReader throws.
+[[nodiscard]] std::optional<TimeWindow> recorded_window(const RobotPlan& plan);
+
 /// Finds the robots whose optimised poses are not in the frame that most robots ended in (of
 /// equally many, that of the lowest anchor): sets `in_team_frame` of these to false and notes why.
 /// A robot that left no summary is taken to be in it.

@@ -2,6 +2,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <thread>
@@ -9,6 +10,7 @@
 #include "apps/robot/run_summary.hpp"
 #include "apps/team/run_team.hpp"
 #include "test/support/command.hpp"
+#include "test/support/own_networks.hpp"
 #include "test/support/temporary_folder.hpp"
 
 // kimera_multi_team as a program, with a shell script in the robots' place.
@@ -163,6 +165,73 @@ TEST_CASE("Robots die with a team program that is killed", "[team]") {
   };
   while (is_alive()) std::this_thread::yield();  // fails by the time limit of the test
   SUCCEED("robot ended");
+}
+
+TEST_CASE("With bad links each robot is in a network of its own", "[team][namespaces]") {
+  const Team team(
+      "echo $name has $(grep -o '10[.]77[.]0[.][1-9]' /proc/net/fib_trie | sort -u) on "
+      "$(grep : /proc/net/dev | cut -d: -f1)");
+  const std::string links = team.folder.write("links.yaml", "loss: 0.5\n").string();
+  const auto result = run_command(team.command + " --links " + links);
+  if (!had_own_networks(result.output)) return;
+  CAPTURE(result.output);
+  CHECK(result.exit_code == 0);
+  CHECK_THAT(result.output, Catch::Contains("alice has 10.77.0.1 on lo eth0\n") &&
+                                Catch::Contains("bob has 10.77.0.2 on lo eth0\n"));
+  const std::string table = team.folder.read("out/links.csv");
+  CHECK_THAT(table, Catch::StartsWith("from,to,frames_in,") && Catch::Contains("\nalice,bob,") &&
+                        Catch::Contains("\nbob,alice,"));
+}
+
+TEST_CASE("Networks of robots vanish with their team, however it ends", "[team][namespaces]") {
+  const int signal = GENERATE(0, SIGINT, SIGKILL);
+  CAPTURE(signal);
+  const Team team(
+      "readlink /proc/self/ns/net > \"$out/network.new\"\n"
+      "mv \"$out/network.new\" \"$out/network\"\n" +
+      std::string(signal == 0 ? "exit 0" : "trap 'exit 0' INT; while :; do sleep 0.05; done"));
+  const fs::path links = team.folder.write("links.yaml", "");
+  sigset_t none;
+  sigemptyset(&none);
+  RobotProcess program({"/bin/sh", "-c", "exec " + team.command + " --links " + links.string()},
+                       none, team.folder.path() / "log");
+  const fs::path network = team.folder.path() / "out/bob/network";
+  while (!fs::exists(network) && !program.exit()) program.read();
+  if (signal != 0) program.send(signal);
+  while (!program.exit()) program.read();
+  if (!had_own_networks(team.folder.read("log"))) return;
+  REQUIRE(fs::exists(network));
+  const std::string name = team.folder.read("out/bob/network");
+  const auto is_used = [&name] {  // by any process there is
+    for (const auto& process : fs::directory_iterator("/proc")) {
+      std::error_code error;
+      const fs::path used = fs::read_symlink(process.path() / "ns/net", error);
+      if (!error && used.string() + '\n' == name) return true;
+    }
+    return false;
+  };
+  while (is_used()) std::this_thread::yield();  // fails by the time limit of the test
+  CHECK(fs::exists(team.folder.path() / "out/links.csv") == (signal != SIGKILL));
+}
+
+TEST_CASE("Where networks are not allowed, a team with bad links does not start", "[team]") {
+  const Team team("echo started");
+  const std::string links = team.folder.write("links.yaml", "").string();
+  const std::string forbid =
+      "unshare --user --map-root-user sh -c "
+      "'echo 0 > /proc/sys/user/max_net_namespaces && exec ";
+  if (run_command(forbid + "true'").exit_code != 0) {
+    std::cout << "SKIPPED: needs user namespaces, to forbid networks in one\n";
+    return;
+  }
+  const auto result = run_command(forbid + team.command + " --links " + links + '\'');
+  CAPTURE(result.output);
+  CHECK(result.exit_code == 1);
+  CHECK_THAT(result.output,
+             Catch::StartsWith("kimera_multi_team: robots cannot have networks of their own here ("
+                               "a network namespace: ") &&
+                 Catch::Contains("/dev/net/tun"));
+  CHECK_THAT(result.output, !Catch::Contains("started"));
 }
 
 TEST_CASE("A time limit asks the robots to end", "[team]") {

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <atomic>
+#include <exception>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "apps/team/robot_network.hpp"
+#include "modules/link_emulation/link_emulator.hpp"
+
+namespace km {
+
+/// Networks for the robots of a team, and a thread that carries frames between them as a script
+/// says. Its time begins with the construction.
+class EmulatedLinks {
+ public:
+  /// Throws what RobotNetwork and LinkEmulator throw. Make it where no other thread of the program
+  /// holds a lock: it forks.
+  explicit EmulatedLinks(LinkScript script);
+  ~EmulatedLinks();
+  EmulatedLinks(const EmulatedLinks&) = delete;
+  EmulatedLinks& operator=(const EmulatedLinks&) = delete;
+
+  [[nodiscard]] const RobotNetwork& network(std::size_t robot) const { return networks_[robot]; }
+
+  /// Ends the thread; what is on its way does not arrive. The emulator, with its counts. Throws
+  /// std::runtime_error if frames could not be carried to the end.
+  const LinkEmulator& finish();
+
+ private:
+  void carry();
+  void take_frames(std::size_t robot, double now_s);
+  void hand_over(const LinkDelivery& delivery);
+  void wait_for_frames(std::optional<double> due_in_s);
+  void stop();
+
+  LinkEmulator emulator_;  // the thread's until it has ended
+  std::vector<RobotNetwork> networks_;
+  Descriptor wake_;
+  double start_s_;
+  std::atomic<bool> stopped_ = false;
+  std::exception_ptr failure_;  // of the thread
+  std::thread carrier_;
+};
+
+}  // namespace km

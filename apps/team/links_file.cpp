@@ -1,0 +1,135 @@
+#include "apps/team/links_file.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <iterator>
+#include <limits>
+#include <set>
+
+#include "apps/team/team_results.hpp"
+#include "modules/evaluation/trajectory_file.hpp"
+#include "runtime/config_text.hpp"
+#include "runtime/yaml_config.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+
+// `usual`, and over it what `own` says.
+LinkKeys merged(LinkKeys usual, const LinkKeys& own) {
+  const auto take = [](auto& value, const auto& over) {
+    if (over) value = over;
+  };
+  take(usual.delay_s, own.delay_s);
+  take(usual.jitter_s, own.jitter_s);
+  take(usual.loss, own.loss);
+  take(usual.rate_bytes_per_s, own.rate_bytes_per_s);
+  take(usual.queue_bytes, own.queue_bytes);
+  take(usual.range_m, own.range_m);
+  if (!own.trace.empty() || own.delay_s || own.rate_bytes_per_s) usual.trace = own.trace;
+  usual.outages.insert(usual.outages.end(), own.outages.begin(), own.outages.end());
+  return usual;
+}
+
+LinkPlan plan_of(const LinkKeys& keys) {
+  LinkPlan link;
+  if (keys.trace.empty())
+    link.course = LinkTrace({{.bytes_per_s = keys.rate_bytes_per_s.value_or(kUnlimited),
+                              .delay_s = keys.delay_s.value_or(0.0)}});
+  else
+    link.course = read_link_trace(keys.trace);
+  link.jitter_s = keys.jitter_s.value_or(link.jitter_s);
+  link.loss = keys.loss.value_or(link.loss);
+  link.queue_bytes = keys.queue_bytes.value_or(link.queue_bytes);
+  link.range_m = keys.range_m.value_or(link.range_m);
+  for (const SpanKeys& outage : keys.outages) link.outages.push_back(outage.span());
+  return link;
+}
+
+LinkPartition partition_of(const LinksFile& file, const PartitionKeys& keys) {
+  LinkPartition partition{keys.when.span(), std::vector<std::size_t>(file.team.size(), 0)};
+  for (std::size_t group = 0; group < keys.groups.size(); ++group)
+    for (const std::string& name : keys.groups[group])
+      partition.group_of[*file.number_of(name)] = group + 1;
+  return partition;
+}
+
+// The true positions of a robot over the time of the run, if its recording plays without a break.
+std::vector<TimedPosition> path_of(const RobotPlan& robot, const std::string& rate,
+                                   const std::string& file) {
+  if (robot.truth.empty())
+    throw ConfigError(file + ": range_m needs the true poses of " + robot.name +
+                      ": give its truth in the team file, or --truth");
+  if (rate == "max")
+    throw ConfigError(file + ": range_m needs a run in real time: give a --rate that is not max");
+  const double speed = std::strtod(rate.c_str(), nullptr);
+  const std::vector<StampedPose> poses = read_trajectory(robot.truth);
+  const auto window = recorded_window(robot);
+  const Stamp start = window ? window->from : poses.front().stamp;
+  std::vector<TimedPosition> path;
+  for (const StampedPose& pose : poses)
+    path.push_back({seconds_between(start, pose.stamp) / speed, pose.T.translation()});
+  return path;
+}
+
+LinkScript make_script(const LinksFile& keys, const TeamPlan& plan, const std::string& file) {
+  LinkScript script;
+  script.seed = keys.seed;
+  script.robots = keys.team.size();
+  std::vector<LinkKeys> links(script.robots * script.robots, keys.all);
+  const auto change = [&](std::size_t from, std::size_t to, const LinkKeys& own) {
+    LinkKeys& link = links[from * script.robots + to];
+    link = merged(link, own);
+  };
+  for (const PairKeys& pair : keys.pairs) {
+    const std::size_t from = *keys.number_of(pair.from), to = *keys.number_of(pair.to);
+    change(from, to, pair.link);
+    if (!pair.one_way) change(to, from, pair.link);
+  }
+  std::ranges::transform(links, std::back_inserter(script.links), plan_of);
+  for (const PartitionKeys& partition : keys.partitions)
+    script.partitions.push_back(partition_of(keys, partition));
+  const auto has_range = [](const LinkPlan& link) { return std::isfinite(link.range_m); };
+  if (std::ranges::any_of(script.links, has_range))
+    for (const RobotPlan& robot : plan.robots)
+      script.paths.push_back(path_of(robot, plan.rate, file));
+  return script;
+}
+
+}  // namespace
+
+std::optional<std::size_t> LinksFile::number_of(const std::string& robot) const {
+  const auto found = std::ranges::find(team, robot);
+  if (found == team.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - team.begin());
+}
+
+std::string LinksFile::problem_of(const std::vector<std::vector<std::string>>& groups) const {
+  std::set<std::string> named;
+  for (const auto& group : groups)
+    for (const std::string& name : group) {
+      if (!number_of(name)) return "name " + name + ", which is no robot of the team";
+      if (!named.insert(name).second) return "name " + name + " twice";
+    }
+  return {};
+}
+
+LinkScript read_links_file(const fs::path& file, const TeamPlan& plan) {
+  LinksFile keys;
+  for (const RobotPlan& robot : plan.robots) keys.team.push_back(robot.name);
+  ConfigProblems problems;
+  const ConfigContext context{problems, fs::absolute(file).parent_path()};
+  fill_config(read_section(load_yaml(file), "", file.string(), context), "", context, keys);
+  problems.finish();
+  return make_script(keys, plan, file.string());
+}
+
+std::string links_file_keys() {
+  return keys_of(LinksFile());
+}
+
+}  // namespace km
