@@ -47,14 +47,14 @@ struct TeamRun {
 };
 
 /// Runs a team file on `dataset` as fast as it can, in a random DDS domain (the program draws it).
-/// Results go to `folder`.
+/// Results go to `folder`. `options` of the program come in addition.
 inline TeamRun run_team(const std::filesystem::path& team, const std::filesystem::path& dataset,
-                        const TemporaryFolder& folder) {
+                        const TemporaryFolder& folder, const std::string& options = {}) {
   const std::filesystem::path json = folder.path() / "team.json";
   TeamRun run;
   run.result = run_command(std::string(KM_BIN_DIR "/kimera_multi_team --config ") + team.string() +
                            " --dataset " + dataset.string() + " --rate max --output " +
-                           folder.path().string() + " --json " + json.string() +
+                           folder.path().string() + " --json " + json.string() + ' ' + options +
                            " -- --serve-limit 1000");  // sanitizers are slow
   if (run.result.exit_code == 0) run.json = read_json(json);
   return run;
@@ -70,6 +70,20 @@ inline void write_part(const SplitGraph& graph, RobotId robot,
   for (const RelativePose& e : graph.closures)
     if (e.from.robot == robot || e.to.robot == robot) part.edges.push_back(e);
   write_g2o(folder / ("part" + std::to_string(robot) + ".g2o"), part);
+}
+
+/// Writes the parts of all robots of `graph`, whose ids are 0, 1, ..., and a team file that begins
+/// with `settings`; the file. The robots are robot0, robot1, ...
+inline std::filesystem::path write_team(const SplitGraph& graph, const TemporaryFolder& folder,
+                                        const std::string& settings = {}) {
+  std::string team = settings + "robots:\n";
+  for (const auto& [robot, keyframes] : graph.keyframes) {
+    write_part(graph, robot, folder.path());
+    const std::string number = std::to_string(robot);
+    team += "  - {id: " + number + ", name: " + robot_name(robot) + ", graph: part" + number +
+            ".g2o}\n";
+  }
+  return folder.write("team.yaml", team);
 }
 
 /// The files of a team's robots as one graph, and the poses they ended with.

@@ -139,14 +139,7 @@ TEST_CASE("Five processes over DDS come to the cost that one process comes to", 
       random_team(20, {0, 1, 2, 3, 4}, 40, {{0, 1}, {1, 2}, {2, 3}, {3, 4}, {0, 4}, {1, 3}});
   constexpr int kRobots = 5;
   const TemporaryFolder folder;
-  std::string robots = "robots:\n";
-  for (RobotId k = 0; k < kRobots; ++k) {
-    write_part(graph, k, folder.path());
-    const std::string number = std::to_string(k);
-    robots +=
-        "  - {id: " + number + ", name: robot" + number + ", graph: part" + number + ".g2o}\n";
-  }
-  const TeamRun run = run_team(folder.write("team.yaml", robots), folder.path(), folder);
+  const TeamRun run = run_team(write_team(graph, folder), folder.path(), folder);
   CAPTURE(run.result.output);
   REQUIRE(run.result.exit_code == 0);
   for (RobotId k = 0; k < kRobots; ++k) {
