@@ -2,6 +2,7 @@
 
 #include <compare>
 #include <cstdint>
+#include <stdexcept>
 #include <string>
 
 #include "modules/core/ids.hpp"
@@ -12,7 +13,29 @@ namespace km {
 /// Fields appended to a topic type do not change it, see idl/README.md.
 inline constexpr std::uint16_t kProtocolVersion = 1;
 
-/// A process of a robot: a restarted robot keeps its id and gets another boot.
+/// A process of a robot has a boot of its own, not zero: the upper 48 bits name the robot's life,
+/// the lower 16 count how often that was resumed. Another process of one life has the same
+/// keyframes; in another life an index stands for another keyframe.
+inline constexpr unsigned kResumeBits = 16;
+
+[[nodiscard]] constexpr bool is_same_life(std::uint64_t a, std::uint64_t b) {
+  return a >> kResumeBits == b >> kResumeBits;
+}
+
+[[nodiscard]] constexpr std::uint32_t resume_count(std::uint64_t boot) {
+  return static_cast<std::uint32_t>(boot & ((1U << kResumeBits) - 1U));
+}
+
+/// Of the process that resumes the life of `boot`. Throws std::overflow_error if there have been
+/// too many.
+[[nodiscard]] inline std::uint64_t next_boot(std::uint64_t boot) {
+  if (!is_same_life(boot, boot + 1))
+    throw std::overflow_error("a robot's life was resumed " + std::to_string(resume_count(boot)) +
+                              " times, which is as often as can be told");
+  return boot + 1;
+}
+
+/// A process of a robot: a restarted or resumed robot keeps its id and gets another boot.
 struct TeamPeer {
   RobotId robot = 0;
   std::uint64_t boot = 0;
@@ -24,7 +47,7 @@ struct RobotIdentity {
   RobotId robot = 0;
   std::string name;  ///< 1 to 64 printable ASCII characters without ';'.
   std::uint16_t protocol = kProtocolVersion;
-  std::uint64_t boot = 0;  ///< Random, not zero: tells a restarted robot from its former self.
+  std::uint64_t boot = 0;  ///< Tells this process from the robot's former ones.
 
   bool operator==(const RobotIdentity&) const = default;
 };

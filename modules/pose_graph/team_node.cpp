@@ -79,6 +79,7 @@ void TeamNode::take_peer_event(const PeerEvent& event) {
   switch (event.kind) {
     case PeerEventKind::kJoined:
     case PeerEventKind::kReturned:
+    case PeerEventKind::kResumed:
     case PeerEventKind::kRestarted:
       return agent_.peer_alive({event.identity.robot, event.identity.boot});
     case PeerEventKind::kLost:

@@ -138,7 +138,7 @@ void IncomingTopic::recall(double now_s) {
       admit(std::move(serialized), writer, claim, now_s);
       return true;
     }
-    if (waited_s < kPatience_s) return false;
+    if (claim.standing == Standing::kArriving || waited_s < kPatience_s) return false;
     refuse(claim.standing == Standing::kRival ? "claims another robot's id"
                                               : "from no known robot");
     return true;
@@ -149,9 +149,10 @@ void IncomingTopic::recall(double now_s) {
 
 // Whether it is known what is to be done with the messages of a participant.
 bool IncomingTopic::is_settled(Standing standing) const {
-  const bool is_open = standing == Standing::kUnknown || standing == Standing::kRival;
+  const bool is_open = standing == Standing::kUnknown || standing == Standing::kRival ||
+                       standing == Standing::kArriving;
   // Keys come before anything can show who sends them; each is sealed by itself.
-  return !is_open || (spec_.carries_keys && standing == Standing::kRival);
+  return !is_open || (spec_.carries_keys && standing != Standing::kUnknown);
 }
 
 void IncomingTopic::admit(Serdata serialized, const Guid& writer, const Peers::Claim& claim,
@@ -262,7 +263,7 @@ void IncomingTopic::await_key(Filed filed, double now_s) {
 bool IncomingTopic::deliver_again(double now_s) {
   return sealed_.serve(now_s, [this](RobotId /*from*/, const Filed& filed, double waited_s) {
     if (deliver(filed) == Verdict::kTaken) return true;
-    if (waited_s < kPatience_s) return false;
+    if (claim.standing == Standing::kArriving || waited_s < kPatience_s) return false;
     refuse("sealed with a key that is not known");
     return true;
   }) > 0;

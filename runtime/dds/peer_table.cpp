@@ -47,6 +47,10 @@ void PeerTable::prove(const Guid& guid) {
   appear_if_there(guid, found->second);
 }
 
+void PeerTable::told(const TeamPeer& restarted) {
+  if (is_current(restarted)) peers_.at(restarted.robot).arriving = false;
+}
+
 void PeerTable::participant_gone(const Guid& guid) {
   closed(guid);
   const auto found = participants_.find(guid);
@@ -107,8 +111,8 @@ Standing PeerTable::standing(const Guid& guid) const {
     return participant.announced ? Standing::kStranger : Standing::kUnknown;
   if (participant.identity->robot == self_.robot) return Standing::kTwin;
   const auto known = peers_.find(participant.identity->robot);
-  const bool admitted = known != peers_.end() && known->second.guid == guid;
-  return admitted ? Standing::kAdmitted : Standing::kRival;
+  if (known == peers_.end() || known->second.guid != guid) return Standing::kRival;
+  return known->second.arriving ? Standing::kArriving : Standing::kAdmitted;
 }
 
 std::optional<TeamPeer> PeerTable::current(RobotId robot) const {
@@ -148,12 +152,16 @@ void PeerTable::appear(const Guid& guid, Participant& participant) {
 
 void PeerTable::take_over(KnownPeer& known, const Guid& guid, const Participant& participant) {
   const RobotIdentity& identity = *participant.identity;
-  const bool same_boot = known.peer.identity.boot == identity.boot;
+  const std::uint64_t former_boot = known.peer.identity.boot;
   const Guid former = known.guid;
-  known = {{identity, PeerState::kAlive, participant.addresses}, guid};
+  const bool arriving =
+      former_boot == identity.boot ? known.arriving : !is_same_life(former_boot, identity.boot);
+  known = {{identity, PeerState::kAlive, participant.addresses}, guid, arriving};
   if (former != guid && !participants_.at(former).announced) participants_.erase(former);
-  emit(same_boot ? PeerEventKind::kReturned : PeerEventKind::kRestarted, identity,
-       same_boot ? "returned" : "restarted");
+  if (former_boot == identity.boot) return emit(PeerEventKind::kReturned, identity, "returned");
+  if (is_same_life(former_boot, identity.boot))
+    return emit(PeerEventKind::kResumed, identity, "resumed");
+  emit(PeerEventKind::kRestarted, identity, "restarted");
 }
 
 // The participant is heard no more. Its id goes to who has been claiming it for longest.

@@ -28,8 +28,9 @@ enum class PeerEventKind {
   kJoined,     ///< First heard of.
   kLost,       ///< Silent for longer than dds.liveliness_s.
   kReturned,   ///< Heard again, same boot.
+  kResumed,    ///< Same robot id, other boot of the same life: its keyframes are as before.
   kLeft,       ///< Ended in order.
-  kRestarted,  ///< Same robot id, other boot.
+  kRestarted,  ///< Same robot id, another life: its keyframes are others now.
   kRefused,    ///< Not talked to: another protocol version, unreadable user data, one robot too
                ///< many, or the id of a robot that is there already.
   kConflict,   ///< This robot's id is another's, which had it first: this one must not go on.
@@ -41,6 +42,7 @@ enum class Standing {
   kStranger,  ///< No robot, or one that is refused.
   kTwin,      ///< Claims this robot's id.
   kRival,     ///< Claims the id of a robot that is there already, or has not been heard itself.
+  kArriving,  ///< The robot of its id, but not all nodes know yet that its former life is over.
   kAdmitted,  ///< The robot of its id.
 };
 
@@ -78,6 +80,9 @@ class PeerTable {
 
   /// A message shows that the participant is who it says it is.
   void prove(const Guid& guid);
+
+  /// All nodes have handled the event of this process: nothing that it sends comes before that.
+  void told(const TeamPeer& restarted);
 
   /// Its status writer is alive, silent, or closed.
   void alive(const Guid& guid);
@@ -118,6 +123,7 @@ class PeerTable {
   struct KnownPeer {
     Peer peer;
     Guid guid{};
+    bool arriving = false;  // until told()
   };
 
   void appear_if_there(const Guid& guid, Participant& participant);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -93,6 +94,20 @@ void WriterBook::on_matched(dds_entity_t reader, dds_subscription_matched_status
   book.gone_.pop_front();
 }
 
+Topic<PeerEvent>::Message EventReceipts::track(PeerEvent event) {
+  const auto take_back = [self = shared_from_this()](const PeerEvent* handled) {
+    const std::unique_ptr<const PeerEvent> owner(handled);
+    const std::lock_guard lock(self->mutex_);
+    self->handled_.push_back({handled->identity.robot, handled->identity.boot});
+  };
+  return {new PeerEvent(std::move(event)), take_back};
+}
+
+std::vector<TeamPeer> EventReceipts::take() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(handled_, {});
+}
+
 Peers::Peers(const DdsParticipant& participant)
     : self_(participant.guid()),
       seal_(participant.seal()),
@@ -108,8 +123,8 @@ Peers::Peers(const DdsParticipant& participant)
               "reader of the participants"),
       discovered_(dds_create_readcondition(reader_.handle(), DDS_ANY_STATE), "read condition"),
       announcer_(
-          kMaxEvents, Overflow::kDropOldest,
-          [this](const PeerEvent& event) { events_.publish(event); }, "peer_events") {}
+          kMaxEvents, Overflow::kDropOldest, [this](const auto& event) { events_.publish(event); },
+          "peer_events") {}
 
 // Called with the mutex held, as all of the table is.
 const char* Peers::admit(const RobotIdentity& identity, std::string_view credentials) {
@@ -190,6 +205,10 @@ void Peers::on_liveliness_changed(dds_entity_t /*reader*/, dds_liveliness_change
 void Peers::poll() {
   take_discovered();
   take_liveliness();
+  {
+    const std::lock_guard lock(mutex_);
+    for (const TeamPeer& restarted : receipts_->take()) table_.told(restarted);
+  }
   publish_events();
 }
 
@@ -258,7 +277,9 @@ void Peers::publish_events() {
   }
   for (PeerEvent& event : events) {
     log_event(event);
-    announcer_.post(std::move(event));
+    const bool restarted = event.kind == PeerEventKind::kRestarted;
+    announcer_.post(restarted ? receipts_->track(std::move(event))
+                              : std::make_shared<const PeerEvent>(std::move(event)));
   }
 }
 

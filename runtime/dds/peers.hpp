@@ -3,6 +3,7 @@
 #include <deque>
 #include <exception>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <vector>
@@ -37,6 +38,20 @@ class WriterBook {
   std::deque<dds_instance_handle_t> gone_;  // oldest first
 };
 
+/// Knows when all subscribers are done with an event. Thread-safe.
+class EventReceipts : public std::enable_shared_from_this<EventReceipts> {
+ public:
+  /// The event, whose process is handed out by take() once nobody holds it any more.
+  [[nodiscard]] Topic<PeerEvent>::Message track(PeerEvent event);
+
+  /// Empty thereafter.
+  [[nodiscard]] std::vector<TeamPeer> take();
+
+ private:
+  std::mutex mutex_;  // guards handled_
+  std::vector<TeamPeer> handled_;
+};
+
 /// Feeds a PeerTable from DDS discovery and from the liveliness of the status topic, and logs its
 /// events. The bridge's receive thread calls poll(); everything else is thread-safe.
 class Peers {
@@ -46,7 +61,8 @@ class Peers {
   Peers(const Peers&) = delete;
   Peers& operator=(const Peers&) = delete;
 
-  /// Published on a thread of their own. Subscribe before start().
+  /// Published on a thread of their own. Subscribe before start(). While a kRestarted is held, what
+  /// its process sends waits.
   [[nodiscard]] In<PeerEvent> events() { return events_; }
 
   /// Robots of the team ever met by this one, ascending by id.
@@ -57,7 +73,7 @@ class Peers {
   /// What is to be done with what a participant sends, and whom it says it is.
   struct Claim {
     Standing standing = Standing::kUnknown;
-    TeamPeer sender;  ///< Of a robot: kTwin, kRival, kAdmitted.
+    TeamPeer sender;  ///< Of a robot: neither kUnknown nor kStranger.
   };
   [[nodiscard]] Claim claim_of(const Guid& guid) const;
   [[nodiscard]] bool is_current(const TeamPeer& sender) const;
@@ -111,7 +127,8 @@ class Peers {
   DdsEntity liveliness_changed_;  // guard condition
   DdsEntity reader_;
   DdsEntity discovered_;
-  Worker<PeerEvent> announcer_;  // last member: stops first
+  std::shared_ptr<EventReceipts> receipts_ = std::make_shared<EventReceipts>();
+  Worker<Topic<PeerEvent>::Message> announcer_;  // last member: stops first
 };
 
 /// Participant that a writer's matched reader belongs to; nullopt if it is gone.

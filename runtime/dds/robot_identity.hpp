@@ -12,7 +12,7 @@ namespace km {
 /// "name (id 7)", for messages.
 [[nodiscard]] std::string to_string(const RobotIdentity& identity);
 
-/// A fresh, nonzero boot id.
+/// The boot of a new life, random, which has not been resumed.
 [[nodiscard]] std::uint64_t random_boot_id();
 
 /// What a robot tells of itself in the USER_DATA of its DDS participant:

@@ -33,6 +33,8 @@ const char* name_of(PeerEventKind kind) {
       return "returned";
     case PeerEventKind::kLeft:
       return "left";
+    case PeerEventKind::kResumed:
+      return "resumed";
     case PeerEventKind::kRestarted:
       return "restarted";
     case PeerEventKind::kRefused:

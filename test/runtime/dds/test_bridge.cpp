@@ -247,6 +247,38 @@ TEST_CASE("A robot that leaves and starts again is recognised by its boot", "[dd
   CHECK(a.bridge.peers().list()[0].identity == second.participant.identity());
 }
 
+TEST_CASE("What a robot sends in another life waits until all know that it has restarted",
+          "[dds]") {
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3);
+  std::mutex mutex;
+  Topic<PeerEvent>::Message held;
+  a.bridge.peers().events().subscribe([&](const auto& event) {
+    const std::lock_guard lock(mutex);
+    if (event->kind == PeerEventKind::kRestarted) held = event;
+  });
+  a.start();
+  {
+    TestRobot first(domain, 4);
+    first.start();
+    first.ping(0);
+    REQUIRE(a.received.wait_for(1).size() == 1);
+  }
+  REQUIRE(a.hears(PeerEventKind::kLeft, 4));
+  TestRobot second(domain, 4);
+  second.ping(1);
+  second.start();
+  REQUIRE(second.hears(PeerEventKind::kJoined, 3));
+  REQUIRE(a.hears(PeerEventKind::kRestarted, 4));
+  std::this_thread::sleep_for(std::chrono::milliseconds(700));  // enough for it to arrive
+  CHECK(a.received.messages().size() == 1);
+  {
+    const std::lock_guard lock(mutex);
+    held.reset();
+  }
+  CHECK(a.received.wait_for(2).size() == 2);
+}
+
 TEST_CASE("A subscriber that throws does not stop the robot from hearing", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4);

@@ -91,10 +91,13 @@ TEST_CASE("An orderly end is not a loss", "[peers]") {
   CHECK(table.identity_of(guid(2)).has_value());  // what it sent may still be on its way
 }
 
-// Robot 7, heard from guid 2, with boot 70.
+constexpr std::uint64_t kBoot = 70U << kResumeBits;
+constexpr std::uint64_t kOtherLife = 71U << kResumeBits;
+
+// Robot 7, heard from guid 2, with kBoot.
 PeerTable with_robot() {
   PeerTable table(kSelf);
-  table.participant(guid(2), data_of(7, 70), "udp/10.0.0.7");
+  table.participant(guid(2), data_of(7, kBoot), "udp/10.0.0.7");
   table.alive(guid(2));
   REQUIRE(kinds(table) == Kinds{PeerEventKind::kJoined});
   return table;
@@ -102,9 +105,11 @@ PeerTable with_robot() {
 
 TEST_CASE("A robot that is started again has its id back once its former self is missed",
           "[peers]") {
+  const auto [boot, kind] = GENERATE(table<std::uint64_t, PeerEventKind>(
+      {{kOtherLife, PeerEventKind::kRestarted}, {kBoot + 1, PeerEventKind::kResumed}}));
   PeerTable table = with_robot();
   SECTION("killed and restarted at once") {
-    table.participant(guid(3), data_of(7, 71), "");
+    table.participant(guid(3), data_of(7, boot), "");
     table.alive(guid(3));
     CHECK(table.standing(guid(3)) == Standing::kRival);
     CHECK(kinds(table) == Kinds{PeerEventKind::kRefused});
@@ -112,7 +117,7 @@ TEST_CASE("A robot that is started again has its id back once its former self is
   }
   SECTION("restarted after it was lost") {
     table.silent(guid(2));
-    table.participant(guid(3), data_of(7, 71), "");
+    table.participant(guid(3), data_of(7, boot), "");
     CHECK(table.standing(guid(3)) == Standing::kRival);  // not heard itself yet
     table.alive(guid(3));
   }
@@ -121,24 +126,31 @@ TEST_CASE("A robot that is started again has its id back once its former self is
     table.participant_gone(guid(2));
     CHECK(table.standing(guid(2)) == Standing::kAdmitted);  // what it said may still be coming
     CHECK(kinds(table) == Kinds{PeerEventKind::kLeft});
-    table.participant(guid(3), data_of(7, 71), "");
+    table.participant(guid(3), data_of(7, boot), "");
     table.alive(guid(3));
   }
   const Kinds events = kinds(table);
   REQUIRE_FALSE(events.empty());
-  CHECK(events.back() == PeerEventKind::kRestarted);
+  CHECK(events.back() == kind);
   REQUIRE(table.peers().size() == 1);
-  CHECK(table.peers()[0].identity.boot == 71);
+  CHECK(table.peers()[0].identity.boot == boot);
   CHECK(table.peers()[0].state == PeerState::kAlive);
+  if (kind == PeerEventKind::kRestarted) {
+    CHECK(table.standing(guid(3)) == Standing::kArriving);
+    table.told({7, kBoot});  // of the former life, late
+    CHECK(table.standing(guid(3)) == Standing::kArriving);
+    table.told({7, boot});
+  }
   CHECK(table.standing(guid(3)) == Standing::kAdmitted);
-  CHECK(table.is_current({7, 71}));
-  CHECK_FALSE(table.is_current({7, 70}));
+  CHECK(table.is_current({7, boot}));
+  CHECK_FALSE(table.is_current({7, kBoot}));
   CHECK(table.standing(guid(2)) != Standing::kAdmitted);
 }
 
 TEST_CASE("Nobody takes over the id of a robot that is there", "[peers]") {
   PeerTable table = with_robot();
-  const std::uint64_t boot = GENERATE(70, 71);  // that of the robot itself is no secret
+  // That of the robot itself is no secret.
+  const std::uint64_t boot = GENERATE(kBoot, kBoot + 1, kOtherLife);
   for (int i = 0; i < 3; ++i) {
     table.participant(guid(3), data_of(7, boot), "udp/10.0.0.66");
     table.alive(guid(3));
@@ -149,7 +161,7 @@ TEST_CASE("Nobody takes over the id of a robot that is there", "[peers]") {
   CHECK_THAT(events[0].text, Catch::Matchers::Contains("udp/10.0.0.66"));
   CHECK(table.standing(guid(3)) == Standing::kRival);
   CHECK(table.standing(guid(2)) == Standing::kAdmitted);
-  CHECK(table.peers()[0].identity.boot == 70);
+  CHECK(table.peers()[0].identity.boot == kBoot);
 
   table.closed(guid(3));
   CHECK(table.take_events().empty());
@@ -162,7 +174,7 @@ TEST_CASE("Nobody takes over the id of a robot that is there", "[peers]") {
 TEST_CASE("An id goes to who has claimed it for longest", "[peers]") {
   PeerTable table = with_robot();
   for (const std::uint8_t n : std::vector<std::uint8_t>{5, 4, 3}) {
-    table.participant(guid(n), data_of(7, 70U + n), "");
+    table.participant(guid(n), data_of(7, kBoot + n), "");
     table.alive(guid(n));
   }
   table.closed(guid(2));
@@ -311,8 +323,29 @@ TEST_CASE("A name that cannot be sent is refused at home", "[identity]") {
   CHECK_THROWS_AS(to_user_data({1, "tab\t", 1, 1}), std::invalid_argument);
 }
 
-TEST_CASE("Boot ids differ", "[identity]") {
-  CHECK(random_boot_id() != random_boot_id());
+TEST_CASE("A new life differs from all others and has not been resumed", "[identity]") {
+  std::set<std::uint64_t> lives;
+  for (int i = 0; i < 100; ++i) {
+    const std::uint64_t boot = random_boot_id();
+    CHECK(resume_count(boot) == 0);
+    CHECK_FALSE(is_same_life(boot, 0));
+    lives.insert(boot >> kResumeBits);
+  }
+  CHECK(lives.size() == 100);
+}
+
+TEST_CASE("A life is resumed as often as can be counted, and stays the same", "[identity]") {
+  const std::uint64_t first = random_boot_id();
+  std::uint64_t boot = first;
+  constexpr std::uint32_t kMost = 65535;
+  for (std::uint32_t count = 1; count <= kMost; ++count) {
+    boot = next_boot(boot);
+    REQUIRE(resume_count(boot) == count);
+  }
+  CHECK(boot != first);
+  CHECK(is_same_life(boot, first));
+  CHECK_FALSE(is_same_life(boot + 1, first));
+  CHECK_THROWS_AS(next_boot(boot), std::overflow_error);
 }
 
 TEST_CASE("Duplicates and gaps agree with a set of all numbers, in any order", "[sequence]") {
