@@ -211,14 +211,16 @@ class Watch {
                                     traffic, process_usage().resident_bytes));
   }
 
-  // A peer that is there but has not said how far it is counts as running.
+  // A peer that is there but has not said how far it is counts as running, whatever its former
+  // process has said.
   std::map<RobotId, Departure::Present> present_peers() const {
-    std::map<RobotId, Departure::Present> told;
+    std::map<TeamPeer, Departure::Present> told;
     for (const RobotStatus& status : robot_.status_node().peers())
-      told[status.robot] = {status.phase, status.settled_links};
+      told[{status.robot, status.boot}] = {status.phase, status.settled_links};
     std::map<RobotId, Departure::Present> present;
-    for (const Peer& peer : robot_.bridge().peers().list())
-      if (peer.state == PeerState::kAlive) present[peer.identity.robot] = told[peer.identity.robot];
+    for (const auto& [identity, state, addresses] : robot_.bridge().peers().list())
+      if (state == PeerState::kAlive)
+        present[identity.robot] = told[{identity.robot, identity.boot}];
     return present;
   }
 

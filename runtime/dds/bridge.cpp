@@ -66,7 +66,7 @@ void DdsBridge::exchange_keys() {
 void DdsBridge::tell_key(const TeamPeer& peer) {
   auto message =
       participant_.seal()->with([&](TeamSeal& team) { return team.key_message_for(peer); });
-  if (message) keys_->write(peer.robot, message_key({peer.boot}), *std::move(message));
+  if (message) keys_->write(Addressee{peer.robot}, message_key({peer.boot}), *std::move(message));
 }
 
 void DdsBridge::tell_keys() {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <exception>
 #include <functional>
 #include <limits>
@@ -32,6 +33,7 @@ template <typename T>
 struct Addressed {
   RobotId to = 0;
   std::shared_ptr<const T> message;
+  std::uint64_t boot = 0;  ///< See Addressee.
 };
 
 /// A channel between robots: what is published here on `to_peers` comes out of `from_peers` there.
@@ -145,14 +147,14 @@ class DdsBridge final : public Node {
 namespace detail {
 
 template <typename T>
-void write_encoded(OutgoingTopic& topic, const T& message, std::optional<RobotId> to = {}) {
+void write_encoded(OutgoingTopic& topic, const T& message, std::optional<Addressee> to = {}) {
   const auto encoded = Codec<T>::encode(message);
   topic.write(to, Codec<T>::key_of(message), serialize(Codec<T>::descriptor(), &encoded.wire));
 }
 
 template <typename T>
 void write_encoded(OutgoingTopic& topic, const Addressed<T>& message) {
-  write_encoded(topic, *message.message, message.to);
+  write_encoded(topic, *message.message, Addressee{message.to, message.boot});
 }
 
 // Publishes what `content` holds, or says why not.

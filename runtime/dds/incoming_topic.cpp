@@ -83,8 +83,12 @@ IncomingTopic::~IncomingTopic() {
 
 DdsEntity IncomingTopic::make_reader() {
   const DdsQos partition = make_dds_qos();
+  const RobotIdentity& self = participant_.identity();
   if (addressed_)
-    dds_qset_partition1(partition.get(), partition_of(participant_.identity().robot).c_str());
+    dds_qset_partition1(
+        partition.get(),
+        (spec_.carries_keys ? partition_of(self.robot) : partition_of({self.robot, self.boot}))
+            .c_str());
   subscriber_ = DdsEntity(dds_create_subscriber(participant_.handle(), partition.get(), nullptr),
                           "subscriber of " + spec_.name);
   const std::unique_ptr<dds_listener_t, decltype(&dds_delete_listener)> listener(

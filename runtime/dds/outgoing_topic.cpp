@@ -14,6 +14,10 @@ std::string partition_of(RobotId robot) {
   return "robot" + std::to_string(robot);
 }
 
+std::string partition_of(const TeamPeer& peer) {
+  return partition_of(peer.robot) + '.' + std::to_string(peer.boot >> kResumeBits);
+}
+
 OutgoingTopic::OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec)
     : participant_(participant),
       peers_(peers),
@@ -22,17 +26,32 @@ OutgoingTopic::OutgoingTopic(const DdsParticipant& participant, const Peers& pee
                               nullptr, nullptr),
              "topic " + spec_.name) {}
 
-OutgoingTopic::Writer& OutgoingTopic::writer_to(std::optional<RobotId> to) {
+// Empty for all robots; nullopt if there is nobody whom it is for.
+std::optional<std::string> OutgoingTopic::partition_for(std::optional<Addressee> to) const {
+  if (!to) return std::string();
+  if (spec_.carries_keys) return partition_of(to->robot);
+  const auto current = peers_.current(to->robot);
+  if (!current || (to->boot != 0 && !is_same_life(to->boot, current->boot))) return std::nullopt;
+  return partition_of(*current);
+}
+
+// Of a robot in another life the counts go on; what was kept for the former is gone.
+OutgoingTopic::Writer& OutgoingTopic::writer_to(std::optional<RobotId> to,
+                                                const std::string& partition) {
   const std::lock_guard lock(mutex_);
   const auto [entry, fresh] = writers_.try_emplace(to);
   Writer& writer = entry->second;
-  if (!fresh) return writer;
+  if (!fresh && writer.partition == partition) return writer;
 
-  const DdsQos partition = make_dds_qos();
-  if (to) dds_qset_partition1(partition.get(), partition_of(*to).c_str());
-  writer.publisher =
-      DdsEntity(dds_create_publisher(participant_.handle(), partition.get(), nullptr),
-                "publisher of " + spec_.name);
+  writer.partition = partition;
+  writer.next_number = 0;
+  writer.readers.clear();
+  writer.statistics.reset();
+  writer.writer = DdsEntity();
+  const DdsQos group = make_dds_qos();
+  if (!partition.empty()) dds_qset_partition1(group.get(), partition.c_str());
+  writer.publisher = DdsEntity(dds_create_publisher(participant_.handle(), group.get(), nullptr),
+                               "publisher of " + spec_.name);
   const DdsQos qos = make_writer_qos(spec_.kind, participant_.config());
   writer.writer =
       DdsEntity(dds_create_writer(writer.publisher.handle(), topic_.handle(), qos.get(), nullptr),
@@ -41,9 +60,12 @@ OutgoingTopic::Writer& OutgoingTopic::writer_to(std::optional<RobotId> to) {
   return writer;
 }
 
-void OutgoingTopic::write(std::optional<RobotId> to, MessageKey key,
+void OutgoingTopic::write(std::optional<Addressee> addressee, MessageKey key,
                           std::vector<std::uint8_t> content) {
-  Writer& writer = writer_to(to);
+  const auto partition = partition_for(addressee);
+  if (!partition) return;
+  const auto to = addressee ? std::optional(addressee->robot) : std::nullopt;
+  Writer& writer = writer_to(to, *partition);
   km_wire_Envelope envelope{.key = key,
                             .boot = participant_.identity().boot,
                             .number = writer.next_number,

@@ -30,7 +30,16 @@ struct TopicSpec {
   bool carries_keys = false;  ///< Its messages are sealed by themselves.
 };
 
-/// DDS partition in which the messages to one robot travel.
+/// Whom a message is for.
+struct Addressee {
+  RobotId robot = 0;
+  std::uint64_t boot = 0;  ///< Only for the life of this process; 0: whichever it lives.
+};
+
+/// DDS partition in which the messages to one robot travel, in the life of this process: what was
+/// kept for a former life does not reach the next.
+[[nodiscard]] std::string partition_of(const TeamPeer& peer);
+/// Likewise, of what is sealed for one process by itself.
 [[nodiscard]] std::string partition_of(RobotId robot);
 
 /// The sending end of a topic. Messages to all robots go through one writer; each robot addressed
@@ -40,10 +49,11 @@ class OutgoingTopic {
  public:
   OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec);
 
-  /// Writes to robot `to`, or to all, sealed where the team has keys. Messages are numbered per
-  /// writer. What DDS refuses is counted and logged, as is content that no reader would take and
-  /// what is for a robot that has shown no keys.
-  void write(std::optional<RobotId> to, MessageKey key, std::vector<std::uint8_t> content);
+  /// Writes to a robot or to all, sealed where the team has keys. Messages are numbered per writer.
+  /// What DDS refuses is counted and logged, as is content that no reader would take and what is
+  /// for a robot that has shown no keys. What is for a robot that has never been there, or for a
+  /// life that is over, is dropped.
+  void write(std::optional<Addressee> addressee, MessageKey key, std::vector<std::uint8_t> content);
 
   /// Waits until every matched reader has everything. False on timeout.
   bool wait_for_acks(std::chrono::nanoseconds timeout);
@@ -58,6 +68,7 @@ class OutgoingTopic {
     DdsEntity publisher;
     DdsEntity writer;
     std::unique_ptr<dds_statistics, StatisticsDeleter> statistics;
+    std::string partition;
     std::uint32_t next_number = 0;
     std::vector<Guid> readers;  // participants of those matched
     TrafficCount written;
@@ -65,7 +76,8 @@ class OutgoingTopic {
     std::map<Guid, TrafficCount> sent_to;
   };
 
-  Writer& writer_to(std::optional<RobotId> to);
+  [[nodiscard]] std::optional<std::string> partition_for(std::optional<Addressee> to) const;
+  Writer& writer_to(std::optional<RobotId> to, const std::string& partition);
   const char* seal(std::optional<RobotId> to, const km_wire_Envelope& head,
                    std::vector<std::uint8_t>& content) const;
   static void refresh_readers(Writer& writer);

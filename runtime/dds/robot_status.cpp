@@ -47,8 +47,8 @@ Decoded<RobotStatus> Codec<RobotStatus>::decode(const Wire& wire, const TeamPeer
   if (wire.phase > km_wire_PHASE_LEAVING) return Result::refuse("unknown phase");
   if (!std::isfinite(wire.dataset_time_s)) return Result::refuse("time is not finite");
   const auto phase = static_cast<RobotPhase>(wire.phase);
-  return Result::accept(
-      {writer.robot, name, phase, wire.dataset_time_s, wire.keyframes, wire.settled_links});
+  return Result::accept({writer.robot, name, phase, wire.dataset_time_s, wire.keyframes,
+                         wire.settled_links, writer.boot});
 }
 
 RobotStatusNode::RobotStatusNode(std::function<RobotStatus()> provider,

@@ -33,6 +33,7 @@ struct RobotStatus {
   /// Robots fewer links away than this have settled; 0: not even this one. It grows by one with
   /// what each neighbour tells of its own, so that also far ones are waited for.
   std::uint8_t settled_links = 0;
+  std::uint64_t boot = 0;  ///< Of the process that told it.
 };
 
 /// How often a robot tells its status [s].

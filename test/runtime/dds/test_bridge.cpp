@@ -247,6 +247,46 @@ TEST_CASE("A robot that leaves and starts again is recognised by its boot", "[dd
   CHECK(a.bridge.peers().list()[0].identity == second.participant.identity());
 }
 
+TEST_CASE("What was sent to a robot reaches it when it is resumed, and not in another life",
+          "[dds]") {
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3, TopicKind::kEvent, TopicKind::kEvent);
+  a.start();
+  const RobotIdentity former{4, robot_name(4), kProtocolVersion, random_boot_id()};
+  RobotIdentity next = former;
+  const bool resumed = GENERATE(true, false);
+  next.boot = resumed ? next_boot(former.boot) : random_boot_id();
+  {
+    TestRobot first(domain, former, nullptr, TopicKind::kEvent, TopicKind::kEvent);
+    first.start();
+    REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+    a.ping_one(4, 0);
+    REQUIRE(first.received_addressed.wait_for(1).size() == 1);
+  }
+  REQUIRE(a.hears(PeerEventKind::kLeft, 4));
+  a.ping_one(4, 1);  // while it is away
+
+  TestRobot second(domain, next, nullptr, TopicKind::kEvent, TopicKind::kEvent);
+  second.start();
+  REQUIRE(a.hears(resumed ? PeerEventKind::kResumed : PeerEventKind::kRestarted, 4));
+  a.addressed_pings.to_peers().publish(
+      {4, std::make_shared<const Ping>(Ping{3, 2, {}}), former.boot});
+  a.addressed_pings.to_peers().publish(
+      {4, std::make_shared<const Ping>(Ping{3, 3, {}}), next.boot});
+  a.ping_one(4, 4);
+  const std::vector<std::uint32_t> others{3, 4};
+  const auto expected = resumed ? up_to(5) : others;
+  CHECK(indices(second.received_addressed.wait_for(expected.size())) == expected);
+  CHECK(a.traffic(Direction::kOut, true).failures == 0);
+}
+
+TEST_CASE("A status names the process that told it", "[dds]") {
+  Two two;
+  auto& [domain, a, b] = two;
+  REQUIRE(eventually([&] { return b.status.peers().size() == 1; }));
+  CHECK(b.status.peers()[0].boot == a.participant.identity().boot);
+}
+
 TEST_CASE("What a robot sends in another life waits until all know that it has restarted",
           "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
