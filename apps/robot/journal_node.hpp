@@ -45,6 +45,9 @@ class JournalNode final : public Node {
               const RestoredRun* restored, const JournalTopics& topics);
   ~JournalNode() override { stop(); }
 
+  /// Writes that this process has the run: no later one takes itself for it. Call before start().
+  void begin() { step(Tick()); }
+
   /// True while a keyframe waits for the disk. Thread-safe.
   [[nodiscard]] bool holds_back() const { return new_keyframes_ > 0; }
 

@@ -30,6 +30,12 @@ void forward(In<T> from, Out<T> to) {
   from.subscribe([to](const auto& message) { to.publish(message); });
 }
 
+// A run that is taken up goes on with its life.
+std::uint64_t boot_of(const RobotInput& input) {
+  const bool goes_on = input.restored && !std::holds_alternative<PastRun>(input.source);
+  return goes_on ? next_boot(input.restored->boot) : random_boot_id();
+}
+
 }  // namespace
 
 template <typename NodeType, typename... Arguments>
@@ -42,7 +48,7 @@ NodeType& Robot::add(bool feeds, Arguments&&... arguments) {
 
 Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput input,
              const std::optional<MappingPlan>& mapping, ResultWriter& results, SignalWatch& signals)
-    : identity_{.robot = options.robot, .name = options.name, .boot = random_boot_id()},
+    : identity_{.robot = options.robot, .name = options.name, .boot = boot_of(input)},
       seal_(make_team_seal(options.security, identity_)),
       participant_(config.dds, identity_, seal_),
       restored_(std::move(input.restored)),

@@ -79,8 +79,10 @@ class Robot {
   Robot(const RobotOptions& options, const RobotConfig& config, RobotInput input,
         const std::optional<MappingPlan>& mapping, ResultWriter& results, SignalWatch& signals);
 
-  /// Runs until the robot may leave its team, a node fails, or a signal.
+  /// Runs until the robot may leave its team, a node fails, or a signal. The folder of the results
+  /// is there.
   [[nodiscard]] RunResult run(const Supervisor::Finished& finished) {
+    if (journal_ != nullptr) journal_->begin();
     return supervisor_.run(finished);
   }
 

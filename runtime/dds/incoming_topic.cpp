@@ -267,7 +267,7 @@ void IncomingTopic::await_key(Filed filed, double now_s) {
 bool IncomingTopic::deliver_again(double now_s) {
   return sealed_.serve(now_s, [this](RobotId /*from*/, const Filed& filed, double waited_s) {
     if (deliver(filed) == Verdict::kTaken) return true;
-    if (claim.standing == Standing::kArriving || waited_s < kPatience_s) return false;
+    if (waited_s < kPatience_s) return false;
     refuse("sealed with a key that is not known");
     return true;
   }) > 0;

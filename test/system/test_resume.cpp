@@ -1,0 +1,213 @@
+#include <catch2/catch.hpp>
+
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <random>
+#include <thread>
+
+#include "test/support/process.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/system/team_run.hpp"
+
+// Robots that are killed at any moment and taken up; runs of the past that are joined.
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Part {
+  std::string robot;
+  std::string from_s;
+  std::string to_s;
+};
+
+// Two parts of the recording that see the same places.
+const Part kFirst{"0", "0", "12"};
+const Part kSecond{"1", "5", "17"};
+
+std::vector<std::string> command_of(const Part& part, const fs::path& dataset, int domain,
+                                    const std::string& rate = "max") {
+  return {std::string(KM_BIN_DIR) + "/kimera_multi_robot",
+          "--config",
+          "config/datasets/euroc.yaml",
+          "--robot",
+          part.robot,
+          "--dataset",
+          dataset.string(),
+          "--from",
+          part.from_s,
+          "--to",
+          part.to_s,
+          "--rate",
+          rate,
+          "--domain",
+          std::to_string(domain),
+          "--serve-limit",
+          "100"};
+}
+
+std::vector<std::string> with(std::vector<std::string> command, const std::string& option,
+                              const fs::path& value) {
+  command.insert(command.end(), {option, value.string()});
+  return command;
+}
+
+// How often robots are killed; KIMERA_MULTI_KILLS makes it more.
+int kills() {
+  const char* const wanted = std::getenv("KIMERA_MULTI_KILLS");
+  return wanted == nullptr ? 3 : std::atoi(wanted);
+}
+
+std::uintmax_t size_of(const fs::path& file) {
+  std::error_code none;
+  const std::uintmax_t size = fs::file_size(file, none);
+  return none ? 0 : size;
+}
+
+// True once the journal has grown by so much; false if the process has ended its input before.
+bool grows_by(const fs::path& folder, std::uintmax_t bytes) {
+  const fs::path journal = folder / "run.journal";
+  const std::uintmax_t goal = size_of(journal) + bytes;
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (size_of(journal) < goal) {
+    if (fs::exists(folder / "summary.json") || std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return true;
+}
+
+std::size_t lines_of(const fs::path& file) {
+  std::ifstream in(file);
+  return static_cast<std::size_t>(std::count(std::istreambuf_iterator<char>(in), {}, '\n'));
+}
+
+// Position error after alignment, of all estimates in one frame [m].
+double error_m(const fs::path& dataset, const std::vector<fs::path>& estimates,
+               const TemporaryFolder& folder) {
+  std::string command =
+      std::string(KM_BIN_DIR "/kimera_multi_evaluate trajectory --truth ") +
+      (dataset / "mav0/state_groundtruth_estimate0/groundtruth_tum.txt").string() + " --json " +
+      (folder.path() / "error.json").string() + " --estimate";
+  for (const fs::path& estimate : estimates) command += ' ' + estimate.string();
+  const CommandResult result = run_command(command);
+  CAPTURE(result.output);
+  REQUIRE(result.exit_code == 0);
+  return read_json(folder.path() / "error.json")["joint"]["position_m"]["rmse"].get<double>();
+}
+
+TEST_CASE("A robot that is killed again and again loses nothing", "[system][resume]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const auto command = command_of(kFirst, *dataset, random_domain());
+  const fs::path output = folder.path() / "killed";
+  {
+    Process whole(with(command, "--output", folder.path() / "whole"));
+    REQUIRE(whole.wait() == 0);
+  }
+  const std::uintmax_t journal = size_of(folder.path() / "whole/run.journal");
+  std::mt19937 rng(1);
+  for (int k = 0; k < kills(); ++k) {
+    Process victim(with(command, k == 0 ? "--output" : "--resume", output));
+    const auto share = static_cast<std::uintmax_t>(2 * kills());
+    if (!grows_by(output, k == 0 ? 1 : rng() % (journal / share))) break;
+    victim.kill(SIGKILL);
+    victim.wait();
+  }
+  Process last(with(command, "--resume", output));
+  CHECK(last.wait() == 0);
+  CHECK(lines_of(output / "odometry.tum") == lines_of(folder.path() / "whole/odometry.tum"));
+  const double whole_m = error_m(*dataset, {folder.path() / "whole/optimized.tum"}, folder);
+  const double killed_m = error_m(*dataset, {output / "optimized.tum"}, folder);
+  CAPTURE(whole_m, killed_m);
+  // Each start knows the biases of the sensors anew: a millimetre here.
+  CHECK(killed_m < whole_m + 2e-3);
+}
+
+TEST_CASE("A robot that is killed and taken up is in its team as before", "[system][resume]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const int domain = random_domain();
+  const Part& killed = GENERATE(kFirst, kSecond);
+  const Part& other = killed.robot == kFirst.robot ? kSecond : kFirst;
+  CAPTURE(killed.robot);
+  const fs::path survivor_output = folder.path() / "survivor", output = folder.path() / "killed";
+  Process survivor(with(command_of(other, *dataset, domain, "2"), "--output", survivor_output));
+  const auto command = command_of(killed, *dataset, domain, "2");
+  {
+    Process victim(with(command, "--output", output));
+    REQUIRE(grows_by(output, 300'000));
+    victim.kill(SIGKILL);
+    victim.wait();
+  }
+  Process resumed(with(command, "--resume", output));
+  CHECK(resumed.wait() == 0);
+  CHECK(survivor.wait() == 0);
+  for (const fs::path& folder_of_one : {survivor_output, output}) {
+    const RunSummary summary = read_summary(folder_of_one / "summary.json");
+    CHECK(summary.pgo.members == std::vector<RobotId>{0, 1});
+    CHECK(summary.exit_reason == "all present robots have settled");
+  }
+  CHECK(error_m(*dataset, {survivor_output / "optimized.tum", output / "optimized.tum"}, folder) <
+        0.015);
+}
+
+TEST_CASE("A robot finds itself in the map of a run of the past", "[system][resume]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const fs::path yesterday = folder.path() / "yesterday", today = folder.path() / "today";
+  {
+    Part first = kFirst;
+    first.robot = "7";
+    Process mapping(with(command_of(first, *dataset, random_domain()), "--output", yesterday));
+    REQUIRE(mapping.wait() == 0);
+  }
+  const int domain = random_domain();
+  const fs::path silent_output = folder.path() / "silent";
+  Process silent({std::string(KM_BIN_DIR) + "/kimera_multi_robot", "--robot", "0", "--session",
+                  yesterday.string(), "--domain", std::to_string(domain), "--output",
+                  silent_output.string()});
+  Process robot(with(command_of(kSecond, *dataset, domain), "--output", today));
+  CHECK(robot.wait() == 0);
+  CHECK(silent.wait() == 0);
+  CHECK(read_summary(today / "summary.json").pgo.members == std::vector<RobotId>{0, 1});
+  CHECK(lines_of(silent_output / "optimized.tum") == lines_of(yesterday / "optimized.tum"));
+  CHECK(error_m(*dataset, {silent_output / "optimized.tum", today / "optimized.tum"}, folder) <
+        0.015);
+}
+
+TEST_CASE("Journals that cannot be gone on with are refused by name", "[system][resume]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const fs::path output = folder.path() / "run";
+  Part part{"3", "0", "2.5"};
+  {
+    Process robot(with(command_of(part, *dataset, random_domain()), "--output", output));
+    REQUIRE(robot.wait() == 0);
+  }
+  const auto refused = [&](const std::string& arguments, const std::string& why) {
+    const CommandResult result = run_command(KM_BIN_DIR "/kimera_multi_robot " + arguments);
+    CAPTURE(arguments, result.output);
+    CHECK(result.exit_code == 1);
+    CHECK(result.output.find("run.journal: " + why) != std::string::npos);
+  };
+  const std::string data = " --dataset " + dataset->string();
+  refused("--robot 4 --resume " + output.string() + data, "is of robot 3 on MH_01_easy");
+  fs::create_directory_symlink(*dataset, folder.path() / "other");
+  refused(
+      "--robot 3 --resume " + output.string() + " --dataset " + (folder.path() / "other").string(),
+      "is of robot 3 on MH_01_easy");
+  const fs::path notes = folder.write("notes/run.journal", "Dear diary").parent_path();
+  refused("--robot 3 --resume " + notes.string() + data, "is no journal");
+  const std::string out = " --output " + (folder.path() / "out").string();
+  refused("--robot 3 --session " + notes.string() + out, "is no journal");
+  refused("--robot 3 --session " + folder.path().string() + out, "no such file");
+}
+
+}  // namespace
+}  // namespace km
