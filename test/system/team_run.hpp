@@ -47,15 +47,16 @@ struct TeamRun {
 };
 
 /// Runs a team file on `dataset` as fast as it can, in a random DDS domain (the program draws it).
-/// Results go to `folder`. `options` of the program come in addition.
+/// Results go to `folder`. `options` of the program, and of its robots, come in addition.
 inline TeamRun run_team(const std::filesystem::path& team, const std::filesystem::path& dataset,
-                        const TemporaryFolder& folder, const std::string& options = {}) {
+                        const TemporaryFolder& folder, const std::string& options = {},
+                        const std::string& robot_options = {}) {
   const std::filesystem::path json = folder.path() / "team.json";
   TeamRun run;
   run.result = run_command(std::string(KM_BIN_DIR "/kimera_multi_team --config ") + team.string() +
                            " --dataset " + dataset.string() + " --rate max --output " +
                            folder.path().string() + " --json " + json.string() + ' ' + options +
-                           " -- --serve-limit 1000");  // sanitizers are slow
+                           " -- --serve-limit 1000 " + robot_options);  // sanitizers are slow
   if (run.result.exit_code == 0) run.json = read_json(json);
   return run;
 }
