@@ -17,6 +17,7 @@ using Face = LabelledMesh::Face;
 
 constexpr double kFarthest_steps = 1U << 30U;  // so that the sum of three fits 64 bits by far
 constexpr std::int64_t kMaxOffset = std::numeric_limits<std::uint16_t>::max();
+constexpr std::int64_t kThirdOfMaxOffset = kMaxOffset / 3;
 
 std::vector<GridPoint> quantise(const std::vector<Eigen::Vector3f>& vertices, double step_m) {
   std::vector<GridPoint> points;
@@ -66,7 +67,7 @@ class Splitter {
       const auto [low, high] =
           std::minmax({points_[face[0]][axis], points_[face[1]][axis], points_[face[2]][axis]});
       // A third of the range: two such faces of one cell of at most that size fit together.
-      if (std::int64_t{high} - low > kMaxOffset / 3) return false;
+      if (std::int64_t{high} - low > kThirdOfMaxOffset) return false;
     }
     return true;
   }
@@ -164,7 +165,7 @@ class Splitter {
 void check(const LabelledMesh& mesh, const ChunkGrid& grid) {
   // Faces reach up to a third of the range of offsets beyond their cell on both sides.
   if (!(grid.step_m > 0.0) || !(grid.cell_m > grid.step_m) ||
-      !(grid.cell_m / grid.step_m <= static_cast<double>(kMaxOffset / 3)))
+      !(grid.cell_m / grid.step_m <= static_cast<double>(kThirdOfMaxOffset)))
     throw std::invalid_argument("mesh chunks: cells of " + std::to_string(grid.cell_m) +
                                 " m in steps of " + std::to_string(grid.step_m) + " m");
   if (!mesh.labels.empty() && mesh.labels.size() != mesh.vertices.size())
