@@ -11,6 +11,7 @@ std::vector<PeerQuery> PeerHistory::add(std::uint32_t index, BowVector vector) {
   const auto [added, is_new] = keyframes_.try_emplace(index, nullptr);
   if (!is_new) return released;
   added->second = std::make_shared<const BowVector>(std::move(vector));
+  kept_.insert(index);
   deadlines_[index] = keyframes_.size() + max_waiting_;
 
   for (auto waiting = deadlines_.begin(); waiting != deadlines_.end();) {
@@ -23,6 +24,7 @@ std::vector<PeerQuery> PeerHistory::add(std::uint32_t index, BowVector vector) {
     waiting = deadlines_.erase(waiting);
     released.push_back(release(keyframe));
   }
+  forget_oldest_gaps();
   return released;
 }
 
@@ -34,7 +36,8 @@ bool PeerHistory::follows_its_predecessor(Keyframes::const_iterator keyframe) co
 PeerQuery PeerHistory::release(Keyframes::iterator keyframe) {
   PeerQuery query{keyframe->first, keyframe->second, nullptr};
   if (keyframe != keyframes_.begin()) {
-    // The nearest earlier keyframe still has its vector: only its successor frees it.
+    // The nearest earlier keyframe still has its vector, unless there are too many gaps: only its
+    // successor frees it.
     const auto before = std::prev(keyframe);
     query.previous = before->second;
     forget_if_done(before);
@@ -46,9 +49,24 @@ PeerQuery PeerHistory::release(Keyframes::iterator keyframe) {
 void PeerHistory::forget_if_done(Keyframes::iterator keyframe) {
   const auto after = std::next(keyframe);
   const bool successor_is_known = after != keyframes_.end() && follows_its_predecessor(after);
-  if (successor_is_known && !deadlines_.contains(keyframe->first) &&
-      !deadlines_.contains(after->first))
-    keyframe->second.reset();
+  if (!successor_is_known || deadlines_.contains(keyframe->first) ||
+      deadlines_.contains(after->first))
+    return;
+  keyframe->second.reset();
+  kept_.erase(keyframe->first);
+}
+
+// What waits is kept: of that there is not more than may wait.
+void PeerHistory::forget_oldest_gaps() {
+  for (auto oldest = kept_.begin();
+       kept_.size() > kMaxGaps + deadlines_.size() && oldest != kept_.end();) {
+    if (deadlines_.contains(*oldest)) {
+      ++oldest;
+      continue;
+    }
+    keyframes_.at(*oldest).reset();
+    oldest = kept_.erase(oldest);
+  }
 }
 
 }  // namespace km

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <set>
 #include <vector>
 
 #include "modules/place_recognition/bag_of_words.hpp"
@@ -22,10 +23,14 @@ struct PeerQuery {
 /// A query is normalised by the keyframe before it, but messages arrive in any order, and a peer
 /// that was out of reach delivers its history in a burst. A keyframe whose predecessor is missing
 /// waits for it while `max_waiting` further keyframes arrive; then the nearest earlier keyframe
-/// stands in. Keyframe 0, and one before which nothing has arrived by then, have no normaliser.
-/// What stays in memory are vectors that may still be needed: one per gap, and the newest.
+/// stands in. Keyframe 0, one before which nothing has arrived by then, and one in a gap that is
+/// forgotten have no normaliser.
+/// What stays in memory are vectors that may still be needed: one per gap, of the kMaxGaps newest
+/// gaps, and the newest.
 class PeerHistory {
  public:
+  static constexpr std::size_t kMaxGaps = 1000;
+
   explicit PeerHistory(std::size_t max_waiting) : max_waiting_(max_waiting) {}
 
   /// Takes keyframe `index`. Returns the queries that became possible, by ascending index. Each
@@ -43,10 +48,12 @@ class PeerHistory {
   using Keyframes = std::map<std::uint32_t, Vector>;
   PeerQuery release(Keyframes::iterator keyframe);
   void forget_if_done(Keyframes::iterator keyframe);
+  void forget_oldest_gaps();
   bool follows_its_predecessor(Keyframes::const_iterator keyframe) const;
 
   std::size_t max_waiting_;
   Keyframes keyframes_;                             // null once it and its successor are released
+  std::set<std::uint32_t> kept_;                    // of keyframes_, those that are not null
   std::map<std::uint32_t, std::size_t> deadlines_;  // of waiting keyframes, in keyframes_.size()
 };
 

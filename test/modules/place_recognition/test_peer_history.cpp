@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <memory>
 #include <numeric>
 #include <random>
 
@@ -101,6 +102,29 @@ TEST_CASE("A repeated keyframe is ignored", "[place_recognition]") {
   CHECK_FALSE(history.has(2));
   CHECK(history.add(~0U, vector_of(7)).empty());  // waits; its successor would be 0
   CHECK(history.add(2, vector_of(2)).size() == 1);
+}
+
+TEST_CASE("Of endless gaps only the newest are remembered", "[place_recognition]") {
+  PeerHistory history(0);
+  constexpr std::uint32_t kGaps = 3 * PeerHistory::kMaxGaps;
+  std::vector<std::weak_ptr<const BowVector>> vectors;
+  for (std::uint32_t k = 0; k < kGaps; ++k)
+    for (const PeerQuery& query : history.add(2 * k, vector_of(2 * k)))
+      vectors.push_back(query.vector);
+  CHECK(vectors.size() + 1 >= kGaps);  // the last one waits for its turn
+  const auto kept = std::ranges::count_if(vectors, [](const auto& v) { return !v.expired(); });
+  CHECK(kept <= static_cast<std::ptrdiff_t>(PeerHistory::kMaxGaps) + 1);
+  CHECK(vectors.front().expired());
+  CHECK_FALSE(vectors.back().expired());
+  // In a gap that is forgotten a keyframe is searched for by itself, in one that is not beside the
+  // one before it.
+  const auto in_old_gap = history.add(1, vector_of(1));
+  const auto in_new_gap = history.add(2 * kGaps - 5, vector_of(2 * kGaps - 5));
+  std::map<std::uint32_t, bool> has_previous;
+  for (const auto* queries : {&in_old_gap, &in_new_gap})
+    for (const PeerQuery& query : *queries) has_previous[query.index] = query.previous != nullptr;
+  CHECK_FALSE(has_previous.at(1));
+  CHECK(has_previous.at(2 * kGaps - 5));
 }
 
 }  // namespace
