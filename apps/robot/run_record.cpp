@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "modules/core/odometry_correction.hpp"
+#include "modules/pose_graph/own_graph.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
 
 namespace km {
@@ -33,7 +34,12 @@ void RunRecord::add(const Closure& closure) {
   if (closure.from.id.robot != robot_ && closure.to.id.robot != robot_) return;
   const auto edge = pose_edge(closure.relative_pose());
   if (!edge) return;  // the optimiser refuses it, too
-  const auto [known, is_new] = closures_.try_emplace(closure.id(), closure);
+  const ClosureId id = closure.id();
+  const RobotId other = id.from.robot == robot_ ? id.to.robot : id.from.robot;
+  if (other != robot_ && closures_to_[other] >= OwnGraph::kMaxClosures && !closures_.contains(id))
+    return;
+  const auto [known, is_new] = closures_.try_emplace(id, closure);
+  closures_to_[other] += is_new ? 1 : 0;
   if (!is_new && is_better(*edge, *pose_edge(known->second.relative_pose())))
     known->second = closure;
 }

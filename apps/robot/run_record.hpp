@@ -84,7 +84,8 @@ class RunRecord {
   /// State of the optimiser after each round.
   [[nodiscard]] const std::vector<OptimizerProgress>& rounds() const { return rounds_; }
 
-  /// Closures that touch this robot, with what was measured, by whichever of its ends.
+  /// Closures that touch this robot, with what was measured, by whichever of its ends: to each
+  /// other robot as many as the optimiser keeps.
   [[nodiscard]] const std::map<ClosureId, Closure>& closures() const { return closures_; }
 
   /// Closures of this robot that are inliers, with its own and its peers' measurements.
@@ -109,6 +110,7 @@ class RunRecord {
   std::map<std::uint32_t, double> median_depths_m_;  // by keyframe
   std::size_t keypoints_ = 0;
   std::map<ClosureId, Closure> closures_;
+  std::map<RobotId, std::size_t> closures_to_;  // by the other robot; of `closures_`
   std::map<std::pair<RobotId, RobotId>, InlierSet> inlier_sets_;
   std::set<ClosureId> rejected_;  // by the optimiser, of the inlier sets
   std::map<ClosureId, ClosureOutcome> outcomes_;

@@ -71,16 +71,31 @@ bool OwnGraph::add(const Closure& closure) {
   if (!touches || id.from == id.to) return false;
   const auto edge = pose_edge(closure.relative_pose());
   if (!edge) return false;
+  if (is_full(id)) return false;
+  const RobotId peer = peer_of(id);
   const auto [known, is_new] = closures_.try_emplace(id, *edge);
-  if (!is_new) {
+  if (is_new) {
+    ++closures_to_[peer];
+  } else {
     if (!is_better(*edge, known->second)) return false;
     known->second = *edge;
-    const auto sets = sets_.find(id.from.robot == self_ ? id.to.robot : id.from.robot);
+    const auto sets = sets_.find(peer);
     if (sets != sets_.end())
       sets->second.changed |= std::ranges::binary_search(sets->second.newest.closures, id);
   }
   complete_sets();
   return true;
+}
+
+RobotId OwnGraph::peer_of(const ClosureId& id) const {
+  return id.from.robot == self_ ? id.to.robot : id.from.robot;
+}
+
+bool OwnGraph::is_full(const ClosureId& id) const {
+  const RobotId peer = peer_of(id);
+  const auto known = closures_to_.find(peer);
+  return peer != self_ && known != closures_to_.end() && known->second >= kMaxClosures &&
+         !closures_.contains(id);
 }
 
 bool OwnGraph::add(const InlierSet& set) {
@@ -105,6 +120,7 @@ bool OwnGraph::add(const InlierSet& set) {
 
 void OwnGraph::forget(RobotId peer) {
   sets_.erase(peer);
+  closures_to_.erase(peer);
   std::erase_if(closures_, [&](const auto& closure) {
     return closure.first.from.robot == peer || closure.first.to.robot == peer;
   });

@@ -26,15 +26,20 @@ class OwnGraph {
  public:
   explicit OwnGraph(RobotId self) : self_(self) {}
 
+  /// Closures to one peer; more are not taken.
+  static constexpr std::size_t kMaxClosures = 10000;
+
   /// False, and ignored, unless it is this robot's next keyframe.
   /// Throws std::invalid_argument if its pose, covariance or vertical is not usable.
   bool add(const KeyframeOdometry& keyframe);
-  /// False, and ignored, if it does not touch this robot, has no usable covariance, or is no better
-  /// than what is known of its pair of keyframes.
+  /// False, and ignored, if it does not touch this robot, has no usable covariance, is no better
+  /// than what is known of its pair of keyframes, or is one too many: see is_full().
   bool add(const Closure& closure);
   /// False, and ignored, if it does not concern this robot, is not newer than what is known, or
   /// names closures that are not between its robots.
   bool add(const InlierSet& set);
+  /// True if there is no room for this closure: it is not known, and kMaxClosures to its peer are.
+  [[nodiscard]] bool is_full(const ClosureId& id) const;
   /// Forgets a robot that has been restarted: its keyframes are others now.
   void forget(RobotId peer);
 
@@ -74,6 +79,7 @@ class OwnGraph {
     std::vector<EdgeSet> complete;  // newest first
   };
 
+  [[nodiscard]] RobotId peer_of(const ClosureId& id) const;
   void complete_sets();
   bool complete(Sets& sets) const;
 
@@ -84,7 +90,8 @@ class OwnGraph {
   std::vector<PoseEdge> odometry_;
   std::vector<VerticalPrior> verticals_;
   std::map<ClosureId, PoseEdge> closures_;
-  std::map<RobotId, Sets> sets_;  // by peer; `self_`: inside this robot
+  std::map<RobotId, std::size_t> closures_to_;  // by peer; of `closures_`
+  std::map<RobotId, Sets> sets_;                // by peer; `self_`: inside this robot
 };
 
 }  // namespace km

@@ -91,6 +91,10 @@ bool TeamAgent::add(const Closure& closure) {
   if (!taken && touches(id, self_.robot) &&
       (id.from == id.to || !pose_edge(closure.relative_pose())))
     return refuse("a closure that has no usable pose or covariance");
+  if (!taken && touches(id, self_.robot) && graph_.is_full(id))
+    return refuse("closures of robots " + std::to_string(id.from.robot) + " and " +
+                  std::to_string(id.to.robot) + " beyond the " +
+                  std::to_string(OwnGraph::kMaxClosures) + " that are kept");
   return taken;
 }
 

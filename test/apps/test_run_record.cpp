@@ -2,6 +2,7 @@
 
 #include "apps/robot/results.hpp"
 #include "apps/robot/run_record.hpp"
+#include "modules/pose_graph/own_graph.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -43,6 +44,15 @@ TEST_CASE("what the optimiser rejects is no inlier, until it takes it back", "[r
   CHECK(outcomes[1].stage == ClosureStage::kInlier);
   CHECK(outcomes[1].reason.empty());
   CHECK(record.inlier_closures().size() == 2);
+}
+
+TEST_CASE("closures to one robot are recorded up to a bound", "[robot]") {
+  RunRecord record(1);
+  constexpr auto kMost = static_cast<KeyframeIndex>(OwnGraph::kMaxClosures);
+  for (KeyframeIndex i = 0; i <= kMost; ++i) record.add(closure_between({{1, 0}, {2, i}}));
+  record.add(closure_between({{1, 0}, {3, 0}}));
+  CHECK(record.closures().size() == kMost + 1);
+  CHECK_FALSE(record.closures().contains({{1, 0}, {2, kMost}}));
 }
 
 TEST_CASE("of two measurements of a pair of keyframes the optimiser's is recorded", "[robot]") {

@@ -154,6 +154,20 @@ TEST_CASE("what does not concern a robot, or cannot be weighed, is ignored", "[o
   CHECK(graph.own_edges().size() == 2);
 }
 
+TEST_CASE("of one peer's closures no more are kept than there is room for", "[own_graph]") {
+  OwnGraph graph = graph_of(5, 1);
+  constexpr auto kMost = static_cast<std::uint32_t>(OwnGraph::kMaxClosures);
+  for (std::uint32_t i = 0; i < kMost; ++i) REQUIRE(graph.add(measured({9, i}, {5, 0})));
+  CHECK(graph.is_full(ClosureId{{5, 0}, {9, kMost}}));
+  CHECK_FALSE(graph.is_full(ClosureId{{5, 0}, {9, 7}}));  // is known
+  CHECK_FALSE(graph.add(measured({9, kMost}, {5, 0})));
+  CHECK(graph.add(measured({9, 7}, {5, 0}, 0.5)));  // better than what is known
+  CHECK_FALSE(graph.is_full(ClosureId{{5, 0}, {8, kMost}}));
+  CHECK(graph.add(measured({8, kMost}, {5, 0})));
+  graph.forget(9);
+  CHECK(graph.add(measured({9, kMost}, {5, 0})));
+}
+
 TEST_CASE("closures inside the robot join its own edges", "[own_graph]") {
   OwnGraph graph = graph_of(5, 4);
   const std::uint32_t before = graph.revision();

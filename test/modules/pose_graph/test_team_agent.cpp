@@ -312,6 +312,24 @@ TEST_CASE("what is refused is counted and told", "[pose_graph][agent]") {
   CHECK(agent.step(0.2).notices.empty());  // the third time
 }
 
+TEST_CASE("closures beyond what is kept of one robot are told, repeated ones are not",
+          "[pose_graph][agent]") {
+  TeamAgent agent({}, {7, 1}, gather());
+  Closure closure;
+  closure.to.id = {7, 0};
+  const auto add = [&](std::size_t number) {
+    closure.from.id = {33, static_cast<KeyframeIndex>(number)};
+    return agent.add(closure);
+  };
+  for (std::size_t i = 0; i < OwnGraph::kMaxClosures; ++i) REQUIRE(add(i));
+  CHECK_FALSE(add(0));
+  CHECK(agent.step(0.0).notices.empty());
+  CHECK_FALSE(add(OwnGraph::kMaxClosures));
+  const TeamOutput output = agent.step(0.1);
+  REQUIRE(output.notices.size() == 1);
+  CHECK_THAT(output.notices.front(), Catch::Contains("closures of robots 7 and 33 beyond"));
+}
+
 TEST_CASE("messages that lie are refused or do no lasting harm", "[pose_graph][agent]") {
   const unsigned seed = GENERATE(range(1U, 7U));
   CAPTURE(seed);
