@@ -15,6 +15,20 @@ constexpr double kMaxPatience = 16.0;
 // Copies of letters that are remembered per pair of robots: older ones are taken for seen.
 constexpr std::size_t kRememberedCopies = 256;
 
+// What a message that is told to all takes in memory.
+std::size_t bytes_of(const TeamMessage& message) {
+  const auto bytes = [](const auto&... lists) {
+    return (sizeof(TeamMessage) + ... +
+            (lists.size() * sizeof(typename std::decay_t<decltype(lists)>::value_type)));
+  };
+  if (const auto* status = std::get_if<TeamStatus>(&message))
+    return bytes(status->hears, status->offers);
+  if (const auto* session = std::get_if<Session>(&message))
+    return bytes(session->plan.members, session->plan.pairs);
+  const auto& poses = std::get<MemberPoses>(message);
+  return bytes(poses.keyframes, poses.T_frame_kf, poses.verdicts);
+}
+
 // Of what is told to all.
 std::uint32_t number_of(const TeamMessage& message) {
   return std::visit([](const auto& m) { return m.number; }, message);
@@ -25,6 +39,8 @@ std::uint32_t number_of(const TeamMessage& message) {
 void Relay::meet(const TeamPeer& peer) {
   const auto [known, is_new] = origins_.try_emplace(peer.robot, Origin{peer.boot});
   if (is_new || known->second.boot == peer.boot) return;
+  for (const auto& held : known->second.newest)
+    if (held) held_from_[held->from] -= held->bytes;
   known->second = Origin{peer.boot};
   for (auto& [robot, neighbour] : direct_)
     std::erase_if(neighbour.served,
@@ -179,7 +195,7 @@ Arrival Relay::receive(RobotId from, const TeamMessagePtr& message, double now_s
   std::optional<Held>& held = origins_.at(sender.robot).newest[kind];
   const bool newer = !held || held->number < number;
   if (newer) {
-    held = Held{message, number, now_s};
+    if (!hold(held, {message, number, now_s, from, bytes_of(*message)})) return Arrival::kNoRoom;
     if (const auto* status = std::get_if<TeamStatus>(message.get())) tell_links(*status);
   }
   if (const auto neighbour = direct_.find(from); neighbour != direct_.end()) {
@@ -192,6 +208,17 @@ Arrival Relay::receive(RobotId from, const TeamMessagePtr& message, double now_s
   if (!newer) return Arrival::kRepeated;
   pass_on(from, sender.robot, kind, now_s);
   return Arrival::kNew;
+}
+
+// False if there is no room for what is newer.
+bool Relay::hold(std::optional<Held>& held, Held newer) {
+  std::size_t& bytes = held_from_[newer.from];
+  const std::size_t freed = held && held->from == newer.from ? held->bytes : 0;
+  if (bytes - freed + newer.bytes > kMaxHeldFromOne) return false;
+  if (held) held_from_[held->from] -= held->bytes;
+  bytes += newer.bytes;
+  held = std::move(newer);
+  return true;
 }
 
 void Relay::pass_on(RobotId from, RobotId origin, std::size_t kind, double now_s) {

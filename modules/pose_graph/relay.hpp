@@ -24,6 +24,7 @@ enum class [[nodiscard]] Arrival{
     kPassedOn,  ///< A letter to another robot.
     kLost,      ///< A letter to a robot that no links lead to, or one that has gone in a circle.
     kRefused,   ///< Of another process of its robot than the one that is known, or one too many.
+    kNoRoom,    ///< The robot that hands it over has made this one hold too much already.
 };
 
 /// One robot's part in carrying the team's messages over whatever links there are.
@@ -47,6 +48,10 @@ class Relay {
   /// A link that has gone is told for so long as if it were still there [s]: many come back at
   /// once, and nobody else needs to know.
   static constexpr double kPatience_s = 3.0;
+
+  /// Of all that one robot hands over so much is held [octets in memory]; what is beyond is not
+  /// taken. Statuses, sessions and public poses of a thousand keyframes of a hundred robots fit.
+  static constexpr std::size_t kMaxHeldFromOne = 8U << 20U;
 
   /// `peer` is heard directly from now on, or no more.
   void link_up(TeamPeer peer, double now_s);
@@ -84,6 +89,8 @@ class Relay {
     TeamMessagePtr message;
     std::uint32_t number = 0;
     double learned_s = 0.0;
+    RobotId from = 0;       // who has handed it over
+    std::size_t bytes = 0;  // none of this robot's own
   };
   struct Origin {
     std::uint64_t boot = 0;
@@ -107,6 +114,7 @@ class Relay {
   };
 
   [[nodiscard]] bool accepts(const TeamPeer& origin);
+  [[nodiscard]] bool hold(std::optional<Held>& held, Held newer);
   [[nodiscard]] bool heard_by_someone(const TeamPeer& peer) const;
   void meet(const TeamPeer& peer);
   void tell_links(const TeamStatus& status);
@@ -126,6 +134,7 @@ class Relay {
     std::uint64_t boot = 0;
     double since_s = 0.0;
   };
+  std::map<RobotId, std::size_t> held_from_;  // octets, by who has handed them over
   std::map<RobotId, Neighbour> direct_;
   std::map<RobotId, Gone> gone_;                          // from there, not longer than kPatience_s
   std::map<std::pair<RobotId, RobotId>, Passed> passed_;  // by sender and addressee

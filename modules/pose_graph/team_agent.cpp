@@ -166,6 +166,9 @@ bool TeamAgent::receive(RobotId from, const TeamMessagePtr& message) {
     case Arrival::kRefused:
       return refuse("a message of robot " + std::to_string(sender.robot) +
                     " by another process than the one that is known");
+    case Arrival::kNoRoom:
+      return refuse("what robot " + std::to_string(from) +
+                    " hands over beyond what is held of one robot");
     case Arrival::kRepeated:
     case Arrival::kPassedOn:
     case Arrival::kLost:

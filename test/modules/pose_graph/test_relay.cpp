@@ -218,6 +218,26 @@ TEST_CASE("robots that are made up fill no more room than a team takes", "[pose_
   CHECK(relay.receive(4000, std::make_shared<const TeamMessage>(status), 0.0) == Arrival::kNew);
 }
 
+TEST_CASE("what one robot hands over does not use up the room for what others do",
+          "[pose_graph][relay]") {
+  Relays team({{1, 2}, {1, 3}});
+  Relay& relay = team.at(1);
+  const auto poses_of = [](TeamPeer sender, std::uint32_t number, std::size_t size) {
+    MemberPoses poses{.sender = sender, .number = number};
+    poses.keyframes.resize(size);
+    return std::make_shared<const TeamMessage>(std::move(poses));
+  };
+  constexpr std::size_t kLarge = Relay::kMaxHeldFromOne / sizeof(KeyframeIndex) / 3;
+  CHECK(relay.receive(2, poses_of({100, 1}, 1, kLarge), 0.0) == Arrival::kNew);
+  CHECK(relay.receive(2, poses_of({101, 1}, 1, kLarge), 0.0) == Arrival::kNew);
+  CHECK(relay.receive(2, poses_of({102, 1}, 1, kLarge), 0.0) == Arrival::kNoRoom);
+  CHECK(relay.receive(3, poses_of({102, 1}, 1, kLarge), 0.0) == Arrival::kNew);
+  // What is newer takes the place of what was there.
+  CHECK(relay.receive(2, poses_of({101, 1}, 2, kLarge), 0.0) == Arrival::kNew);
+  CHECK(relay.receive(2, poses_of({101, 1}, 3, 1), 0.0) == Arrival::kNew);
+  CHECK(relay.receive(2, poses_of({103, 1}, 1, kLarge), 0.0) == Arrival::kNew);
+}
+
 TEST_CASE("a link that comes back at once has never been gone", "[pose_graph][relay]") {
   Relays relays({{1, 2}, {2, 3}});
   const auto version = relays.at(2).links_version();
