@@ -34,8 +34,8 @@ struct RobotMesh {
 /// one that restarts begins anew with its first chunk. Not thread-safe.
 class TeamMesh {
  public:
-  /// About 13 million vertices; a hostile peer gets no more.
-  static constexpr std::size_t kMaxBytesPerRobot = std::size_t{256} << 20U;
+  /// About 2 million vertices with their faces; a hostile peer gets no more.
+  static constexpr std::size_t kMaxBytesPerRobot = std::size_t{40} << 20U;
 
   explicit TeamMesh(std::size_t max_bytes_per_robot = kMaxBytesPerRobot)
       : max_bytes_per_robot_(max_bytes_per_robot) {}
