@@ -107,11 +107,23 @@ TEST_CASE("A robot whose id is taken says so and ends, and who had it first goes
   if (!dataset) return;
   const TemporaryFolder folder;
   const int domain = random_domain();
+  const bool with_keys = GENERATE(false, true);
+  CAPTURE(with_keys);
+  std::vector<std::string> keys;
+  if (with_keys) {
+    const fs::path team = folder.path() / "team";
+    REQUIRE(run_command(KM_BIN_DIR "/kimera_multi_keys make " + team.string() + " --robots r7:7")
+                .exit_code == 0);
+    keys = {"--security", (team / "r7").string()};
+  }
   auto command = robot_command("7", *dataset, folder.path() / "a", domain);
+  command.insert(command.end(), keys.begin(), keys.end());
+  auto same_id = robot_command("7", *dataset, folder.path() / "b", domain);
+  same_id.insert(same_id.end(), keys.begin(), keys.end());
   command.insert(command.end(), {"--to", "7.5"});
   Process incumbent(command);
   REQUIRE(incumbent.wait_until(is_past_start).has_value());
-  Process twin(robot_command("7", *dataset, folder.path() / "b", domain));
+  Process twin(same_id);
   CHECK(twin.wait() == 3);
   CHECK_THAT(read_summary(folder.path() / "b/summary.json").exit_reason,
              Catch::Contains("give every robot its own --robot"));
