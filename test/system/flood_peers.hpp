@@ -1,0 +1,127 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "modules/loop_closure/loop_closure_codec.hpp"
+#include "modules/mesh/mesh_codec.hpp"
+#include "modules/outlier_rejection/outlier_rejection_codec.hpp"
+#include "modules/place_recognition/place_recognition_codec.hpp"
+#include "modules/pose_graph/parcel_codec.hpp"
+#include "test/runtime/dds/dds_fixture.hpp"
+
+namespace km {
+
+/// The other end of all that a robot says and hears (Robot::add_network), with nothing behind it.
+struct FloodPeer {
+  /// `make_seal` may be empty: then it speaks in clear.
+  FloodPeer(const std::shared_ptr<const DdsDomain>& domain, const RobotIdentity& identity,
+            const TestRobot::MakeSeal& make_seal)
+      : participant(domain, identity, make_seal ? make_seal(identity) : nullptr),
+        bridge(participant),
+        status_node(
+            [identity] { return RobotStatus{.robot = identity.robot, .name = identity.name}; },
+            {.own = statuses.to_peers(), .peers = statuses.from_peers()}),
+        peer_events(bridge.peers().events()) {
+    using enum TopicKind;
+    constexpr auto kOther = TrafficCategory::kOther;
+    constexpr CrossingEnds kSpeaks{.receive = false};
+    bridge.exchange(statuses, kStatus, kOther);
+    bridge.exchange(bows, kEvent, kOther, kSpeaks);
+    bridge.exchange(requests, kRequest, kOther, kSpeaks);
+    bridge.exchange(replies, kRequest, kOther);
+    bridge.exchange(closures, kEvent, kOther, kSpeaks);
+    bridge.exchange(inlier_sets, kState, kOther, kSpeaks);
+    bridge.exchange(parcels, kRequest, kOther);
+    bridge.exchange(chunks, kState, kOther, kSpeaks);
+  }
+  ~FloodPeer() {
+    status_node.stop();
+    bridge.stop();
+  }
+
+  /// Subscribe before.
+  void start() {
+    bridge.start();
+    status_node.start();
+  }
+  [[nodiscard]] TeamPeer self() const {
+    return {participant.identity().robot, participant.identity().boot};
+  }
+  [[nodiscard]] bool hears(RobotId robot) {
+    return !peer_events
+                .wait_until([&](const auto& events) {
+                  return TestRobot::matching(events, PeerEventKind::kJoined, robot) > 0;
+                })
+                .empty();
+  }
+  [[nodiscard]] TrafficCount sent() const {
+    TrafficCount sum;
+    for (const TopicTraffic& t : bridge.traffic().topics)
+      if (t.direction == Direction::kOut) {
+        sum.messages += t.count.messages;
+        sum.bytes += t.count.bytes;
+      }
+    return sum;
+  }
+  [[nodiscard]] std::uint64_t bytes_from(RobotId robot) const {
+    std::uint64_t sum = 0;
+    for (const PeerTraffic& t : bridge.traffic().peers)
+      if (t.direction == Direction::kIn && t.peer == robot) sum += t.count.bytes;
+    return sum;
+  }
+
+  DdsParticipant participant;
+  Crossing<KeyframeBow> bows;
+  AddressedCrossing<KeyframeRequest> requests;
+  AddressedCrossing<KeyframeReply> replies;
+  AddressedCrossing<Closure> closures;
+  AddressedCrossing<InlierSet> inlier_sets;
+  AddressedCrossing<TeamParcel> parcels;
+  Crossing<MeshChunk> chunks;
+  Crossing<RobotStatus> statuses;
+  DdsBridge bridge;
+  RobotStatusNode status_node;
+  Inbox<PeerEvent> peer_events;
+};
+
+/// When numbered questions were asked, and how long their answers took. Thread-safe.
+class AnswerTimes {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  void asked(std::uint32_t number) {
+    const std::lock_guard lock(mutex_);
+    open_.emplace(number, Clock::now());
+  }
+  /// Of this question, and of those before it.
+  void answered(std::uint32_t number) {
+    const std::lock_guard lock(mutex_);
+    while (!open_.empty() && open_.begin()->first <= number) {
+      taken_s_.push_back(
+          std::chrono::duration<double>(Clock::now() - open_.begin()->second).count());
+      open_.erase(open_.begin());
+    }
+  }
+  [[nodiscard]] bool all_answered() const {
+    const std::lock_guard lock(mutex_);
+    return open_.empty();
+  }
+  /// Those since the last call [s], ascending.
+  [[nodiscard]] std::vector<double> take() {
+    const std::lock_guard lock(mutex_);
+    std::ranges::sort(taken_s_);
+    return std::exchange(taken_s_, {});
+  }
+
+ private:
+  mutable std::mutex mutex_;  // guards what follows
+  std::map<std::uint32_t, Clock::time_point> open_;
+  std::vector<double> taken_s_;
+};
+
+}  // namespace km

@@ -1,0 +1,434 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+#include <future>
+#include <iostream>
+#include <string>
+#include <thread>
+
+#include "apps/robot/robot_config.hpp"
+#include "modules/place_recognition/vocabulary_file.hpp"
+#include "modules/security/key_folder.hpp"
+#include "modules/security/team_folder.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/log.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/temporary_folder.hpp"
+#include "test/system/flood_peers.hpp"
+#include "test/system/long_run.hpp"
+
+// One robot of a team sends to a robot process as much of one kind as a fast radio link carries,
+// all of it well-formed; another asks that robot something twenty times a second. What the flood
+// costs: memory of the process, octets that it sends for each that it gets, and how long the other
+// waits.
+
+namespace km {
+namespace {
+
+constexpr RobotId kVictim = 3, kFlooder = 5, kLowFlooder = 2, kFriend = 4, kFar = 6;
+constexpr std::array<RobotId, 5> kTeam{kVictim, kFlooder, kLowFlooder, kFriend, kFar};
+constexpr std::uint32_t kWalk = 5000;  // keyframes of the victim
+
+constexpr double kMaxGrowth_MB = 64.0;
+constexpr double kMaxOutPerIn = 10.0;
+constexpr double kMaxP99_s = 0.2;
+constexpr double kMaxLate_s = 2.0;
+
+// Of a link.
+constexpr double kMessages_Hz = 2000.0;
+constexpr double kBytes_Hz = 12.5e6;
+constexpr double kStrangers_Hz = 20.0;
+
+struct Flood {
+  std::string name;
+  std::function<void(FloodPeer& from, std::uint32_t number)> send;
+  RobotId flooder = kFlooder;
+  bool sealed = false;
+};
+
+/// A process of a robot that made-up messages are said by.
+TeamPeer made_up(std::uint32_t number) {
+  return {static_cast<RobotId>(1000 + number % 2000), 1U + number % 2000U};
+}
+
+template <typename Message>
+void hand_over(FloodPeer& from, Message message) {
+  from.parcels.to_peers().publish(
+      {kVictim, std::make_shared<const TeamParcel>(TeamParcel{
+                    from.self().robot, std::make_shared<const TeamMessage>(std::move(message))})});
+}
+
+Closure contradiction(std::uint32_t number) {
+  Closure closure;
+  closure.from.id = {kFlooder, number};
+  closure.to.id = {kVictim, number % kWalk};
+  for (Matrix6* covariance :
+       {&closure.from.covariance, &closure.to.covariance, &closure.covariance})
+    *covariance = 1e-4 * Matrix6::Identity();
+  closure.T_from_to.translation() = Eigen::Vector3d(100.0 * number, 7.0 * number, 0.0);
+  return closure;
+}
+
+InlierSet claimed_inliers(std::uint32_t number) {
+  InlierSet set{.a = kLowFlooder, .b = kVictim, .version = number + 1, .closures = {}};
+  for (std::uint32_t k = 0; k < 40000; ++k)
+    set.closures.push_back({{kLowFlooder, k}, {kVictim, k % kWalk}});
+  return set;
+}
+
+KeyframeBow many_words(std::uint32_t number, std::uint64_t vocabulary) {
+  KeyframeBow bow{.id = {kFlooder, 2 * number}, .vocabulary = vocabulary, .words = {}};
+  for (std::uint32_t k = 0; k < 900; ++k) bow.words.push_back({k, 1});
+  return bow;
+}
+
+MeshChunk some_surface(std::uint32_t number) {
+  MeshChunk chunk{.key = {kFlooder, {static_cast<std::int32_t>(number), 0, 0}, 0}};
+  chunk.offsets.resize(2000, {1, 2, 3});
+  chunk.faces.resize(2500, {0, 1, 2});
+  return chunk;
+}
+
+MemberPoses many_poses(std::uint32_t number) {
+  MemberPoses poses{.sender = made_up(number), .number = number + 1};
+  poses.session = {poses.sender, 1};
+  for (KeyframeIndex k = 0; k < 5000; ++k) poses.keyframes.push_back(k);
+  poses.T_frame_kf.resize(poses.keyframes.size());
+  return poses;
+}
+
+Session large_session(std::uint32_t number) {
+  Session session{.id = {made_up(number), number + 1}, .number = number + 1, .plan = {}};
+  session.plan.frame = session.id.coordinator;
+  for (RobotId robot = 1000; robot < 1200; ++robot)
+    session.plan.members.push_back({{robot, 1}, 1, {}});
+  return session;
+}
+
+std::vector<Flood> all_floods() {
+  return {
+      {"closures",
+       [](FloodPeer& from, std::uint32_t i) {
+         from.closures.to_peers().publish(
+             {kVictim, std::make_shared<const Closure>(contradiction(i))});
+       }},
+      {"requests",
+       [](FloodPeer& from, std::uint32_t i) {
+         from.requests.to_peers().publish(
+             {kVictim, std::make_shared<const KeyframeRequest>(
+                           KeyframeRequest{kFlooder, i, {kVictim, i % kWalk}, i})});
+       }},
+      {"replies",
+       [](FloodPeer& from, std::uint32_t i) {
+         KeyframeReply reply{.number = i, .found = true, .keyframe = {}};
+         reply.keyframe.odometry.id = {kFlooder, i};
+         from.replies.to_peers().publish(
+             {kVictim, std::make_shared<const KeyframeReply>(std::move(reply))});
+       }},
+      {"inlier sets",
+       [](FloodPeer& from, std::uint32_t i) {
+         from.inlier_sets.to_peers().publish(
+             {kVictim, std::make_shared<const InlierSet>(claimed_inliers(i))});
+       },
+       kLowFlooder},
+      {"team statuses",
+       [](FloodPeer& from, std::uint32_t i) {
+         TeamStatus status{.sender = made_up(i), .number = i + 1, .frame = made_up(i)};
+         for (RobotId robot = 1000; robot < 1200; ++robot) status.hears.push_back({robot, i});
+         hand_over(from, std::move(status));
+       }},
+      {"sessions", [](FloodPeer& from, std::uint32_t i) { hand_over(from, large_session(i)); }},
+      {"public poses", [](FloodPeer& from, std::uint32_t i) { hand_over(from, many_poses(i)); }},
+      {"letters",
+       [](FloodPeer& from, std::uint32_t i) {
+         hand_over(from, SessionLetter{.sender = made_up(i),
+                                       .session = {made_up(i), 1},
+                                       .number = i,
+                                       .to = i % 2 == 0 ? kVictim : kFar,
+                                       .bytes = std::make_shared<const std::vector<std::uint8_t>>(
+                                           10000, std::uint8_t{1}),
+                                       .copy = i});
+       }},
+      {"statuses",
+       [](FloodPeer& from, std::uint32_t i) {
+         from.statuses.to_peers().publish(
+             RobotStatus{.robot = kFlooder, .name = "flooder", .keyframes = i});
+       }},
+      {"identities", [](FloodPeer&, std::uint32_t) {}},  // see strangers_main.cpp
+      {"keys", [](FloodPeer& from, std::uint32_t) { from.bridge.tell_keys(); }, kFlooder, true},
+      {"mesh chunks",
+       [](FloodPeer& from, std::uint32_t i) { from.chunks.to_peers().publish(some_surface(i)); }},
+  };
+}
+
+double resident_MB(pid_t process) {
+  std::ifstream file("/proc/" + std::to_string(process) + "/status");
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with("VmRSS:")) return std::stod(line.substr(6)) / 1024.0;
+  return 0.0;
+}
+
+double part_of(const std::vector<double>& ascending, double part) {
+  if (ascending.empty()) return 0.0;
+  return ascending[static_cast<std::size_t>(part * static_cast<double>(ascending.size() - 1))];
+}
+
+std::int64_t now_s() {
+  return static_cast<std::int64_t>(wall_now_s());
+}
+
+// A robot process that is flooded, and whom it serves meanwhile.
+class Scene {
+ public:
+  Scene(const Flood& flood, const std::optional<std::filesystem::path>& images)
+      : domain_(std::make_shared<const DdsDomain>(loopback_config())),
+        log_(open((folder_.path() / "log").c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600)),
+        victim_(command(flood, images), log_),
+        flooder(peer(flood, flood.flooder)),
+        friend_(peer(flood, kFriend)),
+        far_(peer(flood, kFar)) {
+    friend_.replies.from_peers().subscribe(
+        [this](const auto& reply) { replies.answered(reply->number); });
+    far_.parcels.from_peers().subscribe([this](const auto& parcel) {
+      const auto* status = std::get_if<TeamStatus>(parcel->message.get());
+      if (status != nullptr && status->sender == friend_.self()) relayed.answered(status->number);
+    });
+    for (FloodPeer* peer : {&flooder, &friend_, &far_}) peer->start();
+    for (FloodPeer* peer : {&flooder, &friend_, &far_}) REQUIRE(peer->hears(kVictim));
+    ask();
+    REQUIRE(eventually([&] { return all_answered(); }));
+  }
+
+  /// Asks for a keyframe, and for something to be handed on.
+  void ask() {
+    const std::uint32_t number = ++asked_;
+    replies.asked(number);
+    friend_.requests.to_peers().publish(
+        {kVictim, std::make_shared<const KeyframeRequest>(
+                      KeyframeRequest{kFriend, number, {kVictim, 0}, 0})});
+    relayed.asked(number);
+    const TeamStatus status{
+        .sender = friend_.self(), .number = number, .frame = friend_.self(), .keyframes = number};
+    friend_.parcels.to_peers().publish(
+        {kVictim, std::make_shared<const TeamParcel>(
+                      TeamParcel{kFriend, std::make_shared<const TeamMessage>(status)})});
+  }
+  [[nodiscard]] bool all_answered() const {
+    return replies.all_answered() && relayed.all_answered();
+  }
+  [[nodiscard]] double memory_MB() const { return resident_MB(victim_.pid()); }
+  [[nodiscard]] std::uint64_t bytes_out() const {
+    std::uint64_t sum = 0;
+    for (const FloodPeer* peer : {&flooder, &friend_, &far_}) sum += peer->bytes_from(kVictim);
+    return sum;
+  }
+  [[nodiscard]] std::uint64_t bytes_in() const {
+    return flooder.sent().bytes + friend_.sent().bytes;
+  }
+  [[nodiscard]] const DdsConfig& dds() const { return domain_->config(); }
+  [[nodiscard]] int interrupt() {
+    victim_.kill(SIGINT);
+    return victim_.wait();
+  }
+
+  AnswerTimes replies, relayed;
+
+ private:
+  [[nodiscard]] std::filesystem::path keys_of(RobotId robot) const {
+    return folder_.path() / "keys" / robot_name(robot);
+  }
+  [[nodiscard]] FloodPeer peer(const Flood& flood, RobotId robot) const {
+    const TestRobot::MakeSeal make_seal = [this](const RobotIdentity& own) {
+      return std::make_shared<SharedSeal>(load_robot_keys(keys_of(own.robot)), own, now_s());
+    };
+    return {domain_,
+            {robot, robot_name(robot), kProtocolVersion, random_boot_id()},
+            flood.sealed ? make_seal : TestRobot::MakeSeal()};
+  }
+  std::vector<std::string> command(const Flood& flood,
+                                   const std::optional<std::filesystem::path>& images) {
+    const DdsConfig& dds = domain_->config();
+    std::vector<std::string> words{KM_BIN_DIR "/kimera_multi_robot",
+                                   "--robot",
+                                   std::to_string(kVictim),
+                                   "--domain",
+                                   std::to_string(dds.domain),
+                                   "--output",
+                                   (folder_.path() / "out").string(),
+                                   "--set",
+                                   "dds.team=" + dds.team,
+                                   "--set",
+                                   "dds.interface=lo",
+                                   "--set",
+                                   "mesh_chunks.collect=true"};
+    if (flood.sealed) {
+      std::vector<RobotName> robots;
+      for (const RobotId robot : kTeam) robots.push_back({robot, robot_name(robot)});
+      TeamFolder::make(folder_.path() / "keys", robots, now_s(), now_s() + 3600);
+      words.insert(words.end(), {"--security", keys_of(kVictim).string()});
+    }
+    if (images)
+      words.insert(words.end(), {"--config", "config/datasets/euroc.yaml", "--rate", "0.02",
+                                 "--dataset", images->string()});
+    else
+      words.insert(words.end(), {"--graph", long_walk(folder_.path(), kVictim).string()});
+    return words;
+  }
+
+  TemporaryFolder folder_;
+  std::shared_ptr<const DdsDomain> domain_;
+  int log_;
+  Child victim_;
+  std::uint32_t asked_ = 0;
+
+ public:
+  FloodPeer flooder;
+
+ private:
+  FloodPeer friend_, far_;
+};
+
+struct Waits {
+  double p50_s = 0.0, p99_s = 0.0;
+};
+
+struct Costs {
+  std::uint64_t messages = 0;  // of the flood
+  std::uint64_t bytes_in = 0, bytes_out = 0;
+  double growth_MB = 0.0;
+  Waits replies, relayed;
+  double late_s = 0.0;  // the answer to what is asked when the flood is over
+
+  void print(const std::string& name) const {
+    std::printf("%-14s %8llu %8.1f %7.1f %8.2f %7.0f %7.0f %7.0f %7.0f %7.2f\n", name.c_str(),
+                static_cast<unsigned long long>(messages), 1e-6 * static_cast<double>(bytes_in),
+                growth_MB, out_per_in(), 1e3 * replies.p50_s, 1e3 * replies.p99_s,
+                1e3 * relayed.p50_s, 1e3 * relayed.p99_s, late_s);
+    std::fflush(stdout);
+  }
+  [[nodiscard]] double out_per_in() const {
+    return static_cast<double>(bytes_out) / static_cast<double>(bytes_in);
+  }
+};
+
+Waits waits_of(AnswerTimes& times) {
+  const std::vector<double> ascending = times.take();
+  return {part_of(ascending, 0.5), part_of(ascending, 0.99)};
+}
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// Sends as much as the link carries.
+void send_for(double seconds, const Flood& flood, FloodPeer& from) {
+  const TrafficCount before = from.sent();
+  const auto start = Clock::now();
+  for (std::uint32_t i = 0; seconds_since(start) < seconds;) {
+    const double s = seconds_since(start);
+    if (i < kMessages_Hz * s &&
+        static_cast<double>(from.sent().bytes - before.bytes) < kBytes_Hz * s)
+      flood.send(from, i++);
+    else
+      std::this_thread::sleep_for(std::chrono::microseconds(200));
+  }
+}
+
+Costs measure(Scene& scene, const Flood& flood, double seconds) {
+  const double before_MB = scene.memory_MB();
+  const std::uint64_t in_before = scene.bytes_in(), out_before = scene.bytes_out();
+  const std::uint64_t messages_before = scene.flooder.sent().messages;
+  (void)waits_of(scene.replies);
+  (void)waits_of(scene.relayed);
+  std::optional<Child> strangers;
+  if (flood.name == "identities")
+    strangers.emplace(
+        std::vector<std::string>{KM_BIN_DIR "/test_strangers", std::to_string(scene.dds().domain),
+                                 scene.dds().team, std::to_string(kStrangers_Hz)},
+        STDOUT_FILENO);
+  Costs costs;
+  const auto look = [&] {
+    costs.growth_MB = std::max(costs.growth_MB, scene.memory_MB() - before_MB);
+  };
+  std::future<void> flooding =
+      std::async(std::launch::async, [&] { send_for(seconds, flood, scene.flooder); });
+  constexpr std::chrono::milliseconds kPeriod(50);
+  while (flooding.wait_for(kPeriod) != std::future_status::ready) {
+    scene.ask();
+    look();
+  }
+  strangers.reset();
+  const auto over = Clock::now();
+  scene.ask();
+  CHECK(eventually([&] { return scene.all_answered(); }));
+  costs.late_s = seconds_since(over);
+  look();
+  CHECK(scene.flooder.bridge.error() == nullptr);
+  costs.replies = waits_of(scene.replies);
+  costs.relayed = waits_of(scene.relayed);
+  costs.messages = scene.flooder.sent().messages - messages_before;
+  costs.bytes_in = scene.bytes_in() - in_before;
+  costs.bytes_out = scene.bytes_out() - out_before;
+  return costs;
+}
+
+// Seconds of the long form; nullopt in the short one, where what depends on the machine only shows.
+std::optional<double> long_form_s() {
+  const char* given = std::getenv("KM_FLOOD_SECONDS");
+  return given != nullptr ? std::optional(std::stod(given)) : std::nullopt;
+}
+
+void print_head() {
+  std::printf(
+      "                    sent              grown     out   replies [ms]     relayed [ms]  "
+      "answer after\nflood          messages       MB      MB     /in     p50     p99     p50     "
+      "p99     [s]\n");
+}
+
+void check(const Flood& flood, const std::optional<std::filesystem::path>& images = {}) {
+  CAPTURE(flood.name);
+  constexpr double kShort_s = 0.4;
+  Scene scene(flood, images);
+  const Costs costs = measure(scene, flood, long_form_s().value_or(kShort_s));
+  costs.print(flood.name);
+  CHECK(costs.growth_MB < kMaxGrowth_MB);
+  CHECK(costs.out_per_in() < kMaxOutPerIn);
+  if (long_form_s()) {
+    CHECK(costs.replies.p99_s < kMaxP99_s);
+    CHECK(costs.relayed.p99_s < kMaxP99_s);
+    CHECK(costs.late_s < kMaxLate_s);
+  }
+  CHECK(scene.interrupt() == 0);
+}
+
+TEST_CASE("A flood from one robot costs a robot little, and the others next to nothing",
+          "[floods]") {
+  log::set_level(log::Level::kError);
+  print_head();
+  for (const Flood& flood : all_floods()) check(flood);
+}
+
+TEST_CASE("A flood of places costs little, too", "[floods]") {
+  const auto images = shared_data("euroc/MH_01_easy");
+  if (!images) return;
+  log::set_level(log::Level::kError);
+  const std::uint64_t vocabulary =
+      load_vocabulary(find_shipped_file("vocabulary/indoor.kmvoc")).id();
+  print_head();
+  check({.name = "bags of words",
+         .send = [vocabulary](
+                     FloodPeer& from,
+                     std::uint32_t i) { from.bows.to_peers().publish(many_words(i, vocabulary)); }},
+        images);
+}
+
+}  // namespace
+}  // namespace km
