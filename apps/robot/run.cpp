@@ -171,6 +171,8 @@ class Watch {
                                                   .present_peers = present,
                                                   .unheard = static_cast<std::size_t>(unheard)});
       robot_.set_settled(told);
+      silent_peers_.update(now_s, silent_peers());
+      lost_peers_ = silent_peers_.lost(team);
       const auto running = [](const auto& peer) { return peer.phase == RobotPhase::kRunning; };
       if (told.phase == RobotPhase::kSettled && std::ranges::none_of(present, running))
         robot_.expect_no_more_closures();
@@ -183,6 +185,7 @@ class Watch {
   [[nodiscard]] RunSummary::Process process() const { return process_csv_.summary(); }
   [[nodiscard]] double seconds() const { return steady_now_s() - start_s_; }
   [[nodiscard]] const char* reason() const { return departure_.reason(); }
+  [[nodiscard]] const std::vector<LostPeer>& lost_peers() const { return lost_peers_; }
 
  private:
   static constexpr double kInterval_s = 1.0;  // between rows of a CSV, and status lines
@@ -211,6 +214,16 @@ class Watch {
                                     traffic, process_usage().resident_bytes));
   }
 
+  // A peer that last said that it leaves is not missed.
+  std::map<RobotId, std::string> silent_peers() const {
+    std::map<RobotId, std::string> silent;
+    for (const Peer& peer : robot_.bridge().peers().list())
+      if (peer.state == PeerState::kLost) silent[peer.identity.robot] = peer.identity.name;
+    for (const RobotStatus& status : robot_.status_node().peers())
+      if (status.phase == RobotPhase::kLeaving) silent.erase(status.robot);
+    return silent;
+  }
+
   // A peer that is there but has not said how far it is counts as running, whatever its former
   // process has said.
   std::map<RobotId, Departure::Present> present_peers() const {
@@ -236,6 +249,8 @@ class Watch {
   const bool is_past_;
   const double serve_limit_s_;
   Departure departure_;
+  SilentPeers silent_peers_;
+  std::vector<LostPeer> lost_peers_;
   double start_s_;
   GrowingFile traffic_file_;
   TrafficCsv traffic_csv_;
@@ -263,7 +278,7 @@ std::string timings(const Robot& robot) {
 // Call when the robot has stopped; `record` is what it has recorded.
 RunEnd end_of(const RobotOptions& options, const Robot& robot, const RunResult& result,
               const char* departure, const RunRecord& record) {
-  RunEnd end{options.robot, result, robot.id_taken(), departure, {}, {}};
+  RunEnd end{options.robot, result, robot.id_taken(), departure};
   if (const SensorsNode* sensors = robot.sensors()) {
     // The last image of those before comes once more.
     const std::size_t before = std::max<std::size_t>(robot.restored_images(), 1) - 1;
@@ -325,6 +340,7 @@ int conclude(const RobotOptions& options, Robot& robot, std::optional<Watch>& wa
              const RunResult& result, const RunRecord& record, ResultWriter& results) {
   watch->finish();
   RunEnd end = end_of(options, robot, result, watch->reason(), record);
+  end.lost_peers = watch->lost_peers();
   RunSummary summary = summary_of(record);
   summary.name = options.name;
   summary.frames = end.images.value_or(ImageCounts{}).read;
@@ -332,6 +348,7 @@ int conclude(const RobotOptions& options, Robot& robot, std::optional<Watch>& wa
   summary.traffic = sent_bytes(robot);
   summary.process = watch->process();
   summary.seconds = watch->seconds();
+  for (const LostPeer& peer : end.lost_peers) summary.lost_peers[peer.name] = peer.silent_s;
   watch.reset();  // the status line ends before the last log lines
   write_all(options, robot, record, result, results);
   end.lost_results = results.lost();

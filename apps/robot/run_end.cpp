@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "modules/core/text_table.hpp"
+
 namespace km {
 namespace {
 
@@ -58,12 +60,36 @@ Departure::Present Departure::update(double now_s, const Inputs& inputs) {
   return {settled ? RobotPhase::kSettled : RobotPhase::kFinished, links};
 }
 
+void SilentPeers::update(double now_s, const std::map<RobotId, std::string>& silent) {
+  now_s_ = now_s;
+  std::erase_if(silent_, [&](const auto& entry) { return !silent.contains(entry.first); });
+  for (const auto& [robot, name] : silent) silent_.try_emplace(robot, Silence{name, now_s});
+}
+
+std::vector<LostPeer> SilentPeers::lost(std::span<const RobotId> reached) const {
+  std::vector<LostPeer> lost;
+  for (const auto& [robot, silence] : silent_)
+    if (std::ranges::find(reached, robot) == reached.end())
+      lost.push_back({silence.name, now_s_ - silence.since_s});
+  return lost;
+}
+
 std::string to_string(const ImageCounts& images) {
   return std::to_string(images.with_pose) + " of " + std::to_string(images.listed) +
          " images have a pose";
 }
 
 namespace {
+
+// "without bob (silent for 31.2 s), carol (silent for 7.0 s)"
+std::string without(const std::vector<LostPeer>& lost) {
+  std::string text = "without";
+  for (const char* separator = " "; const LostPeer& peer : lost) {
+    text += separator + peer.name + " (silent for " + fixed(peer.silent_s, 1) + " s)";
+    separator = ", ";
+  }
+  return text;
+}
 
 Verdict verdict_of_run(const RunEnd& end) {
   if (end.result.failure)
@@ -75,7 +101,8 @@ Verdict verdict_of_run(const RunEnd& end) {
   if (end.result.interrupted) return {0, "interrupted"};
   if (end.images && end.images->with_pose == 0)
     return {kNothingEstimated, why_no_pose(*end.images)};
-  return {0, end.departure != nullptr ? end.departure : "unknown"};
+  const std::string departure = end.departure != nullptr ? end.departure : "unknown";
+  return {0, end.lost_peers.empty() ? departure : without(end.lost_peers) + ": " + departure};
 }
 
 }  // namespace

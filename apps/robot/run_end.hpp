@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "modules/core/ids.hpp"
 #include "runtime/dds/robot_status.hpp"
@@ -52,6 +53,31 @@ class Departure {
   const char* reason_ = nullptr;
 };
 
+/// A robot that went silent without a word and has not come back: out of reach, or dead.
+struct LostPeer {
+  std::string name;
+  double silent_s = 0.0;  ///< At the end.
+};
+
+/// Keeps since when robots are silent. Pure: time comes in [s], any origin.
+class SilentPeers {
+ public:
+  /// The names of those that are silent at `now_s`; of the others nothing is kept.
+  void update(double now_s, const std::map<RobotId, std::string>& silent);
+
+  /// All as of the last update(), ascending by id, but those that `reached` names: others hear
+  /// them.
+  [[nodiscard]] std::vector<LostPeer> lost(std::span<const RobotId> reached) const;
+
+ private:
+  struct Silence {
+    std::string name;
+    double since_s = 0.0;
+  };
+  double now_s_ = 0.0;
+  std::map<RobotId, Silence> silent_;
+};
+
 /// What became of the images of a recording.
 struct ImageCounts {
   std::size_t listed = 0;     ///< Stereo pairs of the part that was to be played.
@@ -64,11 +90,12 @@ struct ImageCounts {
 struct RunEnd {
   RobotId robot = 0;
   RunResult result;
-  bool id_taken = false;              ///< Another living robot had the same id first.
-  const char* departure = nullptr;    ///< Why the robot left its team, if it did.
-  std::optional<ImageCounts> images;  ///< Absent for a robot without sensors.
+  bool id_taken = false;                   ///< Another living robot had the same id first.
+  const char* departure = nullptr;         ///< Why the robot left its team, if it did.
+  std::optional<ImageCounts> images = {};  ///< Absent for a robot without sensors.
   /// Why each result that could not be written is lost, by file.
   std::map<std::string, std::string> lost_results = {};
+  std::vector<LostPeer> lost_peers = {};  ///< Robots of the team that were lost at the end.
 };
 
 /// What the robot says of its run, to people and to the process that started it.
@@ -79,7 +106,8 @@ struct Verdict {
 
 /// 5 if a module hung. 3 if one failed, or another robot claimed the id: whose data the team then
 /// used is anybody's guess. 1 if the run came to its end and not one image has a pose. 4 if results
-/// could not be written. 0 otherwise.
+/// could not be written. 0 otherwise. A robot that left while others were lost says whom, and for
+/// how long they had been silent.
 [[nodiscard]] Verdict verdict_of(const RunEnd& end);
 
 /// "2910 of 2912 images have a pose".

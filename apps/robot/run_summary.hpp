@@ -114,6 +114,8 @@ struct RunSummary {
   std::map<std::string, std::uint64_t> traffic;  ///< Bytes sent, by category.
   Process process;
   double seconds = 0.0;  ///< Wall time of the run.
+  /// Robots that went silent and did not come back, and for how long they had been silent [s].
+  std::map<std::string, double> lost_peers;
   std::string exit_reason;
 
   void visit_fields(auto& visitor) {
@@ -129,6 +131,7 @@ struct RunSummary {
     visitor.field("traffic", traffic);
     visitor.field("process", process);
     visitor.field("seconds", seconds);
+    visitor.field("lost_peers", lost_peers);
     visitor.field("exit_reason", exit_reason);
   }
   bool operator==(const RunSummary&) const = default;

@@ -146,6 +146,40 @@ TEST_CASE("Without sensors, or interrupted, no pose is no failure", "[run_end]")
   CHECK(verdict_of(interrupted).reason == "interrupted");
 }
 
+TEST_CASE("A robot that leaves while others are lost names them", "[run_end]") {
+  RunEnd end = usual_end();
+  end.lost_peers = {{"bob", 31.24}};
+  CHECK(verdict_of(end).exit_code == 0);
+  CHECK(verdict_of(end).reason ==
+        "without bob (silent for 31.2 s): all present robots have settled");
+  end.departure = "time limit for serving peers";
+  end.lost_peers.push_back({"carol", 7.0});
+  CHECK(verdict_of(end).reason ==
+        "without bob (silent for 31.2 s), carol (silent for 7.0 s): time limit for serving peers");
+  end.result.interrupted = true;
+  CHECK(verdict_of(end).reason == "interrupted");  // it did not leave of itself
+}
+
+TEST_CASE("A silent robot is lost for as long as it has been silent", "[run_end]") {
+  SilentPeers peers;
+  const auto lost = [&](const std::vector<RobotId>& reached) {
+    std::string text;
+    for (const LostPeer& peer : peers.lost(reached))
+      text += peer.name + ' ' + std::to_string(static_cast<int>(peer.silent_s)) + ' ';
+    return text;
+  };
+  CHECK(lost({}).empty());
+  peers.update(100.0, {{2, "bob"}});
+  peers.update(103.0, {{2, "bob"}, {7, "carol"}});
+  peers.update(110.0, {{2, "bob"}, {7, "carol"}});
+  CHECK(lost({}) == "bob 10 carol 7 ");
+  CHECK(lost({{2}}) == "carol 7 ");
+  peers.update(111.0, {{7, "carol"}});  // bob is back
+  peers.update(112.0, {{2, "bob"}, {7, "carol"}});
+  peers.update(113.0, {{2, "bob"}, {7, "carol"}});
+  CHECK(lost({}) == "bob 1 carol 10 ");
+}
+
 TEST_CASE("Lost results are told with their reasons and have an exit code, the least of all",
           "[run_end]") {
   RunEnd end = usual_end();

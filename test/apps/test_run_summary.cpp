@@ -28,7 +28,8 @@ struct Filler {
     else if constexpr (requires { value.append("x"); })
       value = "text \"" + std::to_string(number) + "\"\n";
     else if constexpr (requires { value["x"]; })
-      value["x"] = std::numeric_limits<std::uint64_t>::max() - static_cast<std::uint64_t>(number);
+      value["x"] = static_cast<typename T::mapped_type>(std::numeric_limits<std::uint64_t>::max() -
+                                                        static_cast<std::uint64_t>(number));
     else
       value = {static_cast<RobotId>(number), 65535};
   }
@@ -67,7 +68,7 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/mapping/correction_seconds /mapping/unbound_vertices "
         "/traffic/x /process/cpu_s /process/peak_memory_bytes /process/memory_at_start_bytes "
         "/process/memory_at_end_bytes /process/memory_growth_bytes_per_minute "
-        "/seconds /exit_reason ");
+        "/seconds /lost_peers/x /exit_reason ");
   const Json least = RunSummary{};
   CHECK_FALSE(least.contains("mapping"));  // what is absent has no key
   CHECK_FALSE(least["pgo"].contains("anchor"));

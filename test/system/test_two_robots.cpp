@@ -85,7 +85,7 @@ TEST_CASE("An interrupted robot ends in order with everything written", "[system
   CHECK(read_summary(folder.path() / "summary.json").exit_reason == "interrupted");
 }
 
-TEST_CASE("A robot whose peer is killed goes on and finishes", "[system]") {
+TEST_CASE("A robot whose peer is killed goes on, finishes and says whom it lost", "[system]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -96,10 +96,19 @@ TEST_CASE("A robot whose peer is killed goes on and finishes", "[system]") {
   {
     Process victim(robot_command("60000", *dataset, folder.path() / "b", domain));
     REQUIRE(victim.wait_until(is_past_start).has_value());
+    const auto knows_it = [](const std::string& line) {
+      return line.find("r60000 alive") != line.npos;
+    };
+    REQUIRE(survivor.wait_until(knows_it).has_value());
     victim.kill(SIGKILL);
   }
   CHECK(survivor.wait() == 0);
-  CHECK(read_summary(folder.path() / "a/summary.json").pgo.settled);
+  const RunSummary summary = read_summary(folder.path() / "a/summary.json");
+  CHECK(summary.pgo.settled);
+  REQUIRE(summary.lost_peers.size() == 1);
+  CHECK(summary.lost_peers.at("r60000") > 0.0);
+  CHECK_THAT(summary.exit_reason, Catch::StartsWith("without r60000 (silent for ") &&
+                                      Catch::EndsWith("): all present robots have settled"));
 }
 
 TEST_CASE("A robot whose id is taken says so and ends, and who had it first goes on", "[system]") {
