@@ -89,8 +89,8 @@ void EmulatedLinks::take_frames(std::size_t robot, double now_s) {
 void EmulatedLinks::hand_over(const LinkDelivery& delivery) {
   const EthernetFrame& frame = delivery.frame;
   const ssize_t n = write(networks_[delivery.to].frames(), frame.data(), frame.size());
-  // As on a wire, who is too slow to take a frame does not get it.
-  if (n < 0 && !is_passing(errno) && errno != ENOBUFS && errno != ENOMEM)
+  // As on a wire, who is too slow to take a frame, or has its interface down, does not get it.
+  if (n < 0 && !is_passing(errno) && errno != ENOBUFS && errno != ENOMEM && errno != EIO)
     throw carry_error("writing frames for robot " + std::to_string(delivery.to));
 }
 

@@ -71,6 +71,7 @@ std::vector<TimedPosition> path_of(const RobotPlan& robot, const std::string& ra
   const auto window = recorded_window(robot);
   const Stamp start = window ? window->from : poses.front().stamp;
   std::vector<TimedPosition> path;
+  path.reserve(poses.size());
   for (const StampedPose& pose : poses)
     path.push_back({seconds_between(start, pose.stamp) / speed, pose.T.translation()});
   return path;

@@ -109,6 +109,7 @@ LinkTrace parse_link_trace(std::string_view text, const std::string& name) {
     return name + (row < table.size() ? ':' + std::to_string(table[row].line) : "") + ": ";
   };
   std::vector<LinkTraceRow> rows;
+  rows.reserve(table.size());
   for (const TextRow& row : table) rows.push_back(parse_trace_row(row, where(rows.size())));
   if (const auto [row, problem] = problem_of(rows); !problem.empty())
     throw LinkTraceError(where(row) + problem);

@@ -183,6 +183,24 @@ TEST_CASE("With bad links each robot is in a network of its own", "[team][namesp
                         Catch::Contains("\nbob,alice,"));
 }
 
+TEST_CASE("A robot whose interface is down loses frames and nothing else", "[team][namespaces]") {
+  const Team team(
+      "cd \"$out/..\"\n"
+      "if [ $name = alice ]; then\n"
+      "  ip link set eth0 down; touch down; while [ ! -e sent ]; do sleep 0.05; done\n"
+      "else\n"
+      "  while [ ! -e down ]; do sleep 0.05; done\n"
+      "  bash -c 'echo anybody > /dev/udp/10.77.0.1/9'; sleep 0.3; touch sent\n"  // asks by ARP
+      "fi");
+  const std::string links = team.folder.write("links.yaml", "").string();
+  const auto result = run_command(team.command + " --links " + links);
+  if (!had_own_networks(result.output)) return;
+  CAPTURE(result.output);
+  CHECK(result.exit_code == 0);
+  const std::string table = team.folder.read("out/links.csv");
+  CHECK_THAT(table, Catch::Contains("\nbob,alice,") && !Catch::Contains("\nbob,alice,0,"));
+}
+
 TEST_CASE("Networks of robots vanish with their team, however it ends", "[team][namespaces]") {
   const int signal = GENERATE(0, SIGINT, SIGKILL);
   CAPTURE(signal);
