@@ -1,19 +1,26 @@
 #include <catch2/catch.hpp>
 
+#include <algorithm>
+#include <cstdlib>
 #include <iostream>
 #include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "modules/core/config.hpp"
 #include "modules/core/text_rows.hpp"
 #include "test/support/own_networks.hpp"
 #include "test/support/random_team.hpp"
+#include "test/support/shared_data.hpp"
 #include "test/system/team_run.hpp"
 
 // Teams whose frames the team's program carries, over links that lose some of them: --links.
 
 namespace km {
 namespace {
+
+namespace fs = std::filesystem;
 
 // barc as in test_links.cpp. Outages are shorter than the robots stay on for each other.
 constexpr const char* kSettings =
@@ -105,6 +112,135 @@ TEST_CASE("A team in two parts ends in two frames and its table of links says wh
     CHECK(link.at("frames_in") > 0);
     CHECK(link.at("frames_partition") == link.at("frames_in"));
     CHECK(link.at("frames_delivered") == 0);
+  }
+}
+
+namespace {
+
+// One way in which links are bad, all through the run but for the outage.
+struct BadLinks {
+  double outage_s = 0.0;  // from kOutage_s on
+  double loss = 0.0;
+  double delay_s = 0.0;
+
+  static constexpr double kOutage_s = 2.0;
+
+  [[nodiscard]] std::string script() const {
+    return "rate_bytes_per_s: 125000\nqueue_bytes: 60000\nloss: " + shortest_text(loss) +
+           "\ndelay_s: " + shortest_text(delay_s) +
+           "\noutages:\n  - {from_s: " + shortest_text(kOutage_s) +
+           ", to_s: " + shortest_text(kOutage_s + outage_s) + "}\n";
+  }
+};
+
+std::ostream& operator<<(std::ostream& out, const BadLinks& links) {
+  return out << "outage " << links.outage_s << " s, loss " << links.loss << ", delay "
+             << links.delay_s << " s";
+}
+
+// Any two values of two of the three quantities meet in one of nine.
+std::vector<BadLinks> all_pairs() {
+  constexpr double kOutages_s[] = {5.0, 20.0, 60.0};
+  constexpr double kLosses[] = {0.0, 0.1, 0.3};
+  constexpr double kDelays_s[] = {0.0, 0.1, 0.5};
+  std::vector<BadLinks> all;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j)
+      all.push_back({kOutages_s[i], kLosses[j], kDelays_s[(i + j) % 3]});
+  return all;
+}
+
+// Two robots of the tunnels that trust all closures: which of them count hangs on no order.
+class TunnelsRun {
+ public:
+  TunnelsRun(const fs::path& dataset, const std::string& script, double settle_s) {
+    std::string team =
+        "arguments: [--link, wifi, --set, pose_graph.robust=false, --set, "
+        "run.settle_s=" +
+        shortest_text(settle_s) + "]\nrobots:\n";
+    for (const char* number : {"0", "1"})
+      team += std::string("  - {id: ") + number + ", name: robot" + number +
+              ", graph: \"${DATASET}/robot" + number + ".csv\"}\n";
+    const std::string links = folder_.write("links.yaml", script).string();
+    run_ = run_team(folder_.write("team.yaml", team), dataset, folder_, "--links " + links);
+  }
+
+  [[nodiscard]] const CommandResult& result() const { return run_.result; }
+  [[nodiscard]] TeamResult team() const { return read_team(folder_.path(), 2); }
+  [[nodiscard]] LinksTable links() const { return read_links_table(folder_); }
+  [[nodiscard]] RunSummary summary(int robot) const {
+    return read_summary(folder_.path() / robot_name(robot) / "summary.json");
+  }
+
+  // How often each closure stands in the robots' files; of one between two, in both.
+  [[nodiscard]] std::map<std::pair<KeyframeId, KeyframeId>, int> closures() const {
+    std::map<std::pair<KeyframeId, KeyframeId>, int> count;
+    for (const int robot : {0, 1})
+      for (const RelativePose& edge :
+           read_g2o(folder_.path() / robot_name(robot) / "pose_graph.g2o").edges)
+        ++count[{edge.from, edge.to}];
+    return count;
+  }
+
+  // When the last robot had the cost it ended with for good [s since its start].
+  [[nodiscard]] double agreed_s() const {
+    double last_s = 0.0;
+    for (const int robot : {0, 1}) {
+      const std::string text = folder_.read(robot_name(robot) + "/optimizer.csv");
+      const std::vector<TextRow> rows = split_rows(text);
+      const auto number = [](const TextRow& row, std::size_t column) {
+        return parse_double(row.fields.at(column)).value_or(0.0);
+      };
+      const double final_cost = number(rows.back(), 3);
+      std::size_t row = rows.size() - 1;
+      while (row > 1 && number(rows[row - 1], 3) == Approx(final_cost).epsilon(1e-6)) --row;
+      last_s = std::max(last_s, number(rows[row], 0));
+    }
+    return last_s;
+  }
+
+ private:
+  TemporaryFolder folder_;
+  TeamRun run_;
+};
+
+}  // namespace
+
+TEST_CASE("Whatever links two robots have, no closure is lost or doubled", "[system][endurance]") {
+  if (std::getenv("KM_LINKS") == nullptr) {
+    std::cout << "SKIPPED: takes half an hour, see test/endure links\n";
+    return;
+  }
+  const auto dataset = shared_data("multi_robot/tunnels_8robots");
+  if (!dataset) return;
+  const TunnelsRun perfect(*dataset, "", 3.0);
+  if (!had_own_networks(perfect.result().output)) return;
+  REQUIRE(perfect.result().exit_code == 0);
+  const TeamResult expected = perfect.team();
+  const double best = cost_of(expected.graph, expected.poses);
+  for (const BadLinks& links : all_pairs()) {
+    CAPTURE(links);
+    const TunnelsRun run(*dataset, links.script(), links.outage_s + 10.0);  // they stay on for it
+    REQUIRE(run.result().exit_code == 0);
+    const auto closures = run.closures();
+    int lost = 0, doubled = 0;
+    for (const auto& [ends, count] : perfect.closures()) {
+      const auto found = closures.find(ends);
+      const int now = found == closures.end() ? 0 : found->second;
+      lost += std::max(count - now, 0);
+      doubled += std::max(now - count, 0);
+    }
+    const TeamResult team = run.team();
+    const double cost = cost_of(team.graph, team.poses);
+    double sent_bytes = 0.0;
+    for (const auto& [pair, link] : run.links()) sent_bytes += link.at("bytes_in");
+    std::cout << links << ": closures lost " << lost << ", doubled " << doubled
+              << ", cost apart by " << std::abs(cost - best) / best
+              << " of it, link-up to agreement "
+              << run.agreed_s() - BadLinks::kOutage_s - links.outage_s << " s, frames of "
+              << 1e-6 * sent_bytes << " MB, " << run.summary(0).exit_reason << std::endl;
+    CHECK(closures == perfect.closures());
+    CHECK(cost == Approx(best).epsilon(1e-6).margin(0.0));
   }
 }
 

@@ -54,9 +54,9 @@ std::vector<std::string> with(std::vector<std::string> command, const std::strin
   return command;
 }
 
-// How often robots are killed; KIMERA_MULTI_KILLS makes it more.
+// How often robots are killed; KM_KILLS makes it more.
 int kills() {
-  const char* const wanted = std::getenv("KIMERA_MULTI_KILLS");
+  const char* const wanted = std::getenv("KM_KILLS");
   return wanted == nullptr ? 3 : std::atoi(wanted);
 }
 
