@@ -78,6 +78,17 @@ void RunRecord::add(const Trajectory& trajectory) {
   if (trajectory.robot == robot_) trajectory_ = trajectory;
 }
 
+void RunRecord::add(const PeerEvent& event) {
+  if (event.kind != PeerEventKind::kRestarted) return;
+  ++activity_;
+  const RobotId peer = event.identity.robot;
+  const auto of_peer = [&](const auto& entry) { return touches(entry.first, peer); };
+  std::erase_if(closures_, of_peer);
+  std::erase_if(outcomes_, of_peer);
+  std::erase_if(rejected_, [&](const ClosureId& id) { return touches(id, peer); });
+  inlier_sets_.erase(std::minmax(robot_, peer));
+}
+
 void RunRecord::add(const OptimizedMesh& mesh) {
   ++activity_;
   ++(mesh.deformed ? mesh_corrections_.deformed : mesh_corrections_.moved);

@@ -21,6 +21,7 @@
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
+#include "runtime/dds/peer_table.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
 #include "runtime/worker.hpp"
@@ -40,6 +41,7 @@ class RunRecord {
   void add(const InlierSet& set);  ///< Kept if newer than the pair's last.
   void add(const ClosureOutcome& outcome);
   void add(const Trajectory& trajectory);  ///< Of this robot.
+  void add(const PeerEvent& event);        ///< Of a robot that restarts all closures are dropped.
   void add(const OptimizerProgress& progress);
   void add(const ClosureVerdicts& verdicts);
   void add(const DenseSensingProgress& progress) { dense_sensing_ = progress; }

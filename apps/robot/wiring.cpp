@@ -135,8 +135,10 @@ void Robot::add_place_recognition(const RobotConfig& config) {
   add<PlaceRecognitionNode>(false, config.place_recognition, identity_.robot, vocabulary_,
                             PlaceRecognitionTopics{.keyframes = topics_.keyframes,
                                                    .peer_bows = topics_.bows.from_peers(),
+                                                   .peer_events = bridge_->peers().events(),
                                                    .own_bows = topics_.bows.to_peers(),
                                                    .candidates = topics_.candidates,
+                                                   .restarts = topics_.candidate_restarts,
                                                    .queries = topics_.place_queries});
 }
 
@@ -201,6 +203,10 @@ void Robot::add_playback(const RobotConfig& config, double rate, RecordedGraph g
                                                               .end = topics_.playback_end});
   if (restored_) playback.continue_after(restored_->keyframes.size());
   add_restore();
+  bridge_->peers().events().subscribe(
+      [to = Out<PeerEvent>(topics_.candidate_restarts)](const auto& event) {
+        if (event->kind == PeerEventKind::kRestarted) to.publish(event);
+      });
   topics_.playback_end.subscribe([this](const auto&) { source_ended_ = true; });
 }
 
@@ -213,24 +219,28 @@ void Robot::add_back_end(const RobotConfig& config) {
                                          .peer_requests = topics_.requests.from_peers(),
                                          .peer_replies = topics_.replies.from_peers(),
                                          .peer_events = peer_events,
+                                         .restarts = topics_.candidate_restarts,
                                          .peer_bows = topics_.bows.from_peers(),
                                          .restored = topics_.restored_outcomes,
                                          .own_requests = topics_.requests.to_peers(),
                                          .own_replies = topics_.replies.to_peers(),
                                          .own_closures = topics_.own_closures,
+                                         .own_restarts = topics_.closure_restarts,
                                          .outcomes = topics_.outcomes});
   forward<Closure>(topics_.own_closures, topics_.closures);
   forward<Closure>(topics_.shared_closures.from_peers(), topics_.closures);
   pcm_ = &add<PcmNode>(false, config.pcm, identity_.robot,
                        PcmTopics{.closures = topics_.closures,
-                                 .peer_events = peer_events,
-                                 .inlier_sets = topics_.own_inlier_sets});
+                                 .restarts = topics_.closure_restarts,
+                                 .inlier_sets = topics_.own_inlier_sets},
+                       resume_count(identity_.boot) << kResumeBits);
   add<TeamNode>(false, config.pose_graph, TeamPeer{identity_.robot, identity_.boot},
                 TeamTopics{.odometry = topics_.keyframe_odometry,
                            .closures = topics_.closures,
                            .inlier_sets = topics_.own_inlier_sets,
                            .peer_inlier_sets = topics_.shared_inlier_sets.from_peers(),
                            .peer_events = peer_events,
+                           .restarts = topics_.closure_restarts,
                            .peer_parcels = topics_.parcels.from_peers(),
                            .parcels = topics_.parcels.to_peers(),
                            .trajectory = topics_.trajectory,
@@ -254,14 +264,20 @@ void Robot::add_network(CrossingEnds meshes) {
   dds.exchange(t.chunks, kState, kOther, meshes);
   dds.exchange(t.status, kStatus, kOther);
   // A closure, and whether it is an inlier, is of use to the robots it joins and to no others.
-  t.own_closures.subscribe([to = t.shared_closures.to_peers()](const auto& closure) {
-    if (closure->to.id.robot != closure->from.id.robot)
-      to.publish(Addressed<Closure>{closure->to.id.robot, closure});
+  t.own_closures.subscribe([this, to = t.shared_closures.to_peers()](const auto& closure) {
+    const RobotId other = closure->to.id.robot;
+    if (other != closure->from.id.robot)
+      to.publish(Addressed<Closure>{other, closure, lives_.of(other)});
   });
+  const auto meet = [this](const auto& event) {
+    lives_.meet({event->identity.robot, event->identity.boot});
+  };
+  t.closure_restarts.subscribe(meet);
   t.own_inlier_sets.subscribe([to = t.shared_inlier_sets.to_peers()](const auto& set) {
     if (set->a != set->b) to.publish(Addressed<InlierSet>{set->b, set});
   });
-  dds.peers().events().subscribe([this](const auto& event) {
+  dds.peers().events().subscribe([this, meet](const auto& event) {
+    if (event->kind == PeerEventKind::kJoined) meet(event);
     if (event->kind == PeerEventKind::kConflict && event->identity.robot == identity_.robot)
       id_taken_ = true;
   });
@@ -272,6 +288,7 @@ void Robot::add_records() {
   recorder_->record(topics_.odometry);
   recorder_->record(topics_.keyframe_odometry);
   recorder_->record(topics_.keyframes);
+  recorder_->record(topics_.closure_restarts);
   recorder_->record(topics_.closures);
   recorder_->record(topics_.outcomes);
   recorder_->record(topics_.restored_outcomes);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "apps/robot/journal_node.hpp"
+#include "apps/robot/lives_met.hpp"
 #include "apps/robot/mapping_plan.hpp"
 #include "apps/robot/mesh_files_node.hpp"
 #include "apps/robot/restore_node.hpp"
@@ -54,6 +55,8 @@ struct Topics {
   Topic<RelativePose> measured_closures;
   Topic<PlaceQuery> place_queries;
   Topic<LoopCandidate> candidates;
+  Topic<PeerEvent> candidate_restarts,
+      closure_restarts;  // where candidates and closures begin anew
   Topic<ClosureOutcome> outcomes, restored_outcomes;
   Topic<Closure> own_closures, closures;  // the latter: own and received
   Topic<InlierSet> own_inlier_sets;
@@ -154,6 +157,7 @@ class Robot {
   std::atomic<std::uint32_t> keyframes_ = 0;
   std::atomic<RobotPhase> phase_ = RobotPhase::kRunning;
   std::atomic<std::uint8_t> settled_links_ = 0;
+  LivesMet lives_;
   std::vector<Node*> feeding_;  // from the source to the last that makes keyframes
   std::vector<const Node*> nodes_;
   SensorsNode* sensors_ = nullptr;

@@ -40,6 +40,11 @@ struct ClosureId {
   return b < a ? ClosureId{b, a} : ClosureId{a, b};
 }
 
+/// True if one of its keyframes is of this robot.
+[[nodiscard]] constexpr bool touches(const ClosureId& closure, RobotId robot) {
+  return closure.from.robot == robot || closure.to.robot == robot;
+}
+
 /// A geometrically verified loop closure with the odometry of both ends, so that every robot can
 /// test its consistency without having heard of those keyframes before.
 struct Closure {

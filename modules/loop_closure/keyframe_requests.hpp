@@ -56,6 +56,9 @@ class KeyframeRequests {
   /// The peer is there (again): what it has not answered is due at once.
   void returned(RobotId robot);
 
+  /// The peer's keyframes are others now: none of them is wanted.
+  void forget(RobotId robot) { peers_.erase(robot); }
+
   /// Keyframes that have not come.
   [[nodiscard]] std::size_t size() const;
 
@@ -99,6 +102,12 @@ class KeyframeCache {
     if (found == place_.end()) return nullptr;
     by_use_.splice(by_use_.begin(), by_use_, found->second);
     return by_use_.front();
+  }
+
+  /// Drops those of a robot.
+  void forget(RobotId robot) {
+    std::erase_if(by_use_, [&](const auto& kept) { return kept->odometry.id.robot == robot; });
+    std::erase_if(place_, [&](const auto& entry) { return entry.first.robot == robot; });
   }
 
  private:

@@ -95,7 +95,10 @@ LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
   topics_.measured_closures.subscribe(queue);
   topics_.peer_requests.subscribe(queue);
   topics_.peer_replies.subscribe(queue);
-  topics_.peer_events.subscribe(queue);
+  topics_.peer_events.subscribe([this](const auto& event) {
+    if (event->kind != PeerEventKind::kRestarted) worker_.post(event);
+  });
+  topics_.restarts.subscribe(queue);
   topics_.restored.subscribe(queue);
   if (vocabulary_) topics_.peer_bows.subscribe(queue);
 }
@@ -174,11 +177,28 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeReply>& reply) {
 }
 
 void LoopClosureNode::step(const std::shared_ptr<const PeerEvent>& event) {
+  const RobotId peer = event->identity.robot;
+  if (event->kind == PeerEventKind::kRestarted) {
+    forget(peer);
+    return topics_.own_restarts.publish(*event);
+  }
   if (event->kind != PeerEventKind::kReturned && event->kind != PeerEventKind::kJoined &&
-      event->kind != PeerEventKind::kRestarted)
+      event->kind != PeerEventKind::kResumed)
     return;
-  requests_.returned(event->identity.robot);
+  requests_.returned(peer);
   send_due_requests();
+}
+
+void LoopClosureNode::forget(RobotId peer) {
+  peers_.forget(peer);
+  words_.forget(peer);
+  requests_.forget(peer);
+  economy_.forget(peer);
+  replies_.erase(peer);
+  std::erase_if(known_, [&](const ClosureId& id) { return touches(id, peer); });
+  for (auto& [keyframe, works] : waiting_)
+    std::erase_if(works, [&](const Work& work) { return touches(work.id, peer); });
+  std::erase_if(waiting_, [](const auto& entry) { return entry.second.empty(); });
 }
 
 void LoopClosureNode::step(const std::shared_ptr<const KeyframeBow>& bow) {

@@ -35,11 +35,13 @@ struct LoopClosureTopics {
   In<KeyframeRequest> peer_requests;   ///< For own keyframes.
   In<KeyframeReply> peer_replies;      ///< To this robot's requests.
   In<PeerEvent> peer_events;           ///< Who comes and goes.
+  In<PeerEvent> restarts;              ///< kRestarted, before the first candidate of that life.
   In<KeyframeBow> peer_bows;           ///< Words of the peers' keyframes.
   In<ClosureOutcome> restored;         ///< What became of candidates in an earlier process.
   Out<Addressed<KeyframeRequest>> own_requests;
   Out<Addressed<KeyframeReply>> own_replies;
   Out<Closure> own_closures;     ///< Verified.
+  Out<PeerEvent> own_restarts;   ///< kRestarted, after the last closure with a former keyframe.
   Out<ClosureOutcome> outcomes;  ///< Whenever a candidate gets further or stops.
 };
 
@@ -56,6 +58,9 @@ struct LoopClosureTick {
 ///
 /// A closure starts at an own keyframe: `from` is the candidate's match, `to` its query. Each pair
 /// is verified once here; its other robot may find and verify it as well, with the ends exchanged.
+///
+/// When a robot has restarted, its keyframes are others: all work on closures with it is dropped,
+/// measured ones, too, and begins anew.
 class LoopClosureNode final : public Node {
  public:
   /// `vocabulary` may be null: then keypoints are sent without regard to their words. Throws
@@ -100,6 +105,7 @@ class LoopClosureNode final : public Node {
   };
 
   void thin_out_before(KeyframeIndex newest);
+  void forget(RobotId peer);
   void accept(const Work& work);
   bool advance(const Work& work);
   void ask_for(const KeyframeId& missing, const Work& work);

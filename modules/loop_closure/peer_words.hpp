@@ -18,7 +18,11 @@ class PeerWords {
   /// `words` ascending; those of a keyframe that is known already are replaced.
   void put(const KeyframeId& id, std::vector<std::uint32_t> words);
 
-  /// nullptr if they are not known (any more). Valid until the next put().
+  /// Its keyframes are others now.
+  void forget(RobotId robot) { robots_.erase(robot); }
+
+  /// nullptr if they are not known (any more). Valid until the next put() or
+  /// forget().
   [[nodiscard]] const std::vector<std::uint32_t>* find(const KeyframeId& id) const;
 
  private:

@@ -45,6 +45,9 @@ class RequestEconomy {
   /// A closure between own keyframe `from` and a peer's `to` was verified.
   void link(const ClosureId& closure);
 
+  /// The peer's keyframes are others now.
+  void forget(RobotId peer) { peers_.erase(peer); }
+
   /// A keyframe that was asked for has come, and has led to closures or to none.
   void conclude(const KeyframeId& keyframe, bool verified);
 

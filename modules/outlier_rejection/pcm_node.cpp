@@ -18,9 +18,11 @@ std::string text_of(RobotId a, RobotId b) {
 
 }  // namespace
 
-PcmNode::PcmNode(const PcmConfig& config, RobotId self, const PcmTopics& topics)
+PcmNode::PcmNode(const PcmConfig& config, RobotId self, const PcmTopics& topics,
+                 std::uint32_t first_version)
     : config_(checked(config)),
       self_(self),
+      first_version_(first_version),
       inlier_sets_(topics.inlier_sets),
       worker_(
           kQueue, Overflow::kBlock, [this](const Input& input) { handle(input); },
@@ -28,7 +30,7 @@ PcmNode::PcmNode(const PcmConfig& config, RobotId self, const PcmTopics& topics)
       ticks_(
           steady_duration(config.publish_period_s), [this] { worker_.post(Tick{}); }, "pcm tick") {
   topics.closures.subscribe([this](const auto& message) { worker_.post(message); });
-  topics.peer_events.subscribe([this](const auto& message) { worker_.post(message); });
+  topics.restarts.subscribe([this](const auto& message) { worker_.post(message); });
 }
 
 void PcmNode::start() {
@@ -53,7 +55,9 @@ void PcmNode::handle(const Input& input) {
 }
 
 void PcmNode::step(const PeerEvent& event) {
-  if (event.kind == PeerEventKind::kRestarted) pairs_.erase(event.identity.robot);
+  if (event.kind != PeerEventKind::kRestarted) return;
+  pairs_.erase(event.identity.robot);
+  no_more_ = false;
 }
 
 void PcmNode::step(const Closure& closure) {
@@ -102,7 +106,8 @@ void PcmNode::publish_changes(double now_s) {
     std::vector<ClosureId> closures = selected(other, pair, now_s);
     if (closures.empty()) continue;
     pair.changed = false;
-    inlier_sets_.publish(InlierSet{self_, other, ++version_of_[other], std::move(closures)});
+    const auto version = version_of_.try_emplace(other, first_version_).first;
+    inlier_sets_.publish(InlierSet{self_, other, ++version->second, std::move(closures)});
   }
 }
 

@@ -24,7 +24,7 @@ namespace km {
 /// Channels of the PCM node; they must outlive it.
 struct PcmTopics {
   In<Closure> closures;        ///< Own and received ones, in any order, repeated or not.
-  In<PeerEvent> peer_events;   ///< The keyframes of a peer that has restarted are others.
+  In<PeerEvent> restarts;      ///< kRestarted, before the first closure of that life.
   Out<InlierSet> inlier_sets;  ///< Versions ascending per pair.
 };
 
@@ -38,8 +38,10 @@ struct PcmTopics {
 /// inside the robot join nothing and are published at once.
 class PcmNode final : public Node {
  public:
-  /// Throws ConfigError if `config` is out of bounds.
-  PcmNode(const PcmConfig& config, RobotId self, const PcmTopics& topics);
+  /// The versions of its sets follow `first_version`: those of a robot that is resumed must be
+  /// newer than before. Throws ConfigError if `config` is out of bounds.
+  PcmNode(const PcmConfig& config, RobotId self, const PcmTopics& topics,
+          std::uint32_t first_version = 0);
   ~PcmNode() override { stop(); }
 
   std::string_view name() const override { return PcmConfig::kSection; }
@@ -60,7 +62,7 @@ class PcmNode final : public Node {
   void publish_changes(double now_s);
 
   /// The runs of all robots are over, and all that was found has arrived: whoever waits for a
-  /// witness waits for nothing. Safe to call from any thread, repeatedly.
+  /// witness waits for nothing, until a robot restarts. Safe to call from any thread, repeatedly.
   void expect_no_more() { no_more_ = true; }
 
  private:
@@ -83,6 +85,7 @@ class PcmNode final : public Node {
 
   const PcmConfig config_;
   const RobotId self_;
+  const std::uint32_t first_version_;
   const Out<InlierSet> inlier_sets_;
   std::map<RobotId, Pair> pairs_;  // by the other robot; `self_` for closures inside this one
   std::map<RobotId, std::uint32_t> version_of_;

@@ -21,11 +21,23 @@ PlaceRecognitionNode::PlaceRecognitionNode(const PlaceRecognitionConfig& config,
       vocabulary_(std::move(vocabulary)),
       topics_(topics),
       own_(config_, vocabulary_->size()),
-      worker_(kQueueCapacity, Overflow::kBlock, [this](const Input& input) {
-        std::visit([this](const auto& message) { step(*message); }, input);
-      }) {
+      worker_(kQueueCapacity, Overflow::kBlock, [this](const Input& input) { handle(input); }) {
   topics_.keyframes.subscribe([this](const auto& message) { worker_.post(message); });
   topics_.peer_bows.subscribe([this](const auto& message) { worker_.post(message); });
+  topics_.peer_events.subscribe([this](const auto& message) { worker_.post(message); });
+}
+
+void PlaceRecognitionNode::handle(const Input& input) {
+  if (const auto* event = std::get_if<Topic<PeerEvent>::Message>(&input)) return step(*event);
+  if (const auto* bow = std::get_if<Topic<KeyframeBow>::Message>(&input)) return step(**bow);
+  step(*std::get<Topic<Keyframe>::Message>(input));
+}
+
+// The event itself is handed on: what the robot sends waits while somebody holds it.
+void PlaceRecognitionNode::step(const Topic<PeerEvent>::Message& event) {
+  if (event->kind != PeerEventKind::kRestarted) return;
+  peers_.erase(event->identity.robot);
+  topics_.restarts.publish(event);
 }
 
 void PlaceRecognitionNode::step(const Keyframe& keyframe) {

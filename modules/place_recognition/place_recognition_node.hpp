@@ -13,6 +13,7 @@
 #include "modules/place_recognition/candidate_filter.hpp"
 #include "modules/place_recognition/peer_history.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
+#include "runtime/dds/peer_table.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
 #include "runtime/worker.hpp"
@@ -23,8 +24,10 @@ namespace km {
 struct PlaceRecognitionTopics {
   In<Keyframe> keyframes;     ///< Own, ascending.
   In<KeyframeBow> peer_bows;  ///< Of peers; own ones that come back are ignored.
+  In<PeerEvent> peer_events;  ///< Whose keyframes are others from now on.
   Out<KeyframeBow> own_bows;  ///< Every own keyframe, for the peers.
   Out<LoopCandidate> candidates;
+  Out<PeerEvent> restarts;  ///< kRestarted, after the last candidate with a keyframe from before.
   Out<PlaceQuery> queries;  ///< One per keyframe heard of.
 };
 
@@ -38,7 +41,8 @@ struct PlaceRecognitionTopics {
 /// takes the candidates must expect a pair from either side. Keyframe 0 of a robot has no
 /// normaliser and is found only as the one that is known already.
 ///
-/// A keyframe index stands for one keyframe for ever: a robot that starts anew needs another id.
+/// A keyframe index stands for one keyframe for as long as its robot lives; one that restarts
+/// begins anew.
 class PlaceRecognitionNode final : public Node {
  public:
   /// Throws ConfigError if `config` is out of bounds.
@@ -56,9 +60,13 @@ class PlaceRecognitionNode final : public Node {
   /// Handle one input synchronously. The thread calls only these; so can tests and replay.
   void step(const Keyframe& keyframe);
   void step(const KeyframeBow& peer_bow);
+  void step(const Topic<PeerEvent>::Message& event);
 
  private:
-  using Input = std::variant<Topic<Keyframe>::Message, Topic<KeyframeBow>::Message>;
+  using Input = std::variant<Topic<Keyframe>::Message, Topic<KeyframeBow>::Message,
+                             Topic<PeerEvent>::Message>;
+
+  void handle(const Input& input);
 
   void publish(const KeyframeId& query, CandidateSearch search) const;
   void publish_refusal(const KeyframeId& query, PlaceQueryStatus status) const;

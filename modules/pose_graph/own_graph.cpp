@@ -121,9 +121,7 @@ bool OwnGraph::add(const InlierSet& set) {
 void OwnGraph::forget(RobotId peer) {
   sets_.erase(peer);
   closures_to_.erase(peer);
-  std::erase_if(closures_, [&](const auto& closure) {
-    return closure.first.from.robot == peer || closure.first.to.robot == peer;
-  });
+  std::erase_if(closures_, [&](const auto& closure) { return touches(closure.first, peer); });
 }
 
 void OwnGraph::complete_sets() {

@@ -32,10 +32,6 @@ bool same_content(const TeamStatus& a, const TeamStatus& b) {
   return rest(a) == rest(b) && a.T_odom_first.matrix() == b.T_odom_first.matrix();
 }
 
-bool touches(const ClosureId& id, RobotId robot) {
-  return id.from.robot == robot || id.to.robot == robot;
-}
-
 // What the codec checks, too, and everything else that is relied on: nobody else is trusted.
 bool in_order(const MemberPoses& poses) {
   const auto& keyframes = poses.keyframes;
@@ -127,16 +123,21 @@ void TeamAgent::peer_lost(RobotId robot) {
 TeamAgent::Peer& TeamAgent::meet(const TeamPeer& peer) {
   Peer& entry = peers_.try_emplace(peer.robot, Peer{.boot = peer.boot}).first->second;
   if (entry.boot != peer.boot) {
-    forget(peer.robot);
+    if (!is_same_life(entry.boot, peer.boot)) forget_measured(peer.robot);
+    told_.erase(peer.robot);
+    plan_outdated_ = true;
     entry = Peer{.boot = peer.boot};
   }
   return entry;
 }
 
-// It has been restarted: its keyframes are others now.
-void TeamAgent::forget(RobotId robot) {
+void TeamAgent::peer_restarted(const TeamPeer& peer) {
+  meet(peer);
+  forget_measured(peer.robot);
+}
+
+void TeamAgent::forget_measured(RobotId robot) {
   graph_.forget(robot);
-  told_.erase(robot);
   std::erase_if(decided_, [&](const auto& decision) { return touches(decision.first, robot); });
   std::erase_if(chances_, [&](const auto& chance) { return touches(chance.first, robot); });
   std::erase_if(verdicts_, [&](const auto& verdict) { return touches(verdict.first, robot); });

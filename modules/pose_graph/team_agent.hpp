@@ -44,13 +44,13 @@ struct [[nodiscard]] TeamOutput {
 ///
 /// A robot that is out of reach leaves its last public poses behind, to be held fixed by the
 /// others, so that they keep their frame and what it told them. When it comes back it catches up;
-/// if it comes back as another process it is forgotten. What has been decided about closures
-/// carries over from session to session, and so does what they tell of their noise; both ends
-/// of a closure tell each other first. What a robot decides alone holds until it is in a team,
-/// which knows the noise better; what a team decides beside the poses of robots that have gone,
-/// until its next session: it may be those poses that are wrong. Where closures were set aside
-/// unheard, those that fit the solution all the same are taken for undecided again, and one more
-/// session weighs them.
+/// of another process what it told is forgotten, of another life also what was measured. What has
+/// been decided about closures carries over from session to session, and so does what they tell of
+/// their noise; both ends of a closure tell each other first. What a robot decides alone holds
+/// until it is in a team, which knows the noise better; what a team decides beside the poses of
+/// robots that have gone, until its next session: it may be those poses that are wrong. Where
+/// closures were set aside unheard, those that fit the solution all the same are taken for
+/// undecided again, and one more session weighs them.
 ///
 /// Where all members know which way is up, that is part of what they minimise, and `world` has z
 /// up.
@@ -69,6 +69,9 @@ class TeamAgent {
   /// A robot is heard directly from now on, or no more.
   void peer_alive(TeamPeer peer);
   void peer_lost(RobotId robot);
+
+  /// The keyframes of `peer` are others from now on: what was measured before counts no more.
+  void peer_restarted(const TeamPeer& peer);
 
   /// A message that `from`, which is heard directly, has handed over; in any order, repeated or
   /// lost. False if it is refused.
@@ -106,7 +109,7 @@ class TeamAgent {
 
   // Who is there.
   Peer& meet(const TeamPeer& peer);
-  void forget(RobotId robot);
+  void forget_measured(RobotId robot);
   void watch_links();
   [[nodiscard]] bool in_reach(const TeamPeer& peer) const;
   bool take(const TeamPeer& sender, const TeamStatus& status);

@@ -37,6 +37,9 @@ TeamNode::TeamNode(const PoseGraphConfig& config, TeamPeer self, const TeamTopic
   topics.inlier_sets.subscribe(post);
   topics.peer_inlier_sets.subscribe(post);
   topics.peer_events.subscribe(post);
+  topics.restarts.subscribe([this](const auto& event) {
+    worker_.post(NewLife{{event->identity.robot, event->identity.boot}});
+  });
   topics.peer_parcels.subscribe(post);
 }
 
@@ -68,6 +71,7 @@ void TeamNode::step(const Input& input, double now_s) {
 void TeamNode::take(const Input& input) {
   const auto take_in = Overloaded{
       [](const Tick&) {},
+      [&](const NewLife& life) { agent_.peer_restarted(life.peer); },
       [&](const Topic<PeerEvent>::Message& m) { take_peer_event(*m); },
       [&](const Topic<TeamParcel>::Message& m) { agent_.receive(m->from, m->message); },
       [&](const auto& measured) { agent_.add(*measured); },

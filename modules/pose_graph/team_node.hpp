@@ -23,6 +23,7 @@ struct TeamTopics {
   In<InlierSet> inlier_sets;           ///< Decided here.
   In<InlierSet> peer_inlier_sets;      ///< Decided by other robots.
   In<PeerEvent> peer_events;           ///< Who is heard directly.
+  In<PeerEvent> restarts;              ///< kRestarted, before the first closure of that life.
   In<TeamParcel> peer_parcels;         ///< From robots that are heard directly.
   Out<Addressed<TeamParcel>> parcels;  ///< To robots that are heard directly.
   Out<Trajectory> trajectory;
@@ -53,8 +54,12 @@ class TeamNode final : public Node {
   /// Time passes. Always null: as a plain struct among pointers it sets off a false alarm of
   /// GCC 12.
   using Tick = std::shared_ptr<const struct TickTag>;
+  /// The keyframes of this process are others than its robot's former ones.
+  struct NewLife {
+    TeamPeer peer;
+  };
   using Input = std::variant<Tick, Topic<KeyframeOdometry>::Message, Topic<Closure>::Message,
-                             Topic<InlierSet>::Message, Topic<PeerEvent>::Message,
+                             Topic<InlierSet>::Message, Topic<PeerEvent>::Message, NewLife,
                              Topic<TeamParcel>::Message>;
 
   /// Handles one input synchronously at time `now_s`. The thread calls only this; so can tests.

@@ -55,6 +55,34 @@ TEST_CASE("closures to one robot are recorded up to a bound", "[robot]") {
   CHECK_FALSE(record.closures().contains({{1, 0}, {2, kMost}}));
 }
 
+TEST_CASE("of a robot that restarts no closure is kept, of one that is resumed all", "[robot]") {
+  const auto kind = GENERATE(PeerEventKind::kRestarted, PeerEventKind::kResumed);
+  const ClosureId with_it{{1, 2}, {2, 3}}, doubted{{1, 4}, {2, 5}}, with_other{{1, 4}, {3, 5}};
+  RunRecord record(1);
+  for (const ClosureId& id : {with_it, doubted, with_other}) {
+    record.add(closure_between(id));
+    record.add(ClosureOutcome{.id = id, .stage = ClosureStage::kVerified, .reason = {}});
+  }
+  record.add(InlierSet{1, 2, 7, {with_it, doubted}});
+  record.add(InlierSet{1, 3, 7, {with_other}});
+  record.add(ClosureVerdicts{{{doubted, false}}});
+  PeerEvent event{kind, {}, {}};
+  event.identity.robot = 2;
+  record.add(event);
+  if (kind == PeerEventKind::kResumed) {
+    CHECK(record.inlier_closures().size() == 2);
+    return;
+  }
+  CHECK(record.closures().size() == 1);
+  CHECK(record.outcomes().size() == 1);
+  CHECK(record.closures_per_peer().at(3).inliers == 1);
+  // In the new life the same numbers are of other keyframes, and versions begin again.
+  for (const ClosureId& id : {with_it, doubted}) record.add(closure_between(id));
+  CHECK(record.inlier_closures().size() == 1);
+  record.add(InlierSet{1, 2, 1, {doubted}});
+  CHECK(record.inlier_closures().size() == 2);
+}
+
 TEST_CASE("of two measurements of a pair of keyframes the optimiser's is recorded", "[robot]") {
   const ClosureId id{{1, 4}, {2, 3}};
   Closure precise = closure_between(id), vague = closure_between(id);

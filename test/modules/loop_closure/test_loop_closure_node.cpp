@@ -22,11 +22,13 @@ struct Robot {
               .peer_requests = peer_requests,
               .peer_replies = peer_replies,
               .peer_events = peer_events,
+              .restarts = restarts,
               .peer_bows = peer_bows,
               .restored = restored,
               .own_requests = own_requests,
               .own_replies = own_replies,
               .own_closures = own_closures,
+              .own_restarts = own_restarts,
               .outcomes = outcomes}) {
     own_requests.subscribe([this](const auto& m) { requests.push_back(*m); });
     own_replies.subscribe([this](const auto& m) { replies.push_back(*m); });
@@ -45,7 +47,7 @@ struct Robot {
   Topic<RelativePose> measured;
   Topic<KeyframeRequest> peer_requests;
   Topic<KeyframeReply> peer_replies;
-  Topic<PeerEvent> peer_events;
+  Topic<PeerEvent> peer_events, restarts, own_restarts;
   Topic<KeyframeBow> peer_bows;
   Topic<ClosureOutcome> restored;
   Topic<Addressed<KeyframeRequest>> own_requests;
@@ -266,6 +268,71 @@ TEST_CASE("a peer that returns is asked at once for what it owes", "[loop_closur
   REQUIRE(robot.requests.size() == 1);
   deliver(robot, peer);
   CHECK(robot.closures.size() == 1);
+}
+
+PeerEvent event_of(PeerEventKind kind) {
+  PeerEvent event{kind, {}, {}};
+  event.identity.robot = kPeer;
+  return event;
+}
+
+TEST_CASE("with a restarted peer everything begins anew, with a resumed one nothing",
+          "[loop_closure_node]") {
+  Meeting meeting(5);
+  auto& [scene, robot, peer] = meeting;
+  std::vector<PeerEventKind> told;
+  robot.own_restarts.subscribe([&](const auto& event) { told.push_back(event->kind); });
+  robot.give(scene.candidate());
+  deliver(robot, peer);
+  REQUIRE(robot.closures.size() == 1);
+  SECTION("restarted") {
+    robot.give(event_of(PeerEventKind::kRestarted));
+    CHECK(told == std::vector{PeerEventKind::kRestarted});
+    robot.give(scene.candidate());
+    CHECK(robot.requests.size() == 1);  // its keyframe is another
+    deliver(robot, peer);
+    CHECK(robot.closures.size() == 2);
+  }
+  SECTION("resumed") {
+    robot.give(event_of(PeerEventKind::kResumed));
+    CHECK(told.empty());
+    robot.give(scene.candidate());
+    CHECK(robot.requests.empty());
+    CHECK(robot.closures.size() == 1);
+  }
+}
+
+TEST_CASE("what was under way for a peer is dropped when it restarts, and asked anew when resumed",
+          "[loop_closure_node]") {
+  const bool measured = GENERATE(true, false);
+  const bool own_is_missing = GENERATE(true, false);
+  CAPTURE(measured, own_is_missing);
+  const Scene scene(5);
+  Robot robot(kSelf), peer(kPeer);
+  peer.give(scene.peer);
+  if (!own_is_missing) robot.give(scene.own);
+  if (measured)
+    robot.give(RelativePose{.from = scene.own.odometry.id, .to = scene.peer.odometry.id});
+  else
+    robot.give(scene.candidate());
+  for (int t = 0; t < 60; ++t) robot.tick(t);  // nobody answers
+  robot.requests.clear();
+  SECTION("restarted") {
+    robot.give(event_of(PeerEventKind::kRestarted));
+    robot.give(scene.own);
+    for (int t = 60; t < 120; ++t) robot.tick(t);
+    CHECK(robot.requests.empty());
+    robot.give(KeyframeReply{.number = 0, .found = true, .keyframe = scene.peer});  // late
+    CHECK(robot.closures.empty());
+  }
+  SECTION("resumed") {
+    robot.give(event_of(PeerEventKind::kResumed));
+    CHECK(robot.requests.size() == (own_is_missing ? 0 : 1));
+    robot.give(scene.own);
+    robot.tick(60);
+    deliver(robot, peer);
+    CHECK(robot.closures.size() == 1);
+  }
 }
 
 TEST_CASE("a keyframe its owner does not have yet is asked for again", "[loop_closure_node]") {

@@ -17,12 +17,12 @@ namespace {
 struct Team {
   std::mt19937 rng{1};
   Topic<Closure> closures;
-  Topic<PeerEvent> peer_events;
+  Topic<PeerEvent> restarts;
   Topic<InlierSet> inlier_sets;
   Inbox<InlierSet> sets{inlier_sets};
 
   PcmTopics topics() {
-    return {.closures = closures, .peer_events = peer_events, .inlier_sets = inlier_sets};
+    return {.closures = closures, .restarts = restarts, .inlier_sets = inlier_sets};
   }
 
   // Exact to a millimetre, weighed as such: all agree.
@@ -226,6 +226,32 @@ TEST_CASE("Of a peer that has restarted the closures are forgotten", "[node]") {
   CHECK(sets[0].closures.size() == 20);
   CHECK(sets[1].closures.size() == 2);
   CHECK(sets[0].version < sets[1].version);
+}
+
+TEST_CASE("The sets of a resumed robot are newer than all before", "[node]") {
+  Team team;
+  const auto closures = team.agreeing(2, 5, 20);
+  constexpr std::uint32_t kFirst = 3U << 16U;
+  PcmNode node(PcmConfig{}, 2, team.topics(), kFirst);
+  for (const Closure& closure : closures) node.step(closure);
+  node.publish_changes(0.0);
+  REQUIRE(team.sets.messages().size() == 1);
+  CHECK(team.sets.messages()[0].version == kFirst + 1);
+}
+
+TEST_CASE("When a robot restarts, its pair waits for a witness again", "[node]") {
+  Team team;
+  PcmNode node(PcmConfig{}, 2, team.topics());
+  node.expect_no_more();
+  RobotIdentity identity;
+  identity.robot = 5;
+  node.step(PeerEvent{PeerEventKind::kRestarted, identity, {}});
+  node.step(team.agreeing(2, 5, 20)[3]);
+  node.publish_changes(0.0);
+  CHECK(team.sets.messages().empty());
+  node.expect_no_more();
+  node.publish_changes(0.5);
+  CHECK(team.sets.messages().size() == 1);
 }
 
 const InlierSet kSet{.a = 3,

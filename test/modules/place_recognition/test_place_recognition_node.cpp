@@ -34,8 +34,10 @@ struct Recorder {
 struct Robot {
   Topic<Keyframe> keyframes;
   Topic<KeyframeBow> peer_bows;
+  Topic<PeerEvent> peer_events;
   Recorder<KeyframeBow> own_bows;
   Recorder<LoopCandidate> candidates;
+  Recorder<PeerEvent> restarts;
   Recorder<PlaceQuery> queries;
   PlaceRecognitionNode node;
 
@@ -44,8 +46,10 @@ struct Robot {
       : node(config, self, std::make_shared<const Vocabulary>(vocabulary),
              {.keyframes = keyframes,
               .peer_bows = peer_bows,
+              .peer_events = peer_events,
               .own_bows = own_bows.topic,
               .candidates = candidates.topic,
+              .restarts = restarts.topic,
               .queries = queries.topic}) {}
 };
 
@@ -89,6 +93,27 @@ TEST_CASE("A peer's view of a known place is a candidate, through the thread",
   CHECK(robot.candidates.received[0].match == KeyframeId{kSelf, 0});
   CHECK(robot.candidates.received[0].similarity == Approx(1.0));
   CHECK(robot.queries.received.size() == 4);
+}
+
+TEST_CASE(
+    "The keyframes of a peer in another life are searched for, and of a resumed one not again",
+    "[place_recognition][node]") {
+  const auto kind = GENERATE(PeerEventKind::kRestarted, PeerEventKind::kResumed);
+  Robot robot(kSelf);
+  robot.node.step(keyframe({kSelf, 0}, {1, 2, 3, 4}));
+  robot.node.step(keyframe({kSelf, 1}, {11, 12, 13, 14}));
+  robot.node.step(bow({kPeer, 0}, {1, 2, 3, 4}));
+  robot.node.step(bow({kPeer, 1}, {1, 2, 3, 5}));
+  REQUIRE(robot.candidates.received.size() == 1);
+  PeerEvent event{kind, {}, {}};
+  event.identity.robot = kPeer;
+  robot.node.step(std::make_shared<const PeerEvent>(event));
+  const bool restarted = kind == PeerEventKind::kRestarted;
+  CHECK(robot.restarts.received.size() == (restarted ? 1 : 0));  // before what follows
+  robot.node.step(bow({kPeer, 0}, {11, 12, 13, 14}));
+  robot.node.step(bow({kPeer, 1}, {11, 12, 13, 15}));
+  REQUIRE(robot.candidates.received.size() == (restarted ? 2 : 1));
+  if (restarted) CHECK(robot.candidates.received[1].match == KeyframeId{kSelf, 1});
 }
 
 TEST_CASE("A return to a place after the gap is a candidate inside one robot",

@@ -29,6 +29,7 @@ struct Robot {
             .inlier_sets = inlier_sets,
             .peer_inlier_sets = peer_inlier_sets,
             .peer_events = peer_events,
+            .restarts = restarts,
             .peer_parcels = peer_parcels,
             .parcels = parcels,
             .trajectory = trajectory,
@@ -75,7 +76,7 @@ struct Robot {
   Topic<KeyframeOdometry> odometry;
   Topic<Closure> closures;
   Topic<InlierSet> inlier_sets, peer_inlier_sets;
-  Topic<PeerEvent> peer_events;
+  Topic<PeerEvent> peer_events, restarts;
   Topic<TeamParcel> peer_parcels;
   Topic<Addressed<TeamParcel>> parcels;
   Topic<Trajectory> trajectory;

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <mutex>
+
+#include "modules/core/robot_identity.hpp"
+
+namespace km {
+
+/// Which life of each other robot the own closures are with. Thread-safe.
+class LivesMet {
+ public:
+  /// From now on, with this one.
+  void meet(const TeamPeer& peer) {
+    const std::lock_guard lock(mutex_);
+    boots_[peer.robot] = peer.boot;
+  }
+
+  /// A boot of it; 0 if the robot has not been met.
+  [[nodiscard]] std::uint64_t of(RobotId robot) const {
+    const std::lock_guard lock(mutex_);
+    const auto found = boots_.find(robot);
+    return found == boots_.end() ? 0 : found->second;
+  }
+
+ private:
+  mutable std::mutex mutex_;  // guards boots_
+  std::map<RobotId, std::uint64_t> boots_;
+};
+
+}  // namespace km
