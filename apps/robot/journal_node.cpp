@@ -50,6 +50,11 @@ JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
   });
   topics.closures.subscribe(post);
   topics.outcomes.subscribe(post);
+  topics.restarts.subscribe(post);
+  topics.peer_events.subscribe([this](const auto& event) {
+    if (event->kind == PeerEventKind::kJoined || event->kind == PeerEventKind::kResumed)
+      worker_.post(event);
+  });
 }
 
 void JournalNode::start() {
@@ -107,6 +112,15 @@ void JournalNode::step(const Message<Closure>& closure) {
 
 void JournalNode::step(const Message<ClosureOutcome>& outcome) {
   add(*outcome);
+}
+
+void JournalNode::step(const Message<PeerEvent>& event) {
+  const RobotIdentity& peer = event->identity;
+  if (event->kind == PeerEventKind::kRestarted)
+    std::erase_if(known_closures_, [&](const auto& ends) {
+      return ends.first.robot == peer.robot || ends.second.robot == peer.robot;
+    });
+  add(JournalPeer{peer.robot, peer.boot, peer.name});
 }
 
 }  // namespace km

@@ -17,6 +17,7 @@
 #include "modules/core/pose_graph.hpp"
 #include "modules/journal/journal_file.hpp"
 #include "modules/journal/restored_run.hpp"
+#include "runtime/dds/peer_table.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
 #include "runtime/topic.hpp"
@@ -31,6 +32,8 @@ struct JournalTopics {
   In<Keyframe> new_keyframes;
   In<Closure> closures;  ///< Own and received ones.
   In<ClosureOutcome> outcomes;
+  In<PeerEvent> peer_events;
+  In<PeerEvent> restarts;   ///< In order with the closures: what follows is with another life.
   Out<Keyframe> keyframes;  ///< The new ones, once they are on the disk.
 };
 
@@ -65,8 +68,9 @@ class JournalNode final : public Node {
   struct Tick {};
   template <typename T>
   using Message = typename Topic<T>::Message;
-  using Input = std::variant<Tick, Message<OdometryState>, Message<KeyframeOdometry>,
-                             Message<Keyframe>, Message<Closure>, Message<ClosureOutcome>>;
+  using Input =
+      std::variant<Tick, Message<OdometryState>, Message<KeyframeOdometry>, Message<Keyframe>,
+                   Message<Closure>, Message<ClosureOutcome>, Message<PeerEvent>>;
 
   void step(Tick tick);
   void step(const Message<OdometryState>& state);
@@ -74,6 +78,7 @@ class JournalNode final : public Node {
   void step(const Message<Keyframe>& keyframe);
   void step(const Message<Closure>& closure);
   void step(const Message<ClosureOutcome>& outcome);
+  void step(const Message<PeerEvent>& event);
   void add(const JournalEntry& entry);
 
   const std::filesystem::path file_;

@@ -83,6 +83,10 @@ void Robot::add_past() {
 void Robot::add_restore() {
   if (!restored_) return;
   restored_images_ = restored_->states.size();
+  for (const auto& [robot, peer] : restored_->peers) {
+    bridge_->peers().recall({.robot = robot, .name = peer.name, .boot = peer.boot});
+    lives_.meet({robot, peer.boot});
+  }
   restore_ = &add<RestoreNode>(false, RestoreTopics{.states = topics_.odometry,
                                                     .odometry = topics_.keyframe_odometry,
                                                     .keyframes = topics_.keyframes,
@@ -101,6 +105,8 @@ void Robot::add_journal(const RobotOptions& options, const std::string& input,
                                              .new_keyframes = topics_.new_keyframes,
                                              .closures = topics_.closures,
                                              .outcomes = topics_.outcomes,
+                                             .peer_events = bridge_->peers().events(),
+                                             .restarts = topics_.closure_restarts,
                                              .keyframes = topics_.keyframes});
 }
 

@@ -26,6 +26,11 @@ class EntryWriter {
     out_.u64(start.boot);
     put(start.input);
   }
+  void put(const JournalPeer& peer) {
+    out_.u16(peer.robot);
+    out_.u64(peer.boot);
+    put(peer.name);
+  }
   void put(const OdometryState& state) {
     put(state.stamp);
     put(state.T_odom_body);
@@ -133,6 +138,11 @@ class EntryReader {
     start.robot = in_.u16();
     start.boot = in_.u64();
     get(start.input);
+  }
+  void get(JournalPeer& peer) {
+    peer.robot = in_.u16();
+    peer.boot = in_.u64();
+    get(peer.name);
   }
   void get(OdometryState& state) {
     get(state.stamp);

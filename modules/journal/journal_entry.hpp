@@ -21,9 +21,16 @@ struct JournalStart {
   std::string input;       ///< What the robot perceives, as its command line names it.
 };
 
+/// Another robot, as met: what follows with it is with this life of it (see RobotIdentity).
+struct JournalPeer {
+  RobotId robot = 0;
+  std::uint64_t boot = 0;
+  std::string name;
+};
+
 /// What a robot cannot work out anew once its process has died. Everything else follows from it.
-using JournalEntry =
-    std::variant<JournalStart, OdometryState, KeyframeOdometry, Keyframe, Closure, ClosureOutcome>;
+using JournalEntry = std::variant<JournalStart, OdometryState, KeyframeOdometry, Keyframe, Closure,
+                                  ClosureOutcome, JournalPeer>;
 
 /// No entry is longer [bytes].
 inline constexpr std::size_t kMaxJournalEntry_bytes = std::size_t{1} << 22U;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "modules/core/input_file.hpp"
+#include "modules/core/robot_identity.hpp"
 
 namespace km {
 namespace {
@@ -68,15 +69,23 @@ void RunRestorer::cut_to_full_keyframes() {
     return full == 0 || state.stamp > run_.odometry.back().stamp;
   };
   std::erase_if(run_.states, later);
-  const auto lacks = [&](const KeyframeId& id) {
-    return id.robot == run_.robot && id.index >= full;
-  };
+  forget_closures([&](const KeyframeId& id) { return id.robot == run_.robot && id.index >= full; });
+}
+
+void RunRestorer::forget_closures(const std::function<bool(const KeyframeId&)>& with) {
   std::erase_if(closures_, [&](const auto& entry) {
-    return lacks(entry.first.first) || lacks(entry.first.second);
+    return with(entry.first.first) || with(entry.first.second);
   });
-  std::erase_if(outcomes_, [&](const auto& entry) {
-    return lacks(entry.first.from) || lacks(entry.first.to);
-  });
+  std::erase_if(outcomes_,
+                [&](const auto& entry) { return with(entry.first.from) || with(entry.first.to); });
+}
+
+// The keyframes of another life are others.
+void RunRestorer::add(JournalPeer peer) {
+  const auto known = run_.peers.find(peer.robot);
+  if (known != run_.peers.end() && !is_same_life(known->second.boot, peer.boot))
+    forget_closures([&](const KeyframeId& id) { return id.robot == peer.robot; });
+  run_.peers[peer.robot] = std::move(peer);
 }
 
 RestoredRun RunRestorer::finish() {
@@ -97,6 +106,7 @@ RestoredRun RunRestorer::finish() {
 
 RestoredRun alone_as(RobotId robot, RestoredRun run) {
   const RobotId former = std::exchange(run.robot, robot);
+  run.peers.clear();
   const auto is_shared = [former](const KeyframeId& a, const KeyframeId& b) {
     return a.robot != former || b.robot != former;
   };

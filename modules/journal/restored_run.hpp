@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -26,6 +27,7 @@ struct RestoredRun {
   /// Of candidates that nothing more becomes of: those verified, whose closures are there, and
   /// those refused.
   std::vector<ClosureOutcome> outcomes;
+  std::map<RobotId, JournalPeer> peers;  ///< As last met.
 
   JournalExtent journal = {};  ///< Where to go on writing.
 };
@@ -50,7 +52,9 @@ class RunRestorer {
   void add(Keyframe keyframe);
   void add(Closure closure);
   void add(ClosureOutcome outcome);
+  void add(JournalPeer peer);
   void cut_to_full_keyframes();
+  void forget_closures(const std::function<bool(const KeyframeId&)>& with);
 
   RestoredRun run_;
   bool started_ = false;

@@ -13,6 +13,11 @@ constexpr double kSameUptime_s = 1.0;
 
 }  // namespace
 
+void PeerTable::recall(const RobotIdentity& identity) {
+  if (identity.robot == self_.robot || peers_.size() >= kMaxRobots) return;
+  peers_.try_emplace(identity.robot, KnownPeer{{identity, PeerState::kLost, "unknown"}, Guid{}});
+}
+
 void PeerTable::participant(const Guid& guid, std::string_view user_data,
                             const std::string& addresses) {
   Participant* found = remember(guid);
@@ -157,7 +162,9 @@ void PeerTable::take_over(KnownPeer& known, const Guid& guid, const Participant&
   const bool arriving =
       former_boot == identity.boot ? known.arriving : !is_same_life(former_boot, identity.boot);
   known = {{identity, PeerState::kAlive, participant.addresses}, guid, arriving};
-  if (former != guid && !participants_.at(former).announced) participants_.erase(former);
+  const auto predecessor = participants_.find(former);
+  if (former != guid && predecessor != participants_.end() && !predecessor->second.announced)
+    participants_.erase(predecessor);
   if (former_boot == identity.boot) return emit(PeerEventKind::kReturned, identity, "returned");
   if (is_same_life(former_boot, identity.boot))
     return emit(PeerEventKind::kResumed, identity, "resumed");

@@ -74,6 +74,9 @@ class PeerTable {
   explicit PeerTable(const RobotIdentity& self, Admit admit = {})
       : self_(self), admit_(std::move(admit)) {}
 
+  /// A robot that was met before this process: it is lost, until it is heard.
+  void recall(const RobotIdentity& identity);
+
   /// A participant announced itself (again) with this user data.
   void participant(const Guid& guid, std::string_view user_data, const std::string& addresses);
   void participant_gone(const Guid& guid);

@@ -161,6 +161,11 @@ void Peers::listen(dds_listener_t* listener) {
   dds_lset_liveliness_changed_arg(listener, &Peers::on_liveliness_changed, this, true);
 }
 
+void Peers::recall(const RobotIdentity& identity) {
+  const std::lock_guard lock(mutex_);
+  table_.recall(identity);
+}
+
 std::vector<Peer> Peers::list() const {
   const std::lock_guard lock(mutex_);
   return table_.peers();

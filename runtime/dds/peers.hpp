@@ -65,6 +65,10 @@ class Peers {
   /// its process sends waits.
   [[nodiscard]] In<PeerEvent> events() { return events_; }
 
+  /// A robot that an earlier process of this one has met: it is lost, until it is heard. Call
+  /// before start().
+  void recall(const RobotIdentity& identity);
+
   /// Robots of the team ever met by this one, ascending by id.
   [[nodiscard]] std::vector<Peer> list() const;
 

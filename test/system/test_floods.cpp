@@ -24,7 +24,7 @@
 #include "test/system/long_run.hpp"
 
 // One robot of a team sends to a robot process as much of one kind as a fast radio link carries,
-// all of it well-formed; another asks that robot something twenty times a second. What the flood
+// all of it readable; another asks that robot something twenty times a second. What the flood
 // costs: memory of the process, octets that it sends for each that it gets, and how long the other
 // waits.
 

@@ -175,7 +175,8 @@ TEST_CASE("A robot finds itself in the map of a run of the past", "[system][resu
   CHECK(robot.wait() == 0);
   CHECK(silent.wait() == 0);
   CHECK(read_summary(today / "summary.json").pgo.members == std::vector<RobotId>{0, 1});
-  CHECK(lines_of(silent_output / "optimized.tum") == lines_of(yesterday / "optimized.tum"));
+  CHECK(read_summary(silent_output / "summary.json").keyframes ==
+        read_summary(yesterday / "summary.json").keyframes);
   CHECK(error_m(*dataset, {silent_output / "optimized.tum", today / "optimized.tum"}, folder) <
         0.015);
 }

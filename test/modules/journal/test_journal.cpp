@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "modules/core/input_file.hpp"
+#include "modules/core/robot_identity.hpp"
 #include "modules/journal/journal_file.hpp"
 #include "modules/journal/restored_run.hpp"
 #include "test/support/random_pose.hpp"
@@ -270,6 +271,42 @@ TEST_CASE("A run taken up goes on behind its last full keyframe, as often as it 
     REQUIRE(run.odometry.size() == 5 + life);
     CHECK(run.odometry.back().T_odom_kf.matrix() == next.T_odom_kf.matrix());
     CHECK(run.states.size() == 9 + life);
+  }
+}
+
+TEST_CASE("What was found with another robot ends with its life", "[journal]") {
+  const TemporaryFolder folder;
+  std::vector<JournalEntry> entries = some_run();
+  const std::uint64_t boot = std::uint64_t{5} << kResumeBits;
+  entries.insert(entries.begin() + 1, JournalPeer{3, boot, "carol"});
+  CHECK(restore_run(written(folder, entries)).closures.size() == 5);
+  entries.emplace_back(JournalPeer{3, boot + 1, "carol"});  // was resumed
+  CHECK(restore_run(written(folder, entries)).closures.size() == 5);
+  entries.emplace_back(JournalPeer{3, std::uint64_t{6} << kResumeBits, "carol"});
+  std::mt19937 rng(9);
+  entries.emplace_back(closure(2, rng));
+  const RestoredRun run = restore_run(written(folder, entries));
+  CHECK(run.closures.size() == 1);
+  CHECK(run.outcomes.empty());
+  CHECK(run.peers.at(3).boot >> kResumeBits == 6);
+  CHECK(run.keyframes.size() == 5);
+}
+
+TEST_CASE("A run of the past has what is its own alone, under another id", "[journal]") {
+  const TemporaryFolder folder;
+  std::vector<JournalEntry> entries = some_run();
+  std::mt19937 rng(10);
+  Closure inside = closure(4, rng);
+  inside.to.id = {kRobot, 1};
+  entries.emplace_back(inside);
+  const RestoredRun run = alone_as(2, restore_run(written(folder, entries)));
+  CHECK(run.robot == 2);
+  REQUIRE(run.closures.size() == 1);
+  CHECK(run.closures[0].id() == ClosureId{{2, 1}, {2, 4}});
+  CHECK(run.outcomes.empty());
+  for (KeyframeIndex i = 0; i < 5; ++i) {
+    CHECK(run.odometry[i].id == KeyframeId{2, i});
+    CHECK(run.keyframes[i].odometry.id == KeyframeId{2, i});
   }
 }
 

@@ -34,6 +34,26 @@ std::vector<PeerEventKind> kinds(PeerTable& table) {
 
 using Kinds = std::vector<PeerEventKind>;
 
+TEST_CASE("A robot of an earlier process is lost until it is heard, and known by its life",
+          "[peers]") {
+  PeerTable table(kSelf);
+  table.recall({7, "peer", kProtocolVersion, std::uint64_t{70} << kResumeBits});
+  table.recall({kSelf.robot, "self", kProtocolVersion, 3});
+  CHECK(kinds(table).empty());
+  REQUIRE(table.peers().size() == 1);
+  CHECK(table.peers()[0].state == PeerState::kLost);
+  const auto [life, resumes, kind] =
+      GENERATE(Catch::Generators::table<std::uint64_t, std::uint64_t, PeerEventKind>(
+          {{70, 0, PeerEventKind::kReturned},
+           {70, 2, PeerEventKind::kResumed},
+           {71, 0, PeerEventKind::kRestarted}}));
+  table.participant(guid(2), data_of(7, (life << kResumeBits) + resumes), "udp/10.0.0.7");
+  table.alive(guid(2));
+  CHECK(kinds(table) == Kinds{kind});
+  CHECK(table.peers()[0].state == PeerState::kAlive);
+  CHECK(table.peers()[0].addresses == "udp/10.0.0.7");
+}
+
 TEST_CASE("A robot joins once its identity and its liveliness are known, in either order",
           "[peers]") {
   PeerTable table(kSelf);
@@ -105,7 +125,7 @@ PeerTable with_robot() {
 
 TEST_CASE("A robot that is started again has its id back once its former self is missed",
           "[peers]") {
-  const auto [boot, kind] = GENERATE(table<std::uint64_t, PeerEventKind>(
+  const auto [boot, kind] = GENERATE(Catch::Generators::table<std::uint64_t, PeerEventKind>(
       {{kOtherLife, PeerEventKind::kRestarted}, {kBoot + 1, PeerEventKind::kResumed}}));
   PeerTable table = with_robot();
   SECTION("killed and restarted at once") {
