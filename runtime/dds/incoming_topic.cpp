@@ -294,6 +294,7 @@ IncomingTopic::Verdict IncomingTopic::accept(const km_wire_Envelope& envelope, c
 // Null, or why the message is refused. A duplicate is neither.
 const char* IncomingTopic::hand_on(const km_wire_Envelope& envelope, const Filed& filed,
                                    std::span<const std::uint8_t> content) {
+  std::shared_ptr<void> token = in_flight_->enter();  // before asking who is current: it may wait
   if (TeamPeer{envelope.robot, envelope.boot} != filed.sender) return "claims another robot's id";
   if (!spec_.carries_keys && !peers_.is_current(filed.sender))
     return "from a former process of its robot";
@@ -308,7 +309,7 @@ const char* IncomingTopic::hand_on(const km_wire_Envelope& envelope, const Filed
     from_[filed.sender.robot].add(ddsi_serdata_size(filed.serialized.get()));
   }
   try {
-    return handler_(filed.sender, content, in_flight_->enter());
+    return handler_(filed.sender, content, std::move(token));
   } catch (const std::exception& e) {
     log::limited(log::Level::kError, "dds", spec_.name + e.what())
         << spec_.name << ": " << e.what();
