@@ -199,7 +199,7 @@ TEST_CASE("Journals that cannot be gone on with are refused by name", "[system][
   };
   const std::string data = " --dataset " + dataset->string();
   refused("--robot 4 --resume " + output.string() + data, "is of robot 3 on MH_01_easy");
-  fs::create_directory_symlink(*dataset, folder.path() / "other");
+  fs::create_directory_symlink(fs::absolute(*dataset), folder.path() / "other");
   refused(
       "--robot 3 --resume " + output.string() + " --dataset " + (folder.path() / "other").string(),
       "is of robot 3 on MH_01_easy");
