@@ -82,6 +82,8 @@ Descriptor make_tap(std::size_t robot) {
   ifreq request = request_for(kInterface);
   request.ifr_flags = IFF_TAP | IFF_NO_PI;
   require(ioctl(tap.get(), TUNSETIFF, &request) == 0, "a TAP device");
+  // It goes with the namespace and not with its descriptor: DDS cannot end without its address.
+  require(ioctl(tap.get(), TUNSETPERSIST, 1) == 0, "a TAP device that stays");
 
   const Descriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   require(socket.get() >= 0, "a socket");

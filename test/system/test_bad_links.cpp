@@ -2,10 +2,14 @@
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
+#include <fstream>
 #include <iostream>
+#include <iterator>
 #include <map>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -64,7 +68,38 @@ SplitGraph pair_of_robots() {
   return random_team(22, {0, 1}, 40, {{0, 1}});
 }
 
+// Whether a process runs that `text` is on the command line of.
+bool is_running(const std::string& text) {
+  for (const auto& process : fs::directory_iterator("/proc")) {
+    std::ifstream file(process.path() / "cmdline");
+    const std::string command(std::istreambuf_iterator<char>(file), {});
+    if (command.find(text) != command.npos) return true;
+  }
+  return false;
+}
+
 }  // namespace
+
+TEST_CASE("Robots in networks of their own end when their team is killed", "[system][namespaces]") {
+  const TemporaryFolder folder;
+  const std::string team = write_team(pair_of_robots(), folder, kSettings).string();
+  const std::string output = (folder.path() / "out").string();
+  Process program({"sh", "-c",
+                   "exec " KM_BIN_DIR "/kimera_multi_team --config " + team + " --links " +
+                       folder.write("links.yaml", "").string() + " --rate max --output " + output +
+                       " 2>&1"});
+  const auto is_telling = [](const std::string& line) {
+    return line.find("peers: robot1 alive") != line.npos || !had_own_networks(line);
+  };
+  const auto told = program.wait_until(is_telling);
+  REQUIRE(told.has_value());
+  if (told->text.find("alive") == told->text.npos) return;
+  program.kill(SIGKILL);
+  program.wait();
+  while (is_running(output)) std::this_thread::yield();  // fails by the time limit of the test
+  for (const int robot : {0, 1})
+    CHECK(fs::exists(fs::path(output) / robot_name(robot) / "summary.json"));
+}
 
 TEST_CASE("A team that loses a fifth of all frames loses nothing else", "[system][namespaces]") {
   const SplitGraph graph = pair_of_robots();
