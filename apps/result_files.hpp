@@ -22,7 +22,8 @@ inline constexpr const char* kJournal = "run.journal";
 inline constexpr const char* kPeerMeshes = "peer_meshes";
 
 /// Removes a robot's results from `folder`, other than its journal, so that those of an earlier run
-/// cannot be taken for those of one that fails. Throws std::filesystem::filesystem_error naming the file.
+/// cannot be taken for those of one that fails. Throws std::filesystem::filesystem_error naming the
+/// file.
 inline void remove_results(const std::filesystem::path& folder) {
   for (const std::string file : kResultFiles)
     for (const char* ending : {"", ".part"})  // that of a file cut short by the process's end

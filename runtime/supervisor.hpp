@@ -63,8 +63,8 @@ struct RunResult {
 
 /// Owns the nodes of a robot and runs them: starts them, sources last, so that what one publishes
 /// finds the others at work, watches them, and stops them, sources first, so that what is in flight
-/// is still processed downstream. A node that does not get on is named, given up (see Watchdog), and
-/// keeps no other from ending.
+/// is still processed downstream. A node that does not get on is named, given up (see Watchdog),
+/// and keeps no other from ending.
 class Supervisor {
  public:
   /// Asks for the state of the run now and then; true ends it. Runs on the supervisor's thread.

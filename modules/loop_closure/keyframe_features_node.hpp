@@ -55,7 +55,7 @@ class KeyframeFeaturesNode final : public Node {
   UncertainPose chain_;  // from the first keyframe's odometry frame to the latest keyframe
   std::uint32_t next_index_ = 0;
   std::uint32_t known_ = 0;  // keyframes with features already
-  Worker<Input> worker_;  // last member: stops first
+  Worker<Input> worker_;     // last member: stops first
 };
 
 }  // namespace km

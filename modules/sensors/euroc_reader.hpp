@@ -21,7 +21,7 @@ struct EurocCalibration {
 struct EurocOptions {
   double from_s = 0.0;                                    ///< First instant that belongs to it.
   double to_s = std::numeric_limits<double>::infinity();  ///< First that does not.
-  std::optional<Stamp> not_before = {};  ///< No frame before this instant.
+  std::optional<Stamp> not_before = {};                   ///< No frame before this instant.
   double stereo_tolerance_s = 1e-3;  ///< Left to right (depth, label) stamp, at most.
   bool depth = false;                ///< Depth images also beside a right camera (open_euroc()).
   bool labels = false;               ///< Label images.
