@@ -76,13 +76,9 @@ JournalFile::JournalFile(std::filesystem::path file) : JournalFile(std::move(fil
 
 JournalFile::JournalFile(std::filesystem::path file, const JournalExtent& read)
     : file_(std::move(file)), keep_bytes_(read.whole_bytes), check_sum_(read.check_sum) {
-  if (keep_bytes_ > 0) return;
+  if (read.whole_bytes > 0) return;
   check_sum_ = kFirstCheckSum;
   waiting_ = kMagic;
-}
-
-JournalFile::~JournalFile() {
-  if (descriptor_ >= 0) close(descriptor_);
 }
 
 void JournalFile::add(const JournalEntry& entry) {
@@ -98,40 +94,30 @@ void JournalFile::add(const JournalEntry& entry) {
 
 void JournalFile::sync() {
   if (waiting_.empty()) return;
-  if (descriptor_ < 0) open();
-  write_waiting();
-  if (fdatasync(descriptor_) != 0) throw failed(errno);
-}
-
-void JournalFile::open() {
   constexpr mode_t kMode = 0666;  // less the umask
-  const int descriptor = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_APPEND, kMode);
-  if (descriptor < 0) throw failed(errno);
-  if (ftruncate(descriptor, static_cast<off_t>(keep_bytes_)) != 0) {
-    const int error = errno;
-    close(descriptor);
-    throw failed(error);
-  }
-  descriptor_ = descriptor;
+  const int descriptor = open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_APPEND, kMode);
+  int error = descriptor < 0 ? errno : write_waiting(descriptor);
+  if (descriptor >= 0 && close(descriptor) != 0 && error == 0) error = errno;
+  if (error != 0)
+    throw std::system_error(error, std::generic_category(), file_.string() + ": cannot be written");
 }
 
-// What is left after a failure may be the rest of an entry: the next write goes on with it.
-void JournalFile::write_waiting() {
+// The error, or 0. What is left after one may be the rest of an entry: the next call goes on with
+// it.
+int JournalFile::write_waiting(int descriptor) {
+  if (keep_bytes_ && ftruncate(descriptor, static_cast<off_t>(*keep_bytes_)) != 0) return errno;
+  keep_bytes_.reset();
   std::size_t written = 0;
   int error = 0;
   while (written < waiting_.size() && error == 0) {
-    const ssize_t n = ::write(descriptor_, waiting_.data() + written, waiting_.size() - written);
+    const ssize_t n = ::write(descriptor, waiting_.data() + written, waiting_.size() - written);
     if (n > 0)
       written += static_cast<std::size_t>(n);
     else if (n == 0 || errno != EINTR)
       error = n == 0 ? ENOSPC : errno;
   }
   waiting_.erase(0, written);
-  if (error != 0) throw failed(error);
-}
-
-std::system_error JournalFile::failed(int error) const {
-  return {error, std::generic_category(), file_.string() + ": cannot be written"};
+  return error == 0 && fdatasync(descriptor) != 0 ? errno : error;
 }
 
 }  // namespace km

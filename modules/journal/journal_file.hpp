@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,15 +39,12 @@ class JournalFile {
   explicit JournalFile(std::filesystem::path file);
   /// Goes on with one that was read, and cuts its torn end off with the first sync().
   JournalFile(std::filesystem::path file, const JournalExtent& read);
-  ~JournalFile();
-  JournalFile(const JournalFile&) = delete;
-  JournalFile& operator=(const JournalFile&) = delete;
-
   /// Takes an entry for the next sync(). A journal has no holes: where one would not fit
   /// any more, it and all that follow are left out.
   void add(const JournalEntry& entry);
 
-  /// Everything added is on the disk afterwards, whatever happens to this machine. Throws
+  /// Everything added is on the disk afterwards, whatever happens to this machine, and the file
+  /// closed: nothing keeps the disk from being taken away in between. Throws
   /// std::system_error, one line that names the file and why; what is not written yet waits for the
   /// next call.
   void sync();
@@ -55,16 +53,13 @@ class JournalFile {
   [[nodiscard]] bool is_whole() const { return !full_; }
 
  private:
-  void open();
-  void write_waiting();
-  [[nodiscard]] std::system_error failed(int error) const;
+  [[nodiscard]] int write_waiting(int descriptor);
 
   const std::filesystem::path file_;
-  const std::uintmax_t keep_bytes_;  // of what was there
+  std::optional<std::uintmax_t> keep_bytes_;  // of what was there, until the rest is cut off
   std::uint64_t check_sum_;
   std::string waiting_;
   bool full_ = false;
-  int descriptor_ = -1;
 };
 
 }  // namespace km

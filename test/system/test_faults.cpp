@@ -75,8 +75,9 @@ TEST_CASE("A module that throws or hangs is named, and what was recorded is writ
           "[system][faults]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
-  const std::string module = GENERATE(as<std::string>(), "sensors", "vio", "keyframe_features",
-                                      "place_recognition", "loop_closure", "pcm", "pose_graph");
+  const std::string module =
+      GENERATE(as<std::string>(), "sensors", "vio", "keyframe_features", "journal",
+               "place_recognition", "loop_closure", "pcm", "pose_graph");
   check_faults(module, *dataset);
 }
 
@@ -122,11 +123,15 @@ TEST_CASE("The team goes on without a robot whose module hangs, and sees it leav
   // With four times the patience of others it is named before it is given up.
   CHECK_THAT(faulty.told(), Catch::Contains("supervisor: pose_graph has not finished"));
   const auto end = std::chrono::steady_clock::now() + kPatience;
-  while (faulty.folder.read("sound.log").find("faulty left") == std::string::npos &&
-         std::chrono::steady_clock::now() < end)
-    poll(nullptr, 0, 50);
-  CHECK_THAT(faulty.folder.read("sound.log"),
-             Catch::Contains("faulty alive") && Catch::Contains("faulty left"));
+  // On a machine that is too busy it may be silent for two seconds before it says good-bye.
+  const auto has = [&](const char* words) {
+    return faulty.folder.read("sound.log").find(words) != std::string::npos;
+  };
+  const auto gone = [&] { return has("faulty left") || has("faulty lost"); };
+  while (!gone() && std::chrono::steady_clock::now() < end) poll(nullptr, 0, 50);
+  CAPTURE(faulty.folder.read("sound.log"));
+  CHECK(has("faulty alive"));
+  CHECK(gone());
   sound.kill(SIGTERM);
   CHECK(sound.wait() == 0);
 }
