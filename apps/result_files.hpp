@@ -18,12 +18,15 @@ inline constexpr std::array kResultFiles = {
 /// What a run needs to be taken up, or to be joined as one of the past.
 inline constexpr const char* kJournal = "run.journal";
 
+/// The map of such a run.
+inline constexpr const char* kMap = "run.map";
+
 /// Folder of the meshes that other robots sent, robot<id>.ply each.
 inline constexpr const char* kPeerMeshes = "peer_meshes";
 
-/// Removes a robot's results from `folder`, other than its journal, so that those of an earlier run
-/// cannot be taken for those of one that fails. Throws std::filesystem::filesystem_error naming the
-/// file.
+/// Removes a robot's results from `folder`, other than its journal and map, so that those of an
+/// earlier run cannot be taken for those of one that fails. Throws
+/// std::filesystem::filesystem_error naming the file.
 inline void remove_results(const std::filesystem::path& folder) {
   for (const std::string file : kResultFiles)
     for (const char* ending : {"", ".part"})  // that of a file cut short by the process's end

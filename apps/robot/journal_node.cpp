@@ -1,7 +1,6 @@
 #include "apps/robot/journal_node.hpp"
 
 #include <chrono>
-#include <limits>
 #include <stdexcept>
 
 namespace km {
@@ -23,12 +22,9 @@ JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
                          const JournalTopics& topics)
     : file_(std::move(file)),
       results_(results),
-      keyframes_(topics.keyframes),
+      topics_(topics),
       journal_(begin_or_go_on(file_, restored)),
       known_keyframes_(restored == nullptr ? 0 : restored->keyframes.size()),
-      known_states_(restored == nullptr || restored->states.empty()
-                        ? std::numeric_limits<Stamp>::min()
-                        : restored->states.back().stamp),
       worker_(
           kQueueCapacity, Overflow::kBlock,
           [this](const Input& input) {
@@ -48,9 +44,10 @@ JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
     ++new_keyframes_;
     worker_.post(keyframe);
   });
-  topics.closures.subscribe(post);
+  topics.new_closures.subscribe(post);
+  topics.new_restarts.subscribe(post);
+  topics.peer_closures.subscribe([this](const auto& closure) { worker_.post(FromPeer{closure}); });
   topics.outcomes.subscribe(post);
-  topics.restarts.subscribe(post);
   topics.peer_events.subscribe([this](const auto& event) {
     if (event->kind == PeerEventKind::kJoined || event->kind == PeerEventKind::kResumed)
       worker_.post(event);
@@ -87,14 +84,17 @@ void JournalNode::step(Tick /*tick*/) {
                                ": ends where the disk was full for too long: taken up, the run "
                                "goes on from there");
   });
-  for (const auto& keyframe : std::exchange(held_back_, {})) {
-    keyframes_.publish(keyframe);
-    --new_keyframes_;
-  }
+  for (const HeldBack& held : std::exchange(held_back_, {}))
+    std::visit([this](const auto& message) { hand_on(message); }, held);
+}
+
+void JournalNode::hand_on(const Message<Keyframe>& keyframe) {
+  topics_.keyframes.publish(keyframe);
+  --new_keyframes_;
 }
 
 void JournalNode::step(const Message<OdometryState>& state) {
-  if (state->stamp > known_states_) add(*state);
+  add(*state);
 }
 
 void JournalNode::step(const Message<KeyframeOdometry>& odometry) {
@@ -107,7 +107,13 @@ void JournalNode::step(const Message<Keyframe>& keyframe) {
 }
 
 void JournalNode::step(const Message<Closure>& closure) {
-  if (known_closures_.emplace(closure->from.id, closure->to.id).second) add(*closure);
+  add(*closure);
+  held_back_.push_back(closure);
+}
+
+void JournalNode::step(const FromPeer& from_peer) {
+  const Closure& closure = *from_peer.closure;
+  if (known_closures_.emplace(closure.from.id, closure.to.id).second) add(closure);
 }
 
 void JournalNode::step(const Message<ClosureOutcome>& outcome) {
@@ -121,6 +127,7 @@ void JournalNode::step(const Message<PeerEvent>& event) {
       return ends.first.robot == peer.robot || ends.second.robot == peer.robot;
     });
   add(JournalPeer{peer.robot, peer.boot, peer.name});
+  if (event->kind == PeerEventKind::kRestarted) held_back_.push_back(event);
 }
 
 }  // namespace km

@@ -30,17 +30,22 @@ struct JournalTopics {
   In<OdometryState> states;
   In<KeyframeOdometry> odometry;
   In<Keyframe> new_keyframes;
-  In<Closure> closures;  ///< Own and received ones.
+  In<Closure> new_closures;    ///< Found here.
+  In<PeerEvent> new_restarts;  ///< In order with them: what follows is with another life.
+  In<Closure> peer_closures;
   In<ClosureOutcome> outcomes;
   In<PeerEvent> peer_events;
-  In<PeerEvent> restarts;   ///< In order with the closures: what follows is with another life.
-  Out<Keyframe> keyframes;  ///< The new ones, once they are on the disk.
+  // The new ones in the same order, once they are on the disk.
+  Out<Keyframe> keyframes;
+  Out<Closure> closures;
+  Out<PeerEvent> restarts;
 };
 
 /// Writes down what a robot must not lose with its process, several times a second, whatever
-/// becomes of the machine. Keyframes are handed on once they are written: what others learn of is
-/// never forgotten, so that an index stands for one keyframe for ever. A disk that is full, or
-/// fails, keeps nothing back: it is told, and the run goes on.
+/// becomes of the machine. Keyframes and closures are handed on once they are written: what others
+/// learn of is never forgotten, so that an index stands for one keyframe for ever, and both ends of
+/// a closure know the same measurements. A disk that is full, or fails, keeps nothing back: it is
+/// told, and the run goes on.
 class JournalNode final : public Node {
  public:
   /// Goes on with the journal of `restored`, or begins a new one. `results` outlives this.
@@ -68,30 +73,37 @@ class JournalNode final : public Node {
   struct Tick {};
   template <typename T>
   using Message = typename Topic<T>::Message;
+  struct FromPeer {
+    Message<Closure> closure;
+  };
+  using HeldBack = std::variant<Message<Keyframe>, Message<Closure>, Message<PeerEvent>>;
   using Input =
       std::variant<Tick, Message<OdometryState>, Message<KeyframeOdometry>, Message<Keyframe>,
-                   Message<Closure>, Message<ClosureOutcome>, Message<PeerEvent>>;
+                   Message<Closure>, FromPeer, Message<ClosureOutcome>, Message<PeerEvent>>;
 
   void step(Tick tick);
   void step(const Message<OdometryState>& state);
   void step(const Message<KeyframeOdometry>& odometry);
   void step(const Message<Keyframe>& keyframe);
+  void step(const FromPeer& closure);
   void step(const Message<Closure>& closure);
   void step(const Message<ClosureOutcome>& outcome);
   void step(const Message<PeerEvent>& event);
   void add(const JournalEntry& entry);
+  void hand_on(const Message<Keyframe>& keyframe);
+  void hand_on(const Message<Closure>& closure) { topics_.closures.publish(closure); }
+  void hand_on(const Message<PeerEvent>& restart) { topics_.restarts.publish(restart); }
 
   const std::filesystem::path file_;
   ResultWriter& results_;
-  const Out<Keyframe> keyframes_;
+  const JournalTopics topics_;
   JournalFile journal_;
   // What a journal that is gone on with holds already: it is published once more.
   const std::size_t known_keyframes_;
-  const Stamp known_states_;  // up to here
   std::set<std::pair<KeyframeId, KeyframeId>> known_closures_;
   bool added_ = false;                          // since the last sync
   std::atomic<std::size_t> new_keyframes_ = 0;  // that are not handed on
-  std::vector<Message<Keyframe>> held_back_;
+  std::vector<HeldBack> held_back_;
   Worker<Input> worker_;
   Periodic ticks_;  // last member: stops before the worker it posts to
 };

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "apps/result_files.hpp"
+#include "modules/mesh/map_file.hpp"
 #include "modules/mesh/ply_file.hpp"
 #include "runtime/thread.hpp"
 
@@ -52,6 +54,7 @@ void MeshFilesNode::step(const Trajectory& trajectory) {
 
 void MeshFilesNode::step(const MapMesh& map) {
   write_map(map.mesh);
+  results_.write(folder_ / kMap, [&map](const auto& file) { write_map_file(file, map); });
 }
 
 void MeshFilesNode::step(const OptimizedMesh& mesh) {

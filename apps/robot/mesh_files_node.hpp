@@ -31,7 +31,8 @@ struct MeshFilesTopics {
 ///
 /// mesh.ply is the mapper's mesh, as odometry built it; as a whole it is moved to where the first
 /// keyframe belongs in the team's frame, so that it can be laid over others. mesh_optimized.ply is
-/// the mesh bent to the optimised keyframes, in the team's frame.
+/// the mesh bent to the optimised keyframes, in the team's frame. run.map is the mapper's mesh for
+/// the process that takes the run up.
 class MeshFilesNode final : public Node {
  public:
   /// `results` outlives this, and learns which meshes could not be written: no reason to end.

@@ -11,10 +11,8 @@ void RestoreNode::start() {
   RestoredRun run = std::exchange(run_, {});
   // Before the keyframes: what came of a candidate is known when it is found again.
   for (ClosureOutcome& outcome : run.outcomes) topics_.outcomes.publish(std::move(outcome));
-  auto state = run.states.begin();
+  for (OdometryState& state : run.states) topics_.states.publish(std::move(state));
   for (std::size_t i = 0; i < run.keyframes.size(); ++i) {
-    for (; state != run.states.end() && state->stamp <= run.odometry[i].stamp; ++state)
-      topics_.states.publish(*state);
     topics_.odometry.publish(std::move(run.odometry[i]));
     topics_.keyframes.publish(std::move(run.keyframes[i]));
   }

@@ -7,6 +7,7 @@
 
 #include "apps/result_files.hpp"
 #include "modules/core/input_file.hpp"
+#include "modules/mesh/map_file.hpp"
 #include "modules/sensors/euroc_reader.hpp"
 #include "modules/sensors/euroc_rig_codec.hpp"
 #include "runtime/log.hpp"
@@ -35,9 +36,19 @@ std::optional<RestoredRun> restore(const RobotOptions& options, const std::strin
                                 std::to_string(options.robot) + " on " + input +
                                 ": give the options it was started with, or --output");
   if (run.keyframes.empty()) return std::nullopt;
-  if (!options.dataset.empty() && run.states.empty())
+  if (!options.dataset.empty() && run.final_states() == 0)
     throw std::invalid_argument(file.string() + ": has keyframes but no odometry");
   return run;
+}
+
+// A map that is lost, or of a run that is not taken up, is no reason not to go on.
+std::optional<ContinuedMap> restore_map(const RobotOptions& options, const RestoredRun& run) try {
+  const fs::path file = options.output / kMap;
+  if (is_absent(file)) return std::nullopt;
+  return ContinuedMap(read_map_file(file), static_cast<KeyframeIndex>(run.keyframes.size()));
+} catch (const InputFileError& error) {
+  log::warn("journal") << error.what() << ": the map begins anew";
+  return std::nullopt;
 }
 
 RestoredRun open_session(const RobotOptions& options) {
@@ -84,7 +95,8 @@ RobotInput open_robot_input(const RobotOptions& options, const RobotConfig& conf
   std::optional<RestoredRun> restored = restore(options, name);
   if (!is_dataset) return {open_graph(options), name, std::move(restored)};
   auto reader = open_dataset(options, config, mapping, restored);
-  return {std::move(reader), name, std::move(restored)};
+  auto map = restored && mapping ? restore_map(options, *restored) : std::nullopt;
+  return {std::move(reader), name, std::move(restored), std::move(map)};
 }
 
 }  // namespace km

@@ -8,6 +8,7 @@
 #include "apps/robot/mapping_plan.hpp"
 #include "apps/robot/robot_config.hpp"
 #include "modules/journal/restored_run.hpp"
+#include "modules/mesh/continued_map.hpp"
 #include "modules/pose_graph/recorded_graph.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 
@@ -22,6 +23,7 @@ struct RobotInput {
   std::variant<std::unique_ptr<DatasetReader>, RecordedGraph, PastRun> source;
   std::string name;  ///< For the journal.
   std::optional<RestoredRun> restored = {};
+  std::optional<ContinuedMap> map = {};  ///< Of the restored run, where there is mapping.
 };
 
 /// Opens what the options name, and with --resume the journal of the run to go on with. Throws

@@ -41,7 +41,8 @@ void prepare_output(const RobotOptions& options, ResultWriter& results) try {
   const fs::path& folder = options.output;
   fs::create_directories(folder);
   remove_results(folder);
-  if (!options.resume) fs::remove(folder / kJournal);
+  if (!options.resume)
+    for (const char* file : {kJournal, kMap}) fs::remove(folder / file);
   if (access(folder.c_str(), W_OK) != 0)
     throw fs::filesystem_error("", std::error_code(errno, std::generic_category()));
 } catch (const fs::filesystem_error& error) {

@@ -13,6 +13,11 @@ constexpr std::size_t kQueueCapacity = 4096;  // far more than a module publishe
 
 }  // namespace
 
+void RunRecord::add(const OdometryState& state) {
+  while (!odometry_.empty() && odometry_.back().stamp >= state.stamp) odometry_.pop_back();
+  odometry_.push_back({state.stamp, state.T_odom_body});
+}
+
 void RunRecord::add(const KeyframeOdometry& keyframe) {
   ++activity_;
   keyframes_.push_back(keyframe);

@@ -34,7 +34,7 @@ class RunRecord {
  public:
   explicit RunRecord(RobotId robot) : robot_(robot) {}
 
-  void add(const OdometryState& state) { odometry_.push_back({state.stamp, state.T_odom_body}); }
+  void add(const OdometryState& state);  ///< Replaces those of this instant and later.
   void add(const KeyframeOdometry& keyframe);
   void add(const Keyframe& keyframe);  ///< Of this robot: what depth it sees.
   void add(const Closure& closure);

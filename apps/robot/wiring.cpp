@@ -56,7 +56,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   auto bridge = std::make_unique<DdsBridge>(participant_);
   bridge_ = bridge.get();
   if (auto* reader = std::get_if<std::unique_ptr<DatasetReader>>(&input.source))
-    add_sensing(config, options.rate, std::move(*reader), mapping);
+    add_sensing(config, options.rate, std::move(*reader), mapping, std::move(input.map));
   else if (auto* graph = std::get_if<RecordedGraph>(&input.source))
     add_playback(config, options.rate, std::move(*graph));
   else
@@ -76,18 +76,21 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
 
 void Robot::add_past() {
   add_restore();
+  // What it finds out now is not kept: tomorrow it is found again.
+  forward<Closure>(topics_.new_closures, topics_.own_closures);
+  forward<PeerEvent>(topics_.new_closure_restarts, topics_.closure_restarts);
   source_ended_ = true;
 }
 
 // Behind the source, since it starts before it.
 void Robot::add_restore() {
   if (!restored_) return;
-  restored_images_ = restored_->states.size();
+  restored_images_ = restored_->final_states();
   for (const auto& [robot, peer] : restored_->peers) {
     bridge_->peers().recall({.robot = robot, .name = peer.name, .boot = peer.boot});
     lives_.meet({robot, peer.boot});
   }
-  restore_ = &add<RestoreNode>(false, RestoreTopics{.states = topics_.odometry,
+  restore_ = &add<RestoreNode>(false, RestoreTopics{.states = topics_.restored_odometry,
                                                     .odometry = topics_.keyframe_odometry,
                                                     .keyframes = topics_.keyframes,
                                                     .own_closures = topics_.own_closures,
@@ -103,16 +106,20 @@ void Robot::add_journal(const RobotOptions& options, const std::string& input,
                                JournalTopics{.states = topics_.odometry,
                                              .odometry = topics_.keyframe_odometry,
                                              .new_keyframes = topics_.new_keyframes,
-                                             .closures = topics_.closures,
+                                             .new_closures = topics_.new_closures,
+                                             .new_restarts = topics_.new_closure_restarts,
+                                             .peer_closures = topics_.shared_closures.from_peers(),
                                              .outcomes = topics_.outcomes,
                                              .peer_events = bridge_->peers().events(),
-                                             .restarts = topics_.closure_restarts,
-                                             .keyframes = topics_.keyframes});
+                                             .keyframes = topics_.keyframes,
+                                             .closures = topics_.own_closures,
+                                             .restarts = topics_.closure_restarts});
 }
 
 void Robot::add_sensing(const RobotConfig& config, double rate,
                         std::unique_ptr<DatasetReader> reader,
-                        const std::optional<MappingPlan>& mapping) {
+                        const std::optional<MappingPlan>& mapping,
+                        std::optional<ContinuedMap> map) {
   const SensorRig rig = reader->rig();
   sensors_ =
       &add<SensorsNode>(true, config.sensors, rate, std::move(reader),
@@ -123,7 +130,7 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
                                      .odometry = topics_.odometry,
                                      .keyframes = topics_.keyframe_odometry,
                                      .frames = topics_.located_frames});
-  if (mapping) add_mapping(config, rate, rig.stereo, *mapping);
+  if (mapping) add_mapping(config, rate, rig.stereo, *mapping, std::move(map));
   auto& features =
       add<KeyframeFeaturesNode>(true, config.keyframe_features, rig.stereo,
                                 KeyframeFeaturesTopics{.odometry = topics_.keyframe_odometry,
@@ -131,7 +138,7 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
                                                        .keyframes = topics_.new_keyframes});
   topics_.sensors_end.subscribe([this](const auto&) { source_ended_ = true; });
   if (!restored_) return;
-  vio.continue_from({restored_->states.back(), restored_->odometry.back()});
+  vio.continue_from({restored_->states[restored_->final_states() - 1], restored_->odometry.back()});
   features.continue_from(restored_->keyframes.back().odometry);
 }
 
@@ -151,7 +158,7 @@ void Robot::add_place_recognition(const RobotConfig& config) {
 // A mapper that is too slow leaves frames out; at --rate max, where no frame is late, it holds the
 // others up, so that the map does not depend on the machine.
 void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
-                        const MappingPlan& plan) {
+                        const MappingPlan& plan, std::optional<ContinuedMap> before) {
   const Overflow overflow = std::isinf(rate) ? Overflow::kBlock : Overflow::kDropOldest;
   SemanticMappingConfig map = config.semantic_mapping;
   map.max_range_m =
@@ -163,12 +170,13 @@ void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig&
                         DenseSensingTopics{.located = topics_.located_frames,
                                            .frames = topics_.dense_frames,
                                            .progress = topics_.dense_sensing_progress});
-  add<SemanticMappingNode>(true, map, camera, plan.palette, config.mapping.mesh_interval_s,
-                           overflow,
-                           SemanticMappingTopics{.frames = topics_.dense_frames,
-                                                 .superseded = topics_.superseded_surface,
-                                                 .maps = topics_.maps,
-                                                 .progress = topics_.mapping_progress});
+  auto& mapper = add<SemanticMappingNode>(
+      true, map, camera, plan.palette, config.mapping.mesh_interval_s, overflow,
+      SemanticMappingTopics{.frames = topics_.dense_frames,
+                            .superseded = topics_.superseded_surface,
+                            .maps = topics_.maps,
+                            .progress = topics_.mapping_progress});
+  if (before) mapper.continue_from(*std::move(before));
 }
 
 void Robot::add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder,
@@ -230,8 +238,8 @@ void Robot::add_back_end(const RobotConfig& config) {
                                          .restored = topics_.restored_outcomes,
                                          .own_requests = topics_.requests.to_peers(),
                                          .own_replies = topics_.replies.to_peers(),
-                                         .own_closures = topics_.own_closures,
-                                         .own_restarts = topics_.closure_restarts,
+                                         .own_closures = topics_.new_closures,
+                                         .own_restarts = topics_.new_closure_restarts,
                                          .outcomes = topics_.outcomes});
   forward<Closure>(topics_.own_closures, topics_.closures);
   forward<Closure>(topics_.shared_closures.from_peers(), topics_.closures);
@@ -291,6 +299,7 @@ void Robot::add_network(CrossingEnds meshes) {
 
 void Robot::add_records() {
   recorder_ = &add<RecorderNode>(false, identity_.robot);
+  recorder_->record(topics_.restored_odometry);
   recorder_->record(topics_.odometry);
   recorder_->record(topics_.keyframe_odometry);
   recorder_->record(topics_.keyframes);

@@ -42,7 +42,7 @@ struct Topics {
   Topic<SensorPacket> packets;
   Topic<SensorsEnd> sensors_end;
   Topic<GraphPlaybackEnd> playback_end;
-  Topic<OdometryState> odometry;
+  Topic<OdometryState> odometry, restored_odometry;
   Topic<KeyframeOdometry> keyframe_odometry;
   Topic<Keyframe> new_keyframes, keyframes;  // the latter: those that are on the disk
   Topic<LocatedFrame> located_frames;
@@ -55,10 +55,11 @@ struct Topics {
   Topic<RelativePose> measured_closures;
   Topic<PlaceQuery> place_queries;
   Topic<LoopCandidate> candidates;
-  Topic<PeerEvent> candidate_restarts,
+  Topic<PeerEvent> candidate_restarts, new_closure_restarts,
       closure_restarts;  // where candidates and closures begin anew
   Topic<ClosureOutcome> outcomes, restored_outcomes;
-  Topic<Closure> own_closures, closures;  // the latter: own and received
+  // Found here; those of them that are on the disk; these and received ones.
+  Topic<Closure> new_closures, own_closures, closures;
   Topic<InlierSet> own_inlier_sets;
   Topic<Trajectory> trajectory;
   Topic<OptimizerProgress> progress;
@@ -125,13 +126,13 @@ class Robot {
 
  private:
   void add_sensing(const RobotConfig& config, double rate, std::unique_ptr<DatasetReader> reader,
-                   const std::optional<MappingPlan>& mapping);
+                   const std::optional<MappingPlan>& mapping, std::optional<ContinuedMap> map);
   void add_place_recognition(const RobotConfig& config);
   void add_past();
   void add_restore();
   void add_journal(const RobotOptions& options, const std::string& input, ResultWriter& results);
   void add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
-                   const MappingPlan& plan);
+                   const MappingPlan& plan, std::optional<ContinuedMap> before);
   void add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder,
                            ResultWriter& results);
   [[nodiscard]] CrossingEnds share_meshes(const MeshChunksConfig& config);

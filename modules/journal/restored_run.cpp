@@ -17,6 +17,13 @@ bool is_final(const ClosureOutcome& outcome) {
 
 }  // namespace
 
+std::size_t RestoredRun::final_states() const {
+  if (odometry.empty()) return 0;
+  const auto later = [](Stamp stamp, const OdometryState& state) { return stamp < state.stamp; };
+  const auto end = std::upper_bound(states.begin(), states.end(), odometry.back().stamp, later);
+  return static_cast<std::size_t>(end - states.begin());
+}
+
 void RunRestorer::take(JournalEntry entry) {
   if (!started_ && !std::holds_alternative<JournalStart>(entry))
     throw std::invalid_argument("nothing says whose run it is");
@@ -28,13 +35,16 @@ void RunRestorer::add(JournalStart start) {
     throw std::invalid_argument("begun by robot " + std::to_string(run_.robot) +
                                 ", taken up by robot " + std::to_string(start.robot));
   cut_to_full_keyframes();
-  started_ = true;
+  started_ = first_state_ = true;
   run_.robot = start.robot;
   run_.boot = start.boot;
   run_.input = std::move(start.input);
 }
 
+// What a later process has estimated anew takes the place of what was there.
 void RunRestorer::add(OdometryState state) {
+  if (std::exchange(first_state_, false))
+    std::erase_if(run_.states, [&](const auto& former) { return former.stamp >= state.stamp; });
   if (!run_.states.empty() && state.stamp <= run_.states.back().stamp)
     throw std::invalid_argument("a pose is not later than the one before");
   run_.states.push_back(std::move(state));
@@ -65,10 +75,6 @@ void RunRestorer::cut_to_full_keyframes() {
   const std::size_t full = std::min(run_.odometry.size(), run_.keyframes.size());
   run_.odometry.resize(full);
   run_.keyframes.resize(full);
-  const auto later = [&](const OdometryState& state) {
-    return full == 0 || state.stamp > run_.odometry.back().stamp;
-  };
-  std::erase_if(run_.states, later);
   forget_closures([&](const KeyframeId& id) { return id.robot == run_.robot && id.index >= full; });
 }
 

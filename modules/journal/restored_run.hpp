@@ -14,7 +14,8 @@
 
 namespace km {
 
-/// A run up to the last keyframe that its journal knows in full: from there on odometry goes on.
+/// A run up to the last keyframe that its journal knows in full: from there on odometry goes on, on
+/// the image of that keyframe.
 struct RestoredRun {
   RobotId robot = 0;
   std::uint64_t boot = 0;  ///< Of the last process.
@@ -22,14 +23,18 @@ struct RestoredRun {
 
   std::vector<KeyframeOdometry> odometry;  ///< Index i is keyframe i.
   std::vector<Keyframe> keyframes;         ///< Likewise, equally many.
-  std::vector<OdometryState> states;       ///< Of images up to the last keyframe's.
-  std::vector<Closure> closures;           ///< Own and of the others, each once from either side.
+  /// Of all images: those behind the last keyframe's stand until they are estimated anew.
+  std::vector<OdometryState> states;
+  std::vector<Closure> closures;  ///< Own and of the others, each once from either side.
   /// Of candidates that nothing more becomes of: those verified, whose closures are there, and
   /// those refused.
   std::vector<ClosureOutcome> outcomes;
   std::map<RobotId, JournalPeer> peers;  ///< As last met.
 
   JournalExtent journal = {};  ///< Where to go on writing.
+
+  /// Number of states up to the last keyframe; 0 without one.
+  [[nodiscard]] std::size_t final_states() const;
 };
 
 /// The run under another id, without what it shared with the others of its time.
@@ -58,6 +63,7 @@ class RunRestorer {
 
   RestoredRun run_;
   bool started_ = false;
+  bool first_state_ = true;                                        // of its process
   std::map<std::pair<KeyframeId, KeyframeId>, Closure> closures_;  // by the ends as measured
   std::map<ClosureId, ClosureOutcome> outcomes_;
 };

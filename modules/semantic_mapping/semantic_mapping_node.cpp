@@ -33,7 +33,8 @@ SemanticMappingNode::SemanticMappingNode(const SemanticMappingConfig& config,
 
 void SemanticMappingNode::stop() noexcept {
   worker_.stop();
-  if (std::exchange(stopped_, true) || progress_.integrated == 0 || error()) return;
+  const bool nothing = progress_.integrated == 0 && !before_;
+  if (std::exchange(stopped_, true) || nothing || error()) return;
   progress_.too_late = worker_.load().dropped;
   publish_mesh();
   topics_.progress.publish(progress_);
@@ -51,7 +52,7 @@ void SemanticMappingNode::stop() noexcept {
 void SemanticMappingNode::drop_superseded() {
   const Topic<SupersededSurface>::Message superseded = superseded_.take();
   if (superseded == nullptr) return;
-  const SurfaceDrop dropped = mapper_.drop(*superseded);
+  const SurfaceDrop dropped = mapper_.drop(before_ ? before_->drop(*superseded) : *superseded);
   log::debug(name()) << "dropped " << dropped.faces << " faces seen anew";
 }
 
@@ -87,7 +88,7 @@ void SemanticMappingNode::publish_mesh() {
   mapper_.update_mesh();
   MapMesh map = mapper_.mesh();
   if (!map.mesh.labels.empty()) map.mesh.colour_by(palette_);
-  topics_.maps.publish(std::move(map));
+  topics_.maps.publish(before_ ? before_->with(map) : std::move(map));
 }
 
 }  // namespace km

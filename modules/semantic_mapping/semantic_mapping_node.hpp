@@ -3,9 +3,11 @@
 #include <exception>
 #include <optional>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "modules/core/dense_frame.hpp"
+#include "modules/mesh/continued_map.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "runtime/latest.hpp"
 #include "runtime/node.hpp"
@@ -33,6 +35,9 @@ class SemanticMappingNode final : public Node {
                       const SemanticMappingTopics& topics);
   ~SemanticMappingNode() override { stop(); }
 
+  /// What is mapped comes behind the map of an earlier process. Call before start().
+  void continue_from(ContinuedMap before) { before_.emplace(std::move(before)); }
+
   std::string_view name() const override { return SemanticMappingConfig::kSection; }
   void start() override { worker_.start(); }
   /// Finishes queued frames and publishes the final mesh.
@@ -56,6 +61,7 @@ class SemanticMappingNode final : public Node {
   LabelPalette palette_;
   const double mesh_interval_s_;
   const SemanticMappingTopics topics_;
+  std::optional<ContinuedMap> before_;
   MappingProgress progress_;
   std::optional<KeyframeIndex> meshed_;  // keyframe of the last update of the mesh
   std::optional<Stamp> published_;       // frame of the last mesh published

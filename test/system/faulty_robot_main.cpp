@@ -37,7 +37,7 @@ std::map<std::string, std::function<void(Topics&)>> faults(const std::string& ho
           {"keyframe_features", on(&Topics::new_keyframes)},
           {"journal", on(&Topics::keyframes)},
           {"place_recognition", on(&Topics::place_queries)},
-          {"loop_closure", on(&Topics::own_closures)},
+          {"loop_closure", on(&Topics::new_closures)},
           {"pcm", on(&Topics::own_inlier_sets)},
           {"pose_graph", on(&Topics::progress)},
           {"mesh_deformation", on(&Topics::optimized_meshes)},

@@ -6,6 +6,7 @@
 #include <random>
 #include <thread>
 
+#include "modules/mesh/map_file.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/system/team_run.hpp"
@@ -78,6 +79,13 @@ bool grows_by(const fs::path& folder, std::uintmax_t bytes) {
   return true;
 }
 
+bool is_there_within(const fs::path& file, std::chrono::seconds patience) {
+  const auto end = std::chrono::steady_clock::now() + patience;
+  while (!fs::exists(file) && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  return fs::exists(file);
+}
+
 std::size_t lines_of(const fs::path& file) {
   std::ifstream in(file);
   return static_cast<std::size_t>(std::count(std::istreambuf_iterator<char>(in), {}, '\n'));
@@ -124,6 +132,32 @@ TEST_CASE("A robot that is killed again and again loses nothing", "[system][resu
   CAPTURE(whole_m, killed_m);
   // Each start knows the biases of the sensors anew: a millimetre here.
   CHECK(killed_m < whole_m + 2e-3);
+}
+
+TEST_CASE("A robot that is killed keeps its map, and goes on with it", "[system][resume]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const fs::path output = folder.path() / "run", map = output / "run.map";
+  auto command = command_of(kFirst, *dataset, random_domain(), "2");
+  command.insert(command.end(), {"--set", "mapping.mode=metric"});
+  {
+    Process victim(with(command, "--output", output));
+    REQUIRE(is_there_within(map, kPatience));
+    victim.kill(SIGKILL);
+    victim.wait();
+  }
+  const MapMesh before = read_map_file(map);
+  REQUIRE(before.mesh.faces.size() > 100);
+  Process resumed(with(command, "--resume", output));
+  CHECK(resumed.wait() == 0);
+  const MapMesh after = read_map_file(map);
+  CHECK(after.mesh.faces.size() > before.mesh.faces.size() + 100);
+  // What is seen again, and better, may go.
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < after.ids.size() && after.ids[i] <= before.ids.back(); ++i) ++kept;
+  CHECK(kept > before.ids.size() / 2);
+  CHECK(fs::file_size(output / "mesh_optimized.ply") > 0);
 }
 
 TEST_CASE("A robot that is killed and taken up is in its team as before", "[system][resume]") {
