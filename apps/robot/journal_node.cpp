@@ -9,7 +9,7 @@ namespace {
 // A disk that stands still for a minute holds nobody up.
 constexpr std::size_t kQueueCapacity = 16384;
 // Keyframes wait for it: soon, but few enough syncs for flash memory.
-constexpr std::chrono::milliseconds kSyncPeriod{250};
+constexpr std::chrono::milliseconds kSyncPeriod{500};
 
 JournalFile begin_or_go_on(const std::filesystem::path& file, const RestoredRun* restored) {
   return restored == nullptr ? JournalFile(file) : JournalFile(file, restored->journal);

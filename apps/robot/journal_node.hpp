@@ -53,8 +53,9 @@ class JournalNode final : public Node {
               const RestoredRun* restored, const JournalTopics& topics);
   ~JournalNode() override { stop(); }
 
-  /// Writes that this process has the run: no later one takes itself for it. Call before start().
-  void begin() { step(Tick()); }
+  /// Writes that this process has the run that it goes on with: no later one takes itself for it.
+  /// Call before start().
+  void take_up() { step(Tick()); }
 
   /// True while a keyframe waits for the disk. Thread-safe.
   [[nodiscard]] bool holds_back() const { return new_keyframes_ > 0; }

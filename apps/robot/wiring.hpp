@@ -86,7 +86,7 @@ class Robot {
   /// Runs until the robot may leave its team, a node fails, or a signal. The folder of the results
   /// is there.
   [[nodiscard]] RunResult run(const Supervisor::Finished& finished) {
-    if (journal_ != nullptr) journal_->begin();
+    if (journal_ != nullptr && restore_ != nullptr) journal_->take_up();
     return supervisor_.run(finished);
   }
 

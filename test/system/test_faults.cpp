@@ -124,7 +124,9 @@ TEST_CASE("The team goes on without a robot whose module hangs, and sees it leav
                std::to_string(faulty.domain)},
               log);
   close(log);
-  REQUIRE(wait_for_lines(output / "process.csv", 2));
+  const bool runs = wait_for_lines(output / "process.csv", 2);
+  CAPTURE(faulty.folder.read("sound.log"));
+  REQUIRE(runs);
   faulty.start("pose_graph", "hang", long_walk(faulty.folder.path(), 1));
   check_end(faulty, "pose_graph", "hang");
   const auto end = std::chrono::steady_clock::now() + kPatience;
