@@ -13,6 +13,7 @@
 #include "apps/team/team_results.hpp"
 #include "modules/core/write_file.hpp"
 #include "modules/mesh/ply_file.hpp"
+#include "runtime/dds/dds_config.hpp"
 #include "runtime/unblocked_output.hpp"
 
 namespace {
@@ -90,8 +91,10 @@ km::TeamPlan make_plan(const TeamOptions& options) {
   if (options.domain) plan.domain = options.domain;
   if (options.time_limit_s) plan.time_limit_s = options.time_limit_s;
   if (!plan.domain) {
-    std::random_device device;  // teams of one host must not meet
-    plan.domain = std::uniform_int_distribution<std::uint32_t>(1, 230)(device);
+    // Teams of one host must not meet; the lower half is left to who chooses.
+    std::random_device device;
+    plan.domain = std::uniform_int_distribution<std::uint32_t>(km::kLastQuietDomain / 2 + 1,
+                                                               km::kLastQuietDomain)(device);
   }
   if (!options.security.empty()) plan.security = options.security;
   if (!options.truth.empty()) plan.notes.clear();  // they are about the truths of the file

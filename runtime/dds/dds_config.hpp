@@ -7,6 +7,10 @@
 
 namespace km {
 
+/// Above it lie the ports that Linux hands out to any program (net.ipv4.ip_local_port_range, 32768
+/// to 60999): a domain there cannot be entered while one of its own is among them.
+inline constexpr unsigned kLastQuietDomain = 100;
+
 /// How robots find each other: by multicast on the link, or by a list of addresses.
 enum class Discovery { kMulticast, kPeers };
 
@@ -33,7 +37,8 @@ struct DdsConfig {
 
   void visit_fields(auto& visitor) {
     visitor.field("domain", domain, {0, 230},
-                  "only robots of one DDS domain meet; ports start at 7400 + 250 * domain");
+                  "only robots of one DDS domain meet; ports start at 7400 + 250 * domain: above "
+                  "100 they may be in use by other programs");
     visitor.field("team", team, "robots of other teams are not seen");
     visitor.field("interface", interface,
                   "network interface; empty: chosen, see log and select_interface()");

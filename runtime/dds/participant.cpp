@@ -201,7 +201,11 @@ DdsDomain::DdsDomain(const DdsConfig& config)
   domain_ = DdsEntity(
       dds_create_domain(static_cast<dds_domainid_t>(config_.domain),
                         cyclone_xml(config_, interface_).c_str()),
-      "DDS domain " + std::to_string(config_.domain) + " on interface " + interface_.name);
+      "DDS domain " + std::to_string(config_.domain) + " on interface " + interface_.name +
+          (config_.domain > static_cast<int>(kLastQuietDomain)
+               ? " (its ports may be in use: up to " + std::to_string(kLastQuietDomain) +
+                     " they are not handed out to other programs)"
+               : ""));
 }
 
 DdsParticipant::DdsParticipant(const DdsConfig& config, const RobotIdentity& identity,

@@ -14,6 +14,7 @@
 
 #include "apps/robot/run_summary.hpp"
 #include "modules/pose_graph/g2o_io.hpp"
+#include "runtime/dds/dds_config.hpp"
 #include "test/support/command.hpp"
 #include "test/support/pose_graph_problems.hpp"
 #include "test/support/split_graph.hpp"
@@ -24,9 +25,10 @@ namespace km {
 /// A DDS domain that no other test uses while this process runs: tests run side by side, and robots
 /// of two tests with one id are twins.
 inline int random_domain() {
+  constexpr int kLastDomain = kLastQuietDomain / 2;  // kimera_multi_team draws those above
   std::random_device device;
   for (;;) {
-    const int domain = std::uniform_int_distribution<int>(1, 230)(device);
+    const int domain = std::uniform_int_distribution<int>(1, kLastDomain)(device);
     const auto name = "km_test_domain_" + std::to_string(domain);
     const auto file = std::filesystem::temp_directory_path() / name;
     const int lock = open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
@@ -46,8 +48,8 @@ struct TeamRun {
   Json json;
 };
 
-/// Runs a team file on `dataset` as fast as it can, in a random DDS domain (the program draws it).
-/// Results go to `folder`. `options` of the program, and of its robots, come in addition.
+/// Runs a team file on `dataset` as fast as it can, in a random DDS domain. Results go to `folder`.
+/// `options` of the program, and of its robots, come in addition.
 inline TeamRun run_team(const std::filesystem::path& team, const std::filesystem::path& dataset,
                         const TemporaryFolder& folder, const std::string& options = {},
                         const std::string& robot_options = {}) {
@@ -55,7 +57,8 @@ inline TeamRun run_team(const std::filesystem::path& team, const std::filesystem
   TeamRun run;
   run.result = run_command(std::string(KM_BIN_DIR "/kimera_multi_team --config ") + team.string() +
                            " --dataset " + dataset.string() + " --rate max --output " +
-                           folder.path().string() + " --json " + json.string() + ' ' + options +
+                           folder.path().string() + " --json " + json.string() + " --domain " +
+                           std::to_string(random_domain()) + ' ' + options +
                            " -- --serve-limit 1000 " + robot_options);  // sanitizers are slow
   if (run.result.exit_code == 0) run.json = read_json(json);
   return run;

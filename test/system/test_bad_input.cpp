@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <random>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -12,6 +11,7 @@
 #include "test/support/command.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/system/team_run.hpp"
 
 namespace km {
 namespace {
@@ -90,13 +90,11 @@ std::string day_ahead(const std::string& line) {
 }
 
 CommandResult run_robot(const fs::path& dataset, const fs::path& output) {
-  std::random_device device;
-  const int domain = std::uniform_int_distribution<int>(1, 230)(device);
   return run_command(KM_BIN_DIR
                      "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0"
                      " --rate max --serve-limit 0 --interface lo --domain " +
-                     std::to_string(domain) + " --dataset " + dataset.string() + " --output " +
-                     output.string());
+                     std::to_string(random_domain()) + " --dataset " + dataset.string() +
+                     " --output " + output.string());
 }
 
 struct Fault {

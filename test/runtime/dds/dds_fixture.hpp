@@ -61,7 +61,8 @@ struct Codec<Ping> {
 inline DdsConfig loopback_config() {
   static int count = 0;
   DdsConfig config;
-  config.domain = static_cast<int>((static_cast<unsigned>(getpid()) * 7919U) % 200U) + 1;
+  config.domain =
+      static_cast<int>((static_cast<unsigned>(getpid()) * 7919U) % kLastQuietDomain) + 1;
   config.team = "test-" + std::to_string(getpid()) + '-' + std::to_string(++count);
   config.interface = "lo";
   config.spdp_interval_s = 0.2;
