@@ -45,7 +45,7 @@ void run(const ClosuresCommand& command) {
   write_output(command.json, [&](std::ostream& out) { out << json_text(scores); });
 }
 
-constexpr const char* kDetails =
+constexpr const char* kClosuresDetails =
     "Loop closures of a finished run against the truth, per stage: how many there are, which "
     "share\n"
     "is true (precision), and which share of what there was to be found it found (recall)\n\n"
@@ -90,7 +90,7 @@ void define(CLI::App& app, ClosuresCommand& command) {
 }  // namespace
 
 void add_closures(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("closures", kDetails);
+  CLI::App& app = *parent.add_subcommand("closures", kClosuresDetails);
   const auto command = std::make_shared<ClosuresCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

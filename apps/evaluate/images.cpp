@@ -119,7 +119,7 @@ void run(const ImagesCommand& command) {
   });
 }
 
-constexpr const char* kDetails =
+constexpr const char* kImagesDetails =
     "What the images of a recording are like: corners, how long they can be tracked, how well "
     "they\n"
     "are found in the other camera, gradients, grey levels, exposure, blur and noise\n\n"
@@ -154,7 +154,7 @@ void define(CLI::App& app, ImagesCommand& command) {
 }  // namespace
 
 void add_images(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("images", kDetails);
+  CLI::App& app = *parent.add_subcommand("images", kImagesDetails);
   const auto command = std::make_shared<ImagesCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

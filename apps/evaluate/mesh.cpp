@@ -79,7 +79,7 @@ void run(const MeshCommand& command) {
                [&](std::ostream& out) { out << json_text(to_json(report, palette)); });
 }
 
-constexpr const char* kDetails =
+constexpr const char* kMeshDetails =
     "Errors of estimated meshes against the true one, of each robot and of all together\n\n"
     "Both are sampled evenly, the estimates are moved by ONE rigid transform (ICP) onto the "
     "truth,\n"
@@ -142,7 +142,7 @@ void define(CLI::App& app, MeshCommand& command) {
 }  // namespace
 
 void add_mesh(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("mesh", kDetails);
+  CLI::App& app = *parent.add_subcommand("mesh", kMeshDetails);
   const auto command = std::make_shared<MeshCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

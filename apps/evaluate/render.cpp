@@ -131,7 +131,7 @@ void run(const RenderCommand& command) {
   }
 }
 
-constexpr const char* kDetails =
+constexpr const char* kRenderDetails =
     "Shaded picture of meshes, without a display: colours of labels with a legend, a scale bar,\n"
     "and trajectories on top\n\n"
     "Faces are seen from the side they were mapped from: from above one looks into rooms. Views:\n"
@@ -178,7 +178,7 @@ void define(CLI::App& app, RenderCommand& command) {
 }  // namespace
 
 void add_render(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("render", kDetails);
+  CLI::App& app = *parent.add_subcommand("render", kRenderDetails);
   const auto command = std::make_shared<RenderCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

@@ -65,7 +65,7 @@ void run(const TrajectoryCommand& command) {
   write_output(command.plot, [&](std::ostream& out) { out << plot_from_above(inputs, team); });
 }
 
-constexpr const char* kDetails =
+constexpr const char* kTrajectoryDetails =
     "Errors of estimated trajectories against the truth\n\n"
     "All estimates are moved by ONE rigid transform (Umeyama) to fit the truth, so several robots\n"
     "are judged in their common frame. Files are TUM text (t[s] p q x y z w) or EuRoC CSV\n"
@@ -105,7 +105,7 @@ void define(CLI::App& app, TrajectoryCommand& command) {
 }  // namespace
 
 void add_trajectory(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("trajectory", kDetails);
+  CLI::App& app = *parent.add_subcommand("trajectory", kTrajectoryDetails);
   const auto command = std::make_shared<TrajectoryCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

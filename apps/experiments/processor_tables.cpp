@@ -69,7 +69,7 @@ struct Profiled {
 
 // Modules whose steps take most of a robot's time; those that only wait for others are left out.
 ReportTable profile_table(const std::vector<Profiled>& columns) {
-  constexpr double kLeastShare_percent = 0.5;
+  constexpr double kLeastModule_percent = 0.5;
   ReportTable table{.caption =
                         "Where the time goes: share of each module in that of all steps [%], "
                         "mean of the robots",
@@ -83,7 +83,7 @@ ReportTable profile_table(const std::vector<Profiled>& columns) {
   }
   std::vector<std::pair<double, std::string>> modules;
   for (const auto& [module, percent] : most)
-    if (percent >= kLeastShare_percent) modules.emplace_back(-percent, module);
+    if (percent >= kLeastModule_percent) modules.emplace_back(-percent, module);
   std::sort(modules.begin(), modules.end());
   for (const auto& [percent, module] : modules) {
     std::vector<ReportCell> row{{module}};

@@ -139,7 +139,8 @@ std::vector<Communication> of_all_runs(ReportInput& input, const ReportInput::Wo
 }
 
 // Of worlds whose team was run more than once.
-ReportTable spread_table(ReportInput& input, const std::vector<ReportInput::World>& worlds) {
+ReportTable resource_spread_table(ReportInput& input,
+                                  const std::vector<ReportInput::World>& worlds) {
   ReportTable table{
       .caption = "How much runs differ: median, and lowest to highest [MB]",
       .columns = {"world", "runs", "place recognition", "verification", "all solves of the run",
@@ -194,7 +195,7 @@ std::optional<ReportSection> resources_section(ReportInput& input) {
   if (!worlds.empty()) {
     section.add(communication_table(input, worlds));
     section.add(live_table(input, worlds));
-    section.add(spread_table(input, worlds));
+    section.add(resource_spread_table(input, worlds));
     section.add(computation_table(input, worlds));
   }
   for (const auto& world : worlds) add_targets(input, world);

@@ -152,7 +152,8 @@ ReportTable odometry_table(const std::vector<ReportInput::World>& worlds) {
 }
 
 // Of worlds whose team was run more than once.
-ReportTable spread_table(ReportInput& input, const std::vector<ReportInput::World>& worlds) {
+ReportTable trajectory_spread_table(ReportInput& input,
+                                    const std::vector<ReportInput::World>& worlds) {
   ReportTable table{
       .caption = "How much runs differ: median, and lowest to highest",
       .groups = {{"", 2}, {"ATE of the keyframes [m]", 4}, {"", 3}},
@@ -255,7 +256,7 @@ std::optional<ReportSection> trajectory_section(ReportInput& input) {
   section.add(gap_table(input, worlds));
   section.add(plots(input, worlds));
   section.add(odometry_table(worlds));
-  section.add(spread_table(input, worlds));
+  section.add(trajectory_spread_table(input, worlds));
   for (const auto& world : worlds) add_optimisation_targets(input, world);
   for (const auto& world : worlds) add_odometry_targets(input, world);
   return section;

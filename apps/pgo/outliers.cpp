@@ -143,7 +143,7 @@ std::string outlier_plot(const OutlierStudy& study) {
                         [](const Cell& cell) { return cell.median(&OutlierResult::cpu_s); })});
 }
 
-constexpr const char* kDetails =
+constexpr const char* kOutliersDetails =
     "How far do the poses of a team of robots lie from those without any false closure?\n\n"
     "FILE is as in kimera_multi_pgo solve; what it says of which way is up is left out. A share "
     "of\n"
@@ -225,7 +225,7 @@ void run(const CLI::App& app, const OutliersCommand& command) {
 void add_outliers(CLI::App& parent) {
   CLI::App& app = *parent.add_subcommand(
       "outliers", "Adds more and more random false closures and compares what keeps them out");
-  app.footer(kDetails);
+  app.footer(kOutliersDetails);
   app.option_defaults()->always_capture_default();
   const auto command = std::make_shared<OutliersCommand>();
   command->input.define(app);

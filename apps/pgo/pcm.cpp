@@ -22,7 +22,7 @@ const std::map<std::string, CliqueMethod> kSearches{{"exact", CliqueMethod::kExa
                                                     {"incremental", CliqueMethod::kIncremental},
                                                     {"batch", CliqueMethod::kBatch}};
 
-constexpr const char* kDetails =
+constexpr const char* kPcmDetails =
     "Pairwise consistency maximisation (PCM): the closures are vertices of a consistency graph,\n"
     "whose maximum clique are those to be trusted.\n\n"
     "FILE is one of\n"
@@ -158,7 +158,7 @@ std::vector<PcmRun> run_file(const PcmCommand& command) {
 void add_pcm(CLI::App& parent) {
   CLI::App& app = *parent.add_subcommand(
       "pcm", "Adds loop closures one at a time and follows the largest set that agrees");
-  app.footer(kDetails);
+  app.footer(kPcmDetails);
   app.option_defaults()->always_capture_default();
   const auto command = std::make_shared<PcmCommand>();
   app.add_option("FILE", command->file, "Pose graph (*.g2o) or consistency graph (*.txt)")

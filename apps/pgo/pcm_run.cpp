@@ -22,9 +22,9 @@ namespace km {
 namespace {
 
 // The clique search of one run and what it is asked to note.
-class Additions {
+class RecordedSearch {
  public:
-  explicit Additions(const PcmConfig& config)
+  explicit RecordedSearch(const PcmConfig& config)
       : clique_(static_cast<std::uint64_t>(config.max_search_nodes), config.search) {
     run.search = to_string(config.search);
   }
@@ -56,7 +56,7 @@ class Additions {
 PcmRun run_pcm(const std::vector<LabelledClosure>& closures, const PcmConfig& config,
                const PcmProgress& progress) {
   const CycleTest test(config);
-  Additions additions(config);
+  RecordedSearch additions(config);
   std::vector<PreparedClosure> vertices;
   std::vector<bool> is_true;
   for (std::size_t n = 0; n < closures.size(); ++n) {
@@ -86,7 +86,7 @@ PcmRun run_pcm(const std::vector<LabelledClosure>& closures, const PcmConfig& co
 }
 
 PcmRun run_pcm(const ConsistencyRows& rows, const PcmConfig& config, const PcmProgress& progress) {
-  Additions additions(checked(config));
+  RecordedSearch additions(checked(config));
   for (std::size_t n = 0; n < rows.size(); ++n) {
     if (progress) progress(n);
     additions.add(rows[n], 0.0);

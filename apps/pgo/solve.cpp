@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kDetails =
+constexpr const char* kSolveDetails =
     "Every robot has only its part of the graph, and what it hears from the others are the\n"
     "messages that would cross the network.\n\n"
     "FILE is a g2o file, 2D or 3D, dealt out to --robots robots, or a folder with one *.csv or\n"
@@ -221,7 +221,7 @@ void run(const CLI::App& app, SolveCommand& command) {
 
 void add_solve(CLI::App& parent) {
   CLI::App& app = *parent.add_subcommand("solve", "Optimises a pose graph by a team of robots");
-  app.footer(kDetails);
+  app.footer(kSolveDetails);
   app.option_defaults()->always_capture_default();
   const auto command = std::make_shared<SolveCommand>();
   command->input.define(app);

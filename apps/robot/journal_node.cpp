@@ -7,7 +7,7 @@ namespace km {
 namespace {
 
 // A disk that stands still for a minute holds nobody up.
-constexpr std::size_t kQueueCapacity = 16384;
+constexpr std::size_t kJournalQueue = 16384;
 // Keyframes wait for it: soon, but few enough syncs for flash memory.
 constexpr std::chrono::milliseconds kSyncPeriod{500};
 
@@ -26,7 +26,7 @@ JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
       journal_(begin_or_go_on(file_, restored)),
       known_keyframes_(restored == nullptr ? 0 : restored->keyframes.size()),
       worker_(
-          kQueueCapacity, Overflow::kBlock,
+          kJournalQueue, Overflow::kBlock,
           [this](const Input& input) {
             std::visit([this](const auto& message) { step(message); }, input);
           },

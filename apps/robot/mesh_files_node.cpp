@@ -11,7 +11,7 @@ namespace km {
 namespace {
 
 // Of each kind the newest is kept beside the queue: one piece of news tells of all.
-constexpr std::size_t kQueueCapacity = 1;
+constexpr std::size_t kMeshQueue = 1;
 
 }  // namespace
 
@@ -20,7 +20,7 @@ MeshFilesNode::MeshFilesNode(std::filesystem::path folder, ResultWriter& results
     : folder_(std::move(folder)),
       results_(results),
       worker_(
-          kQueueCapacity, Overflow::kDropOldest,
+          kMeshQueue, Overflow::kDropOldest,
           [this](const News&) {
             work_in_background();
             take_latest();

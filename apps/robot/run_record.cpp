@@ -9,7 +9,7 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kQueueCapacity = 4096;  // far more than a module publishes in a second
+constexpr std::size_t kRecordQueue = 4096;  // far more than a module publishes in a second
 
 }  // namespace
 
@@ -159,7 +159,7 @@ std::map<RobotId, ClosureCounts> RunRecord::closures_per_peer() const {
 RecorderNode::RecorderNode(RobotId robot)
     : record_(robot),
       worker_(
-          kQueueCapacity, Overflow::kBlock,
+          kRecordQueue, Overflow::kBlock,
           [this](const Input& apply) {
             const std::lock_guard lock(mutex_);
             apply();

@@ -17,9 +17,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kPoll_ms = 100;
-constexpr double kGrace_s = 30.0;
-constexpr std::size_t kLastWords = 10;  // of a log
+constexpr int kTeamPoll_ms = 100;
+constexpr double kTeamGrace_s = 30.0;
+constexpr std::size_t kLastLines = 10;  // of a log
 
 // What robots, or those who started them elsewhere, left of an earlier run: --report would show it.
 void remove_earlier_run(const TeamPlan& plan) {
@@ -90,12 +90,12 @@ class RunningTeam {
                        [](const auto& robot) { return !robot->exit(); });
   }
 
-  // Waits for output of any robot, at most kPoll_ms.
+  // Waits for output of any robot, at most kTeamPoll_ms.
   void poll_output() const {
     std::vector<pollfd> polled;
     for (const auto& robot : robots_)
       for (const int fd : robot->descriptors()) polled.push_back({fd, POLLIN, 0});
-    poll(polled.data(), polled.size(), kPoll_ms);
+    poll(polled.data(), polled.size(), kTeamPoll_ms);
   }
 
   void read(std::size_t i) {
@@ -114,7 +114,7 @@ class RunningTeam {
       asked_to_end_ = true;
       send_to_all(SIGINT);
     }
-    if (elapsed_s > *plan_.time_limit_s + kGrace_s) send_to_all(SIGKILL);
+    if (elapsed_s > *plan_.time_limit_s + kTeamGrace_s) send_to_all(SIGKILL);
   }
 
   const TeamPlan& plan_;
@@ -137,7 +137,7 @@ std::deque<std::string> last_words(const fs::path& log) {
   std::ifstream file(log);
   for (std::string line; std::getline(file, line);) {
     lines.push_back(line);
-    if (lines.size() > kLastWords) lines.pop_front();
+    if (lines.size() > kLastLines) lines.pop_front();
   }
   return lines;
 }

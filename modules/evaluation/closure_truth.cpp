@@ -358,7 +358,7 @@ std::vector<std::string> table_row(const char* name, const ClosureScores& scores
           number(stage.rotation_error_deg.max, 2)};
 }
 
-Json to_json(const Statistics& statistics) {
+Json error_of(const Statistics& statistics) {
   return {{"rmse", statistics.rmse}, {"median", statistics.median}, {"max", statistics.max}};
 }
 
@@ -371,8 +371,8 @@ Json to_json(const ClosureScores& scores, const StageScore& stage) {
                {"frames_found", stage.frames_found},
                {"frame_recall", scores.frame_recall(stage)}};
   if (stage.translation_error_m.count > 0) {
-    json["translation_error_m"] = to_json(stage.translation_error_m);
-    json["rotation_error_deg"] = to_json(stage.rotation_error_deg);
+    json["translation_error_m"] = error_of(stage.translation_error_m);
+    json["rotation_error_deg"] = error_of(stage.rotation_error_deg);
   }
   return json;
 }

@@ -7,7 +7,7 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kQueueCapacity = 64;
+constexpr std::size_t kFrameQueue = 64;
 
 }  // namespace
 
@@ -17,7 +17,7 @@ KeyframeFeaturesNode::KeyframeFeaturesNode(const KeyframeFeaturesConfig& config,
     : extractor_(rig, config),
       keyframes_(topics.keyframes),
       worker_(
-          kQueueCapacity, Overflow::kBlock,
+          kFrameQueue, Overflow::kBlock,
           [this](const Input& input) {
             std::visit([this](const auto& message) { step(*message); }, input);
           },

@@ -9,8 +9,8 @@ namespace {
 constexpr double kAcceptRatio = 0.1;  // of the predicted decrease
 constexpr double kShrinkBelow = 0.25;
 constexpr double kGrowAbove = 0.75;
-constexpr double kRounding = 1e-15;  // of the cost
-constexpr int kMaxRejections = 20;   // in a row, the radius shrinking fourfold each time
+constexpr double kLeastDecrease = 1e-15;  // of the cost
+constexpr int kMaxRejections = 20;        // in a row, the radius shrinking fourfold each time
 
 double dot(const LiftedPoses& a, const LiftedPoses& b) {
   return a.cwiseProduct(b).sum();
@@ -91,7 +91,7 @@ TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
     const Step step = solve_model(problem, X, euclidean, gradient, radius, options);
     result.cg_iterations += step.cg_iterations;
     // A decrease below rounding is no decrease: stop rather than wander.
-    last = !(step.predicted_decrease > kRounding * result.cost);
+    last = !(step.predicted_decrease > kLeastDecrease * result.cost);
     if (last) break;
     LiftedPoses candidate = retract(X, step.V);
     const double cost = problem.cost(candidate);

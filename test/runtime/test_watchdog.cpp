@@ -12,7 +12,7 @@ namespace {
 constexpr double kTick_s = 0.5;
 
 // Its steps are made by the test.
-class ToyNode final : public Node {
+class WatchedNode final : public Node {
  public:
   std::string_view name() const override { return "toy"; }
   void start() override {}
@@ -27,7 +27,7 @@ class ToyNode final : public Node {
 
 struct Bench {
   CapturedLog log;
-  ToyNode node;
+  WatchedNode node;
   Watchdog watchdog{{&node}, 1.0};
 
   void pass(double s) {
@@ -103,7 +103,7 @@ TEST_CASE("A node that has ended is blamed for nothing more", "[watchdog]") {
 
 TEST_CASE("Patience multiplies the limits", "[watchdog]") {
   const CapturedLog log;
-  ToyNode node;
+  WatchedNode node;
   Watchdog watchdog({&node}, 2.0);
   const Heartbeat::Step step(node.heartbeat);
   for (double t = 0.0; t < 39.0; t += kTick_s) watchdog.tick(kTick_s);

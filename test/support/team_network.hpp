@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <catch2/catch.hpp>
 #include <functional>
 #include <limits>
 #include <map>
@@ -365,6 +366,13 @@ inline void feed_closures(TeamAgent& agent, RobotId robot, const TeamProblem& pr
 inline void feed(TeamAgent& agent, RobotId robot, const TeamProblem& problem) {
   feed_odometry(agent, robot, problem);
   feed_closures(agent, robot, problem);
+}
+
+/// Runs until all that live are members of one settled session. False if that takes longer.
+inline bool settle(TeamNetwork& network, double within_s = 300.0) {
+  const bool settled = network.run(within_s, [&] { return network.all_settled(); });
+  if (!settled) UNSCOPED_INFO(network.describe());
+  return settled;
 }
 
 }  // namespace km

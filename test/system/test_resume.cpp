@@ -86,7 +86,7 @@ bool is_there_within(const fs::path& file, std::chrono::seconds patience) {
   return fs::exists(file);
 }
 
-std::size_t lines_of(const fs::path& file) {
+std::size_t line_count(const fs::path& file) {
   std::ifstream in(file);
   return static_cast<std::size_t>(std::count(std::istreambuf_iterator<char>(in), {}, '\n'));
 }
@@ -132,8 +132,8 @@ TEST_CASE("A robot that is killed again and again loses a second at most", "[sys
     REQUIRE(last.wait() == 0);
     // Odometry does not start on what is left behind the last keyframe where that is too little.
     constexpr std::size_t kImagesInASecond = 20;
-    CHECK(lines_of(output / "odometry.tum") + kImagesInASecond >=
-          lines_of(folder.path() / "whole/odometry.tum"));
+    CHECK(line_count(output / "odometry.tum") + kImagesInASecond >=
+          line_count(folder.path() / "whole/odometry.tum"));
     const double killed_m = error_m(*dataset, {output / "optimized.tum"}, folder);
     CAPTURE(whole_m, killed_m);
     // Each start knows the biases of the sensors anew: a millimetre here.

@@ -13,7 +13,7 @@
 namespace km {
 namespace {
 
-const std::string kTool = std::string(KM_BIN_DIR) + "/kimera_multi_evaluate ";
+const std::string kMeshTool = std::string(KM_BIN_DIR) + "/kimera_multi_evaluate ";
 const char* const kPalette =
     "name,red,green,blue,alpha,id\nunknown,0,0,0,255,0\nfloor,200,0,0,255,1\nwest,0,200,0,255,2\n"
     "east,0,0,200,255,3\nsouth,90,90,0,255,4\nnorth,0,90,90,255,5\n";
@@ -43,9 +43,9 @@ struct Meshes {
 TEST_CASE("mesh judges each robot and all together", "[evaluate]") {
   const Meshes meshes;
   meshes.folder.write("label_palette.csv", kPalette);
-  const std::string command = kTool + "mesh --samples-per-m2 100 --truth " + meshes.truth.string() +
-                              " --estimate " + meshes.a.string() + ' ' + meshes.b.string() +
-                              " --json " + meshes.json.string();
+  const std::string command = kMeshTool + "mesh --samples-per-m2 100 --truth " +
+                              meshes.truth.string() + " --estimate " + meshes.a.string() + ' ' +
+                              meshes.b.string() + " --json " + meshes.json.string();
   const auto result = run_command(command);
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
@@ -67,7 +67,7 @@ TEST_CASE("mesh starts registration where the trajectories say", "[evaluate]") {
   const auto moved = meshes.folder.write(
       "moved.tum", "1 50 0 1 0 0 0 1\n2 52 0 1 0 0 0 1\n3 52 2 1 0 0 0 1\n4 50 2 2 0 0 0 1\n");
   const std::string command =
-      kTool + "mesh --truth " + meshes.truth.string() + " --estimate " + meshes.a.string();
+      kMeshTool + "mesh --truth " + meshes.truth.string() + " --estimate " + meshes.a.string();
   const auto lost = run_command(command);
   CHECK(lost.exit_code == 1);
   CHECK_THAT(lost.output, Catch::Contains("are both in one frame?") &&
@@ -83,7 +83,7 @@ TEST_CASE("mesh starts registration where the trajectories say", "[evaluate]") {
 
 TEST_CASE("mesh refuses what it cannot compare, by name", "[evaluate]") {
   const Meshes meshes;
-  const std::string truth = kTool + "mesh --truth " + meshes.truth.string() + " --estimate ";
+  const std::string truth = kMeshTool + "mesh --truth " + meshes.truth.string() + " --estimate ";
   CHECK(run_command(truth + "/none.ply").output ==
         "kimera_multi_evaluate: /none.ply: cannot be opened: no such file\n");
   const auto palette =
@@ -106,7 +106,7 @@ TEST_CASE("render draws one picture per view", "[evaluate]") {
   const Meshes meshes;
   meshes.folder.write("label_palette.csv", kPalette);
   const auto path = meshes.folder.write("path.tum", "1 1 1 1 0 0 0 1\n2 3 2 1 0 0 0 1\n");
-  const auto result = run_command(kTool + "render --mesh " + meshes.truth.string() +
+  const auto result = run_command(kMeshTool + "render --mesh " + meshes.truth.string() +
                                   " --size 320x240 --view top --view 2,1,1,45,0 --output " +
                                   meshes.png.string() + " --trajectory " + path.string());
   CAPTURE(result.output);
@@ -133,7 +133,7 @@ TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]")
   const auto turned = meshes.folder.write(
       "optimized.tum", "1 1 1 -1 0 0.70710678 0 0.70710678\n2 1 2 -3 0 0.70710678 0 0.70710678\n");
   const auto top = [&](const std::string& arguments) {
-    const auto result = run_command(kTool + "render --size 320x240 --color shade --output " +
+    const auto result = run_command(kMeshTool + "render --size 320x240 --color shade --output " +
                                     meshes.png.string() + ' ' + arguments);
     CAPTURE(result.output);
     REQUIRE(result.exit_code == 0);
@@ -144,14 +144,14 @@ TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]")
   const cv::Mat3b found = top("--mesh " + meshes.a.string() + " --trajectory " + turned.string() +
                               " --reference " + upright.string());
   CHECK(cv::norm(expected, found, cv::NORM_L1) / (3.0 * 320 * 240) < 0.5);  // of 255
-  const auto many = run_command(kTool + "render --mesh " + meshes.a.string() + " --output " +
+  const auto many = run_command(kMeshTool + "render --mesh " + meshes.a.string() + " --output " +
                                 meshes.png.string() + " --reference " + upright.string());
   CHECK_THAT(many.output, Catch::Contains("more --reference than --trajectory"));
 }
 
 TEST_CASE("render refuses what it cannot draw", "[evaluate]") {
   const Meshes meshes;
-  const std::string command = kTool + "render --mesh " + meshes.truth.string() + " --output ";
+  const std::string command = kMeshTool + "render --mesh " + meshes.truth.string() + " --output ";
   CHECK_THAT(run_command(command + "out.jpg").output, Catch::Contains("out.jpg: pictures are PNG"));
   CHECK_THAT(run_command(command + "/none/out.png").output,
              Catch::Contains("/none/out.png: cannot be written"));

@@ -13,7 +13,7 @@ namespace {
 
 using Catch::Contains;
 
-const std::string kTool = KM_BIN_DIR "/kimera_multi_pgo outliers ";
+const std::string kOutliersTool = KM_BIN_DIR "/kimera_multi_pgo outliers ";
 
 // A square driven round five times in the plane, each lap tied to the one before.
 std::string laps_g2o() {
@@ -31,8 +31,9 @@ TEST_CASE("outliers compares methods in a table, JSON and a plot", "[outliers]")
   const TemporaryFolder folder;
   const std::string graph = folder.write("laps.g2o", laps_g2o()).string();
   const CommandResult result = run_command(
-      kTool + graph + " --robots 2 --shares 12.5,25 --seeds 1,2 --outlier-range 20 " + "--json " +
-      (folder.path() / "out.json").string() + " --plot " + (folder.path() / "out.svg").string());
+      kOutliersTool + graph + " --robots 2 --shares 12.5,25 --seeds 1,2 --outlier-range 20 " +
+      "--json " + (folder.path() / "out.json").string() + " --plot " +
+      (folder.path() / "out.svg").string());
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
   CHECK_THAT(result.output,
@@ -51,8 +52,9 @@ TEST_CASE("outliers compares methods in a table, JSON and a plot", "[outliers]")
 TEST_CASE("Clusters of false closures are added on request", "[outliers]") {
   const TemporaryFolder folder;
   const std::string graph = folder.write("laps.g2o", laps_g2o()).string();
-  const CommandResult result = run_command(
-      kTool + graph + " --robots 2 --shares 0 --methods newton --clusters 2 --cluster-size 3");
+  const CommandResult result =
+      run_command(kOutliersTool + graph +
+                  " --robots 2 --shares 0 --methods newton --clusters 2 --cluster-size 3");
   CAPTURE(result.output);
   CHECK(result.exit_code == 0);
   CHECK_THAT(result.output, Contains("newton    0 %      6"));
@@ -62,7 +64,7 @@ TEST_CASE("outliers says what is wrong with its input", "[outliers]") {
   const TemporaryFolder folder;
   const std::string graph = folder.write("laps.g2o", laps_g2o()).string();
   const auto fails_with = [](const std::string& arguments, const std::string& message) {
-    const CommandResult result = run_command(kTool + arguments);
+    const CommandResult result = run_command(kOutliersTool + arguments);
     CAPTURE(arguments, result.output);
     CHECK(result.exit_code == 1);
     CHECK_THAT(result.output, Contains(message));

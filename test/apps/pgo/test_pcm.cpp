@@ -18,7 +18,7 @@ namespace {
 
 using Catch::Contains;
 
-const std::string kTool = std::string(KM_BIN_DIR) + "/kimera_multi_pgo pcm ";
+const std::string kPcmTool = std::string(KM_BIN_DIR) + "/kimera_multi_pgo pcm ";
 
 // A triangle, and a vertex on its own.
 constexpr const char* kGraph = "4\n\n0\n\n0 1\n";
@@ -26,7 +26,7 @@ constexpr const char* kGraph = "4\n\n0\n\n0 1\n";
 TEST_CASE("pcm prints a table and writes JSON and a plot", "[pcm]") {
   const TemporaryFolder folder;
   const std::string graph = folder.write("graph.txt", kGraph).string();
-  const auto result = run_command(kTool + graph + " --search exact batch --json " +
+  const auto result = run_command(kPcmTool + graph + " --search exact batch --json " +
                                   (folder.path() / "out.json").string() + " --plot " +
                                   (folder.path() / "out.svg").string());
   CAPTURE(result.output);
@@ -44,7 +44,7 @@ TEST_CASE("pcm says what is wrong with its input", "[pcm]") {
   const std::string bad = folder.write("bad.txt", "2\n\n7\n").string();
   const std::string other = folder.write("graph.csv", kGraph).string();
   const auto fails_with = [](const std::string& arguments, const std::string& message) {
-    const auto result = run_command(kTool + arguments);
+    const auto result = run_command(kPcmTool + arguments);
     CAPTURE(arguments, result.output);
     CHECK(result.exit_code == 1);
     CHECK_THAT(result.output, Contains(message));

@@ -15,7 +15,7 @@ namespace {
 
 using Catch::Contains;
 
-const std::string kTool = KM_BIN_DIR "/kimera_multi_pgo solve ";
+const std::string kSolveTool = KM_BIN_DIR "/kimera_multi_pgo solve ";
 
 // A square driven twice in the plane, its second lap tied to the first.
 std::string square_g2o() {
@@ -40,7 +40,7 @@ TEST_CASE("Every method runs from the command line and says what it reached", "[
                "newton --trust-all --links chain", "centralized", "rbcd --schedule greedy",
                "rbcd --over-relaxation 1", "rbcd-asynchronous --max-delay 2 --loss 0.1 --seed 4");
   CAPTURE(method);
-  const CommandResult result = run_command(kTool + graph.string() + " --robots 2 --method " +
+  const CommandResult result = run_command(kSolveTool + graph.string() + " --robots 2 --method " +
                                            method + " --json " + json.string());
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
@@ -59,7 +59,7 @@ TEST_CASE("Poses and plot are written", "[pgo]") {
   const auto g2o = folder.path() / "poses.g2o";
   const auto svg = folder.path() / "gap.svg";
   for (const auto& output : {tum, g2o})
-    REQUIRE(run_command(kTool + graph.string() + " --method centralized --output " +
+    REQUIRE(run_command(kSolveTool + graph.string() + " --method centralized --output " +
                         output.string() + " --plot " + svg.string())
                 .exit_code == 0);
   const G2oGraph written = read_g2o(g2o);
@@ -84,8 +84,8 @@ TEST_CASE("A graph without noise has no gap to report, and is certified", "[pgo]
   const TemporaryFolder folder;
   const auto graph = folder.write("exact.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n");
   const auto json = folder.path() / "out.json";
-  const CommandResult result =
-      run_command(kTool + graph.string() + " --robots 2 --method rbcd --json " + json.string());
+  const CommandResult result = run_command(kSolveTool + graph.string() +
+                                           " --robots 2 --method rbcd --json " + json.string());
   CAPTURE(result.output);
   CHECK(result.exit_code == 0);
   CHECK_THAT(result.output, !Contains("nan") && Contains("\ncertified"));
@@ -121,7 +121,7 @@ TEST_CASE("newton decides, and says how noisy closures are", "[pgo]") {
   const auto json = folder.path() / "out.json";
   for (const std::string& arguments : {step, square + " --robots 2", square + " --reject-odometry",
                                        square + " --robots 2 --tell-private"}) {
-    const CommandResult result = run_command(kTool + arguments + " --json " + json.string());
+    const CommandResult result = run_command(kSolveTool + arguments + " --json " + json.string());
     CAPTURE(arguments, result.output);
     CHECK(result.exit_code == 0);
     CHECK_THAT(result.output, !Contains("not decided") && Contains("as noisy as the graph says"));
@@ -129,7 +129,7 @@ TEST_CASE("newton decides, and says how noisy closures are", "[pgo]") {
                Contains("\"decided\": true") && Contains("\"noise_scale\":"));
   }
   const CommandResult strict =
-      run_command(kTool + square + " --robots 2 --barc 0.001 --json " + json.string());
+      run_command(kSolveTool + square + " --robots 2 --barc 0.001 --json " + json.string());
   CHECK_THAT(strict.output, Contains("kept 0 of 4 closures between robots"));
 }
 
@@ -173,7 +173,7 @@ TEST_CASE("What cannot be done is told with the reason", "[pgo]") {
   const auto place = std::regex_replace(pattern, std::regex("PLACE"), folder.path().string());
   const auto arguments = std::regex_replace(place, std::regex("FILE"), graph);
   CAPTURE(arguments);
-  const CommandResult result = run_command(kTool + arguments);
+  const CommandResult result = run_command(kSolveTool + arguments);
   CHECK(result.exit_code == 1);
   CHECK_THAT(result.output, Contains(message));
 }
@@ -182,7 +182,7 @@ TEST_CASE("A planar graph costs what it costs in the plane", "[pgo]") {
   const auto file = shared_data("pose_graphs/2d/intel.g2o");
   if (!file) return;
   const CommandResult result =
-      run_command(kTool + file->string() + " --robots 5 --method centralized");
+      run_command(kSolveTool + file->string() + " --robots 5 --method centralized");
   CAPTURE(result.output);
   CHECK(result.exit_code == 0);
   // SE-Sync's optimum; the staircase certifies once what is left is below 4e-8 of the cost.
@@ -225,8 +225,8 @@ TEST_CASE("Verticals of the file are used, told of, and written again", "[pgo][v
       GENERATE("newton --trust-all", "rbcd", "rbcd-accelerated", "centralized", "local");
   CAPTURE(method);
   const std::string options = graph.string() + " --robots 2 --rounds 100 --method " + method;
-  const CommandResult result =
-      run_command(kTool + options + " --json " + json.string() + " --output " + solved.string());
+  const CommandResult result = run_command(kSolveTool + options + " --json " + json.string() +
+                                           " --output " + solved.string());
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
   CHECK_THAT(result.output, Contains("8 poses, 11 edges, 7 verticals, 2 robots"));
@@ -243,7 +243,7 @@ TEST_CASE("Verticals of the file are used, told of, and written again", "[pgo][v
   if (method != "local") CHECK_THAT(result.output, Contains("\ncertified"));
 
   const CommandResult without =
-      run_command(kTool + options + " --no-vertical --json " + json.string());
+      run_command(kSolveTool + options + " --no-vertical --json " + json.string());
   CHECK(without.exit_code == 0);
   CHECK_THAT(without.output, Contains("8 poses, 11 edges, 2 robots"));
   CHECK_THAT(folder.read("out.json"), Contains("\"verticals\": 0"));
@@ -257,7 +257,7 @@ TEST_CASE("What does not know verticals says so, and how to leave them out", "[p
        {"--method rbcd-asynchronous", "method rbcd-asynchronous does"},
        {"--method rbcd --verify", "(--verify) does"}}));
   CAPTURE(options);
-  const std::string command = kTool + graph.string() + " --robots 2 --rounds 20 " + options;
+  const std::string command = kSolveTool + graph.string() + " --robots 2 --rounds 20 " + options;
   const CommandResult refused = run_command(command);
   CHECK(refused.exit_code == 1);
   CHECK_THAT(refused.output, Contains(who + " not know verticals, and the graph has 7: leave them "

@@ -134,7 +134,7 @@ TEST_CASE("a frame that does not fit its rig is refused", "[loop_closure]") {
   CHECK_THROWS_AS(KeyframeFeatureExtractor(rgbd, {}).extract(frame), std::invalid_argument);
 }
 
-constexpr double kBaseline_m = 0.5;
+constexpr double kRigBaseline_m = 0.5;
 
 // With k1 = -0.3 and no k2 the model has its fold at a bearing of 1.05: what lies further out it
 // puts where nearer things are seen. Undistorted, the images reach to 1.6 at their sides.
@@ -148,7 +148,7 @@ StereoRig folding_rig() {
                     .cy = 239.5,
                     .distortion = {-0.3, 0.0, 0.0, 0.0}};
   rig.cameras[1] = rig.cameras[0];
-  rig.cameras[1].T_body_cam.translation().x() = kBaseline_m;
+  rig.cameras[1].T_body_cam.translation().x() = kRigBaseline_m;
   return rig;
 }
 
@@ -171,7 +171,7 @@ float found(const StereoRig& rig, const Eigen::Vector2d& left, double truth) {
   const EpipolarMatcher matcher(rig, {.min_depth_m = 0.5, .max_depth_m = 10.0});
   StereoFrame frame;
   frame.left = dot_at(left, rig.cameras[0]);
-  frame.right = dot_at(left - Eigen::Vector2d(kBaseline_m * truth, 0.0), rig.cameras[1]);
+  frame.right = dot_at(left - Eigen::Vector2d(kRigBaseline_m * truth, 0.0), rig.cameras[1]);
   const Eigen::Vector2f bearing = left.cast<float>();
   return matcher.inverse_depths(frame, {&bearing, 1}).front();
 }

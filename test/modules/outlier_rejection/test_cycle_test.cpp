@@ -10,12 +10,10 @@
 namespace km {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 // Three steps round a unit square: the true closure 3 -> 0 is rotz(90 deg, 1).
 Chain square(double variance = 1e-4) {
   Chain chain(0);
-  for (int i = 0; i < 3; ++i) chain.step(rotz(kPi / 2, 1.0), variance);
+  for (int i = 0; i < 3; ++i) chain.step(rotz(std::numbers::pi / 2, 1.0), variance);
   return chain;
 }
 
@@ -25,10 +23,11 @@ bool passes_gate(const PcmConfig& config, const Chain& chain, const SE3& T_3_0) 
 }
 
 TEST_CASE("The odometry gate bounds translation per transform", "[pcm]") {
-  const PcmConfig config = bounds_per_transform(0.051, kPi);
-  CHECK(passes_gate(config, square(), rotz(kPi / 2, 1.0)));
-  CHECK(passes_gate(config, square(), rotz(kPi / 2, 0.8)));          // 0.200 / 4 = 0.050
-  CHECK_FALSE(passes_gate(config, square(), rotz(kPi / 2, 0.792)));  // 0.208 / 4 = 0.052
+  const PcmConfig config = bounds_per_transform(0.051, std::numbers::pi);
+  CHECK(passes_gate(config, square(), rotz(std::numbers::pi / 2, 1.0)));
+  CHECK(passes_gate(config, square(), rotz(std::numbers::pi / 2, 0.8)));  // 0.200 / 4 = 0.050
+  CHECK_FALSE(
+      passes_gate(config, square(), rotz(std::numbers::pi / 2, 0.792)));  // 0.208 / 4 = 0.052
 }
 
 TEST_CASE("The odometry gate bounds rotation per transform", "[pcm]") {
@@ -128,7 +127,7 @@ TEST_CASE("Exact cycles without any covariance are consistent, wrong ones are no
   const CycleTest test(PcmConfig{});
   const auto agrees = [&](double x) {
     return test.agrees_with_odometry(
-        test.orient(closure(chain.at(3), chain.at(0), rotz(kPi / 2, x), 0.0)));
+        test.orient(closure(chain.at(3), chain.at(0), rotz(std::numbers::pi / 2, x), 0.0)));
   };
   CHECK(agrees(1.0));
   CHECK_FALSE(agrees(1.001));

@@ -12,12 +12,10 @@
 namespace km {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 // Two quarter turns, then four steps straight on.
 Chain hook() {
   Chain chain(0);
-  for (int i = 0; i < 2; ++i) chain.step(rotz(kPi / 2, 1.0));
+  for (int i = 0; i < 2; ++i) chain.step(rotz(std::numbers::pi / 2, 1.0));
   for (int i = 0; i < 4; ++i) chain.step(rotz(0.0, 1.0));
   return chain;
 }
@@ -36,9 +34,9 @@ std::vector<std::uint32_t> later_ends(const Pcm& pcm) {
 
 TEST_CASE("Pairwise bounds on translation keep the older of two equal sets", "[pcm]") {
   const Chain chain = hook();
-  Pcm pcm(0, 0, per_transform(0.05, kPi));
+  Pcm pcm(0, 0, per_transform(0.05, std::numbers::pi));
   const auto add = [&](std::size_t from, double x, double y) {
-    return pcm.add(closure(chain.at(from), chain.at(0), rotz(kPi, x, y)));
+    return pcm.add(closure(chain.at(from), chain.at(0), rotz(std::numbers::pi, x, y)));
   };
   CHECK(add(3, 0.0, 0.9) == PcmVerdict::kGrew);
   CHECK(add(4, -0.9, 0.9) == PcmVerdict::kGrew);
@@ -54,7 +52,7 @@ TEST_CASE("Pairwise bounds on rotation keep the older of two equal sets", "[pcm]
   const auto add = [&](std::size_t from, double angle, double x) {
     return pcm.add(closure(chain.at(from), chain.at(0), rotz(angle, x, 1.0)));
   };
-  CHECK(add(3, kPi, 0.0) == PcmVerdict::kGrew);
+  CHECK(add(3, std::numbers::pi, 0.0) == PcmVerdict::kGrew);
   CHECK(add(4, 3.141, -1.0) == PcmVerdict::kGrew);
   CHECK(add(5, 3.13, -2.0) == PcmVerdict::kGrew);
   CHECK(add(6, 3.12, -3.0) == PcmVerdict::kAdded);  // 0.021 / 4 = 0.00525 against closure 4
@@ -163,13 +161,14 @@ TEST_CASE("The odometry gate is for closures inside one robot, when asked for", 
   const Chain chain = hook();
   PcmConfig config;
   config.min_inliers = 1;
-  const Closure wrong = closure(chain.at(3), chain.at(0), rotz(kPi, 5.0, 5.0));
+  const Closure wrong = closure(chain.at(3), chain.at(0), rotz(std::numbers::pi, 5.0, 5.0));
   CHECK(Pcm(0, 0, config).add(wrong) == PcmVerdict::kGrew);
   config.odometry_gate = true;
   Pcm gated(0, 0, config);
   CHECK(gated.add(wrong) == PcmVerdict::kAgainstOdometry);
   CHECK(gated.add(wrong) == PcmVerdict::kRepeated);
-  CHECK(gated.add(closure(chain.at(4), chain.at(0), rotz(kPi, -1.0, 1.0))) == PcmVerdict::kGrew);
+  CHECK(gated.add(closure(chain.at(4), chain.at(0), rotz(std::numbers::pi, -1.0, 1.0))) ==
+        PcmVerdict::kGrew);
   CHECK(gated.size() == 1);
 }
 

@@ -4,6 +4,7 @@
 #include "modules/pgo_study/asynchronous_team.hpp"
 #include "modules/pgo_study/block_descent_team.hpp"
 #include "modules/pgo_study/staircase.hpp"
+#include "test/modules/pgo_study/certified_optimum.hpp"
 #include "test/support/pose_graph_problems.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"
@@ -11,19 +12,8 @@
 namespace km {
 namespace {
 
-// A rounded pose is off by 6e-8 of itself, squared residuals by twice that and their weights.
-constexpr double kSinglePrecision = 1e-6;
-
 LiftedPoses start_of(const TeamGraph& graph, Eigen::Index rank = 5) {
   return lift(chordal_initialisation(graph.poses(), graph.edges), rank);
-}
-
-double optimum_of(const TeamGraph& graph) {
-  Staircase staircase(graph.edges, start_of(graph, 3));
-  while (staircase.step()) {
-  }
-  REQUIRE(staircase.certificate()->certified);
-  return staircase.cost();
 }
 
 double cost_of(const TeamGraph& graph, const LiftedPoses& X) {
@@ -117,7 +107,7 @@ TEST_CASE("Whatever comes late or never, descent goes on to the optimum", "[pgo_
     REQUIRE(V <= bound + kSinglePrecision * start);
     bound = V;
   }
-  CHECK(cost_of(graph, X) == Approx(optimum_of(graph)).epsilon(1e-5));
+  CHECK(cost_of(graph, X) == Approx(certified_optimum_of(graph)).epsilon(1e-5));
 }
 
 TEST_CASE("A robot that hears too little waits, and moves again when it hears", "[pgo_study]") {

@@ -7,6 +7,7 @@
 #include "modules/pgo_study/message_sizes.hpp"
 #include "modules/pgo_study/team_staircase.hpp"
 #include "modules/pose_graph/rounding.hpp"
+#include "test/modules/pgo_study/certified_optimum.hpp"
 #include "test/support/pose_graph_problems.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"
@@ -15,19 +16,8 @@ namespace km {
 namespace {
 
 constexpr double kSmallGridOptimum = 1025.398056;  // SE-Sync, unit quaternions
-// A rounded pose is off by 6e-8 of itself, squared residuals by twice that and their weights.
-constexpr double kSinglePrecision = 1e-6;
-
 std::vector<SE3> chordal(const TeamGraph& graph) {
   return chordal_initialisation(graph.poses(), graph.edges);
-}
-
-double optimum_of(const TeamGraph& graph) {
-  Staircase staircase(graph.edges, lift(chordal(graph), 3));
-  while (staircase.step()) {
-  }
-  REQUIRE(staircase.certificate()->certified);
-  return staircase.cost();
 }
 
 // A unit of time for every use of the clock.
@@ -108,14 +98,14 @@ TEST_CASE("The published schedule descends with every update", "[pgo_study]") {
   const auto rounds = run_team(graph, team, {.max_rounds = 200}, {});
   for (std::size_t k = 1; k < rounds.size(); ++k)
     REQUIRE(rounds[k].cost <= rounds[k - 1].cost * (1.0 + kSinglePrecision));
-  CHECK(rounds.back().cost == Approx(optimum_of(graph)).epsilon(1e-4));
+  CHECK(rounds.back().cost == Approx(certified_optimum_of(graph)).epsilon(1e-4));
   CHECK(rounds.back().gradient_norm < rounds.front().gradient_norm);
 }
 
 TEST_CASE("Acceleration ends at the optimum in fewer rounds than plain descent", "[pgo_study]") {
   std::mt19937 rng(5);
   const TeamGraph graph = noisy_chain(100, 5, 0.1, rng);
-  const double optimum = optimum_of(graph);
+  const double optimum = certified_optimum_of(graph);
   const auto rounds_to = [&](bool accelerated) {
     BlockDescentTeam team(graph, lift(chordal(graph), 5),
                           {.max_over_relaxation = 1.0, .accelerated = accelerated});
@@ -155,7 +145,7 @@ TEST_CASE("Gauss-Seidel sweeps of a team come to the answer of one robot", "[pgo
   // One Gauss-Newton step from the chordal rotations: better than those, no better than the best.
   const QuadraticProblem problem(3, 40, graph.edges, {});
   CHECK(team_cost < problem.cost(lift(chordal(graph), 3)));
-  CHECK(team_cost >= optimum_of(graph) * (1.0 - 1e-9));
+  CHECK(team_cost >= certified_optimum_of(graph) * (1.0 - 1e-9));
 }
 
 TEST_CASE("Alone, robots meet if nothing is noisy", "[pgo_study]") {

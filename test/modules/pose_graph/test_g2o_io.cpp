@@ -12,7 +12,7 @@
 namespace km {
 namespace {
 
-G2oGraph read(const std::string& text) {
+G2oGraph read_graph(const std::string& text) {
   std::istringstream in(text);
   return read_g2o(in, "test.g2o");
 }
@@ -24,7 +24,7 @@ const std::string kUnit = " 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1";
 TEST_CASE("g2o's translation-first information becomes a rotation-first covariance", "[g2o]") {
   // Diagonal 1..6 and one cross term between x (row 0) and roll (row 3).
   const auto graph =
-      read("EDGE_SE3:QUAT 0 1" + kPose + " 1 0 0 0.5 0 0 2 0 0 0 0 3 0 0 0 4 0 0 5 0 6\n");
+      read_graph("EDGE_SE3:QUAT 0 1" + kPose + " 1 0 0 0.5 0 0 2 0 0 0 0 3 0 0 0 4 0 0 5 0 6\n");
   REQUIRE(graph.edges.size() == 1);
   Matrix6 expected = Matrix6::Identity();  // information, [rotation; translation]
   expected.diagonal() << 4, 5, 6, 1, 2, 3;
@@ -33,7 +33,7 @@ TEST_CASE("g2o's translation-first information becomes a rotation-first covarian
 }
 
 TEST_CASE("g2o poses are read in the order t, x y z w and normalised", "[g2o]") {
-  const auto graph = read("VERTEX_SE3:QUAT 7 1 2 3 0 0 0.60006 0.80008\n");
+  const auto graph = read_graph("VERTEX_SE3:QUAT 7 1 2 3 0 0 0.60006 0.80008\n");
   REQUIRE(graph.vertices.size() == 1);
   const SE3& T = graph.vertices[0].T_world_kf;
   CHECK(T.translation() == Eigen::Vector3d(1, 2, 3));
@@ -113,8 +113,8 @@ TEST_CASE("A prior on the tilt of a pose is its vertical, wherever else it looks
           "[g2o][vertical]") {
   // Turned by 90 degrees about x: z of the world is y of the pose. Heading and place say nothing.
   const std::string information = " 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 25 0 0 0 0 25";
-  const auto graph = read(kVertex + kOffset + "EDGE_SE3_PRIOR 0 4 7 8 9 " +
-                          "0.70710678 0 0 0.70710678" + information + '\n');
+  const auto graph = read_graph(kVertex + kOffset + "EDGE_SE3_PRIOR 0 4 7 8 9 " +
+                                "0.70710678 0 0 0.70710678" + information + '\n');
   REQUIRE(graph.verticals.size() == 1);
   CHECK(graph.verticals[0].id == KeyframeId{0, 0});
   CHECK(graph.verticals[0].vertical.up_body.isApprox(Eigen::Vector3d::UnitY(), 1e-7));
@@ -144,12 +144,13 @@ TEST_CASE("Other priors than verticals are refused with the line and the reason"
       {"EDGE_SE3_PRIOR 0 4" + pose + " 0 0 0", "line ends before information"},
   }));
   CAPTURE(lines);
-  CHECK_THROWS_WITH(read(kVertex + kOffset + lines + '\n'),
+  CHECK_THROWS_WITH(read_graph(kVertex + kOffset + lines + '\n'),
                     Catch::StartsWith("test.g2o:3: ") && Catch::Contains(reason));
   const std::string vertical = "EDGE_SE3_PRIOR 0 4" + pose + level;
-  CHECK_THROWS_WITH(read(kVertex + kOffset + vertical + vertical),
+  CHECK_THROWS_WITH(read_graph(kVertex + kOffset + vertical + vertical),
                     "test.g2o:4: second prior on 0:0");
-  CHECK_THROWS_WITH(read("VERTEX_SE2 0 0 0 0\n" + kOffset), "test.g2o:2: 2D and 3D in one file");
+  CHECK_THROWS_WITH(read_graph("VERTEX_SE2 0 0 0 0\n" + kOffset),
+                    "test.g2o:2: 2D and 3D in one file");
 }
 
 TEST_CASE("A vertical that is no direction is not written", "[g2o][vertical]") {
@@ -165,7 +166,7 @@ TEST_CASE("A vertical that is no direction is not written", "[g2o][vertical]") {
 }
 
 TEST_CASE("2D g2o is lifted to the plane z = 0", "[g2o]") {
-  const auto graph = read("VERTEX_SE2 0 1 2 0.5\nEDGE_SE2 0 1 3 4 -0.25 2 0 0 4 0 8\n");
+  const auto graph = read_graph("VERTEX_SE2 0 1 2 0.5\nEDGE_SE2 0 1 3 4 -0.25 2 0 0 4 0 8\n");
   CHECK(graph.dimension == 2);
   CHECK(graph.vertices.at(0).T_world_kf.translation() == Eigen::Vector3d(1, 2, 0));
   CHECK(graph.edges.at(0).T_from_to.linear()(1, 0) == Approx(std::sin(-0.25)));
@@ -208,15 +209,15 @@ TEST_CASE("A bad g2o file is refused with its line and the reason", "[g2o]") {
        "outside 1e-15 .. 1e+12"},
   }));
   CAPTURE(line);
-  CHECK_THROWS_WITH(read(kVertex + "# comment\n\nFIX 0\n" + line + '\n'),
+  CHECK_THROWS_WITH(read_graph(kVertex + "# comment\n\nFIX 0\n" + line + '\n'),
                     Catch::StartsWith("test.g2o:5: ") && Catch::Contains(reason));
 }
 
 TEST_CASE("An edge with indefinite information weighs what its blocks say", "[g2o]") {
   // As in cubicle.g2o: cross terms that no covariance has, beside definite blocks.
-  const G2oGraph graph =
-      read("EDGE_SE3:QUAT 1 2" + kPose + " 4 2 0 0 0 0 4 0 0 0 0 10 70 100 0 10 0 0 10 0 5\n" +
-           "EDGE_SE3:QUAT 2 3" + kPose + kUnit + '\n');
+  const G2oGraph graph = read_graph("EDGE_SE3:QUAT 1 2" + kPose +
+                                    " 4 2 0 0 0 0 4 0 0 0 0 10 70 100 0 10 0 0 10 0 5\n" +
+                                    "EDGE_SE3:QUAT 2 3" + kPose + kUnit + '\n');
   CHECK(graph.indefinite_edges == 1);
   // tr(I_t^-1) = 8 / 12 + 1 / 10, tr(I_R^-1) = 2 / 10 + 1 / 5.
   const double tau = 3.0 / (8.0 / 12.0 + 0.1);
@@ -225,21 +226,22 @@ TEST_CASE("An edge with indefinite information weighs what its blocks say", "[g2
   variances << Eigen::Vector3d::Constant(0.5 / kappa), Eigen::Vector3d::Constant(1.0 / tau);
   CHECK(graph.edges[0].covariance.isApprox(Matrix6(variances.asDiagonal()), 1e-14));
 
-  const G2oGraph planar = read("EDGE_SE2 0 1 1 0 0 4 0 9 4 0 16\n");
+  const G2oGraph planar = read_graph("EDGE_SE2 0 1 1 0 0 4 0 9 4 0 16\n");
   CHECK(planar.indefinite_edges == 1);
   variances << 0.0, 0.0, 1.0 / 16.0, 0.25, 0.25, 0.0;
   CHECK(planar.edges[0].covariance.isApprox(Matrix6(variances.asDiagonal()), 1e-14));
 }
 
 TEST_CASE("A g2o file without content or that is not there is refused", "[g2o]") {
-  CHECK_THROWS_WITH(read("# nothing\n"), "test.g2o: no vertex and no edge");
+  CHECK_THROWS_WITH(read_graph("# nothing\n"), "test.g2o: no vertex and no edge");
   CHECK_THROWS_WITH(read_g2o(std::filesystem::path("no/such.g2o")), "no/such.g2o: no such file");
 }
 
 TEST_CASE("A message about a broken line is short and printable", "[g2o]") {
   std::string line = "VERTEX\x1b[2J";
   line.resize(100'000, 'x');
-  CHECK_THROWS_WITH(read(line), Catch::Contains("VERTEX?[2Jxxx") && Catch::EndsWith("xx ..."));
+  CHECK_THROWS_WITH(read_graph(line),
+                    Catch::Contains("VERTEX?[2Jxxx") && Catch::EndsWith("xx ..."));
 }
 
 TEST_CASE("A covariance without inverse is not written", "[g2o]") {
@@ -271,7 +273,7 @@ TEST_CASE("The public benchmark graphs have the sizes their sources state", "[g2
 
 TEST_CASE("The weights of an edge are those SE-Sync takes from its information blocks", "[g2o]") {
   const auto graph =
-      read("EDGE_SE3:QUAT 0 1" + kPose + " 2 0 0 0 0 0 4 0 0 0 0 4 0 0 0 10 0 0 20 0 20\n");
+      read_graph("EDGE_SE3:QUAT 0 1" + kPose + " 2 0 0 0 0 0 4 0 0 0 0 4 0 0 0 10 0 0 20 0 20\n");
   const Precision precision = precision_of(graph.edges.at(0).covariance);
   CHECK(precision.tau == Approx(3.0 / (0.5 + 0.25 + 0.25)));
   CHECK(precision.kappa == Approx(3.0 / (2.0 * (0.1 + 0.05 + 0.05))));

@@ -15,7 +15,7 @@ double surrogate(double w, double r2, double c2, double mu) {
 }
 
 // Weighs residuals that stay as they are until the schedule has decided.
-struct Weighing {
+struct Weighed {
   std::vector<double> residuals;
   double barc;
   RobustSchedule schedule = {};
@@ -103,7 +103,7 @@ TEST_CASE("The default threshold is a chi-squared quantile", "[pose_graph]") {
 
 TEST_CASE("A decision that the poses contradict is taken up again, but not for ever",
           "[pose_graph]") {
-  Weighing weighing{.residuals = {0.5, 400.0}, .barc = 3.0};
+  Weighed weighing{.residuals = {0.5, 400.0}, .barc = 3.0};
   weighing.run();
   REQUIRE(weighing.weights == std::vector<double>{1.0, 0.0});
   weighing.residuals[1] = 2.0;  // once the poses have come to rest
@@ -120,7 +120,7 @@ TEST_CASE("A decision that the poses contradict is taken up again, but not for e
 }
 
 TEST_CASE("The schedule ends, and every closure is decided by its residual", "[pose_graph]") {
-  Weighing weighing{.residuals = {0.5, 2.9, 3.1, 400.0}, .barc = 3.0};
+  Weighed weighing{.residuals = {0.5, 2.9, 3.1, 400.0}, .barc = 3.0};
   weighing.run();
   CHECK(weighing.schedule.decided());
   CHECK(weighing.weights == std::vector<double>{1.0, 1.0, 0.0, 0.0});
@@ -130,7 +130,7 @@ TEST_CASE("The schedule ends, and every closure is decided by its residual", "[p
 TEST_CASE("Residuals of any size are decided in a bounded number of steps", "[pose_graph]") {
   const double largest = GENERATE(3.001, 30.0, 1e4, 1e9);
   CAPTURE(largest);
-  Weighing weighing{.residuals = {0.0, 2.999, 3.001, largest}, .barc = 3.0};
+  Weighed weighing{.residuals = {0.0, 2.999, 3.001, largest}, .barc = 3.0};
   weighing.run();
   CHECK(weighing.weights == std::vector<double>{1.0, 1.0, 0.0, 0.0});
 }

@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-const std::string kUnit = " 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
+const std::string kUnitLine = " 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
 
 std::string drive_g2o() {
   std::string text = "# one robot, with a closure and two verticals\n";
@@ -19,8 +19,8 @@ std::string drive_g2o() {
   }
   for (int i = 0; i < 5; ++i)
     text += "EDGE_SE3:QUAT " + std::to_string(i) + ' ' + std::to_string(i + 1) +
-            " 1.25 0.5 -0.125 0 0 0 1" + kUnit;
-  text += "EDGE_SE3:QUAT 0 5 6.0 2.5 -0.5 0 0 0 1" + kUnit;
+            " 1.25 0.5 -0.125 0 0 0 1" + kUnitLine;
+  text += "EDGE_SE3:QUAT 0 5 6.0 2.5 -0.5 0 0 0 1" + kUnitLine;
   text += "PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n";
   const std::string tilt = " 0 0 0 0 0 0 1 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 100 0 0 100 0 0\n";
   return text + "EDGE_SE3_PRIOR 0 0" + tilt + "EDGE_SE3_PRIOR 3 0" + tilt;

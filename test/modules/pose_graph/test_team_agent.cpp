@@ -32,12 +32,6 @@ TeamProblem without_33_50(TeamProblem problem) {
   return problem;
 }
 
-bool settle(TeamNetwork& network, double within_s = 600.0) {
-  const bool settled = network.run(within_s, [&] { return network.all_settled(); });
-  if (!settled) UNSCOPED_INFO(network.describe());
-  return settled;
-}
-
 void check_optimal(const TeamNetwork& network, const TeamProblem& problem) {
   for (const auto& [id, robot] : network.robots) {
     CAPTURE(id);

@@ -33,12 +33,6 @@ void add_all(TeamNetwork& network, const TeamProblem& problem,
     feed(network.add({robot, 100U + robot}, {}, factory), robot, problem);
 }
 
-bool settle(TeamNetwork& network, double within_s = 300.0) {
-  const bool settled = network.run(within_s, [&] { return network.all_settled(); });
-  if (!settled) UNSCOPED_INFO(network.describe());
-  return settled;
-}
-
 std::size_t closures_of(const TeamProblem& problem) {
   return static_cast<std::size_t>(std::count_if(problem.edges.begin(), problem.edges.end(),
                                                 [](const PoseEdge& e) { return !is_step(e); }));

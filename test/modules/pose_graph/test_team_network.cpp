@@ -72,12 +72,6 @@ void check_optimal(const TeamNetwork& network, const TeamProblem& problem,
   CHECK(network.undecodable == 0);
 }
 
-bool settle(TeamNetwork& network, double within_s = kHour_s) {
-  const bool settled = network.run(within_s, [&] { return network.all_settled(); });
-  if (!settled) UNSCOPED_INFO(network.describe());
-  return settled;
-}
-
 }  // namespace
 
 TEST_CASE("a robot that only one other hears is taken in at the cost of all links",

@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kDay = 86'400'000'000'000;
+constexpr std::int64_t kDay_ns = 86'400'000'000'000;
 
 // Bytes of a PNG file whose header says `width` x `height`; what follows it is too little.
 std::string png_of(std::uint32_t width, std::uint32_t height) {
@@ -86,7 +86,7 @@ void spoil_row(const EurocFolder& folder, const Row& row) {
 }  // namespace
 
 TEST_CASE("A bad row is lost and counted with its line, and no other", "[sensors]") {
-  const std::string day = std::to_string(kDay);
+  const std::string day = std::to_string(kDay_ns);
   const Row row = GENERATE_COPY(
       Row{"gyro 1e300", "imu0/data.csv", 300, "1e300,0,0,0,0,9.8", ReaderFault::kImplausible, 8},
       Row{"gyro 150", "imu0/data.csv", 300, "0,0,150,0,0,9.8", ReaderFault::kImplausible, 8},

@@ -8,6 +8,9 @@
 
 namespace km {
 
+/// A second is asked for; only a failure takes longer than this.
+inline constexpr double kDiscoveryBound_s = 5.0;
+
 /// Starts test_dds_peer as robot `id` with the settings of the section dds.
 inline std::unique_ptr<Process> start_peer(RobotId id, const std::vector<std::string>& settings,
                                            pid_t network_of = 0) {

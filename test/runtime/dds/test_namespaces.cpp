@@ -7,8 +7,6 @@
 namespace km {
 namespace {
 
-constexpr double kDiscoveryBound_s = 5.0;
-
 std::vector<std::string> discovery_settings(const std::string& discovery) {
   auto settings = own_team() + std::vector<std::string>{"discovery=" + discovery};
   if (discovery == "peers")

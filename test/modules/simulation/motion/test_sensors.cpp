@@ -207,7 +207,7 @@ TEST_CASE("The depth sensor refuses options and sizes without sense", "[motion]"
   CHECK_THROWS_AS(sensor.measure({}, 0, 0, 1), std::invalid_argument);
 }
 
-constexpr Stamp kEpoch = 1403636579763555584;
+constexpr Stamp kFlightEpoch = 1403636579763555584;
 
 SplineTrajectory standing(double duration_s, const SE3& T_world_body) {
   return spline_along(0.0, 1.0,
@@ -229,10 +229,11 @@ PredictionErrors predict_seconds(const BodyTrajectory& trajectory, double rate_h
   ImuSimulation options;
   options.ideal = true;
   options.noise.rate_hz = rate_hz;
-  const std::vector<ImuSample> samples = samples_of(simulate_imu(trajectory, kEpoch, options));
+  const std::vector<ImuSample> samples =
+      samples_of(simulate_imu(trajectory, kFlightEpoch, options));
   PredictionErrors worst;
   for (int second = 0; second + 1 <= static_cast<int>(trajectory.end_s()); ++second) {
-    const Stamp from = kEpoch + second * Stamp{1'000'000'000}, to = from + 1'000'000'000;
+    const Stamp from = kFlightEpoch + second * Stamp{1'000'000'000}, to = from + 1'000'000'000;
     ImuPreintegration imu(options.noise, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
     REQUIRE(imu.add(samples, from, to));
     const BodyMotion begin = trajectory.motion(second), end = trajectory.motion(second + 1.0);
@@ -282,7 +283,7 @@ TEST_CASE("At rest the ideal sensor measures minus gravity in the body's frame",
   const SE3 T = make_pose(so3_exp({0.3, -0.7, 1.9}), {1.0, 2.0, 3.0});
   ImuSimulation options;
   options.ideal = true;
-  const auto samples = simulate_imu(standing(8.0, T), kEpoch, options);
+  const auto samples = simulate_imu(standing(8.0, T), kFlightEpoch, options);
   REQUIRE(samples.size() > 1000);
   const Eigen::Vector3d up = T.linear().transpose() * Eigen::Vector3d(0, 0, 9.81);
   for (const SimulatedImu& s : samples) {
@@ -296,12 +297,12 @@ TEST_CASE("At rest the ideal sensor measures minus gravity in the body's frame",
 TEST_CASE("Samples lie on the grid of the rate, rounded to nanoseconds", "[motion]") {
   ImuSimulation options;
   options.noise.rate_hz = 300.0;  // a period that is no whole number of nanoseconds
-  const auto samples = simulate_imu(standing(2.0, SE3::Identity()), kEpoch, options);
+  const auto samples = simulate_imu(standing(2.0, SE3::Identity()), kFlightEpoch, options);
   REQUIRE(samples.size() >= 601);
-  CHECK(samples[0].sample.stamp == kEpoch);
-  CHECK(samples[1].sample.stamp == kEpoch + 3333333);
-  CHECK(samples[2].sample.stamp == kEpoch + 6666667);
-  CHECK(samples[600].sample.stamp == kEpoch + 2000000000);
+  CHECK(samples[0].sample.stamp == kFlightEpoch);
+  CHECK(samples[1].sample.stamp == kFlightEpoch + 3333333);
+  CHECK(samples[2].sample.stamp == kFlightEpoch + 6666667);
+  CHECK(samples[600].sample.stamp == kFlightEpoch + 2000000000);
 }
 
 TEST_CASE("White noise has the density that was asked for", "[motion]") {
@@ -309,7 +310,7 @@ TEST_CASE("White noise has the density that was asked for", "[motion]") {
   options.seed = GENERATE(1U, 2U);
   CAPTURE(options.seed);
   options.noise.gyro_random_walk = options.noise.accel_random_walk = 0.0;
-  const auto samples = simulate_imu(standing(300.0, SE3::Identity()), kEpoch, options);
+  const auto samples = simulate_imu(standing(300.0, SE3::Identity()), kFlightEpoch, options);
   double gyro = 0.0, accel = 0.0, neighbours = 0.0;
   Eigen::Vector3d previous = Eigen::Vector3d::Zero();
   for (const SimulatedImu& s : samples) {
@@ -338,7 +339,7 @@ TEST_CASE("The variance of the biases grows linearly in time", "[motion]") {
     int count = 0;
     for (std::uint64_t seed = 0; seed < 150; ++seed) {
       options.seed = seed;
-      const auto samples = simulate_imu(still, kEpoch, options);
+      const auto samples = simulate_imu(still, kFlightEpoch, options);
       const auto lag = static_cast<std::size_t>(200 * lag_s);
       for (std::size_t k = 0; k + lag < samples.size(); k += lag) {
         gyro += (samples[k + lag].gyro_bias - samples[k].gyro_bias).squaredNorm();
@@ -358,10 +359,10 @@ TEST_CASE("Equal seeds give equal samples, other seeds others", "[motion]") {
   const SplineTrajectory still = standing(3.0, SE3::Identity());
   ImuSimulation options;
   options.seed = 9;
-  const auto a = simulate_imu(still, kEpoch, options);
-  const auto b = simulate_imu(still, kEpoch, options);
+  const auto a = simulate_imu(still, kFlightEpoch, options);
+  const auto b = simulate_imu(still, kFlightEpoch, options);
   options.seed = 10;
-  const auto c = simulate_imu(still, kEpoch, options);
+  const auto c = simulate_imu(still, kFlightEpoch, options);
   REQUIRE(a.size() == b.size());
   for (std::size_t k = 0; k < a.size(); ++k) {
     CHECK(a[k].sample.gyro == b[k].sample.gyro);
@@ -375,7 +376,7 @@ TEST_CASE("The IMU simulator refuses rates and noises without sense", "[motion]"
   const auto refused = [&](auto change) {
     ImuSimulation options;
     change(options);
-    CHECK_THROWS_AS(simulate_imu(still, kEpoch, options), ConfigError);
+    CHECK_THROWS_AS(simulate_imu(still, kFlightEpoch, options), ConfigError);
   };
   refused([](ImuSimulation& o) { o.noise.rate_hz = 0.0; });
   refused([](ImuSimulation& o) { o.noise.rate_hz = std::numeric_limits<double>::quiet_NaN(); });
