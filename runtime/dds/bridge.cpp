@@ -43,7 +43,9 @@ DdsBridge::DdsBridge(const DdsParticipant& participant)
   for (const dds_entity_t condition :
        {stop_request_.handle(), peers_.discovery_condition(), peers_.liveliness_condition()})
     check_dds(dds_waitset_attach(waitset_.handle(), condition, kOther), "cannot wait");
-  if (participant_.seal() != nullptr) exchange_keys();
+  if (participant_.seal() == nullptr) return;
+  exchange_keys();
+  peers_.events().subscribe([this](const auto& event) { catch_up(*event); });
 }
 
 DdsBridge::~DdsBridge() {
@@ -74,6 +76,14 @@ void DdsBridge::tell_keys() {
   for (const Peer& peer : peers_.list())
     if (peer.state == PeerState::kAlive)
       key_teller_.post({peer.identity.robot, peer.identity.boot});
+}
+
+void DdsBridge::catch_up(const PeerEvent& event) {
+  if (event.kind != PeerEventKind::kReturned && event.kind != PeerEventKind::kResumed) return;
+  post([this, robot = event.identity.robot] {
+    for (const auto& topic : outgoing_)
+      if (topic.get() != keys_) topic->catch_up(robot);
+  });
 }
 
 OutgoingTopic& DdsBridge::add_outgoing(TopicSpec spec) {

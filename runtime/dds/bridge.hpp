@@ -123,6 +123,7 @@ class DdsBridge final : public Node {
   void post(Job job) { sender_.post(std::move(job)); }
   void exchange_keys();
   void tell_key(const TeamPeer& peer);
+  void catch_up(const PeerEvent& event);
   void receive_until_stopped();
   void await_acknowledgements() noexcept;
 

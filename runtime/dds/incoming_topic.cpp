@@ -87,7 +87,8 @@ DdsEntity IncomingTopic::make_reader() {
   if (addressed_)
     dds_qset_partition1(
         partition.get(),
-        (spec_.carries_keys ? partition_of(self.robot) : partition_of({self.robot, self.boot}))
+        (spec_.carries_keys ? partition_of(self.robot)
+                            : partition_of({self.robot, self.boot}, participant_.seal() != nullptr))
             .c_str());
   subscriber_ = DdsEntity(dds_create_subscriber(participant_.handle(), partition.get(), nullptr),
                           "subscriber of " + spec_.name);

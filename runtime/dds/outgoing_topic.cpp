@@ -14,8 +14,9 @@ std::string partition_of(RobotId robot) {
   return "robot" + std::to_string(robot);
 }
 
-std::string partition_of(const TeamPeer& peer) {
-  return partition_of(peer.robot) + '.' + std::to_string(peer.boot >> kResumeBits);
+std::string partition_of(const TeamPeer& peer, bool is_sealed) {
+  return partition_of(peer.robot) + '.' +
+         std::to_string(is_sealed ? peer.boot : peer.boot >> kResumeBits);
 }
 
 OutgoingTopic::OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec)
@@ -26,25 +27,42 @@ OutgoingTopic::OutgoingTopic(const DdsParticipant& participant, const Peers& pee
                               nullptr, nullptr),
              "topic " + spec_.name) {}
 
-// Empty for all robots; nullopt if there is nobody whom it is for.
-std::optional<std::string> OutgoingTopic::partition_for(std::optional<Addressee> to) const {
-  if (!to) return std::string();
-  if (spec_.carries_keys) return partition_of(to->robot);
-  const auto current = peers_.current(to->robot);
-  if (!current || (to->boot != 0 && !is_same_life(to->boot, current->boot))) return std::nullopt;
-  return partition_of(*current);
+bool OutgoingTopic::is_sealed() const {
+  return participant_.seal() != nullptr && !spec_.carries_keys;
+}
+
+bool OutgoingTopic::is_kept() const {
+  return is_sealed() && (spec_.kind == TopicKind::kEvent || spec_.kind == TopicKind::kState);
+}
+
+// nullopt if there is nobody whom it is for.
+std::optional<TeamPeer> OutgoingTopic::receiver_of(const Addressee& addressee) const {
+  if (spec_.carries_keys) return TeamPeer{addressee.robot, 0};
+  const auto current = peers_.current(addressee.robot);
+  const bool is_over =
+      current && addressee.boot != 0 && !is_same_life(addressee.boot, current->boot);
+  return is_over ? std::nullopt : current;
+}
+
+std::string OutgoingTopic::partition_for(const std::optional<TeamPeer>& receiver) const {
+  if (!receiver) return {};
+  return spec_.carries_keys ? partition_of(receiver->robot) : partition_of(*receiver, is_sealed());
 }
 
 // Of a robot in another life the counts go on; what was kept for the former is gone.
-OutgoingTopic::Writer& OutgoingTopic::writer_to(std::optional<RobotId> to,
-                                                const std::string& partition) {
+OutgoingTopic::Writer& OutgoingTopic::writer_to(const std::optional<TeamPeer>& receiver) {
   const std::lock_guard lock(mutex_);
-  const auto [entry, fresh] = writers_.try_emplace(to);
+  const auto [entry, fresh] =
+      writers_.try_emplace(receiver ? std::optional(receiver->robot) : std::nullopt);
   Writer& writer = entry->second;
+  const std::string partition = partition_for(receiver);
   if (!fresh && writer.partition == partition) return writer;
 
+  if (!fresh && !is_same_life(writer.receiver->boot, receiver->boot)) writer.kept.clear();
+  writer.due.clear();
+  for (const auto& [key, content] : writer.kept) writer.due.insert(key);
+  writer.receiver = receiver;
   writer.partition = partition;
-  writer.next_number = 0;
   writer.readers.clear();
   writer.statistics.reset();
   writer.writer = DdsEntity();
@@ -60,20 +78,38 @@ OutgoingTopic::Writer& OutgoingTopic::writer_to(std::optional<RobotId> to,
   return writer;
 }
 
-void OutgoingTopic::write(std::optional<Addressee> addressee, MessageKey key,
-                          std::vector<std::uint8_t> content) {
-  const auto partition = partition_for(addressee);
-  if (!partition) return;
-  const auto to = addressee ? std::optional(addressee->robot) : std::nullopt;
-  Writer& writer = writer_to(to, *partition);
+void OutgoingTopic::write(std::optional<Addressee> addressee, MessageKey key, Octets content) {
+  const auto receiver = addressee ? receiver_of(*addressee) : std::nullopt;
+  if (addressee && !receiver) return;
+  Writer& writer = writer_to(receiver);
+  if (!addressee || !is_kept()) return send(writer, key, std::move(content));
+  writer.kept[key] = std::move(content);
+  writer.due.insert(key);
+  send_due(writer);
+}
+
+void OutgoingTopic::catch_up(RobotId robot) {
+  const auto receiver = receiver_of({robot});
+  if (is_kept() && receiver && writers_.contains(robot)) send_due(writer_to(receiver));
+}
+
+void OutgoingTopic::send_due(Writer& writer) {
+  const bool has_keys = participant_.seal()->with(
+      [&](const TeamSeal& team) { return team.is_admitted(*writer.receiver); });
+  if (!has_keys) return;
+  for (const MessageKey key : std::exchange(writer.due, {})) send(writer, key, writer.kept.at(key));
+}
+
+void OutgoingTopic::send(Writer& writer, MessageKey key, Octets content) {
+  std::uint32_t& number = writer.next_number[writer.partition];
   km_wire_Envelope envelope{.key = key,
                             .boot = participant_.identity().boot,
-                            .number = writer.next_number,
+                            .number = number,
                             .version = spec_.version,
                             .robot = participant_.identity().robot,
                             .content = {}};
   const char* problem =
-      content.size() > spec_.max_bytes ? "too large" : seal(to, envelope, content);
+      content.size() > spec_.max_bytes ? "too large" : seal(writer, envelope, content);
   if (problem == nullptr) {
     borrow(envelope.content, content);
     const dds_return_t result = dds_write(writer.writer.handle(), &envelope);
@@ -82,29 +118,26 @@ void OutgoingTopic::write(std::optional<Addressee> addressee, MessageKey key,
   refresh_readers(writer);
   if (problem != nullptr)
     log::limited(log::Level::kError, "dds", "write " + spec_.name)
-        << spec_.name << ": message " << writer.next_number << " of " << content.size()
+        << spec_.name << ": message " << number << " of " << content.size()
         << " bytes not written: " << problem;
   const std::lock_guard lock(mutex_);
   if (problem != nullptr) {
     ++writer.failures;
     return;
   }
-  ++writer.next_number;
+  ++number;
   const std::uint64_t size = envelope_bytes(content.size());
   writer.written.add(size);
   for (const Guid& reader : writer.readers) writer.sent_to[reader].add(size);
 }
 
 // Null, or why it cannot be sealed.
-const char* OutgoingTopic::seal(std::optional<RobotId> to, const km_wire_Envelope& head,
-                                std::vector<std::uint8_t>& content) const {
-  SharedSeal* seal = participant_.seal();
-  if (seal == nullptr || spec_.carries_keys) return nullptr;
-  const auto addressee = to ? peers_.current(*to) : std::nullopt;
-  if (to && !addressee) return "the robot that it is for is not there";
-  const SealedEnvelope envelope(spec_.name, participant_.guid(), head, addressee);
-  auto sealed =
-      seal->with([&](const TeamSeal& team) { return team.seal(envelope.context(), content); });
+const char* OutgoingTopic::seal(const Writer& writer, const km_wire_Envelope& head,
+                                Octets& content) const {
+  if (!is_sealed()) return nullptr;
+  const SealedEnvelope envelope(spec_.name, participant_.guid(), head, writer.receiver);
+  auto sealed = participant_.seal()->with(
+      [&](const TeamSeal& team) { return team.seal(envelope.context(), content); });
   if (!sealed) return "the robot that it is for has shown no keys";
   content = std::move(*sealed);
   return nullptr;

@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -36,24 +37,34 @@ struct Addressee {
   std::uint64_t boot = 0;  ///< Only for the life of this process; 0: whichever it lives.
 };
 
-/// DDS partition in which the messages to one robot travel, in the life of this process: what was
-/// kept for a former life does not reach the next.
-[[nodiscard]] std::string partition_of(const TeamPeer& peer);
+/// DDS partition in which the messages to one robot travel. In clear, those for all processes of
+/// its life: what was kept for a former life does not reach the next. Sealed, those for this
+/// process, since no other can open them.
+[[nodiscard]] std::string partition_of(const TeamPeer& peer, bool is_sealed);
 /// Likewise, of what is sealed for one process by itself.
 [[nodiscard]] std::string partition_of(RobotId robot);
 
 /// The sending end of a topic. Messages to all robots go through one writer; each robot addressed
 /// gets a writer of its own, in its own partition, so that nobody else is sent its bytes.
-/// write() belongs to one thread; add_to() is thread-safe.
+///
+/// What a robot is sent reaches a process that resumes its life, too. Where the team has keys, that
+/// is not what DDS keeps, sealed as it is for the former process: events and states for one robot
+/// are kept here in clear as well, and sealed anew for the next one.
+///
+/// write() and catch_up() belong to one thread; add_to() is thread-safe.
 class OutgoingTopic {
  public:
   OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec);
 
   /// Writes to a robot or to all, sealed where the team has keys. Messages are numbered per writer.
-  /// What DDS refuses is counted and logged, as is content that no reader would take and what is
-  /// for a robot that has shown no keys. What is for a robot that has never been there, or for a
-  /// life that is over, is dropped.
-  void write(std::optional<Addressee> addressee, MessageKey key, std::vector<std::uint8_t> content);
+  /// What DDS refuses is counted and logged, as is content that no reader would take. What is for a
+  /// robot that has never been there, or for a life that is over, is dropped. For a robot that has
+  /// shown no keys events and states wait, and the rest is dropped, counted and logged.
+  void write(std::optional<Addressee> addressee, MessageKey key, Octets content);
+
+  /// The robot is there, perhaps as another process: it gets what waits for it, and what its life
+  /// was sent before.
+  void catch_up(RobotId robot);
 
   /// Waits until every matched reader has everything. False on timeout.
   bool wait_for_acks(std::chrono::nanoseconds timeout);
@@ -68,18 +79,25 @@ class OutgoingTopic {
     DdsEntity publisher;
     DdsEntity writer;
     std::unique_ptr<dds_statistics, StatisticsDeleter> statistics;
+    std::optional<TeamPeer> receiver;  // none: all
     std::string partition;
-    std::uint32_t next_number = 0;
-    std::vector<Guid> readers;  // participants of those matched
+    std::map<std::string, std::uint32_t> next_number;  // by partition: a process may return
+    std::vector<Guid> readers;                         // participants of those matched
+    std::map<MessageKey, Octets> kept;                 // to be sealed for the next process
+    std::set<MessageKey> due;                          // of these, to this one
     TrafficCount written;
     std::uint64_t failures = 0;
     std::map<Guid, TrafficCount> sent_to;
   };
 
-  [[nodiscard]] std::optional<std::string> partition_for(std::optional<Addressee> to) const;
-  Writer& writer_to(std::optional<RobotId> to, const std::string& partition);
-  const char* seal(std::optional<RobotId> to, const km_wire_Envelope& head,
-                   std::vector<std::uint8_t>& content) const;
+  [[nodiscard]] bool is_sealed() const;
+  [[nodiscard]] bool is_kept() const;
+  [[nodiscard]] std::optional<TeamPeer> receiver_of(const Addressee& addressee) const;
+  [[nodiscard]] std::string partition_for(const std::optional<TeamPeer>& receiver) const;
+  Writer& writer_to(const std::optional<TeamPeer>& receiver);
+  void send_due(Writer& writer);
+  void send(Writer& writer, MessageKey key, Octets content);
+  const char* seal(const Writer& writer, const km_wire_Envelope& head, Octets& content) const;
   static void refresh_readers(Writer& writer);
   static std::uint64_t retransmitted_bytes(const Writer& writer);
 

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <unistd.h>
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <thread>
@@ -234,6 +236,21 @@ inline km_wire_Envelope header(const RobotIdentity& identity, std::uint32_t numb
           .version = 1,
           .robot = identity.robot,
           .content = {}};
+}
+
+/// Ascending.
+inline std::vector<std::uint32_t> indices(const std::vector<Ping>& pings) {
+  std::vector<std::uint32_t> result;
+  for (const Ping& ping : pings) result.push_back(ping.index);
+  std::ranges::sort(result);
+  return result;
+}
+
+/// 0, 1, ..., count - 1.
+inline std::vector<std::uint32_t> up_to(std::uint32_t count) {
+  std::vector<std::uint32_t> result(count);
+  std::iota(result.begin(), result.end(), 0U);
+  return result;
 }
 
 /// Two robots of one domain that know of each other.

@@ -1,24 +1,10 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
-#include <numeric>
 
 #include "test/runtime/dds/dds_fixture.hpp"
 
 namespace km {
 namespace {
-
-std::vector<std::uint32_t> indices(const std::vector<Ping>& pings) {
-  std::vector<std::uint32_t> result;
-  for (const Ping& ping : pings) result.push_back(ping.index);
-  std::ranges::sort(result);
-  return result;
-}
-
-std::vector<std::uint32_t> up_to(std::uint32_t count) {
-  std::vector<std::uint32_t> result(count);
-  std::iota(result.begin(), result.end(), 0U);
-  return result;
-}
 
 TEST_CASE("What one robot publishes arrives at the other, unchanged and once", "[dds]") {
   Two two;

@@ -246,5 +246,65 @@ TEST_CASE("A robot with keys that starts again is known by its new process", "[s
   }
 }
 
+// The process that goes on with the life of `former`, or one of another life.
+RobotIdentity successor_of(const RobotIdentity& former, bool resumed) {
+  RobotIdentity next = former;
+  next.boot = resumed ? next_boot(former.boot) : random_boot_id();
+  return next;
+}
+
+TEST_CASE("What was sealed for a robot reaches it when it is resumed, and not in another life",
+          "[sealed]") {
+  const ToyTeam team;
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  const TopicKind kind = GENERATE(TopicKind::kEvent, TopicKind::kState);
+  const bool resumed = GENERATE(true, false);
+  CAPTURE(static_cast<int>(kind), resumed);
+  TestRobot a(domain, {3, robot_name(3), kProtocolVersion, random_boot_id()}, member_of(team),
+              TopicKind::kEvent, kind);
+  a.start();
+  const RobotIdentity former{4, robot_name(4), kProtocolVersion, random_boot_id()};
+  {
+    TestRobot first(domain, former, member_of(team), TopicKind::kEvent, kind);
+    first.start();
+    REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+    a.ping_one(4, 0);
+    a.ping_one(4, 1, {1});
+    a.ping_one(4, 1, {2});  // takes the place of the one before
+    REQUIRE(first.received_addressed.wait_for(3).size() == 3);
+  }
+  REQUIRE(a.hears(PeerEventKind::kLeft, 4));
+  a.ping_one(4, 2);  // while it is away
+
+  TestRobot second(domain, successor_of(former, resumed), member_of(team), TopicKind::kEvent, kind);
+  second.start();
+  REQUIRE(a.hears(resumed ? PeerEventKind::kResumed : PeerEventKind::kRestarted, 4));
+  if (!resumed) a.ping_one(4, 3);
+  const std::vector<Ping> pings = second.received_addressed.wait_for(resumed ? 3 : 1);
+  CHECK(indices(pings) == (resumed ? up_to(3) : std::vector<std::uint32_t>{3}));
+  const auto newest = std::ranges::find(pings, 1U, &Ping::index);
+  CHECK((newest == pings.end() || newest->payload == std::vector<std::uint8_t>{2}));
+  CHECK(second.refused() == 0);
+  CHECK(a.traffic(Direction::kOut, true).failures == 0);
+  for (const TopicTraffic& topic : second.bridge.traffic().topics) CHECK(topic.missing == 0);
+}
+
+TEST_CASE("What is for a robot of an earlier process waits until that shows its keys", "[sealed]") {
+  const ToyTeam team;
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  const RobotIdentity met{4, robot_name(4), kProtocolVersion, random_boot_id()};
+  TestRobot a(domain, {3, robot_name(3), kProtocolVersion, random_boot_id()}, member_of(team),
+              TopicKind::kEvent, TopicKind::kEvent);
+  a.bridge.peers().recall(met);
+  a.start();
+  for (std::uint32_t i = 0; i < 3; ++i) a.ping_one(4, i);
+  const std::uint64_t told = a.status_count();  // behind them in the queue
+  REQUIRE(eventually([&] { return a.status_count() > told + 1; }));
+  TestRobot b(domain, met, member_of(team), TopicKind::kEvent, TopicKind::kEvent);
+  b.start();
+  CHECK(indices(b.received_addressed.wait_for(3)) == up_to(3));
+  CHECK(a.traffic(Direction::kOut, true).failures == 0);
+}
+
 }  // namespace
 }  // namespace km
