@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <concepts>
 #include <cstddef>
@@ -11,11 +12,25 @@
 
 namespace km {
 
+/// What an FNV-1a hash begins with.
+inline constexpr std::uint64_t kFnv1aBasis = 0xcbf29ce484222325ULL;
+
 /// Mixes `value` into `hash`, byte by byte: FNV-1a (Fowler, Noll, Vo), 64 bits.
 inline void mix_fnv1a(std::uint64_t& hash, std::uint64_t value) {
   for (int byte = 0; byte < 8; ++byte) {
     hash ^= (value >> (8 * byte)) & 0xffU;
     hash *= 0x100000001b3ULL;
+  }
+}
+
+/// Mixes `bytes` into `hash`, eight at a time, the least significant first. The last eight may lack
+/// some, which count as zeros: mix in the number of bytes, too.
+inline void mix_fnv1a(std::uint64_t& hash, std::span<const std::uint8_t> bytes) {
+  for (std::size_t begin = 0; begin < bytes.size(); begin += 8) {
+    const auto eight = bytes.subspan(begin, std::min<std::size_t>(8, bytes.size() - begin));
+    std::uint64_t value = 0;
+    for (std::size_t k = 0; k < eight.size(); ++k) value |= std::uint64_t{eight[k]} << (8U * k);
+    mix_fnv1a(hash, value);
   }
 }
 

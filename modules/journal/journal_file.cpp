@@ -16,23 +16,9 @@ namespace km {
 namespace {
 
 constexpr std::string_view kMagic = "KMJRNL1\n";
-constexpr std::uint64_t kFirstCheckSum = 0xcbf29ce484222325ULL;
-
-std::uint64_t number_at(std::span<const std::uint8_t> bytes) {
-  std::uint64_t value = 0;
-  for (std::size_t k = 0; k < bytes.size(); ++k) value |= std::uint64_t{bytes[k]} << (8U * k);
-  return value;
-}
-
-void append_number(std::string& text, std::uint64_t value, std::size_t bytes) {
-  for (std::size_t k = 0; k < bytes; ++k) text += static_cast<char>(value >> (8U * k));
-}
-
-// Eight bytes at a time; the length tells how many of the last are zeros of its own.
 std::uint64_t mixed(std::uint64_t check_sum, std::span<const std::uint8_t> bytes) {
   mix_fnv1a(check_sum, bytes.size());
-  for (std::size_t k = 0; k < bytes.size(); k += 8)
-    mix_fnv1a(check_sum, number_at(bytes.subspan(k, std::min<std::size_t>(8, bytes.size() - k))));
+  mix_fnv1a(check_sum, bytes);
   return check_sum;
 }
 
@@ -41,7 +27,7 @@ std::uint64_t mixed(std::uint64_t check_sum, std::span<const std::uint8_t> bytes
 JournalExtent read_journal(const std::filesystem::path& file,
                            const std::function<void(JournalEntry)>& take) {
   const std::string text = read_input_file(file);
-  JournalExtent read{.check_sum = kFirstCheckSum};
+  JournalExtent read{.check_sum = kFnv1aBasis};
   const std::string_view begin = std::string_view(text).substr(0, kMagic.size());
   if (!kMagic.starts_with(begin))
     throw InputFileError(file.string() + ": is no journal of a robot's run");
@@ -77,7 +63,7 @@ JournalFile::JournalFile(std::filesystem::path file) : JournalFile(std::move(fil
 JournalFile::JournalFile(std::filesystem::path file, const JournalExtent& read)
     : file_(std::move(file)), keep_bytes_(read.whole_bytes), check_sum_(read.check_sum) {
   if (read.whole_bytes > 0) return;
-  check_sum_ = kFirstCheckSum;
+  check_sum_ = kFnv1aBasis;
   waiting_ = kMagic;
 }
 
@@ -87,9 +73,11 @@ void JournalFile::add(const JournalEntry& entry) {
       waiting_.size() + bytes.size() > kMaxWaiting_bytes || bytes.size() > kMaxJournalEntry_bytes;
   if (full_) return;
   check_sum_ = mixed(check_sum_, bytes);
-  append_number(waiting_, bytes.size(), sizeof(std::uint32_t));
-  waiting_.append(bytes.begin(), bytes.end());
-  append_number(waiting_, check_sum_, sizeof(std::uint64_t));
+  ByteWriter size, sum;
+  size.u32(static_cast<std::uint32_t>(bytes.size()));
+  sum.u64(check_sum_);
+  for (const auto& part : {size.release(), bytes, sum.release()})
+    waiting_.append(part.begin(), part.end());
 }
 
 void JournalFile::sync() {

@@ -17,13 +17,8 @@ constexpr std::string_view kMagic = "KMMAP1\n\n";
 constexpr std::size_t kMaxElements = std::size_t{1} << 28U;
 
 std::uint64_t check_sum_of(std::span<const std::uint8_t> bytes) {
-  std::uint64_t sum = 0xcbf29ce484222325ULL;
-  for (std::size_t k = 0; k < bytes.size(); k += 8) {
-    std::uint64_t word = 0;
-    for (std::size_t i = k; i < std::min(k + 8, bytes.size()); ++i)
-      word |= std::uint64_t{bytes[i]} << (8U * (i - k));
-    mix_fnv1a(sum, word);
-  }
+  std::uint64_t sum = kFnv1aBasis;
+  mix_fnv1a(sum, bytes);
   mix_fnv1a(sum, bytes.size());
   return sum;
 }

@@ -18,7 +18,7 @@ constexpr std::size_t kKeptSets = 4;  // per peer
 // Of the measurements used: direction, translation and weights, which cross the network as they
 // are. A rotation does not: as a quaternion it loses its last bit.
 EdgeSetId identify(std::uint32_t version, const std::vector<PoseEdge>& edges) {
-  EdgeSetId id{version, 0xcbf29ce484222325ULL};
+  EdgeSetId id{version, kFnv1aBasis};
   mix_fnv1a(id.hash, version);
   for (const PoseEdge& e : edges) {
     for (const KeyframeId& end : {e.from, e.to})

@@ -174,7 +174,7 @@ void Relay::repeat_status(double now_s) {
 }
 
 std::uint64_t Relay::holds() const {
-  std::uint64_t hash = 0xcbf29ce484222325ULL;
+  std::uint64_t hash = kFnv1aBasis;
   for (const auto& [robot, origin] : origins_)
     for (std::size_t kind = 0; kind < kFlooded; ++kind) {
       if (!origin.newest[kind]) continue;

@@ -21,7 +21,7 @@ using MessageKey = std::uint64_t;
 
 /// The key of a message that these numbers name.
 [[nodiscard]] inline MessageKey message_key(std::initializer_list<std::uint64_t> numbers) {
-  MessageKey key = 0xcbf29ce484222325ULL;  // FNV-1a's offset basis
+  MessageKey key = kFnv1aBasis;
   for (const std::uint64_t number : numbers) mix_fnv1a(key, number);
   return key;
 }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <string>
 
 #include "modules/core/bytes.hpp"
 
@@ -10,6 +11,23 @@ namespace km {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
+
+TEST_CASE("Bytes: hashed eight at a time they give FNV-1a, the last ones filled up with zeros",
+          "[core]") {
+  const auto hash_of = [](const Bytes& bytes) {
+    std::uint64_t hash = kFnv1aBasis;
+    mix_fnv1a(hash, bytes);
+    return hash;
+  };
+  CHECK(hash_of({}) == kFnv1aBasis);
+  const std::string text = "chongo was here!";
+  CHECK(hash_of(Bytes(text.begin(), text.end())) == 0x858e2fa32a55e61dULL);
+  const Bytes odd{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11};
+  CHECK(hash_of(odd) == 0x4be607e06a4cf7d1ULL);
+  Bytes filled = odd;
+  filled.resize(16);
+  CHECK(hash_of(filled) == hash_of(odd));
+}
 
 TEST_CASE("Bytes: every number comes back as it was", "[core]") {
   ByteWriter out;
