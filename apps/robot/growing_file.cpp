@@ -18,7 +18,7 @@ void GrowingFile::flush() {
 
 void GrowingFile::append() {
   // The first part may end in the middle of a row; what follows is the rest of it.
-  while (!waiting_.empty()) waiting_.erase(0, append_to_file(file_, waiting_));
+  if (!waiting_.empty()) append_to_file(file_, waiting_);
   if (rows_lost_)
     throw std::runtime_error(file_.string() + ": rows are missing, the disk was full for too long");
 }

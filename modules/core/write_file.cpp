@@ -22,7 +22,7 @@ struct Written {
 };
 
 Written write_to(const fs::path& file, int how, std::string_view bytes,
-                 const WriteOptions& options = {}) {
+                 const WriteOptions& options) {
   const int descriptor = open(file.c_str(), how | O_WRONLY | O_CREAT | O_CLOEXEC, options.mode);
   if (descriptor < 0) return {0, errno};
   Written written;
@@ -34,7 +34,7 @@ Written write_to(const fs::path& file, int how, std::string_view bytes,
     else if (n == 0 || errno != EINTR)
       written.error = n == 0 ? ENOSPC : errno;
   }
-  if (options.durable && written.error == 0 && fsync(descriptor) != 0) written.error = errno;
+  if (options.durable && written.error == 0 && fdatasync(descriptor) != 0) written.error = errno;
   if (close(descriptor) != 0 && written.error == 0) written.error = errno;
   return written;
 }
@@ -59,10 +59,10 @@ void write_file(const fs::path& file, std::string_view bytes, const WriteOptions
   throw cannot_write(file, error);
 }
 
-std::size_t append_to_file(const fs::path& file, std::string_view bytes) {
-  const Written written = write_to(file, O_APPEND, bytes);
-  if (written.error != 0 && written.bytes == 0) throw cannot_write(file, written.error);
-  return written.bytes;
+void append_to_file(const fs::path& file, std::string& waiting, const WriteOptions& options) {
+  const Written written = write_to(file, O_APPEND, waiting, options);
+  waiting.erase(0, written.bytes);
+  if (written.error != 0) throw cannot_write(file, written.error);
 }
 
 }  // namespace km

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <string_view>
 
 namespace km {
@@ -18,8 +19,10 @@ struct WriteOptions {
 void write_file(const std::filesystem::path& file, std::string_view bytes,
                 const WriteOptions& options = {});
 
-/// Likewise, but appends `bytes` to a file that need not exist. The number of bytes written: fewer
-/// than there are, where the disk is full. Throws if not one could be written.
-std::size_t append_to_file(const std::filesystem::path& file, std::string_view bytes);
+/// Appends `waiting` to a file that need not exist, and takes what is written out of it. Throws like
+/// write_file() where something is left, the disk being full, which the next call goes on with; or
+/// where what is written may not be on the disk, as is asked for.
+void append_to_file(const std::filesystem::path& file, std::string& waiting,
+                    const WriteOptions& options = {});
 
 }  // namespace km

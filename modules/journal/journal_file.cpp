@@ -1,21 +1,19 @@
 #include "modules/journal/journal_file.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <algorithm>
-#include <cerrno>
+#include <span>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 #include "modules/core/bytes.hpp"
 #include "modules/core/input_file.hpp"
+#include "modules/core/write_file.hpp"
 
 namespace km {
 namespace {
 
 constexpr std::string_view kMagic = "KMJRNL1\n";
+
+// The check sum after an entry.
 std::uint64_t mixed(std::uint64_t check_sum, std::span<const std::uint8_t> bytes) {
   mix_fnv1a(check_sum, bytes.size());
   mix_fnv1a(check_sum, bytes);
@@ -82,30 +80,9 @@ void JournalFile::add(const JournalEntry& entry) {
 
 void JournalFile::sync() {
   if (waiting_.empty()) return;
-  constexpr mode_t kMode = 0666;  // less the umask
-  const int descriptor = open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_APPEND, kMode);
-  int error = descriptor < 0 ? errno : write_waiting(descriptor);
-  if (descriptor >= 0 && close(descriptor) != 0 && error == 0) error = errno;
-  if (error != 0)
-    throw std::system_error(error, std::generic_category(), file_.string() + ": cannot be written");
-}
-
-// The error, or 0. What is left after one may be the rest of an entry: the next call goes on with
-// it.
-int JournalFile::write_waiting(int descriptor) {
-  if (keep_bytes_ && ftruncate(descriptor, static_cast<off_t>(*keep_bytes_)) != 0) return errno;
+  if (keep_bytes_ && is_there(file_)) std::filesystem::resize_file(file_, *keep_bytes_);
   keep_bytes_.reset();
-  std::size_t written = 0;
-  int error = 0;
-  while (written < waiting_.size() && error == 0) {
-    const ssize_t n = ::write(descriptor, waiting_.data() + written, waiting_.size() - written);
-    if (n > 0)
-      written += static_cast<std::size_t>(n);
-    else if (n == 0 || errno != EINTR)
-      error = n == 0 ? ENOSPC : errno;
-  }
-  waiting_.erase(0, written);
-  return error == 0 && fdatasync(descriptor) != 0 ? errno : error;
+  append_to_file(file_, waiting_, {.durable = true});
 }
 
 }  // namespace km

@@ -12,10 +12,6 @@
 
 namespace km {
 
-/// A journal is a file that only grows: eight bytes that name the format, then entries, each as its
-/// length (u32), its bytes, and a check sum (u64, FNV-1a) over them and all before. What a process
-/// that was killed, or a machine without power, has left of the last entries fails the check.
-
 /// What a journal holds, as far as it is whole.
 struct JournalExtent {
   std::uintmax_t whole_bytes = 0;  ///< From here on it goes on.
@@ -29,7 +25,10 @@ struct JournalExtent {
 [[nodiscard]] JournalExtent read_journal(const std::filesystem::path& file,
                                          const std::function<void(JournalEntry)>& take);
 
-/// Appends to a journal. Not thread-safe.
+/// A journal is a file that only grows: eight bytes that name the format, then entries, each as its
+/// length (u32), its bytes, and a check sum (u64, FNV-1a) over them and all before. What a process
+/// that was killed, or a machine without power, has left of the last entries fails the check.
+/// Not thread-safe.
 class JournalFile {
  public:
   /// What may wait for a disk that is full [bytes].
@@ -39,6 +38,7 @@ class JournalFile {
   explicit JournalFile(std::filesystem::path file);
   /// Goes on with one that was read, and cuts its torn end off with the first sync().
   JournalFile(std::filesystem::path file, const JournalExtent& read);
+
   /// Takes an entry for the next sync(). A journal has no holes: where one would not fit
   /// any more, it and all that follow are left out.
   void add(const JournalEntry& entry);
@@ -53,8 +53,6 @@ class JournalFile {
   [[nodiscard]] bool is_whole() const { return !full_; }
 
  private:
-  [[nodiscard]] int write_waiting(int descriptor);
-
   const std::filesystem::path file_;
   std::optional<std::uintmax_t> keep_bytes_;  // of what was there, until the rest is cut off
   std::uint64_t check_sum_;
