@@ -1,6 +1,8 @@
 #include "modules/journal/restored_run.hpp"
 
 #include <algorithm>
+#include <functional>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -15,14 +17,33 @@ bool is_final(const ClosureOutcome& outcome) {
          (outcome.stage == ClosureStage::kReceived && !outcome.reason.empty());
 }
 
-}  // namespace
+// Puts the entries of a journal together. A process that takes a run up goes on behind the last
+// full keyframe: what its predecessor wrote beyond that counts no more.
+class RunRestorer {
+ public:
+  // Throws std::invalid_argument for an entry that cannot follow those before.
+  void take(JournalEntry entry);
 
-std::size_t RestoredRun::final_states() const {
-  if (odometry.empty()) return 0;
-  const auto later = [](Stamp stamp, const OdometryState& state) { return stamp < state.stamp; };
-  const auto end = std::upper_bound(states.begin(), states.end(), odometry.back().stamp, later);
-  return static_cast<std::size_t>(end - states.begin());
-}
+  // Call once, after the last entry.
+  [[nodiscard]] RestoredRun finish();
+
+ private:
+  void add(JournalStart start);
+  void add(OdometryState state);
+  void add(KeyframeOdometry keyframe);
+  void add(Keyframe keyframe);
+  void add(Closure closure);
+  void add(ClosureOutcome outcome);
+  void add(JournalPeer peer);
+  void cut_to_full_keyframes();
+  void forget_closures(const std::function<bool(const KeyframeId&)>& with);
+
+  RestoredRun run_;
+  bool started_ = false;
+  bool first_state_ = true;                                        // of its process
+  std::map<std::pair<KeyframeId, KeyframeId>, Closure> closures_;  // by the ends as measured
+  std::map<ClosureId, ClosureOutcome> outcomes_;
+};
 
 void RunRestorer::take(JournalEntry entry) {
   if (!started_ && !std::holds_alternative<JournalStart>(entry))
@@ -108,6 +129,15 @@ RestoredRun RunRestorer::finish() {
       run_.outcomes.push_back(std::move(outcome));
   }
   return std::move(run_);
+}
+
+}  // namespace
+
+std::size_t RestoredRun::final_states() const {
+  if (odometry.empty()) return 0;
+  const auto later = [](Stamp stamp, const OdometryState& state) { return stamp < state.stamp; };
+  const auto end = std::upper_bound(states.begin(), states.end(), odometry.back().stamp, later);
+  return static_cast<std::size_t>(end - states.begin());
 }
 
 RestoredRun alone_as(RobotId robot, RestoredRun run) {

@@ -2,10 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <map>
-#include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -39,34 +36,6 @@ struct RestoredRun {
 
 /// The run under another id, without what it shared with the others of its time.
 [[nodiscard]] RestoredRun alone_as(RobotId robot, RestoredRun run);
-
-/// Puts the entries of a journal together. A process that takes a run up goes on behind the last
-/// full keyframe: what its predecessor wrote beyond that counts no more.
-class RunRestorer {
- public:
-  /// Throws std::invalid_argument for an entry that cannot follow those before.
-  void take(JournalEntry entry);
-
-  /// Call once, after the last entry.
-  [[nodiscard]] RestoredRun finish();
-
- private:
-  void add(JournalStart start);
-  void add(OdometryState state);
-  void add(KeyframeOdometry keyframe);
-  void add(Keyframe keyframe);
-  void add(Closure closure);
-  void add(ClosureOutcome outcome);
-  void add(JournalPeer peer);
-  void cut_to_full_keyframes();
-  void forget_closures(const std::function<bool(const KeyframeId&)>& with);
-
-  RestoredRun run_;
-  bool started_ = false;
-  bool first_state_ = true;                                        // of its process
-  std::map<std::pair<KeyframeId, KeyframeId>, Closure> closures_;  // by the ends as measured
-  std::map<ClosureId, ClosureOutcome> outcomes_;
-};
 
 /// Reads the journal of a run. Throws InputFileError, also for entries that contradict each other.
 [[nodiscard]] RestoredRun restore_run(const std::filesystem::path& file);
