@@ -67,8 +67,7 @@ bool OwnGraph::add(const KeyframeOdometry& keyframe) {
 
 bool OwnGraph::add(const Closure& closure) {
   const ClosureId id = closure.id();
-  const bool touches = id.from.robot == self_ || id.to.robot == self_;
-  if (!touches || id.from == id.to) return false;
+  if (!touches(id, self_) || id.from == id.to) return false;
   const auto edge = pose_edge(closure.relative_pose());
   if (!edge) return false;
   if (is_full(id)) return false;
