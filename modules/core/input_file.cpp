@@ -1,9 +1,12 @@
 #include "modules/core/input_file.hpp"
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cstddef>
-#include <fstream>
 #include <system_error>
 
 namespace km {
@@ -20,6 +23,21 @@ constexpr std::uintmax_t kChunk_bytes = std::uintmax_t{1} << 20U;
 [[noreturn]] void fail_as_too_large(const fs::path& file, std::uintmax_t max_bytes) {
   fail(file, "larger than " + std::to_string(max_bytes >> 20U) + " MiB, which no input is");
 }
+
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() {
+    if (number_ >= 0) close(number_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  [[nodiscard]] int number() const { return number_; }
+
+ private:
+  const int number_;
+};
 
 }  // namespace
 
@@ -60,27 +78,35 @@ bool is_absent(const fs::path& path) noexcept {
 }
 
 std::string read_input_file(const fs::path& file, std::uintmax_t max_bytes) {
-  if (const std::string problem = problem_of_file(file); !problem.empty()) fail(file, problem);
-  errno = 0;
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream)
-    fail(file,
-         "cannot be opened" + (errno == 0 ? "" : ": " + std::generic_category().message(errno)));
-  std::error_code unknown;  // of a pipe: what comes out of it is counted
-  const std::uintmax_t size = fs::file_size(file, unknown);
-  if (!unknown && size > max_bytes) fail_as_too_large(file, max_bytes);
+  return open_input_file(file, max_bytes).bytes;
+}
 
-  std::string bytes;
-  if (!unknown) bytes.reserve(static_cast<std::size_t>(size));
-  while (stream) {
-    const std::size_t before = bytes.size();
-    bytes.resize(before + static_cast<std::size_t>(std::min(kChunk_bytes, max_bytes + 1)));
-    stream.read(bytes.data() + before, static_cast<std::streamsize>(bytes.size() - before));
-    bytes.resize(before + static_cast<std::size_t>(stream.gcount()));
-    if (bytes.size() > max_bytes) fail_as_too_large(file, max_bytes);
+InputFile open_input_file(const fs::path& file, std::uintmax_t max_bytes) {
+  if (const std::string problem = problem_of_file(file); !problem.empty()) fail(file, problem);
+  const Descriptor opened(open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  struct stat status {};
+  if (opened.number() < 0 || fstat(opened.number(), &status) != 0)
+    fail(file, "cannot be opened: " + std::generic_category().message(errno));
+  const bool is_regular = S_ISREG(status.st_mode);  // of a pipe what comes out of it is counted
+  if (is_regular && static_cast<std::uintmax_t>(status.st_size) > max_bytes)
+    fail_as_too_large(file, max_bytes);
+
+  InputFile read{
+      .bytes = {},
+      .status = fs::file_status(is_regular ? fs::file_type::regular : fs::file_type::fifo,
+                                static_cast<fs::perms>(status.st_mode) & fs::perms::mask)};
+  if (is_regular) read.bytes.reserve(static_cast<std::size_t>(status.st_size));
+  for (bool more = true; more;) {
+    const std::size_t before = read.bytes.size();
+    const auto room = static_cast<std::size_t>(std::min(kChunk_bytes, max_bytes + 1));
+    read.bytes.resize(before + room);
+    const ssize_t count = ::read(opened.number(), read.bytes.data() + before, room);
+    if (count < 0 && errno != EINTR) fail(file, "cannot be read to its end");
+    read.bytes.resize(before + static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
+    if (read.bytes.size() > max_bytes) fail_as_too_large(file, max_bytes);
+    more = count != 0;
   }
-  if (stream.bad()) fail(file, "cannot be read to its end");
-  return bytes;
+  return read;
 }
 
 }  // namespace km

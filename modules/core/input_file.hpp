@@ -32,4 +32,14 @@ inline constexpr std::uintmax_t kMaxInputFile_bytes = std::uintmax_t{8} << 30U;
 [[nodiscard]] std::string read_input_file(const std::filesystem::path& file,
                                           std::uintmax_t max_bytes = kMaxInputFile_bytes);
 
+/// A file as it was read: kind and permissions are those of what the bytes come from, whatever has
+/// its name before or afterwards.
+struct InputFile {
+  std::string bytes;
+  std::filesystem::file_status status;
+};
+/// Likewise.
+[[nodiscard]] InputFile open_input_file(const std::filesystem::path& file,
+                                        std::uintmax_t max_bytes = kMaxInputFile_bytes);
+
 }  // namespace km

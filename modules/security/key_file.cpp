@@ -18,14 +18,15 @@ namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kMaxFileSize = 1U << 20U;
 
-std::string read_text(const fs::path& file) try {
-  return read_input_file(file, kMaxFileSize);
+InputFile open_key_file(const fs::path& file) try {
+  return open_input_file(file, kMaxFileSize);
 } catch (const InputFileError& error) {
   throw std::runtime_error(std::string(error.what()) + "; kimera_multi_keys makes it (--help)");
 }
 
-void check_access(const fs::path& file) {
-  const fs::perms mode = fs::status(file).permissions();
+// Of what was read, not of what has its name by now.
+void check_access(const fs::path& file, const fs::file_status& status) {
+  const fs::perms mode = status.permissions();
   if ((mode & (fs::perms::group_all | fs::perms::others_all)) == fs::perms::none) return;
   char text[8];
   std::snprintf(text, sizeof text, "%04o", static_cast<unsigned>(mode & fs::perms::mask));
@@ -44,8 +45,8 @@ std::string_view trimmed(std::string_view text) {
 }  // namespace
 
 KeyFile KeyFile::read(const fs::path& file, std::string_view format, KeyFileAccess access) {
-  if (access == KeyFileAccess::kOwner && is_file(file)) check_access(file);
-  std::string text = read_text(file);
+  auto [text, status] = open_key_file(file);
+  if (access == KeyFileAccess::kOwner && fs::is_regular_file(status)) check_access(file, status);
 
   KeyFile result;
   result.file_ = file;

@@ -1,4 +1,10 @@
+#include <sys/stat.h>
+
 #include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <future>
+#include <string>
 
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
@@ -46,6 +52,24 @@ TEST_CASE("Text in messages is printable and short", "[core]") {
   CHECK(readable("10 m, \xC3\xA4") == "10 m, \xC3\xA4");
   CHECK(readable("a\x1b[2J\n\x7f") == "a?[2J??");
   CHECK(readable("0123456789", 8) == "0123 ...");
+}
+
+TEST_CASE("Kind and permissions are those of the file that is read, not of its successor",
+          "[core]") {
+  namespace fs = std::filesystem;
+  const TemporaryFolder folder;
+  const fs::path name = folder.path() / "name";
+  REQUIRE(mkfifo(name.c_str(), 0600) == 0);
+  auto reading = std::async(std::launch::async, [&] { return open_input_file(name); });
+  std::ofstream writer(name);  // waits for the reader to have it open
+  fs::rename(folder.write("successor", "another"), name);
+  writer << "some";
+  writer.close();
+  const InputFile read = reading.get();
+  CHECK(read.bytes == "some");
+  CHECK(read.status.type() == fs::file_type::fifo);
+  CHECK(read.status.permissions() == (fs::perms::owner_read | fs::perms::owner_write));
+  CHECK(open_input_file(name).status.type() == fs::file_type::regular);
 }
 
 }  // namespace km
