@@ -51,8 +51,11 @@ void write_file(const fs::path& file, std::string_view bytes, const WriteOptions
   }
   fs::path partial = file;
   partial += ".part";
-  if (!options.through_links) unlink(partial.c_str());  // its mode is its own, or it is a link
-  int error = write_to(partial, options.through_links ? O_TRUNC : O_EXCL, bytes, options).error;
+  // One that is left may have another mode, or be a link to anything.
+  if (!options.through_links || fs::is_symlink(fs::symlink_status(partial, unknown)))
+    unlink(partial.c_str());
+  const int how = options.through_links ? O_TRUNC | O_NOFOLLOW : O_EXCL;
+  int error = write_to(partial, how, bytes, options).error;
   if (error == 0 && std::rename(partial.c_str(), file.c_str()) != 0) error = errno;
   if (error == 0) return;
   unlink(partial.c_str());

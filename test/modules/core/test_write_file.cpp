@@ -52,6 +52,17 @@ TEST_CASE("A link stays one and its file is written", "[files]") {
   CHECK(folder.read("file") == "new");
 }
 
+TEST_CASE("A link in place of the partial file leads nowhere", "[files]") {
+  const TemporaryFolder folder;
+  folder.write("elsewhere", "old");
+  fs::create_symlink("elsewhere", folder.path() / "a.part");
+  write_file(folder.path() / "a", "new");
+  CHECK(fs::is_regular_file(fs::symlink_status(folder.path() / "a")));
+  CHECK(folder.read("a") == "new");
+  CHECK(folder.read("elsewhere") == "old");
+  CHECK_FALSE(fs::exists(folder.path() / "a.part"));
+}
+
 TEST_CASE("A file for its owner alone is never anyone else's to read", "[files]") {
   const TemporaryFolder folder;
   const fs::path secret = folder.path() / "secret";
