@@ -61,8 +61,9 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     add_playback(config, options.rate, std::move(*graph));
   else
     add_past();
-  if (!std::holds_alternative<PastRun>(input.source)) add_journal(options, input.name, results);
   if (!std::holds_alternative<RecordedGraph>(input.source)) add_place_recognition(config);
+  add_loop_closure(config);
+  if (!std::holds_alternative<PastRun>(input.source)) add_journal(options, input.name, results);
   add_back_end(config);
   if (mapping) add_mesh_correction(config, options.output, results);
   add_network(share_meshes(config.mesh_chunks));
@@ -98,6 +99,7 @@ void Robot::add_restore() {
                                                     .outcomes = topics_.restored_outcomes});
 }
 
+// Behind all that finds closures, and before what they are handed on to: none is lost at the end.
 void Robot::add_journal(const RobotOptions& options, const std::string& input,
                         ResultWriter& results) {
   journal_ = &add<JournalNode>(false, options.output / kJournal, results,
@@ -224,15 +226,14 @@ void Robot::add_playback(const RobotConfig& config, double rate, RecordedGraph g
   topics_.playback_end.subscribe([this](const auto&) { source_ended_ = true; });
 }
 
-void Robot::add_back_end(const RobotConfig& config) {
-  const In<PeerEvent> peer_events = bridge_->peers().events();
+void Robot::add_loop_closure(const RobotConfig& config) {
   add<LoopClosureNode>(false, config.loop_closure, identity_.robot, vocabulary_,
                        LoopClosureTopics{.keyframes = topics_.keyframes,
                                          .candidates = topics_.candidates,
                                          .measured_closures = topics_.measured_closures,
                                          .peer_requests = topics_.requests.from_peers(),
                                          .peer_replies = topics_.replies.from_peers(),
-                                         .peer_events = peer_events,
+                                         .peer_events = bridge_->peers().events(),
                                          .restarts = topics_.candidate_restarts,
                                          .peer_bows = topics_.bows.from_peers(),
                                          .restored = topics_.restored_outcomes,
@@ -241,6 +242,9 @@ void Robot::add_back_end(const RobotConfig& config) {
                                          .own_closures = topics_.new_closures,
                                          .own_restarts = topics_.new_closure_restarts,
                                          .outcomes = topics_.outcomes});
+}
+
+void Robot::add_back_end(const RobotConfig& config) {
   forward<Closure>(topics_.own_closures, topics_.closures);
   forward<Closure>(topics_.shared_closures.from_peers(), topics_.closures);
   pcm_ = &add<PcmNode>(false, config.pcm, identity_.robot,
@@ -253,7 +257,7 @@ void Robot::add_back_end(const RobotConfig& config) {
                            .closures = topics_.closures,
                            .inlier_sets = topics_.own_inlier_sets,
                            .peer_inlier_sets = topics_.shared_inlier_sets.from_peers(),
-                           .peer_events = peer_events,
+                           .peer_events = bridge_->peers().events(),
                            .restarts = topics_.closure_restarts,
                            .peer_parcels = topics_.parcels.from_peers(),
                            .parcels = topics_.parcels.to_peers(),

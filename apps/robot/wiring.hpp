@@ -137,6 +137,7 @@ class Robot {
                            ResultWriter& results);
   [[nodiscard]] CrossingEnds share_meshes(const MeshChunksConfig& config);
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
+  void add_loop_closure(const RobotConfig& config);
   void add_back_end(const RobotConfig& config);
   void add_network(CrossingEnds meshes);
   void add_records();
