@@ -1,15 +1,20 @@
 #include <catch2/catch.hpp>
 
+#include <array>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
+#include <map>
+#include <memory>
 #include <random>
+#include <set>
 #include <thread>
 
 #include "modules/mesh/map_file.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/system/team_run.hpp"
+#include "test/system/walk.hpp"
 
 // Robots that are killed at any moment and taken up; runs of the past that are joined.
 
@@ -194,6 +199,96 @@ TEST_CASE("A robot that is killed and taken up is in its team as before", "[syst
   }
   CHECK(error_m(*dataset, {survivor_output / "optimized.tum", output / "optimized.tum"}, folder) <
         0.015);
+}
+
+// Its closures with other robots.
+std::set<ClosureId> shared_closures(const G2oGraph& graph) {
+  std::set<ClosureId> closures;
+  for (const RelativePose& edge : graph.edges)
+    if (edge.from.robot != edge.to.robot) closures.insert(closure_id(edge.from, edge.to));
+  return closures;
+}
+
+// Two robots with keys, of which one finds all closures and says which count: what the other has of
+// them it was told. They stay until they are interrupted.
+class SealedTeam {
+ public:
+  static constexpr std::size_t kClosures = kLap / 6;
+
+  SealedTeam() {
+    const CommandResult made = run_command(KM_BIN_DIR "/kimera_multi_keys make " + keys().string() +
+                                           " --robots robot0:0,robot1:1");
+    REQUIRE(made.exit_code == 0);
+  }
+
+  [[nodiscard]] fs::path output(RobotId robot) const {
+    return folder_.path() / robot_name(robot);
+  }
+
+  std::unique_ptr<Process> start(RobotId robot, const std::string& output_option) const {
+    const std::uint32_t last = robot == 0 ? kLap : 0;
+    const fs::path graph = write_walk(kWalks.at(robot), kWalks.at(1 - robot), last,
+                                      folder_.path() / (robot_name(robot) + ".g2o"));
+    return std::make_unique<Process>(std::vector<std::string>{
+        std::string(KM_BIN_DIR) + "/kimera_multi_robot", "--robot", std::to_string(robot), "--name",
+        robot_name(robot), "--security", (keys() / robot_name(robot)).string(), "--graph",
+        graph.string(), "--rate", "max", output_option, output(robot).string(), "--domain",
+        std::to_string(domain_), "--set", "run.settle_s=600", "--set", "pcm.selection=pcm", "--set",
+        "pcm.min_inliers=" + std::to_string(kClosures)});  // all of them, or they are not joined
+  }
+
+  // Waits until it says that it optimises with the other one.
+  static bool is_joint(Process& robot) {
+    return robot
+        .wait_until([](const auto& line) { return line.find(", with 1 |") != std::string::npos; })
+        .has_value();
+  }
+
+  static int interrupt(Process& robot) {
+    robot.kill(SIGINT);
+    return robot.wait();
+  }
+
+ private:
+  static constexpr std::array<Walk, 2> kWalks{Walk{0, 0}, Walk{1, 30}};
+
+  [[nodiscard]] fs::path keys() const { return folder_.path() / "keys"; }
+
+  TemporaryFolder folder_;
+  const int domain_ = random_domain();
+};
+
+TEST_CASE("A robot with keys that is killed and taken up is in its team as before",
+          "[system][resume]") {
+  const SealedTeam team;
+  const RobotId killed = GENERATE(RobotId{0}, RobotId{1});
+  const RobotId other = 1 - killed;
+  CAPTURE(killed);
+  const auto survivor = team.start(other, "--output");
+  {
+    const auto victim = team.start(killed, "--output");
+    REQUIRE(SealedTeam::is_joint(*victim));
+    REQUIRE(SealedTeam::is_joint(*survivor));
+    victim->kill(SIGKILL);
+    victim->wait();
+  }
+  const auto resumed = team.start(killed, "--resume");
+  REQUIRE(SealedTeam::is_joint(*resumed));
+  CHECK(SealedTeam::interrupt(*resumed) == 0);
+  CHECK(SealedTeam::interrupt(*survivor) == 0);
+  std::map<RobotId, G2oGraph> graphs;
+  std::map<KeyframeId, SE3> T_world;
+  for (const RobotId robot : {killed, other}) {
+    CHECK(read_summary(team.output(robot) / "summary.json").pgo.members ==
+          std::vector<RobotId>{0, 1});
+    graphs[robot] = read_g2o(team.output(robot) / "pose_graph.g2o");
+    for (const G2oVertex& vertex : graphs[robot].vertices) T_world[vertex.id] = vertex.T_world_kf;
+  }
+  CHECK(shared_closures(graphs[0]).size() == SealedTeam::kClosures);
+  CHECK(shared_closures(graphs[0]) == shared_closures(graphs[1]));
+  constexpr double kSame_m = 1e-3;  // measurements are exact
+  for (const ClosureId& id : shared_closures(graphs[0]))
+    CHECK((T_world.at(id.from).translation() - T_world.at(id.to).translation()).norm() < kSame_m);
 }
 
 TEST_CASE("A robot finds itself in the map of a run of the past", "[system][resume]") {
