@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <string>
@@ -15,6 +16,9 @@ inline constexpr std::array kResultFiles = {
     "optimizer.csv", "traffic.csv",   "process.csv",        "timing.csv",    "config.yaml",
     "summary.json",  "mesh.ply",      "mesh_optimized.ply", kLabelPalette};
 
+/// Those that grow during the run, and go on when it is taken up.
+inline constexpr std::array kGrowingFiles = {"optimizer.csv", "traffic.csv", "process.csv"};
+
 /// What a run needs to be taken up, or to be joined as one of the past.
 inline constexpr const char* kJournal = "run.journal";
 
@@ -25,12 +29,14 @@ inline constexpr const char* kMap = "run.map";
 inline constexpr const char* kPeerMeshes = "peer_meshes";
 
 /// Removes a robot's results from `folder`, other than its journal and map, so that those of an
-/// earlier run cannot be taken for those of one that fails. Throws
-/// std::filesystem::filesystem_error naming the file.
-inline void remove_results(const std::filesystem::path& folder) {
-  for (const std::string file : kResultFiles)
+/// earlier run cannot be taken for those of one that fails. Where that run goes on, what grows
+/// stays, too. Throws std::filesystem::filesystem_error naming the file.
+inline void remove_results(const std::filesystem::path& folder, bool goes_on = false) {
+  for (const std::string file : kResultFiles) {
+    if (goes_on && std::ranges::find(kGrowingFiles, file) != kGrowingFiles.end()) continue;
     for (const char* ending : {"", ".part"})  // that of a file cut short by the process's end
       std::filesystem::remove(folder / (file + ending));
+  }
   std::filesystem::remove_all(folder / kPeerMeshes);
 }
 

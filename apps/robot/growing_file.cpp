@@ -2,9 +2,20 @@
 
 #include <stdexcept>
 
+#include "modules/core/input_file.hpp"
 #include "modules/core/write_file.hpp"
 
 namespace km {
+
+std::string GrowingFile::go_on() {
+  std::string rows;
+  results_.write(file_, [&rows](const auto& file) {
+    if (is_there(file)) rows = read_input_file(file);
+  });
+  rows.resize(rows.rfind('\n') + 1);
+  keep_bytes_ = rows.size();
+  return rows;
+}
 
 void GrowingFile::flush() {
   const std::string rows = rows_.str();
@@ -17,6 +28,8 @@ void GrowingFile::flush() {
 }
 
 void GrowingFile::append() {
+  if (keep_bytes_ && is_there(file_)) std::filesystem::resize_file(file_, *keep_bytes_);
+  keep_bytes_.reset();
   // The first part may end in the middle of a row; what follows is the rest of it.
   if (!waiting_.empty()) append_to_file(file_, waiting_);
   if (rows_lost_)

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <ostream>
 #include <sstream>
 #include <string>
@@ -20,6 +22,10 @@ class GrowingFile {
   GrowingFile(std::filesystem::path file, ResultWriter& results)
       : file_(std::move(file)), results_(results) {}
 
+  /// Goes on with what an earlier process has left; its rows. One that is torn is cut off with the
+  /// next flush(). Call before that, if at all.
+  [[nodiscard]] std::string go_on();
+
   /// Where rows go.
   [[nodiscard]] std::ostream& rows() { return rows_; }
 
@@ -32,6 +38,7 @@ class GrowingFile {
   const std::filesystem::path file_;
   ResultWriter& results_;
   std::ostringstream rows_;
+  std::optional<std::uintmax_t> keep_bytes_ = {};  // of what is there, until the rest is cut off
   std::string waiting_;
   bool rows_lost_ = false;
 };

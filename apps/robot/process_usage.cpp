@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <fstream>
 
+#include "modules/core/text_rows.hpp"
+
 namespace km {
 
 ProcessUsage process_usage() {
@@ -24,13 +26,17 @@ ProcessUsage process_usage() {
   return usage;
 }
 
-ProcessCsv::ProcessCsv(std::ostream& output) : output_(output) {
-  output_ << "time_s,cpu_s,resident_bytes\n";
+ProcessCsv::ProcessCsv(std::ostream& output, std::string_view former) : output_(output) {
+  if (former.empty()) output_ << "time_s,cpu_s,resident_bytes\n";
+  for (const TextRow& row : split_rows(former)) {
+    former_s_ = number_in(row, 0).value_or(former_s_);
+    former_cpu_s_ = number_in(row, 1).value_or(former_cpu_s_);
+  }
 }
 
 void ProcessCsv::append(double time_s, const ProcessUsage& usage) {
   char line[96];
-  std::snprintf(line, sizeof line, "%.3f,%.3f,%llu\n", time_s, usage.cpu_s,
+  std::snprintf(line, sizeof line, "%.3f,%.3f,%llu\n", time_s, former_cpu_s_ + usage.cpu_s,
                 static_cast<unsigned long long>(usage.resident_bytes));
   output_ << line;
   samples_.push_back({time_s, usage});

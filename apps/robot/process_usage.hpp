@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <ostream>
+#include <string_view>
 #include <vector>
 
 #include "apps/robot/run_summary.hpp"
@@ -21,13 +22,17 @@ struct ProcessUsage {
 /// Writes process.csv, a row for each sample: time_s, cpu_s, resident_bytes.
 class ProcessCsv {
  public:
-  /// Writes the header line. `output` outlives this.
-  explicit ProcessCsv(std::ostream& output);
+  /// Writes the header line, or goes on behind the rows of `former` processes: cpu_s is of all.
+  /// `output` outlives this.
+  explicit ProcessCsv(std::ostream& output, std::string_view former = {});
 
-  /// `time_s` ascends.
+  /// Time of the last row of former processes [s]; 0 without any.
+  [[nodiscard]] double former_s() const { return former_s_; }
+
+  /// `time_s` ascends, from former_s() on.
   void append(double time_s, const ProcessUsage& usage);
 
-  /// Of all samples; those of time and of the peak are the last one's.
+  /// Of all samples of this process; those of time and of the peak are the last one's.
   [[nodiscard]] RunSummary::Process summary() const;
 
  private:
@@ -36,6 +41,8 @@ class ProcessCsv {
     ProcessUsage usage;
   };
   std::ostream& output_;
+  double former_s_ = 0.0;
+  double former_cpu_s_ = 0.0;
   std::vector<Sample> samples_;
 };
 

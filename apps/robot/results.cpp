@@ -81,13 +81,6 @@ G2oGraph graph_of(const RunRecord& record) {
   return graph;
 }
 
-void write_rounds(std::ostream& out, const RunRecord& record) {
-  out << "seconds,round,members,cost,gradient_norm\n";
-  for (const OptimizerProgress& row : record.rounds())
-    out << row.seconds << ',' << row.round << ',' << row.members.size() << ',' << row.cost << ','
-        << row.gradient_norm << '\n';
-}
-
 RunSummary::Mapping map_counts(const RunRecord& record) {
   const MappingProgress map = record.mapping().value_or(MappingProgress{});
   const DenseSensingProgress sensing = record.dense_sensing().value_or(DenseSensingProgress{});
@@ -138,7 +131,6 @@ void write_results(const fs::path& folder, const RunRecord& record, ResultWriter
                 [&](const fs::path& file) { write_g2o(file, graph_of(record)); });
   write("keyframes.csv", write_keyframes, record);
   write("loop_closures.csv", write_closures, record);
-  write("optimizer.csv", write_rounds, record);
 }
 
 RunSummary summary_of(const RunRecord& record) {

@@ -7,8 +7,7 @@
 
 namespace km {
 
-/// odometry.tum, optimized.tum, pose_graph.g2o, keyframes.csv, loop_closures.csv and optimizer.csv
-/// into `folder`.
+/// odometry.tum, optimized.tum, pose_graph.g2o, keyframes.csv and loop_closures.csv into `folder`.
 void write_results(const std::filesystem::path& folder, const RunRecord& record,
                    ResultWriter& results);
 

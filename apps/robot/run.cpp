@@ -16,6 +16,7 @@
 #include "apps/robot/growing_file.hpp"
 #include "apps/robot/process_usage.hpp"
 #include "apps/robot/results.hpp"
+#include "apps/robot/rounds_csv.hpp"
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/wiring.hpp"
 #include "modules/core/text_table.hpp"
@@ -37,10 +38,10 @@ bool is_fault_of_disk(const std::error_code& error) {
 }
 
 // A disk that fails does not keep a robot from its team; a mistake on the command line is told.
-void prepare_output(const RobotOptions& options, ResultWriter& results) try {
+void prepare_output(const RobotOptions& options, bool goes_on, ResultWriter& results) try {
   const fs::path& folder = options.output;
   fs::create_directories(folder);
-  remove_results(folder);
+  remove_results(folder, goes_on);
   if (!options.resume)
     for (const char* file : {kJournal, kMap}) fs::remove(folder / file);
   if (access(folder.c_str(), W_OK) != 0)
@@ -139,16 +140,20 @@ std::string status_text(double dataset_time_s, const RunRecord& record,
 // What happens beside the modules while they run: phase, status line, traffic and memory over time.
 class Watch {
  public:
-  Watch(const RobotOptions& options, const RobotConfig& config, Robot& robot, ResultWriter& results)
+  /// `goes_on`: with the run whose results are there.
+  Watch(const RobotOptions& options, const RobotConfig& config, bool goes_on, Robot& robot,
+        ResultWriter& results)
       : robot_(robot),
         is_past_(!options.session.empty()),
         serve_limit_s_(options.serve_limit_s),
         departure_(config.run.settle_s, options.serve_limit_s),
         start_s_(steady_now_s()),
         traffic_file_(options.output / "traffic.csv", results),
-        traffic_csv_(traffic_file_.rows()),
+        traffic_csv_(traffic_file_.rows(), goes_on ? traffic_file_.go_on() : std::string()),
         process_file_(options.output / "process.csv", results),
-        process_csv_(process_file_.rows()) {}
+        process_csv_(process_file_.rows(), goes_on ? process_file_.go_on() : std::string()),
+        rounds_file_(options.output / "optimizer.csv", results),
+        rounds_csv_(rounds_file_.rows(), goes_on ? rounds_file_.go_on() : std::string()) {}
 
   /// True when the robot may leave, or must: its id is another's. Called ten times a second.
   bool poll() {
@@ -158,6 +163,7 @@ class Watch {
     // If it is at work, the next time will do: this thread waits for no other.
     (void)robot_.recorder().try_with_record([&](const RunRecord& record) {
       say(now_s, record, traffic);
+      rounds_csv_.append(record.rounds());
       if (leaving_since_s_) return;
       const std::map<RobotId, Departure::Present> peers = present_peers();
       std::vector<Departure::Present> present;
@@ -182,7 +188,11 @@ class Watch {
     return robot_.id_taken() || (departure_.reason() != nullptr && said_goodbye(now_s));
   }
 
-  void finish() { write(seconds(), robot_.bridge().traffic()); }
+  /// `record` is final.
+  void finish(const RunRecord& record) {
+    rounds_csv_.append(record.rounds());
+    write(seconds(), robot_.bridge().traffic());
+  }
   [[nodiscard]] RunSummary::Process process() const { return process_csv_.summary(); }
   [[nodiscard]] double seconds() const { return steady_now_s() - start_s_; }
   [[nodiscard]] const char* reason() const { return departure_.reason(); }
@@ -239,10 +249,12 @@ class Watch {
   }
 
   void write(double now_s, const TrafficSnapshot& traffic) {
-    traffic_csv_.append(now_s, traffic);
+    const double run_s = process_csv_.former_s() + now_s;
+    traffic_csv_.append(run_s, traffic);
     traffic_file_.flush();
-    process_csv_.append(now_s, process_usage());
+    process_csv_.append(run_s, process_usage());
     process_file_.flush();
+    rounds_file_.flush();
     written_s_ = now_s;
   }
 
@@ -257,6 +269,8 @@ class Watch {
   TrafficCsv traffic_csv_;
   GrowingFile process_file_;
   ProcessCsv process_csv_;
+  GrowingFile rounds_file_;
+  RoundsCsv rounds_csv_;
   double written_s_ = 0.0;
   double said_s_ = -kInterval_s;
   std::optional<double> leaving_since_s_;
@@ -339,7 +353,7 @@ void write_all(const RobotOptions& options, Robot& robot, const RunRecord& recor
 // Writes what the run leaves; the exit code.
 int conclude(const RobotOptions& options, Robot& robot, std::optional<Watch>& watch,
              const RunResult& result, const RunRecord& record, ResultWriter& results) {
-  watch->finish();
+  watch->finish(record);
   RunEnd end = end_of(options, robot, result, watch->reason(), record);
   end.lost_peers = watch->lost_peers();
   RunSummary summary = summary_of(record);
@@ -370,6 +384,7 @@ int run_robot(const RobotOptions& options, SignalWatch& signals,
   const std::optional<MappingPlan> mapping =
       plan_mapping(config.mapping, config.stereo_depth, config.segmentation, options.dataset);
   RobotInput input = open_robot_input(options, config, mapping);
+  const bool goes_on = options.resume && input.restored;
   ResultWriter results;
   Robot robot(options, config, std::move(input), mapping, results, signals);
   if (listen) listen(robot.topics());
@@ -378,7 +393,7 @@ int run_robot(const RobotOptions& options, SignalWatch& signals,
       !config.segmentation.palette.empty())
     log::warn("robot") << "segmentation.palette is not used: labels are recorded, and with them "
                           "their label_palette.csv";
-  prepare_output(options, results);
+  prepare_output(options, goes_on, results);
   const auto write = [&](const char* name, const std::string& text) {
     results.write(options.output / name, [&text](const auto& file) { write_file(file, text); });
   };
@@ -387,7 +402,7 @@ int run_robot(const RobotOptions& options, SignalWatch& signals,
     write(kLabelPalette, to_csv(mapping->palette));
 
   std::optional<Watch> watch;
-  watch.emplace(options, config, robot, results);
+  watch.emplace(options, config, goes_on, robot, results);
   const RunResult result = robot.run([&watch] { return watch->poll(); });
   const auto end = [&](const RunRecord& record) {
     return conclude(options, robot, watch, result, record, results);

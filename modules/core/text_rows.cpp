@@ -70,6 +70,10 @@ std::optional<std::int64_t> parse_int64(std::string_view field) {
   return parse_whole<std::int64_t>(field);
 }
 
+std::optional<double> number_in(const TextRow& row, std::size_t i) {
+  return i < row.fields.size() ? parse_double(row.fields[i]) : std::nullopt;
+}
+
 std::string readable(std::string_view text, std::size_t max_size) {
   constexpr std::string_view kCut = " ...";
   std::string shown(text.substr(0, max_size));

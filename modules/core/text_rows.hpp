@@ -27,6 +27,9 @@ struct TextRow {
 [[nodiscard]] std::optional<double> parse_double(std::string_view field);
 [[nodiscard]] std::optional<std::int64_t> parse_int64(std::string_view field);
 
+/// The number in field `i` of a row; nullopt if there is no such field, or it is none.
+[[nodiscard]] std::optional<double> number_in(const TextRow& row, std::size_t i);
+
 /// `text` as messages show it: control characters as '?', and no more than `max_size` bytes.
 [[nodiscard]] std::string readable(std::string_view text, std::size_t max_size = 200);
 

@@ -1,5 +1,7 @@
 #include "runtime/dds/traffic.hpp"
 
+#include "modules/core/text_rows.hpp"
+
 namespace km {
 
 std::uint64_t TrafficSnapshot::bytes(Direction direction, TrafficCategory category) const {
@@ -10,20 +12,35 @@ std::uint64_t TrafficSnapshot::bytes(Direction direction, TrafficCategory catego
   return sum;
 }
 
-TrafficCsv::TrafficCsv(std::ostream& output) : output_(output) {
-  output_ << "time_s,direction,topic,category,peer,messages,bytes,retransmitted_bytes\n";
+TrafficCsv::TrafficCsv(std::ostream& output, std::string_view former) : output_(output) {
+  if (former.empty())
+    output_ << "time_s,direction,topic,category,peer,messages,bytes,retransmitted_bytes\n";
+  for (const TextRow& row : split_rows(former)) {
+    constexpr std::size_t kSubject = 4;  // fields, behind the time
+    Counts counts{};
+    if (row.fields.size() != 1 + kSubject + counts.size()) continue;
+    Subject subject(row.fields[1]);
+    for (std::size_t i = 2; i <= kSubject; ++i) (subject += ',') += row.fields[i];
+    for (std::size_t i = 0; i < counts.size(); ++i)
+      counts[i] = static_cast<std::uint64_t>(parse_int64(row.fields[1 + kSubject + i]).value_or(0));
+    former_[subject] = counts;
+  }
+  former_.erase("direction,topic,category,peer");
+  written_ = former_;
 }
 
 void TrafficCsv::append(double time_s, const TrafficSnapshot& snapshot) {
   for (const PeerTraffic& row : snapshot.peers) {
-    const std::tuple now(row.count.messages, row.count.bytes, row.retransmitted_bytes);
-    auto& before = written_[{row.topic, row.direction, row.peer}];
+    const Subject subject = std::string(row.direction == Direction::kOut ? "out," : "in,") +
+                            row.topic + ',' + to_string(row.category) + ',' +
+                            (row.peer ? std::to_string(*row.peer) : "*");
+    Counts now{row.count.messages, row.count.bytes, row.retransmitted_bytes};
+    const Counts& former = former_[subject];
+    for (std::size_t i = 0; i < now.size(); ++i) now[i] += former[i];
+    Counts& before = written_[subject];
     if (now == before) continue;
     before = now;
-    output_ << time_s << (row.direction == Direction::kOut ? ",out," : ",in,") << row.topic << ','
-            << to_string(row.category) << ',' << (row.peer ? std::to_string(*row.peer) : "*") << ','
-            << row.count.messages << ',' << row.count.bytes << ',' << row.retransmitted_bytes
-            << '\n';
+    output_ << time_s << ',' << subject << ',' << now[0] << ',' << now[1] << ',' << now[2] << '\n';
   }
 }
 

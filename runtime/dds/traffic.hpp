@@ -1,11 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
 #include <ostream>
 #include <string>
-#include <tuple>
+#include <string_view>
 #include <vector>
 
 #include "modules/core/ids.hpp"
@@ -63,14 +64,19 @@ struct TrafficSnapshot {
 /// retransmitted_bytes.
 class TrafficCsv {
  public:
-  /// Writes the header line. `output` outlives this.
-  explicit TrafficCsv(std::ostream& output);
+  /// Writes the header line, or goes on behind the rows of `former` processes, whose counts are
+  /// added. `output` outlives this.
+  explicit TrafficCsv(std::ostream& output, std::string_view former = {});
   void append(double time_s, const TrafficSnapshot& snapshot);
 
  private:
+  // Messages, bytes, retransmitted bytes.
+  using Counts = std::array<std::uint64_t, 3>;
+  // "out,bow_vectors,place_recognition,7": what the counts of a row are of.
+  using Subject = std::string;
+
   std::ostream& output_;
-  using Key = std::tuple<std::string, Direction, std::optional<RobotId>>;
-  std::map<Key, std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>> written_;
+  std::map<Subject, Counts> former_, written_;
 };
 
 }  // namespace km

@@ -63,5 +63,32 @@ TEST_CASE("A disk that is full for too long costs rows, and the file is told to 
   CHECK_THAT(results.lost().at(path.string()), Catch::Contains("rows are missing"));
 }
 
+TEST_CASE("A file that is gone on with loses its torn row and no other", "[robot]") {
+  const TemporaryFolder folder;
+  const fs::path path = folder.write("a.csv", "time\n1\n2\n3.");
+  ResultWriter results;
+  GrowingFile file(path, results);
+  CHECK(file.go_on() == "time\n1\n2\n");
+  file.rows() << 4 << '\n';
+  file.flush();
+  file.rows() << 5 << '\n';
+  file.flush();
+  CHECK(folder.read("a.csv") == "time\n1\n2\n4\n5\n");
+  CHECK(results.lost().empty());
+}
+
+TEST_CASE("A file that is not there, or torn in its first row, is begun anew", "[robot]") {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.csv";
+  if (GENERATE(false, true)) folder.write("a.csv", "tim");
+  ResultWriter results;
+  GrowingFile file(path, results);
+  CHECK(file.go_on().empty());
+  file.rows() << "time\n1\n";
+  file.flush();
+  CHECK(folder.read("a.csv") == "time\n1\n");
+  CHECK(results.lost().empty());
+}
+
 }  // namespace
 }  // namespace km

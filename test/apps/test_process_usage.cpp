@@ -1,8 +1,10 @@
 #include <catch2/catch.hpp>
 #include <sstream>
+#include <string>
 #include <vector>
 
 #include "apps/robot/process_usage.hpp"
+#include "apps/robot/rounds_csv.hpp"
 
 namespace km {
 namespace {
@@ -48,6 +50,34 @@ TEST_CASE("process.csv has a row for each sample", "[robot]") {
   CHECK(csv.summary().peak_memory_bytes == 34567);
   for (int s = 2; s < 100; ++s) csv.append(1.0 * s, {.cpu_s = 1.0, .resident_bytes = 23456});
   CHECK_FALSE(csv.summary().memory_growth_bytes_per_minute);  // too short
+}
+
+TEST_CASE("process.csv goes on with the time of the run, and sums up that of processors",
+          "[robot]") {
+  std::ostringstream text;
+  ProcessCsv csv(text, "time_s,cpu_s,resident_bytes\n1.000,0.500,12345\n2.500,1.250,23456\n");
+  CHECK(csv.former_s() == 2.5);
+  csv.append(3.5, {.cpu_s = 0.25, .resident_bytes = 34567});
+  CHECK(text.str() == "3.500,1.500,34567\n");
+  CHECK(csv.summary().cpu_s == 0.25);
+}
+
+TEST_CASE("optimizer.csv has a row for each round, and goes on counting", "[robot]") {
+  std::ostringstream text;
+  std::vector<OptimizerProgress> rounds{
+      {.members = {1, 2}, .round = 1, .cost = 4.0, .seconds = 0.5}};
+  RoundsCsv first(text);
+  first.append(rounds);
+  rounds.push_back({.members = {1, 2}, .round = 3, .cost = 2.0, .seconds = 1.5});
+  first.append(rounds);
+  first.append(rounds);
+  const std::string header = "seconds,round,members,cost,gradient_norm\n";
+  CHECK(text.str() == header + "0.5,1,2,4,0\n1.5,3,2,2,0\n");
+
+  std::ostringstream more;
+  RoundsCsv next(more, text.str());
+  next.append(rounds);
+  CHECK(more.str() == "2,4,2,4,0\n3,6,2,2,0\n");
 }
 
 }  // namespace

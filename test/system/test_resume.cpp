@@ -10,6 +10,8 @@
 #include <set>
 #include <thread>
 
+#include "modules/core/input_file.hpp"
+#include "modules/core/text_rows.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
@@ -221,19 +223,33 @@ class SealedTeam {
     REQUIRE(made.exit_code == 0);
   }
 
-  [[nodiscard]] fs::path output(RobotId robot) const {
-    return folder_.path() / robot_name(robot);
-  }
+  [[nodiscard]] fs::path output(RobotId robot) const { return folder_.path() / robot_name(robot); }
 
   std::unique_ptr<Process> start(RobotId robot, const std::string& output_option) const {
     const std::uint32_t last = robot == 0 ? kLap : 0;
     const fs::path graph = write_walk(kWalks.at(robot), kWalks.at(1 - robot), last,
                                       folder_.path() / (robot_name(robot) + ".g2o"));
     return std::make_unique<Process>(std::vector<std::string>{
-        std::string(KM_BIN_DIR) + "/kimera_multi_robot", "--robot", std::to_string(robot), "--name",
-        robot_name(robot), "--security", (keys() / robot_name(robot)).string(), "--graph",
-        graph.string(), "--rate", "max", output_option, output(robot).string(), "--domain",
-        std::to_string(domain_), "--set", "run.settle_s=600", "--set", "pcm.selection=pcm", "--set",
+        std::string(KM_BIN_DIR) + "/kimera_multi_robot",
+        "--robot",
+        std::to_string(robot),
+        "--name",
+        robot_name(robot),
+        "--security",
+        (keys() / robot_name(robot)).string(),
+        "--graph",
+        graph.string(),
+        "--rate",
+        "max",
+        output_option,
+        output(robot).string(),
+        "--domain",
+        std::to_string(domain_),
+        "--set",
+        "run.settle_s=600",
+        "--set",
+        "pcm.selection=pcm",
+        "--set",
         "pcm.min_inliers=" + std::to_string(kClosures)});  // all of them, or they are not joined
   }
 
@@ -258,6 +274,23 @@ class SealedTeam {
   const int domain_ = random_domain();
 };
 
+// A table whose first column only grows, with one line of names.
+void check_grows(const fs::path& file) {
+  CAPTURE(file);
+  const std::string text = read_input_file(file);
+  double last = 0.0;
+  std::size_t headers = 0;
+  const std::vector<TextRow> rows = split_rows(text);
+  for (const TextRow& row : rows) {
+    CHECK(row.fields.size() == rows.front().fields.size());
+    const auto value = number_in(row, 0);
+    headers += value ? 0 : 1;
+    CHECK(value.value_or(last) >= last);
+    last = value.value_or(last);
+  }
+  CHECK(headers == 1);
+}
+
 TEST_CASE("A robot with keys that is killed and taken up is in its team as before",
           "[system][resume]") {
   const SealedTeam team;
@@ -269,12 +302,23 @@ TEST_CASE("A robot with keys that is killed and taken up is in its team as befor
     const auto victim = team.start(killed, "--output");
     REQUIRE(SealedTeam::is_joint(*victim));
     REQUIRE(SealedTeam::is_joint(*survivor));
+    REQUIRE(is_there_within(team.output(killed) / "optimizer.csv", kPatience));
     victim->kill(SIGKILL);
     victim->wait();
   }
+  const std::array growing{"process.csv", "traffic.csv", "optimizer.csv"};
+  std::map<std::string, std::string> before;
+  for (const std::string file : growing) before[file] = read_input_file(team.output(killed) / file);
   const auto resumed = team.start(killed, "--resume");
   REQUIRE(SealedTeam::is_joint(*resumed));
   CHECK(SealedTeam::interrupt(*resumed) == 0);
+  for (const std::string file : growing) {
+    const std::string whole = before[file].substr(0, before[file].rfind('\n') + 1);
+    const std::string after = read_input_file(team.output(killed) / file);
+    CHECK(after.starts_with(whole));
+    CHECK(after.size() > whole.size());
+    check_grows(team.output(killed) / file);
+  }
   CHECK(SealedTeam::interrupt(*survivor) == 0);
   std::map<RobotId, G2oGraph> graphs;
   std::map<KeyframeId, SE3> T_world;

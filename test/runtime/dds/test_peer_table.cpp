@@ -431,6 +431,28 @@ TEST_CASE("Traffic is written when it changes, cumulatively", "[traffic]") {
         "3.5,out,bow,place_recognition,*,0,0,30\n");
 }
 
+TEST_CASE("Traffic of a run that is taken up is added to what there was", "[traffic]") {
+  const std::string former =
+      "time_s,direction,topic,category,peer,messages,bytes,retransmitted_bytes\n"
+      "1,out,bow,place_recognition,7,1,100,0\n"
+      "3.5,in,bow,place_recognition,7,2,50,0\n"
+      "3.5,out,bow,place_recognition,*,0,0,30\n"
+      "4,out,bow,place_recognition,7,2,200,10\n";
+  std::ostringstream csv;
+  TrafficCsv writer(csv, former);
+  TrafficSnapshot snapshot;
+  snapshot.peers = {row(Direction::kOut, 7, {0, 0}, 0), row(Direction::kIn, 7, {0, 0}, 0)};
+  writer.append(5.0, snapshot);
+  CHECK(csv.str().empty());
+  snapshot.peers = {row(Direction::kOut, 7, {1, 40}, 0), row(Direction::kOut, 8, {1, 40}, 0),
+                    row(Direction::kOut, std::nullopt, {0, 0}, 5)};
+  writer.append(6.0, snapshot);
+  CHECK(csv.str() ==
+        "6,out,bow,place_recognition,7,3,240,10\n"
+        "6,out,bow,place_recognition,8,1,40,0\n"
+        "6,out,bow,place_recognition,*,0,0,35\n");
+}
+
 TEST_CASE("Bytes add up per direction and category", "[traffic]") {
   TrafficSnapshot snapshot;
   snapshot.peers = {row(Direction::kOut, 7, {1, 100}, 5), row(Direction::kOut, 8, {1, 100}, 0),
