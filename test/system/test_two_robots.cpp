@@ -129,13 +129,15 @@ TEST_CASE("A robot whose id is taken says so and ends, and who had it first goes
   command.insert(command.end(), keys.begin(), keys.end());
   auto same_id = robot_command("7", *dataset, folder.path() / "b", domain);
   same_id.insert(same_id.end(), keys.begin(), keys.end());
-  command.insert(command.end(), {"--to", "7.5"});
+  // There as long as it takes the other to start.
+  command.insert(command.end(), {"--to", "7.5", "--set", "run.settle_s=600"});
   Process incumbent(command);
   REQUIRE(incumbent.wait_until(is_past_start).has_value());
   Process twin(same_id);
   CHECK(twin.wait() == 3);
   CHECK_THAT(read_summary(folder.path() / "b/summary.json").exit_reason,
              Catch::Contains("give every robot its own --robot"));
+  incumbent.kill(SIGINT);
   CHECK(incumbent.wait() == 0);
 }
 
