@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "modules/core/ids.hpp"
+#include "runtime/token_bucket.hpp"
 
 namespace km {
 
@@ -31,12 +32,7 @@ class FairQueue {
 
   /// False if `peer` has no room: one message was dropped, this one or its oldest.
   bool push(RobotId peer, Message message, std::size_t bytes, double now_s) {
-    const auto [entry, fresh] = peers_.try_emplace(peer);
-    Line& line = entry->second;
-    if (fresh) {
-      line.tokens = quota_.burst;
-      line.counted_s = now_s;
-    }
+    Line& line = peers_.try_emplace(peer, quota_, now_s).first->second;
     bool fits = has_room(line, bytes);
     const bool all_fit = fits;
     while (!fits && quota_.newest_wins && !line.waiting.empty()) {
@@ -56,7 +52,8 @@ class FairQueue {
     for (std::size_t k = 0; k < peers_.size(); ++k, ++turn) {
       if (turn == peers_.end()) turn = peers_.begin();
       Line& line = turn->second;
-      if (line.waiting.empty() || !may_serve(line, now_s)) continue;
+      if (line.waiting.empty() || line.tokens.wait_s(1.0, now_s) > 0.0) continue;
+      line.tokens.spend(1.0, now_s);
       last_ = turn->first;
       return take_front(line);
     }
@@ -68,8 +65,7 @@ class FairQueue {
     std::optional<double> least;
     for (auto& [peer, line] : peers_) {
       if (line.waiting.empty()) continue;
-      const double wait =
-          may_serve_now(line, now_s) ? 0.0 : (1.0 - line.tokens) / quota_.per_second;
+      const double wait = line.tokens.wait_s(1.0, now_s);
       least = std::min(least.value_or(wait), wait);
     }
     return least;
@@ -83,28 +79,18 @@ class FairQueue {
     std::size_t bytes = 0;
   };
   struct Line {
+    Line(const QueueQuota& quota, double now_s)
+        : tokens(quota.per_second, quota.burst, quota.burst) {
+      tokens.spend(0.0, now_s);  // they flow from now on
+    }
+
     std::deque<Waiting> waiting;
     std::size_t bytes = 0;
-    double tokens = 0.0;  // at counted_s
-    double counted_s = 0.0;
+    TokenBucket tokens;  // a message takes one
   };
 
   [[nodiscard]] bool has_room(const Line& line, std::size_t bytes) const {
     return line.waiting.size() < quota_.messages && line.bytes + bytes <= quota_.bytes;
-  }
-
-  bool may_serve_now(Line& line, double now_s) {
-    if (quota_.per_second == std::numeric_limits<double>::infinity()) return true;
-    line.tokens =
-        std::min(quota_.burst, line.tokens + quota_.per_second * (now_s - line.counted_s));
-    line.counted_s = now_s;
-    return line.tokens >= 1.0;
-  }
-
-  bool may_serve(Line& line, double now_s) {
-    if (!may_serve_now(line, now_s)) return false;
-    line.tokens -= 1.0;
-    return true;
   }
 
   Message take_front(Line& line) {
