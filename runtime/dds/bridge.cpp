@@ -30,7 +30,7 @@ constexpr dds_attach_t kFirstTopic = 1;
 
 }  // namespace
 
-DdsBridge::DdsBridge(const DdsParticipant& participant)
+DdsBridge::DdsBridge(const DdsParticipant& participant, const BudgetConfig& budget)
     : participant_(participant),
       peers_(participant),
       waitset_(dds_create_waitset(participant.handle()), "wait set"),
@@ -38,8 +38,7 @@ DdsBridge::DdsBridge(const DdsParticipant& participant)
       key_teller_(
           kMaxAdmitted, Overflow::kDropOldest, [this](const TeamPeer& peer) { tell_key(peer); },
           "dds_keys"),
-      sender_(
-          kSendQueue, Overflow::kBlock, [](const Job& job) { job(); }, "dds_send") {
+      sender_(budget, participant.config().lease_s, outgoing_) {
   for (const dds_entity_t condition :
        {stop_request_.handle(), peers_.discovery_condition(), peers_.liveliness_condition()})
     check_dds(dds_waitset_attach(waitset_.handle(), condition, kOther), "cannot wait");
@@ -80,10 +79,7 @@ void DdsBridge::tell_keys() {
 
 void DdsBridge::catch_up(const PeerEvent& event) {
   if (event.kind != PeerEventKind::kReturned && event.kind != PeerEventKind::kResumed) return;
-  post([this, robot = event.identity.robot] {
-    for (const auto& topic : outgoing_)
-      if (topic.get() != keys_) topic->catch_up(robot);
-  });
+  sender_.catch_up(event.identity.robot);
 }
 
 OutgoingTopic& DdsBridge::add_outgoing(TopicSpec spec) {
@@ -103,7 +99,12 @@ void DdsBridge::add_incoming(TopicSpec spec, bool addressed, Pace pace,
 
 TrafficSnapshot DdsBridge::traffic() const {
   TrafficSnapshot snapshot;
-  for (const auto& topic : outgoing_) topic->add_to(snapshot);
+  const auto held = sender_.held_back();
+  for (const auto& topic : outgoing_) {
+    topic->add_to(snapshot);
+    if (const auto found = held.find(topic.get()); found != held.end())
+      snapshot.topics.back().held = found->second;
+  }
   for (const auto& topic : incoming_) topic->add_to(snapshot);
   return snapshot;
 }

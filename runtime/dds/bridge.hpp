@@ -21,6 +21,7 @@
 #include "runtime/dds/outgoing_topic.hpp"
 #include "runtime/dds/participant.hpp"
 #include "runtime/dds/peers.hpp"
+#include "runtime/dds/sender.hpp"
 #include "runtime/dds/traffic.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
@@ -72,6 +73,7 @@ struct Pace {
 /// Wire it (exchange) before start(). What is published to the peers is encoded and written on the
 /// bridge's sending thread: DDS never blocks here for want of a receiver (all kinds keep the last
 /// sample per key), but a thin link can hold up the socket, and no algorithm should wait for that.
+/// What is most important is written first, and with a budget the rest waits for that (see Sender).
 /// What is received is filed on the bridge's receive thread, which waits for nothing else, and
 /// published on a thread of each topic, in turn between the peers (see IncomingTopic): a node that
 /// is busy holds up what is for it, and a peer that sends much holds up itself.
@@ -79,15 +81,15 @@ struct Pace {
 /// Where the team has keys (DdsParticipant::seal()), all of it is sealed, and only robots of the
 /// team are heard.
 ///
-/// The bridge is the last of the nodes to stop: it then sends what is queued, and waits up to two
-/// seconds until the peers have acknowledged it.
+/// The bridge is the last of the nodes to stop: it then sends what is queued, with a budget as much
+/// as that lets go in two seconds, and waits as long until the peers have acknowledged it.
 class DdsBridge final : public Node {
  public:
-  /// How many messages may wait to be sent; who publishes one more waits.
-  static constexpr std::size_t kSendQueue = 8192;
+  /// How many messages may wait to be encoded; who publishes one more waits.
+  static constexpr std::size_t kSendQueue = Sender::kQueue;
 
-  /// `participant` outlives the bridge.
-  explicit DdsBridge(const DdsParticipant& participant);
+  /// `participant` outlives the bridge. Throws ConfigError if `budget` is out of bounds.
+  explicit DdsBridge(const DdsParticipant& participant, const BudgetConfig& budget = {});
   ~DdsBridge() override;
 
   /// Joins `crossing`, which outlives the bridge, to those of the other robots: with all of them,
@@ -106,6 +108,9 @@ class DdsBridge final : public Node {
   /// Counts since the start. Thread-safe.
   [[nodiscard]] TrafficSnapshot traffic() const;
 
+  /// True while messages wait for the budget. Thread-safe.
+  [[nodiscard]] bool holds_back() const { return sender_.holds_back(); }
+
   std::string_view name() const override { return "dds"; }
   void start() override;
   void stop() noexcept override;
@@ -116,11 +121,8 @@ class DdsBridge final : public Node {
   double step_limit_s() const override { return 120.0; }
 
  private:
-  using Job = std::function<void()>;
-
   OutgoingTopic& add_outgoing(TopicSpec spec);
   void add_incoming(TopicSpec spec, bool addressed, Pace pace, IncomingTopic::Handler handler);
-  void post(Job job) { sender_.post(std::move(job)); }
   void exchange_keys();
   void tell_key(const TeamPeer& peer);
   void catch_up(const PeerEvent& event);
@@ -142,20 +144,24 @@ class DdsBridge final : public Node {
   std::thread receiver_;
   // Apart from the sender: the receive thread has keys told, and must not wait for room there.
   Worker<TeamPeer> key_teller_;
-  Worker<Job> sender_;  // last members: stop first
+  Sender sender_;  // last members: stop first
 };
 
 namespace detail {
 
 template <typename T>
-void write_encoded(OutgoingTopic& topic, const T& message, std::optional<Addressee> to = {}) {
-  const auto encoded = Codec<T>::encode(message);
-  topic.write(to, Codec<T>::key_of(message), serialize(Codec<T>::descriptor(), &encoded.wire));
+Outgoing outgoing(OutgoingTopic& topic, const std::shared_ptr<const T>& message,
+                  std::optional<Addressee> to = {}) {
+  const auto encode = [message] {
+    const auto encoded = Codec<T>::encode(*message);
+    return serialize(Codec<T>::descriptor(), &encoded.wire);
+  };
+  return {.topic = &topic, .to = to, .key = Codec<T>::key_of(*message), .encode = encode};
 }
 
 template <typename T>
-void write_encoded(OutgoingTopic& topic, const Addressed<T>& message) {
-  write_encoded(topic, *message.message, Addressee{message.to, message.boot});
+Outgoing outgoing(OutgoingTopic& topic, const std::shared_ptr<const Addressed<T>>& message) {
+  return outgoing(topic, message->message, Addressee{message->to, message->boot});
 }
 
 // Publishes what `content` holds, or says why not.
@@ -186,7 +192,7 @@ void DdsBridge::exchange(Crossing<T, Sent>& crossing, TopicKind kind, TrafficCat
   if (ends.send) {
     OutgoingTopic& topic = add_outgoing(spec);
     crossing.own_.subscribe([this, &topic](const std::shared_ptr<const Sent>& message) {
-      post([&topic, message] { detail::write_encoded(topic, *message); });
+      sender_.post(detail::outgoing(topic, message));
     });
   }
   if (!ends.receive) return;

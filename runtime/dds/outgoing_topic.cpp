@@ -131,6 +131,17 @@ void OutgoingTopic::send(Writer& writer, MessageKey key, Octets content) {
   for (const Guid& reader : writer.readers) writer.sent_to[reader].add(size);
 }
 
+std::vector<RobotId> OutgoingTopic::readers_of(std::optional<Addressee> addressee) {
+  if (addressee)
+    return receiver_of(*addressee) ? std::vector{addressee->robot} : std::vector<RobotId>();
+  Writer& writer = writer_to({});
+  refresh_readers(writer);
+  std::vector<RobotId> robots;
+  for (const Guid& reader : writer.readers)
+    if (const auto identity = peers_.identity_of(reader)) robots.push_back(identity->robot);
+  return robots;
+}
+
 // Null, or why it cannot be sealed.
 const char* OutgoingTopic::seal(const Writer& writer, const km_wire_Envelope& head,
                                 Octets& content) const {
@@ -176,6 +187,16 @@ std::uint64_t OutgoingTopic::retransmitted_bytes(const Writer& writer) {
   if (statistics == nullptr || dds_refresh_statistics(statistics) != DDS_RETCODE_OK) return 0;
   const dds_stat_keyvalue* entry = dds_lookup_statistic(statistics, "rexmit_bytes");
   return entry == nullptr ? 0 : entry->u.u64;
+}
+
+std::uint64_t OutgoingTopic::sent_bytes() const {
+  const std::lock_guard lock(mutex_);
+  std::uint64_t bytes = 0;
+  for (const auto& [to, writer] : writers_) {
+    bytes += retransmitted_bytes(writer);
+    for (const auto& [reader, count] : writer.sent_to) bytes += count.bytes;
+  }
+  return bytes;
 }
 
 void OutgoingTopic::add_to(TrafficSnapshot& snapshot) const {

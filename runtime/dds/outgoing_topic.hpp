@@ -51,7 +51,8 @@ struct Addressee {
 /// is not what DDS keeps, sealed as it is for the former process: events and states for one robot
 /// are kept here in clear as well, and sealed anew for the next one.
 ///
-/// write() and catch_up() belong to one thread; add_to() is thread-safe.
+/// write(), catch_up(), readers_of() and wait_for_acks() belong to one thread; the rest is
+/// thread-safe.
 class OutgoingTopic {
  public:
   OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec);
@@ -65,6 +66,14 @@ class OutgoingTopic {
   /// The robot is there, perhaps as another process: it gets what waits for it, and what its life
   /// was sent before.
   void catch_up(RobotId robot);
+
+  /// Robots that a message written now goes to. An addressee counts before its reader is matched.
+  [[nodiscard]] std::vector<RobotId> readers_of(std::optional<Addressee> addressee);
+
+  [[nodiscard]] const TopicSpec& spec() const { return spec_; }
+
+  /// So far: once per reader, and what was sent again.
+  [[nodiscard]] std::uint64_t sent_bytes() const;
 
   /// Waits until every matched reader has everything. False on timeout.
   bool wait_for_acks(std::chrono::nanoseconds timeout);

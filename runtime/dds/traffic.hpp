@@ -29,6 +29,18 @@ struct TrafficCount {
   bool operator==(const TrafficCount&) const = default;
 };
 
+/// What the budget has made of the messages of one topic since the start, see SendSchedule. Bytes
+/// count once per message, however many robots it is for. What is published is the sum of what went
+/// at once and of all of these.
+struct HeldBack {
+  TrafficCount delayed;     ///< Sent later than they could have been.
+  TrafficCount waiting;     ///< To be sent now: for the budget, or for somebody to be there.
+  TrafficCount superseded;  ///< Never sent: a newer state came before their turn.
+  TrafficCount dropped;     ///< Never sent: no budget, or no room, or too late, or the end.
+
+  bool operator==(const HeldBack&) const = default;
+};
+
 /// Traffic of one topic with one peer since the start.
 struct PeerTraffic {
   std::string topic;
@@ -48,6 +60,7 @@ struct TopicTraffic {
   std::uint64_t duplicates = 0;  ///< In: arrived before.
   std::uint64_t missing = 0;     ///< In: numbers not arrived (yet), overtaken states included.
   std::uint64_t failures = 0;    ///< Out: refused by DDS.
+  HeldBack held = {};            ///< Out.
   std::map<std::string, std::uint64_t> refused;  ///< In: by reason.
 };
 
@@ -59,9 +72,10 @@ struct TrafficSnapshot {
   [[nodiscard]] std::uint64_t bytes(Direction direction, TrafficCategory category) const;
 };
 
-/// Writes traffic.csv: cumulative counts over time, a row whenever one has changed. Columns:
-/// time_s, direction, topic, category, peer ("*" where it has no single one), messages, bytes,
-/// retransmitted_bytes.
+/// Writes traffic.csv: counts over time, a row whenever one has changed. Columns: time_s,
+/// direction, topic, category, peer ("*" where it has no single one), messages, bytes,
+/// retransmitted_bytes. Directions are in and out, cumulative, and where there is a budget delayed,
+/// superseded, dropped, likewise, and waiting, as of then: see HeldBack.
 class TrafficCsv {
  public:
   /// Writes the header line, or goes on behind the rows of `former` processes, whose counts are
@@ -74,6 +88,8 @@ class TrafficCsv {
   using Counts = std::array<std::uint64_t, 3>;
   // "out,bow_vectors,place_recognition,7": what the counts of a row are of.
   using Subject = std::string;
+
+  void append(double time_s, const std::string& direction, const PeerTraffic& row);
 
   std::ostream& output_;
   std::map<Subject, Counts> former_, written_;

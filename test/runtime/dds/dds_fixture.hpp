@@ -140,9 +140,9 @@ struct TestRobot {
                   make_seal) {}
   TestRobot(std::shared_ptr<const DdsDomain> domain, const RobotIdentity& identity,
             const MakeSeal& make_seal, TopicKind ping_kind = TopicKind::kEvent,
-            TopicKind addressed_kind = TopicKind::kRequest)
+            TopicKind addressed_kind = TopicKind::kRequest, const BudgetConfig& budget = {})
       : participant(std::move(domain), identity, make_seal ? make_seal(identity) : nullptr),
-        bridge(participant),
+        bridge(participant, budget),
         status([identity] { return RobotStatus{.robot = identity.robot, .name = identity.name}; },
                {.own = statuses.to_peers(), .peers = statuses.from_peers()}),
         peer_events(bridge.peers().events()),

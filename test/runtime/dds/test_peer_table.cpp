@@ -437,6 +437,7 @@ TEST_CASE("Traffic of a run that is taken up is added to what there was", "[traf
       "1,out,bow,place_recognition,7,1,100,0\n"
       "3.5,in,bow,place_recognition,7,2,50,0\n"
       "3.5,out,bow,place_recognition,*,0,0,30\n"
+      "4,waiting,bow,place_recognition,*,9,900,0\n"
       "4,out,bow,place_recognition,7,2,200,10\n";
   std::ostringstream csv;
   TrafficCsv writer(csv, former);
@@ -451,6 +452,41 @@ TEST_CASE("Traffic of a run that is taken up is added to what there was", "[traf
         "6,out,bow,place_recognition,7,3,240,10\n"
         "6,out,bow,place_recognition,8,1,40,0\n"
         "6,out,bow,place_recognition,*,0,0,35\n");
+
+  snapshot = {};
+  snapshot.topics = {{.topic = "bow",
+                      .category = TrafficCategory::kPlaceRecognition,
+                      .count = {},
+                      .held = {.delayed = {}, .waiting = {1, 10}, .superseded = {}, .dropped = {}},
+                      .refused = {}}};
+  csv.str({});
+  writer.append(7.0, snapshot);
+  CHECK(csv.str() == "7,waiting,bow,place_recognition,*,1,10,0\n");
+}
+
+TEST_CASE("What a budget holds back is written beside what is sent", "[traffic]") {
+  std::ostringstream csv;
+  TrafficCsv writer(csv);
+  const HeldBack held{
+      .delayed = {1, 10}, .waiting = {2, 20}, .superseded = {3, 30}, .dropped = {4, 40}};
+  TrafficSnapshot snapshot;
+  snapshot.topics = {
+      {.topic = "bow",
+       .category = TrafficCategory::kPlaceRecognition,
+       .count = {},
+       .held = held,
+       .refused = {}},
+      {.topic = "bow", .direction = Direction::kIn, .count = {}, .held = held, .refused = {}}};
+  writer.append(1.0, snapshot);
+  snapshot.topics[0].held.waiting = {};
+  writer.append(2.0, snapshot);
+  CHECK(csv.str() ==
+        "time_s,direction,topic,category,peer,messages,bytes,retransmitted_bytes\n"
+        "1,delayed,bow,place_recognition,*,1,10,0\n"
+        "1,waiting,bow,place_recognition,*,2,20,0\n"
+        "1,superseded,bow,place_recognition,*,3,30,0\n"
+        "1,dropped,bow,place_recognition,*,4,40,0\n"
+        "2,waiting,bow,place_recognition,*,0,0,0\n");
 }
 
 TEST_CASE("Bytes add up per direction and category", "[traffic]") {

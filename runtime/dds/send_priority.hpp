@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+
+#include "runtime/dds/qos.hpp"
+
+namespace km {
+
+/// What goes first where not all can go, most important first.
+enum class SendPriority {
+  kPresence,      ///< Statuses: small, and always sent.
+  kClosures,      ///< Told once, and what joins two robots.
+  kVerification,  ///< Requests for keyframes, and replies.
+  kPoses,         ///< All messages of the pose graph.
+  kWords,         ///< Bags of words.
+  kBacklog,       ///< Bags of words that are not new any more.
+  kMesh           ///< And whatever else there is.
+};
+inline constexpr std::size_t kSendPriorities = 7;
+
+/// That of a topic: never kBacklog. An event of verification is a closure.
+[[nodiscard]] constexpr SendPriority priority_of(TopicKind kind, TrafficCategory category) {
+  if (kind == TopicKind::kStatus) return SendPriority::kPresence;
+  switch (category) {
+    case TrafficCategory::kPlaceRecognition:
+      return SendPriority::kWords;
+    case TrafficCategory::kGeometricVerification:
+      return kind == TopicKind::kEvent ? SendPriority::kClosures : SendPriority::kVerification;
+    case TrafficCategory::kPoseGraphOptimization:
+      return SendPriority::kPoses;
+    case TrafficCategory::kOther:
+      break;
+  }
+  return SendPriority::kMesh;
+}
+
+}  // namespace km

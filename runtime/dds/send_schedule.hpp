@@ -1,0 +1,215 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <limits>
+#include <list>
+#include <map>
+#include <optional>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "modules/core/ids.hpp"
+#include "runtime/dds/send_budget.hpp"
+#include "runtime/dds/send_priority.hpp"
+#include "runtime/dds/traffic.hpp"
+
+namespace km {
+
+/// Messages that are to be sent, the most important first, each as soon as the budget lets it.
+/// Within a priority they go in order, but for bags of words: those that have waited for kNew_s go
+/// after those that come then.
+///
+/// With a budget nobody waits for room: of each priority so much is kept, then the oldest are
+/// dropped; so are requests that nobody will answer any more. Of a state only the newest with its
+/// key is kept. Without one all go in turn, and nothing is ever dropped or replaced.
+///
+/// Pure: time comes in [s], any origin, and does not go backwards. Not thread-safe.
+template <typename TopicId, typename Message>
+class SendSchedule {
+ public:
+  static constexpr std::size_t kMaxMessages = 8192;       ///< That wait, of one priority.
+  static constexpr std::uint64_t kMaxBytes = 32U << 20U;  ///< Likewise.
+  static constexpr double kNew_s = 5.0;                   ///< So long a bag of words is new.
+
+  struct Entry {
+    TopicId topic = {};
+    SendPriority priority = SendPriority::kMesh;
+    bool newest_wins = false;        ///< It replaces one with its topic, `to` and `key`.
+    std::optional<RobotId> to = {};  ///< Empty: all.
+    std::uint64_t key = 0;
+    std::uint64_t bytes = 0;                                    ///< As sent to one reader.
+    double useful_s = std::numeric_limits<double>::infinity();  ///< Later it is dropped.
+    Message message = {};
+  };
+
+  explicit SendSchedule(const BudgetConfig& config)
+      : limited_(config.is_limited()), budget_(config) {}
+
+  void push(Entry entry, double now_s) {
+    Lane& lane = lane_of(entry.priority);
+    if (limited_ && entry.newest_wins && replace(lane, entry)) return;
+    lane.messages.push_back({std::move(entry), now_s, lane.stops});
+    const Entry& last = lane.messages.back().entry;
+    lane.bytes += last.bytes;
+    ++size_;
+    if (!limited_) return;
+    held_[last.topic].waiting.add(last.bytes);
+    if (last.newest_wins) newest_[name_of(last)] = std::prev(lane.messages.end());
+    drop_surplus(lane);
+  }
+
+  /// The next message that may go. `readers_of(entry)` is the robots that it goes to, or nullopt
+  /// while it should wait for some to be there; it is not asked without a budget.
+  template <typename ReadersOf>
+  [[nodiscard]] std::optional<Entry> pop(double now_s, const ReadersOf& readers_of) {
+    wait_s_.reset();
+    move_to_backlog(now_s);
+    for (Lane& lane : lanes_)
+      if (may_go(lane, now_s, readers_of)) return std::move(take_front(lane).entry);
+    return std::nullopt;
+  }
+
+  /// After a pop() that gave nothing: how long after it the budget lets something go; nullopt if
+  /// nothing waits for that.
+  [[nodiscard]] std::optional<double> wait_s() const { return wait_s_; }
+
+  /// See SendBudget.
+  void settle(std::uint64_t sent_bytes, double now_s) { budget_.settle(sent_bytes, now_s); }
+
+  /// Nothing more will be sent: what waits is dropped.
+  void drop_all() {
+    for (Lane& lane : lanes_)
+      while (!lane.messages.empty()) drop_front(lane);
+  }
+
+  /// By topic; of those with nothing held back there may be none.
+  [[nodiscard]] const std::map<TopicId, HeldBack>& held_back() const { return held_; }
+
+  [[nodiscard]] bool is_limited() const { return limited_; }
+  [[nodiscard]] std::size_t size() const { return size_; }
+
+ private:
+  struct Waiting {
+    Entry entry;
+    double since_s = 0.0;
+    std::uint64_t stops = 0;  // of its lane when it came
+  };
+  struct Lane {
+    SendPriority priority = SendPriority::kPresence;
+    std::list<Waiting> messages = {};
+    std::uint64_t bytes = 0;
+    std::uint64_t stops = 0;  // how often the budget has stopped it
+  };
+  using Place = typename std::list<Waiting>::iterator;
+  using Name = std::tuple<TopicId, std::optional<RobotId>, std::uint64_t>;
+
+  static std::array<Lane, kSendPriorities> make_lanes() {
+    std::array<Lane, kSendPriorities> lanes;
+    for (std::size_t k = 0; k < lanes.size(); ++k) lanes[k].priority = static_cast<SendPriority>(k);
+    return lanes;
+  }
+  [[nodiscard]] Lane& lane_of(SendPriority priority) {
+    return lanes_[static_cast<std::size_t>(priority)];
+  }
+  [[nodiscard]] static Name name_of(const Entry& entry) {
+    return {entry.topic, entry.to, entry.key};
+  }
+
+  // In the place of the one it replaces, so that what changes often has its turn, too.
+  bool replace(Lane& lane, Entry& entry) {
+    const auto found = newest_.find(name_of(entry));
+    if (found == newest_.end()) return false;
+    Entry& before = found->second->entry;
+    HeldBack& held = held_[entry.topic];
+    held.superseded.add(before.bytes);
+    held.waiting.bytes += entry.bytes - before.bytes;
+    lane.bytes += entry.bytes - before.bytes;
+    before = std::move(entry);
+    return true;
+  }
+
+  void move_to_backlog(double now_s) {
+    if (!limited_) return;
+    Lane& words = lane_of(SendPriority::kWords);
+    Lane& backlog = lane_of(SendPriority::kBacklog);
+    while (!words.messages.empty() && now_s - words.messages.front().since_s >= kNew_s) {
+      Waiting& front = words.messages.front();
+      front.stops = front.stops == words.stops ? backlog.stops : kHeld;
+      words.bytes -= front.entry.bytes;
+      backlog.bytes += front.entry.bytes;
+      backlog.messages.splice(backlog.messages.end(), words.messages, words.messages.begin());
+    }
+    drop_surplus(backlog);
+  }
+
+  // Whether the first of a lane may go; those that never may are dropped.
+  template <typename ReadersOf>
+  bool may_go(Lane& lane, double now_s, const ReadersOf& readers_of) {
+    while (!lane.messages.empty()) {
+      if (!limited_) return true;
+      const Waiting& first = lane.messages.front();
+      const std::optional<std::vector<RobotId>> readers = readers_of(first.entry);
+      if (!readers) return false;
+      const auto wait = budget_.wait_s(lane.priority, first.entry.bytes, *readers, now_s);
+      if (wait && now_s - first.since_s <= first.entry.useful_s) {
+        if (*wait <= 0.0) {
+          budget_.spend(lane.priority, first.entry.bytes, *readers, now_s);
+          return true;
+        }
+        ++lane.stops;
+        wait_s_ = std::min(wait_s_.value_or(*wait), *wait);
+        return false;
+      }
+      drop_front(lane);
+    }
+    return false;
+  }
+
+  void drop_surplus(Lane& lane) {
+    while (lane.messages.size() > kMaxMessages ||
+           (lane.bytes > kMaxBytes && lane.messages.size() > 1))
+      drop_front(lane);
+  }
+
+  void drop_front(Lane& lane) {
+    const Entry dropped = take_out(lane).entry;
+    held_[dropped.topic].dropped.add(dropped.bytes);
+  }
+
+  Waiting take_front(Lane& lane) {
+    const bool held = limited_ && lane.messages.front().stops != lane.stops;
+    Waiting front = take_out(lane);
+    if (held) held_[front.entry.topic].delayed.add(front.entry.bytes);
+    return front;
+  }
+
+  Waiting take_out(Lane& lane) {
+    Waiting front = std::move(lane.messages.front());
+    if (front.entry.newest_wins) newest_.erase(name_of(front.entry));
+    lane.messages.pop_front();
+    lane.bytes -= front.entry.bytes;
+    --size_;
+    if (!limited_) return front;
+    TrafficCount& waiting = held_[front.entry.topic].waiting;
+    --waiting.messages;
+    waiting.bytes -= front.entry.bytes;
+    return front;
+  }
+
+  static constexpr std::uint64_t kHeld = std::numeric_limits<std::uint64_t>::max();
+
+  bool limited_;
+  SendBudget budget_;
+  std::array<Lane, kSendPriorities> lanes_ = make_lanes();
+  std::map<Name, Place> newest_;
+  std::map<TopicId, HeldBack> held_;
+  std::optional<double> wait_s_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace km

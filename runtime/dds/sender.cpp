@@ -1,0 +1,163 @@
+#include "runtime/dds/sender.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "runtime/clock.hpp"
+#include "runtime/dds/envelope.hpp"
+#include "runtime/log.hpp"
+#include "runtime/thread.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kTick_s = 0.25;  // for what nobody announces: readers, and what is sent again
+constexpr double kLast_s = 2.0;   // for what is left at the end
+constexpr std::size_t kHeldForNobody = 4096;
+
+}  // namespace
+
+Sender::Sender(const BudgetConfig& budget, double lease_s,
+               const std::vector<std::unique_ptr<OutgoingTopic>>& topics)
+    : lease_s_(lease_s),
+      topics_(topics),
+      posted_(kQueue, Overflow::kBlock),
+      schedule_(budget),
+      heartbeat_([this] { posted_.close(); }) {}
+
+void Sender::stop() noexcept {
+  posted_.close();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Sender::post(Outgoing message) {
+  const Heartbeat::Waiting waiting;  // for room, if there is none
+  posted_.push(std::move(message));
+}
+
+void Sender::catch_up(RobotId robot) {
+  const std::lock_guard lock(mutex_);
+  due_.insert(robot);
+}
+
+std::map<const OutgoingTopic*, HeldBack> Sender::held_back() const {
+  const std::lock_guard lock(mutex_);
+  return held_;
+}
+
+void Sender::run() try {
+  name_this_thread("dds_send");
+  std::optional<double> end_s;
+  while (true) {
+    catch_up_due();
+    file_posted();
+    if (send_next()) continue;
+    const double now_s = steady_now_s();
+    if (posted_.is_over()) {
+      if (!end_s) end_s = now_s + kLast_s;
+      if (schedule_.size() == 0 || now_s >= *end_s) break;
+    }
+    const double wait_s = std::min(schedule_.wait_s().value_or(kTick_s), kTick_s);
+    if (posted_.is_over())
+      std::this_thread::sleep_for(steady_duration(wait_s));
+    else if (const auto message = posted_.pop_within(steady_duration(wait_s)))
+      file(*message);
+  }
+  schedule_.drop_all();
+  tell();
+} catch (...) {
+  error_ = std::current_exception();
+  failed_ = true;  // after error_: publishes it
+  posted_.close();
+}
+
+// Goes past the budget, which settle() has it count against.
+void Sender::catch_up_due() {
+  std::set<RobotId> due;
+  {
+    const std::lock_guard lock(mutex_);
+    due.swap(due_);
+  }
+  const Heartbeat::Step step(heartbeat_);
+  for (const RobotId robot : due)
+    for (const auto& topic : topics_) topic->catch_up(robot);
+}
+
+// What has been posted so far, but no more than leaves time to send. Without a budget who posts
+// waits for room, with one the schedule makes it.
+void Sender::file_posted() {
+  constexpr int kAtOnce = 64;
+  for (int k = 0; k < kAtOnce && (schedule_.is_limited() || schedule_.size() < kQueue); ++k) {
+    const auto message = posted_.pop_within({});
+    if (!message) return;
+    file(*message);
+  }
+}
+
+// False if nothing may go now.
+bool Sender::send_next() {
+  const double now_s = steady_now_s();
+  settle(now_s);
+  auto next = schedule_.pop(now_s, [this](const auto& entry) { return readers_of(entry); });
+  if (!next) {
+    holds_back_ = schedule_.wait_s().has_value();
+    tell();
+    return false;
+  }
+  const Heartbeat::Step step(heartbeat_);
+  const auto scope = timing_.measure();
+  next->topic->write(next->message.to, next->key, std::move(next->message.content));
+  return true;
+}
+
+void Sender::file(const Outgoing& message) {
+  const Heartbeat::Step step(heartbeat_);
+  const auto scope = timing_.measure();
+  const TopicSpec& spec = message.topic->spec();
+  const TopicKind kind = spec.kind;
+  Schedule::Entry entry{.topic = message.topic,
+                        .priority = priority_of(kind, spec.category),
+                        .newest_wins = kind == TopicKind::kState || kind == TopicKind::kStatus,
+                        .key = message.key,
+                        .message = {message.to, message.encode()}};
+  if (message.to) entry.to = message.to->robot;
+  entry.bytes = envelope_bytes(entry.message.content.size());
+  if (kind == TopicKind::kRequest) entry.useful_s = lease_s_;
+  schedule_.push(std::move(entry), steady_now_s());
+}
+
+std::optional<std::vector<RobotId>> Sender::readers_of(const Schedule::Entry& entry) const {
+  OutgoingTopic& topic = *entry.topic;
+  std::vector<RobotId> readers = topic.readers_of(entry.message.to);
+  const bool may_wait = !entry.to && is_reliable(topic.spec().kind) && !posted_.is_over() &&
+                        schedule_.size() < kHeldForNobody;
+  if (readers.empty() && may_wait) return std::nullopt;
+  return readers;
+}
+
+void Sender::settle(double now_s) {
+  if (!schedule_.is_limited() || now_s - settled_s_ < kTick_s) return;
+  settled_s_ = now_s;
+  std::uint64_t sent_bytes = 0;
+  for (const auto& topic : topics_) sent_bytes += topic->sent_bytes();
+  schedule_.settle(sent_bytes, now_s);
+}
+
+void Sender::tell() {
+  if (!schedule_.is_limited()) return;
+  bool lost = false;
+  {
+    const std::lock_guard lock(mutex_);
+    held_.clear();
+    for (const auto& [topic, held] : schedule_.held_back()) {
+      held_[topic] = held;
+      lost |= held.dropped.messages > 0;
+    }
+  }
+  if (holds_back_ && !std::exchange(told_delay_, true))
+    log::info("dds") << "the budget is used up for now: messages wait, see traffic.csv";
+  if (lost && !std::exchange(told_loss_, true))
+    log::warn("dds") << "messages are not sent for want of budget, see traffic.csv";
+}
+
+}  // namespace km

@@ -1,0 +1,105 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "runtime/bounded_queue.hpp"
+#include "runtime/dds/budget_config.hpp"
+#include "runtime/dds/outgoing_topic.hpp"
+#include "runtime/dds/send_schedule.hpp"
+#include "runtime/heartbeat.hpp"
+#include "runtime/metrics.hpp"
+
+namespace km {
+
+/// A message on its way out.
+struct Outgoing {
+  OutgoingTopic* topic = nullptr;
+  std::optional<Addressee> to = {};  ///< Empty: all.
+  MessageKey key = 0;
+  std::function<std::vector<std::uint8_t>()> encode = {};  ///< Called on the sender's thread.
+};
+
+/// Encodes messages and writes them on a thread of its own, in the order of SendSchedule. With a
+/// budget, what is for all robots waits while there is none, within bounds: what DDS is given, it
+/// sends at once to who comes.
+class Sender {
+ public:
+  /// How many messages may wait to be encoded; who posts one more waits.
+  static constexpr std::size_t kQueue = 8192;
+
+  /// `topics` are all that it may be given messages of, and outlive it; the list may grow until
+  /// start(). Requests wait no longer than `lease_s`. Throws ConfigError.
+  Sender(const BudgetConfig& budget, double lease_s,
+         const std::vector<std::unique_ptr<OutgoingTopic>>& topics);
+  ~Sender() { stop(); }
+  Sender(const Sender&) = delete;
+  Sender& operator=(const Sender&) = delete;
+
+  void start() { thread_ = std::thread(&Sender::run, this); }
+
+  /// Sends what is queued, with a budget as much as that lets go within two seconds, and joins.
+  /// Idempotent.
+  void stop() noexcept;
+
+  /// Thread-safe.
+  void post(Outgoing message);
+
+  /// Has `robot` sent what the topics keep for it, see OutgoingTopic::catch_up(). Waits for
+  /// nothing. Thread-safe.
+  void catch_up(RobotId robot);
+
+  /// True while messages wait for the budget. Thread-safe.
+  [[nodiscard]] bool holds_back() const { return holds_back_; }
+  /// Thread-safe.
+  [[nodiscard]] std::map<const OutgoingTopic*, HeldBack> held_back() const;
+
+  /// The exception that ended the thread, or null. Thread-safe.
+  std::exception_ptr error() const { return failed_ ? error_ : nullptr; }
+  Heartbeat& heartbeat() { return heartbeat_; }
+  /// Of encoding and of writing each message. Thread-safe.
+  DurationHistogram timing() const { return timing_.histogram(); }
+
+ private:
+  struct Encoded {
+    std::optional<Addressee> to;
+    std::vector<std::uint8_t> content;
+  };
+  using Schedule = SendSchedule<OutgoingTopic*, Encoded>;
+
+  void run();
+  void catch_up_due();
+  void file_posted();
+  bool send_next();
+  void file(const Outgoing& message);
+  void settle(double now_s);
+  void tell();
+  [[nodiscard]] std::optional<std::vector<RobotId>> readers_of(const Schedule::Entry& entry) const;
+
+  const double lease_s_;
+  const std::vector<std::unique_ptr<OutgoingTopic>>& topics_;
+  BoundedQueue<Outgoing> posted_;
+  Schedule schedule_;  // the thread's own, as what follows
+  double settled_s_ = 0.0;
+  bool told_delay_ = false, told_loss_ = false;
+  std::atomic<bool> holds_back_ = false;
+  mutable std::mutex mutex_;  // guards held_ and due_
+  std::map<const OutgoingTopic*, HeldBack> held_;
+  std::set<RobotId> due_;  // to catch up
+  Heartbeat heartbeat_;
+  Timing timing_;
+  std::exception_ptr error_;
+  std::atomic<bool> failed_ = false;
+  std::thread thread_;
+};
+
+}  // namespace km
