@@ -178,8 +178,7 @@ class Watch {
                                                   .present_peers = present,
                                                   .unheard = static_cast<std::size_t>(unheard)});
       robot_.set_settled(told);
-      silent_peers_.update(now_s, silent_peers());
-      lost_peers_ = silent_peers_.lost(team);
+      absentees_.update(now_s, known_peers(), team);
       const auto running = [](const auto& peer) { return peer.phase == RobotPhase::kRunning; };
       if (told.phase == RobotPhase::kSettled && std::ranges::none_of(present, running))
         robot_.expect_no_more_closures();
@@ -196,11 +195,13 @@ class Watch {
   [[nodiscard]] RunSummary::Process process() const { return process_csv_.summary(); }
   [[nodiscard]] double seconds() const { return steady_now_s() - start_s_; }
   [[nodiscard]] const char* reason() const { return departure_.reason(); }
-  [[nodiscard]] const std::vector<LostPeer>& lost_peers() const { return lost_peers_; }
+  [[nodiscard]] std::vector<MissedPeer> missed() const { return absentees_.missed(kHearsay_s); }
 
  private:
   static constexpr double kInterval_s = 1.0;  // between rows of a CSV, and status lines
   static constexpr double kGoodbye_s = 1.5;   // three times the period of the status
+  // A chain of robots leaves one after the other, and the first are gone before the last hears.
+  static constexpr double kHearsay_s = 2.0 * kGoodbye_s;
 
   // A run of the past is there for others: it stays until one has come, or none does.
   bool waits_for_company(double now_s) const {
@@ -225,14 +226,21 @@ class Watch {
                                     traffic, process_usage().resident_bytes));
   }
 
-  // A peer that last said that it leaves is not missed.
-  std::map<RobotId, std::string> silent_peers() const {
-    std::map<RobotId, std::string> silent;
+  // A peer that last said that it leaves, and is not heard any more, has left.
+  std::map<RobotId, Absentees::Known> known_peers() const {
+    using enum Absentees::Contact;
+    std::map<RobotId, Absentees::Known> known;
     for (const Peer& peer : robot_.bridge().peers().list())
-      if (peer.state == PeerState::kLost) silent[peer.identity.robot] = peer.identity.name;
-    for (const RobotStatus& status : robot_.status_node().peers())
-      if (status.phase == RobotPhase::kLeaving) silent.erase(status.robot);
-    return silent;
+      known[peer.identity.robot] = {peer.identity.name, peer.state == PeerState::kAlive  ? kHeard
+                                                        : peer.state == PeerState::kLost ? kSilent
+                                                                                         : kLeft};
+    for (const RobotStatus& status : robot_.status_node().peers()) {
+      const auto peer = known.find(status.robot);
+      if (status.phase == RobotPhase::kLeaving && peer != known.end() &&
+          peer->second.contact == kSilent)
+        peer->second.contact = kLeft;
+    }
+    return known;
   }
 
   // A peer that is there but has not said how far it is counts as running, whatever its former
@@ -262,8 +270,7 @@ class Watch {
   const bool is_past_;
   const double serve_limit_s_;
   Departure departure_;
-  SilentPeers silent_peers_;
-  std::vector<LostPeer> lost_peers_;
+  Absentees absentees_;
   double start_s_;
   GrowingFile traffic_file_;
   TrafficCsv traffic_csv_;
@@ -355,7 +362,7 @@ int conclude(const RobotOptions& options, Robot& robot, std::optional<Watch>& wa
              const RunResult& result, const RunRecord& record, ResultWriter& results) {
   watch->finish(record);
   RunEnd end = end_of(options, robot, result, watch->reason(), record);
-  end.lost_peers = watch->lost_peers();
+  end.missed = watch->missed();
   RunSummary summary = summary_of(record);
   summary.name = options.name;
   summary.frames = end.images.value_or(ImageCounts{}).read;
@@ -363,7 +370,9 @@ int conclude(const RobotOptions& options, Robot& robot, std::optional<Watch>& wa
   summary.traffic = sent_bytes(robot);
   summary.process = watch->process();
   summary.seconds = watch->seconds();
-  for (const LostPeer& peer : end.lost_peers) summary.lost_peers[peer.name] = peer.silent_s;
+  for (const MissedPeer& peer : end.missed)
+    (peer.why == Absence::kSilent ? summary.lost_peers : summary.apart_peers)[peer.name] =
+        peer.missed_s;
   watch.reset();  // the status line ends before the last log lines
   write_all(options, robot, record, result, results);
   end.lost_results = results.lost();

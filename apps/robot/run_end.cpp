@@ -12,6 +12,8 @@ constexpr int kFailed = 3;
 constexpr int kResultsLost = 4;
 constexpr int kHung = 5;
 
+constexpr const char* kAllSettled = "all present robots have settled";
+
 // Each image is in one of the counts.
 std::string why_no_pose(const ImageCounts& images) {
   const std::size_t given = images.read + images.skipped;
@@ -54,24 +56,44 @@ Departure::Present Departure::update(double now_s, const Inputs& inputs) {
       std::any_of(inputs.present_peers.begin(), inputs.present_peers.end(),
                   [](const Present& peer) { return peer.phase == RobotPhase::kLeaving; });
   if (told || (all_settled && now_s - *all_settled_s_ >= settle_s_))
-    reason_ = "all present robots have settled";
+    reason_ = kAllSettled;
   else if (now_s - *ended_s_ >= serve_limit_s_)
     reason_ = "time limit for serving peers";
   return {settled ? RobotPhase::kSettled : RobotPhase::kFinished, links};
 }
 
-void SilentPeers::update(double now_s, const std::map<RobotId, std::string>& silent) {
+void Absentees::update(double now_s, const std::map<RobotId, Known>& known,
+                       std::span<const RobotId> members) {
   now_s_ = now_s;
-  std::erase_if(silent_, [&](const auto& entry) { return !silent.contains(entry.first); });
-  for (const auto& [robot, name] : silent) silent_.try_emplace(robot, Silence{name, now_s});
+  std::map<RobotId, Missed> missed;
+  for (const auto& [robot, peer] : known) {
+    if (peer.contact == Contact::kLeft || std::ranges::find(members, robot) != members.end())
+      continue;
+    const Absence why = peer.contact == Contact::kSilent ? Absence::kSilent : Absence::kApart;
+    miss(robot, {.name = peer.name, .why = why}, missed);
+  }
+  for (const RobotId robot : ever_members_)
+    if (!known.contains(robot) && std::ranges::find(members, robot) == members.end())
+      miss(robot, {.name = "robot " + std::to_string(robot), .hearsay = true}, missed);
+  missed_ = std::move(missed);
+  ever_members_.insert(members.begin(), members.end());
 }
 
-std::vector<LostPeer> SilentPeers::lost(std::span<const RobotId> reached) const {
-  std::vector<LostPeer> lost;
-  for (const auto& [robot, silence] : silent_)
-    if (std::ranges::find(reached, robot) == reached.end())
-      lost.push_back({silence.name, now_s_ - silence.since_s});
-  return lost;
+// Since when it is missed for this reason.
+void Absentees::miss(RobotId robot, const Missed& missed, std::map<RobotId, Missed>& now) const {
+  const auto before = missed_.find(robot);
+  const bool goes_on = before != missed_.end() && before->second.why == missed.why;
+  now.emplace(robot, missed).first->second.since_s = goes_on ? before->second.since_s : now_s_;
+}
+
+std::vector<MissedPeer> Absentees::missed(double hearsay_s) const {
+  std::vector<MissedPeer> peers;
+  for (const auto& [robot, missed] : missed_) {
+    const double missed_s = now_s_ - missed.since_s;
+    if (!missed.hearsay || missed_s >= hearsay_s)
+      peers.push_back({missed.name, missed.why, missed_s});
+  }
+  return peers;
 }
 
 std::string to_string(const ImageCounts& images) {
@@ -81,13 +103,14 @@ std::string to_string(const ImageCounts& images) {
 
 namespace {
 
-// "without bob (silent for 31.2 s), carol (silent for 7.0 s)"
-std::string without(const std::vector<LostPeer>& lost) {
-  std::string text = "without";
-  for (const char* separator = " "; const LostPeer& peer : lost) {
-    text += separator + peer.name + " (silent for " + fixed(peer.silent_s, 1) + " s)";
-    separator = ", ";
-  }
+// "bob (not heard for 31.2 s), carol (heard, but not in one frame for 7.0 s)"
+std::string names_of(const std::vector<MissedPeer>& missed) {
+  std::string text;
+  for (const MissedPeer& peer : missed)
+    text +=
+        (text.empty() ? "" : ", ") + peer.name +
+        (peer.why == Absence::kSilent ? " (not heard for " : " (heard, but not in one frame for ") +
+        fixed(peer.missed_s, 1) + " s)";
   return text;
 }
 
@@ -102,7 +125,9 @@ Verdict verdict_of_run(const RunEnd& end) {
   if (end.images && end.images->with_pose == 0)
     return {kNothingEstimated, why_no_pose(*end.images)};
   const std::string departure = end.departure != nullptr ? end.departure : "unknown";
-  return {0, end.lost_peers.empty() ? departure : without(end.lost_peers) + ": " + departure};
+  if (end.missed.empty()) return {0, departure};
+  return {0,
+          (departure == kAllSettled ? "settled" : departure) + " without " + names_of(end.missed)};
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -53,29 +54,47 @@ class Departure {
   const char* reason_ = nullptr;
 };
 
-/// A robot that went silent without a word and has not come back: out of reach, or dead.
-struct LostPeer {
+/// Why a robot ends without another one of its team. kSilent: it went silent without a word and has
+/// not come back: out of reach, or dead. kApart: it is heard, but they are not in one frame.
+enum class Absence { kSilent, kApart };
+
+struct MissedPeer {
   std::string name;
-  double silent_s = 0.0;  ///< At the end.
+  Absence why = Absence::kSilent;
+  double missed_s = 0.0;  ///< For how long, at the end.
 };
 
-/// Keeps since when robots are silent. Pure: time comes in [s], any origin.
-class SilentPeers {
+/// Keeps since when a robot misses others of its team. Pure: time comes in [s], any origin.
+class Absentees {
  public:
-  /// The names of those that are silent at `now_s`; of the others nothing is kept.
-  void update(double now_s, const std::map<RobotId, std::string>& silent);
+  /// A robot that has been heard. kLeft: it said good-bye.
+  enum class Contact { kHeard, kSilent, kLeft };
+  struct Known {
+    std::string name;
+    Contact contact = Contact::kHeard;
+  };
 
-  /// All as of the last update(), ascending by id, but those that `reached` names: others hear
-  /// them.
-  [[nodiscard]] std::vector<LostPeer> lost(std::span<const RobotId> reached) const;
+  /// `members`: the robots in one frame with this one, itself included, whether it hears them or
+  /// others do.
+  void update(double now_s, const std::map<RobotId, Known>& known,
+              std::span<const RobotId> members);
+
+  /// As of the last update(), ascending by id. Former members that were never heard are told once
+  /// they have been missed for `hearsay_s`: they may have left in order, as only others know.
+  [[nodiscard]] std::vector<MissedPeer> missed(double hearsay_s) const;
 
  private:
-  struct Silence {
+  struct Missed {
     std::string name;
+    Absence why = Absence::kSilent;
+    bool hearsay = false;
     double since_s = 0.0;
   };
+  void miss(RobotId robot, const Missed& missed, std::map<RobotId, Missed>& now) const;
+
   double now_s_ = 0.0;
-  std::map<RobotId, Silence> silent_;
+  std::set<RobotId> ever_members_;
+  std::map<RobotId, Missed> missed_;
 };
 
 /// What became of the images of a recording.
@@ -95,7 +114,7 @@ struct RunEnd {
   std::optional<ImageCounts> images = {};  ///< Absent for a robot without sensors.
   /// Why each result that could not be written is lost, by file.
   std::map<std::string, std::string> lost_results = {};
-  std::vector<LostPeer> lost_peers = {};  ///< Robots of the team that were lost at the end.
+  std::vector<MissedPeer> missed = {};  ///< Whom the robot left without.
 };
 
 /// What the robot says of its run, to people and to the process that started it.
@@ -106,8 +125,8 @@ struct Verdict {
 
 /// 5 if a module hung. 3 if one failed, or another robot claimed the id: whose data the team then
 /// used is anybody's guess. 1 if the run came to its end and not one image has a pose. 4 if results
-/// could not be written. 0 otherwise. A robot that left while others were lost says whom, and for
-/// how long they had been silent.
+/// could not be written. 0 otherwise. A robot that left without others of its team says whom, why,
+/// and for how long it had missed them.
 [[nodiscard]] Verdict verdict_of(const RunEnd& end);
 
 /// "2910 of 2912 images have a pose".

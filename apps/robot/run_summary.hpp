@@ -116,6 +116,8 @@ struct RunSummary {
   double seconds = 0.0;  ///< Wall time of the run.
   /// Robots that went silent and did not come back, and for how long they had been silent [s].
   std::map<std::string, double> lost_peers;
+  /// Robots that were heard, and for how long they had not been in one frame with this one [s].
+  std::map<std::string, double> apart_peers;
   std::string exit_reason;
 
   void visit_fields(auto& visitor) {
@@ -132,6 +134,7 @@ struct RunSummary {
     visitor.field("process", process);
     visitor.field("seconds", seconds);
     visitor.field("lost_peers", lost_peers);
+    visitor.field("apart_peers", apart_peers);
     visitor.field("exit_reason", exit_reason);
   }
   bool operator==(const RunSummary&) const = default;

@@ -146,38 +146,58 @@ TEST_CASE("Without sensors, or interrupted, no pose is no failure", "[run_end]")
   CHECK(verdict_of(interrupted).reason == "interrupted");
 }
 
-TEST_CASE("A robot that leaves while others are lost names them", "[run_end]") {
+TEST_CASE("A robot that leaves without others has a verdict of its own that names them",
+          "[run_end]") {
   RunEnd end = usual_end();
-  end.lost_peers = {{"bob", 31.24}};
+  end.missed = {{"bob", Absence::kSilent, 31.24}};
   CHECK(verdict_of(end).exit_code == 0);
-  CHECK(verdict_of(end).reason ==
-        "without bob (silent for 31.2 s): all present robots have settled");
+  CHECK(verdict_of(end).reason == "settled without bob (not heard for 31.2 s)");
   end.departure = "time limit for serving peers";
-  end.lost_peers.push_back({"carol", 7.0});
+  end.missed.push_back({"carol", Absence::kApart, 7.0});
   CHECK(verdict_of(end).reason ==
-        "without bob (silent for 31.2 s), carol (silent for 7.0 s): time limit for serving peers");
+        "time limit for serving peers without bob (not heard for 31.2 s), carol (heard, but not in "
+        "one frame for 7.0 s)");
   end.result.interrupted = true;
   CHECK(verdict_of(end).reason == "interrupted");  // it did not leave of itself
 }
 
-TEST_CASE("A silent robot is lost for as long as it has been silent", "[run_end]") {
-  SilentPeers peers;
-  const auto lost = [&](const std::vector<RobotId>& reached) {
-    std::string text;
-    for (const LostPeer& peer : peers.lost(reached))
-      text += peer.name + ' ' + std::to_string(static_cast<int>(peer.silent_s)) + ' ';
-    return text;
-  };
-  CHECK(lost({}).empty());
-  peers.update(100.0, {{2, "bob"}});
-  peers.update(103.0, {{2, "bob"}, {7, "carol"}});
-  peers.update(110.0, {{2, "bob"}, {7, "carol"}});
-  CHECK(lost({}) == "bob 10 carol 7 ");
-  CHECK(lost({{2}}) == "carol 7 ");
-  peers.update(111.0, {{7, "carol"}});  // bob is back
-  peers.update(112.0, {{2, "bob"}, {7, "carol"}});
-  peers.update(113.0, {{2, "bob"}, {7, "carol"}});
-  CHECK(lost({}) == "bob 1 carol 10 ");
+using enum Absentees::Contact;
+
+// "bob silent 10 carol apart 7 "
+std::string told(const Absentees& absentees, double hearsay_s = 0.0) {
+  std::string text;
+  for (const MissedPeer& peer : absentees.missed(hearsay_s))
+    text += peer.name + (peer.why == Absence::kSilent ? " silent " : " apart ") +
+            std::to_string(static_cast<int>(peer.missed_s)) + ' ';
+  return text;
+}
+
+TEST_CASE("A robot is missed for as long as it has been silent or in another frame", "[run_end]") {
+  const std::vector<RobotId> alone{1}, with_bob{1, 2};
+  Absentees absentees;
+  CHECK(told(absentees).empty());
+  absentees.update(99.0, {{2, {"bob", kHeard}}, {7, {"carol", kHeard}}}, with_bob);
+  CHECK(told(absentees) == "carol apart 0 ");
+  absentees.update(100.0, {{2, {"bob", kSilent}}, {7, {"carol", kHeard}}}, alone);
+  absentees.update(103.0, {{2, {"bob", kSilent}}, {7, {"carol", kSilent}}}, alone);
+  absentees.update(110.0, {{2, {"bob", kSilent}}, {7, {"carol", kSilent}}}, alone);
+  CHECK(told(absentees) == "bob silent 10 carol silent 7 ");
+  absentees.update(110.0, {{2, {"bob", kSilent}}, {7, {"carol", kSilent}}}, with_bob);
+  CHECK(told(absentees) == "carol silent 7 ");  // others hear bob
+  absentees.update(111.0, {{2, {"bob", kHeard}}, {7, {"carol", kSilent}}}, alone);
+  absentees.update(112.0, {{2, {"bob", kHeard}}, {7, {"carol", kLeft}}}, alone);
+  CHECK(told(absentees) == "bob apart 1 ");
+}
+
+TEST_CASE("A member that only others heard is missed once it cannot have left in order",
+          "[run_end]") {
+  Absentees absentees;
+  absentees.update(5.0, {{2, {"bob", kHeard}}}, std::vector<RobotId>{1, 2, 7});
+  absentees.update(6.0, {{2, {"bob", kHeard}}}, std::vector<RobotId>{1, 2});
+  absentees.update(8.0, {{2, {"bob", kHeard}}}, std::vector<RobotId>{1, 2});
+  CHECK(told(absentees, 3.0).empty());
+  absentees.update(9.0, {{2, {"bob", kHeard}}}, std::vector<RobotId>{1, 2});
+  CHECK(told(absentees, 3.0) == "robot 7 silent 3 ");
 }
 
 TEST_CASE("Lost results are told with their reasons and have an exit code, the least of all",

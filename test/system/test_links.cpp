@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iostream>
+#include <map>
 #include <memory>
 
 #include "test/support/network.hpp"
@@ -29,10 +30,12 @@ Links all_links(int robots) {
 // A team on hosts of which those in `links` hear each other; robot k is on host k + 1.
 class Team {
  public:
-  Team(const SplitGraph& graph, const Links& links, const fs::path& folder, std::string method)
+  Team(const SplitGraph& graph, const Links& links, const fs::path& folder, std::string method,
+       int settle_s = 3)
       : network_(static_cast<int>(graph.keyframes.size())),
         folder_(folder),
-        method_(std::move(method)) {
+        method_(std::move(method)),
+        settle_s_(settle_s) {
     const int robots = static_cast<int>(graph.keyframes.size());
     for (const auto& [a, b] : all_links(robots))
       if (std::find(links.begin(), links.end(), std::pair(a, b)) == links.end())
@@ -43,6 +46,18 @@ class Team {
       robots_.push_back(std::make_unique<Process>(command(k, domain), network_.host(k + 1)));
     }
   }
+
+  // True once every robot has said that it solves with all others.
+  bool is_joint() {
+    const std::string with_all = ", with " + std::to_string(robots_.size() - 1);
+    return std::all_of(robots_.begin(), robots_.end(), [&](const auto& robot) {
+      return robot->wait_until([&](const auto& line) { return line.find(with_all) != line.npos; })
+          .has_value();
+    });
+  }
+
+  // Nobody hears robot k any more.
+  void cut_off(int k) { network_.set_link(k + 1, false); }
 
   // Exit codes of all.
   std::vector<int> wait() {
@@ -58,6 +73,7 @@ class Team {
             robot_name(k), "--graph", (folder_ / ("part" + number + ".g2o")).string(), "--rate",
             "max", "--output", (folder_ / robot_name(k)).string(), "--domain",
             std::to_string(domain), "--interface", "eth0", "--set", "pose_graph.method=" + method_,
+            "--set", "run.settle_s=" + std::to_string(settle_s_),
             // One of the random closures has a residual of 5.6 sigma with it and more than the
             // default limit of 6.2 without: whether it is kept hangs on which session hears of it.
             "--set", "pose_graph.barc=20", "--log", "warn"};
@@ -66,6 +82,7 @@ class Team {
   VirtualNetwork network_;
   fs::path folder_;
   std::string method_;
+  int settle_s_;
   std::vector<std::unique_ptr<Process>> robots_;
 };
 
@@ -147,6 +164,33 @@ TEST_CASE("A robot that not everyone hears is taken in", "[system][namespaces]")
   std::cout << "link 1-3 cut, rbcd: " << cut << "; with all links: " << whole << '\n';
   CHECK(cut.edges == whole.edges);
   CHECK(cut.cost == Approx(cut.one).epsilon(1e-4));  // rbcd stops when it has become slow
+}
+
+TEST_CASE("A team that falls in two ends with both sides telling whom they waited for",
+          "[system][namespaces]") {
+  if (!VirtualNetwork::available()) return;
+  const SplitGraph graph = random_team(21, {0, 1, 2}, 40, {{0, 1}, {1, 2}});
+  const TemporaryFolder folder;
+  constexpr int kSettle_s = 20;  // they are cut apart before
+  Team team(graph, {{0, 1}, {1, 2}}, folder.path(), "newton", kSettle_s);
+  REQUIRE(team.is_joint());
+  team.cut_off(2);
+  CHECK(team.wait() == std::vector<int>{0, 0, 0});
+  // Robots 0 and 2 know each other from robot 1 alone.
+  const std::map<int, std::vector<std::string>> missed{
+      {0, {"robot 2"}}, {1, {"robot2"}}, {2, {"robot 0", "robot1"}}};
+  for (const auto& [robot, names] : missed) {
+    const RunSummary summary = read_summary(folder.path() / robot_name(robot) / "summary.json");
+    CAPTURE(robot, summary.exit_reason);
+    CHECK_THAT(summary.exit_reason, Catch::StartsWith("settled without "));
+    CHECK(summary.lost_peers.size() == names.size());
+    CHECK(summary.apart_peers.empty());
+    for (const std::string& name : names) {
+      CHECK_THAT(summary.exit_reason, Catch::Contains(name + " (not heard for "));
+      REQUIRE(summary.lost_peers.contains(name));
+      CHECK(summary.lost_peers.at(name) > 0.0);
+    }
+  }
 }
 
 TEST_CASE("Five processes over DDS come to the cost that one process comes to", "[system]") {
