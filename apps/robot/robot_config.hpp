@@ -23,6 +23,7 @@
 #include "modules/sensors/sensors_config.hpp"
 #include "modules/vio/tracker_config.hpp"
 #include "modules/vio/vio_config.hpp"
+#include "runtime/dds/budget_config.hpp"
 #include "runtime/dds/dds_config.hpp"
 
 namespace km {
@@ -57,6 +58,7 @@ struct RobotOptions {
 struct RobotConfig {
   RunConfig run;
   DdsConfig dds;
+  BudgetConfig budget;
   SensorsConfig sensors;
   TrackerConfig tracker;
   VioConfig vio;
@@ -78,8 +80,8 @@ struct RobotConfig {
   /// Calls visit(section) for every section, in the order of files.
   void visit_sections(const auto& visit) {
     const auto visit_all = [&](auto&... sections) { (visit(sections), ...); };
-    visit_all(run, dds, sensors, tracker, vio, keyframe_features, place_recognition, loop_closure,
-              pcm, pose_graph, graph_playback, mapping, stereo_depth, segmentation,
+    visit_all(run, dds, budget, sensors, tracker, vio, keyframe_features, place_recognition,
+              loop_closure, pcm, pose_graph, graph_playback, mapping, stereo_depth, segmentation,
               semantic_mapping, mesh_deformation, mesh_chunks);
   }
 };

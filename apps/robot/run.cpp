@@ -114,12 +114,19 @@ std::string map_text(const std::optional<MappingProgress>& mapping) {
          " faces";
 }
 
+// Nothing where nothing waits.
+std::string waiting_text(const TrafficSnapshot& traffic) {
+  std::uint64_t bytes = 0;
+  for (const TopicTraffic& topic : traffic.topics) bytes += topic.held.waiting.bytes;
+  return bytes == 0 ? "" : ", waiting " + bytes_text(static_cast<double>(bytes));
+}
+
 // How the robot is doing, in one line:
 //     7.4 s, 148 images, 21 keyframes | peers: bob alive | closures: own 3>2>2, bob 14>12>10
 //     | pgo: cost 12.4, round 31, with 2 | map: 812 blocks, 53 k vertices, 101 k faces
-//     | out: place 81.3 kB, verify 210.4 kB, pgo 5.0 kB, other 2.1 kB | 143 MB
-// Closures are candidates > verified > inliers with each robot, counted by who found them; last
-// comes the memory that the robot occupies.
+//     | out: place 81.3 kB, verify 210.4 kB, pgo 5.0 kB, other 2.1 kB, waiting 12.1 kB | 143 MB
+// Closures are candidates > verified > inliers with each robot, counted by who found them; what
+// waits for the budget is told where there is some; last comes the memory that the robot occupies.
 std::string status_text(double dataset_time_s, const RunRecord& record,
                         const std::vector<Peer>& peers, const TrafficSnapshot& traffic,
                         std::uint64_t resident_bytes) {
@@ -133,7 +140,7 @@ std::string status_text(double dataset_time_s, const RunRecord& record,
          sent(TrafficCategory::kPlaceRecognition) + ", verify " +
          sent(TrafficCategory::kGeometricVerification) + ", pgo " +
          sent(TrafficCategory::kPoseGraphOptimization) + ", other " +
-         sent(TrafficCategory::kOther) + " | " +
+         sent(TrafficCategory::kOther) + waiting_text(traffic) + " | " +
          fixed(1e-6 * static_cast<double>(resident_bytes), 0) + " MB";
 }
 
@@ -172,8 +179,10 @@ class Watch {
       const auto unheard = std::count_if(team.begin(), team.end(), [&](RobotId member) {
         return member != record.robot() && !peers.contains(member);
       });
+      // What still waits for the budget may change the graphs of others.
+      const bool settled = record.settled() && !robot_.bridge().holds_back();
       const auto told = departure_.update(now_s, {.input_ended = ended,
-                                                  .graph_settled = record.settled(),
+                                                  .graph_settled = settled,
                                                   .activity = record.activity(),
                                                   .present_peers = present,
                                                   .unheard = static_cast<std::size_t>(unheard)});
@@ -330,6 +339,22 @@ std::map<std::string, std::uint64_t> sent_bytes(Robot& robot) {
   return bytes;
 }
 
+RunSummary::HeldBack held_back(Robot& robot) {
+  RunSummary::HeldBack sums;
+  for (const TopicTraffic& topic : robot.bridge().traffic().topics) {
+    if (topic.direction == Direction::kIn) continue;
+    const std::string category = to_string(topic.category);
+    const auto add = [&](RunSummary::Counts& sum, const TrafficCount& count) {
+      sum.messages[category] += count.messages;
+      sum.bytes[category] += count.bytes;
+    };
+    add(sums.delayed, topic.held.delayed);
+    add(sums.superseded, topic.held.superseded);
+    add(sums.dropped, topic.held.dropped);
+  }
+  return sums;
+}
+
 // What the others sent of their maps, as far as it arrived.
 void write_peer_meshes(const fs::path& folder, const TeamMeshNode& peers, ResultWriter& results) {
   for (const RobotMesh& peer : peers.snapshot()) {
@@ -358,8 +383,9 @@ void write_all(const RobotOptions& options, Robot& robot, const RunRecord& recor
 }
 
 // Writes what the run leaves; the exit code.
-int conclude(const RobotOptions& options, Robot& robot, std::optional<Watch>& watch,
-             const RunResult& result, const RunRecord& record, ResultWriter& results) {
+int conclude(const RobotOptions& options, bool has_budget, Robot& robot,
+             std::optional<Watch>& watch, const RunResult& result, const RunRecord& record,
+             ResultWriter& results) {
   watch->finish(record);
   RunEnd end = end_of(options, robot, result, watch->reason(), record);
   end.missed = watch->missed();
@@ -368,6 +394,7 @@ int conclude(const RobotOptions& options, Robot& robot, std::optional<Watch>& wa
   summary.frames = end.images.value_or(ImageCounts{}).read;
   summary.frames_skipped = end.images.value_or(ImageCounts{}).skipped;
   summary.traffic = sent_bytes(robot);
+  if (has_budget) summary.held_back = held_back(robot);
   summary.process = watch->process();
   summary.seconds = watch->seconds();
   for (const MissedPeer& peer : end.missed)
@@ -414,7 +441,7 @@ int run_robot(const RobotOptions& options, SignalWatch& signals,
   watch.emplace(options, config, goes_on, robot, results);
   const RunResult result = robot.run([&watch] { return watch->poll(); });
   const auto end = [&](const RunRecord& record) {
-    return conclude(options, robot, watch, result, record, results);
+    return conclude(options, config.budget.is_limited(), robot, watch, result, record, results);
   };
   if (result.is_left_behind("recorder"))
     results.note(options.output, "what was recorded is lost with the recorder, which hangs");

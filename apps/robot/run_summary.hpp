@@ -82,6 +82,29 @@ struct RunSummary {
     bool operator==(const Mapping&) const = default;
   };
 
+  /// By category of the traffic.
+  struct Counts {
+    std::map<std::string, std::uint64_t> messages, bytes;
+
+    void visit_fields(auto& visitor) {
+      visitor.field("messages", messages);
+      visitor.field("bytes", bytes);
+    }
+    bool operator==(const Counts&) const = default;
+  };
+
+  /// What the budget has held back, once per message: see HeldBack of the runtime.
+  struct HeldBack {
+    Counts delayed, superseded, dropped;
+
+    void visit_fields(auto& visitor) {
+      visitor.field("delayed", delayed);
+      visitor.field("superseded", superseded);
+      visitor.field("dropped", dropped);
+    }
+    bool operator==(const HeldBack&) const = default;
+  };
+
   /// What the process took of the machine.
   struct Process {
     double cpu_s = 0.0;
@@ -112,6 +135,7 @@ struct RunSummary {
   Optimizer pgo;
   std::optional<Mapping> mapping;                ///< Absent where mapping is off.
   std::map<std::string, std::uint64_t> traffic;  ///< Bytes sent, by category.
+  std::optional<HeldBack> held_back;             ///< Absent without a budget.
   Process process;
   double seconds = 0.0;  ///< Wall time of the run.
   /// Robots that went silent and did not come back, and for how long they had been silent [s].
@@ -131,6 +155,7 @@ struct RunSummary {
     visitor.field("pgo", pgo);
     visitor.field("mapping", mapping);
     visitor.field("traffic", traffic);
+    visitor.field("held_back", held_back);
     visitor.field("process", process);
     visitor.field("seconds", seconds);
     visitor.field("lost_peers", lost_peers);

@@ -53,7 +53,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
       participant_(config.dds, identity_, seal_),
       restored_(std::move(input.restored)),
       supervisor_(signals, config.run.patience) {
-  auto bridge = std::make_unique<DdsBridge>(participant_);
+  auto bridge = std::make_unique<DdsBridge>(participant_, config.budget);
   bridge_ = bridge.get();
   if (auto* reader = std::get_if<std::unique_ptr<DatasetReader>>(&input.source))
     add_sensing(config, options.rate, std::move(*reader), mapping, std::move(input.map));

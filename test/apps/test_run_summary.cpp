@@ -66,12 +66,15 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/mapping/blocks_refused /mapping/blocks /mapping/vertices /mapping/faces "
         "/mapping/superseded_faces_dropped /mapping/corrections /mapping/moves_as_a_whole "
         "/mapping/correction_seconds /mapping/unbound_vertices "
-        "/traffic/x /process/cpu_s "
+        "/traffic/x /held_back/delayed/messages/x /held_back/delayed/bytes/x "
+        "/held_back/superseded/messages/x /held_back/superseded/bytes/x "
+        "/held_back/dropped/messages/x /held_back/dropped/bytes/x /process/cpu_s "
         "/process/peak_memory_bytes /process/memory_at_start_bytes "
         "/process/memory_at_end_bytes /process/memory_growth_bytes_per_minute "
         "/seconds /lost_peers/x /apart_peers/x /exit_reason ");
   const Json least = RunSummary{};
   CHECK_FALSE(least.contains("mapping"));  // what is absent has no key
+  CHECK_FALSE(least.contains("held_back"));
   CHECK_FALSE(least["pgo"].contains("anchor"));
 }
 

@@ -166,6 +166,30 @@ TEST_CASE("A robot that not everyone hears is taken in", "[system][namespaces]")
   CHECK(cut.cost == Approx(cut.one).epsilon(1e-4));  // rbcd stops when it has become slow
 }
 
+TEST_CASE("Robots with a budget come to one frame and send no more than that", "[system]") {
+  const SplitGraph graph = random_team(22, {0, 1}, 40, {{0, 1}});
+  const TemporaryFolder folder;
+  constexpr double kRate = 6000.0;
+  const TeamRun run = run_team(write_team(graph, folder), folder.path(), folder, {},
+                               "--set budget.bytes_per_s=" + std::to_string(kRate));
+  CAPTURE(run.result.output);
+  REQUIRE(run.result.exit_code == 0);
+  for (const int robot : {0, 1}) {
+    const RunSummary summary = read_summary(folder.path() / robot_name(robot) / "summary.json");
+    CHECK(summary.pgo.members == std::vector<RobotId>{0, 1});
+    CHECK(summary.pgo.settled);
+    CHECK(summary.exit_reason == "all present robots have settled");
+    REQUIRE(summary.held_back);
+    CHECK(summary.held_back->delayed.messages.at("pgo") > 0);
+    CHECK(summary.held_back->dropped.bytes.at("pgo") == 0);
+    double bytes = 0.0;
+    for (const auto& [category, sent] : summary.traffic) bytes += static_cast<double>(sent);
+    std::cout << "budget of " << kRate << " B/s: sent " << bytes << " B in " << summary.seconds
+              << " s\n";
+    CHECK(bytes < 1.05 * kRate * summary.seconds);
+  }
+}
+
 TEST_CASE("A team that falls in two ends with both sides telling whom they waited for",
           "[system][namespaces]") {
   if (!VirtualNetwork::available()) return;
