@@ -1,0 +1,387 @@
+#include "modules/relay/relay_store.hpp"
+
+#include <algorithm>
+#include <memory>
+
+namespace km {
+namespace {
+
+constexpr std::size_t kFilingBytes = 96;  // that a message takes beside its content
+constexpr std::uint8_t kMaxHops = 16;     // ways that are out of date may go in a circle
+constexpr std::size_t kMaxUnmet = 10'000;
+
+std::size_t bytes_of(const RelayMessage& message) {
+  return message.content.size() + kFilingBytes;
+}
+
+}  // namespace
+
+bool RelayStore::Stream::put(RelayMessage message, std::size_t max_bytes) {
+  const std::size_t bytes = bytes_of(message);
+  const auto known = messages_.find(message.number);
+  const std::size_t freed = known == messages_.end() ? 0 : bytes_of(known->second);
+  if (bytes_ - freed + bytes > max_bytes) return false;
+  bytes_ += bytes - freed;
+  const std::uint32_t number = message.number;
+  messages_.insert_or_assign(number, std::move(message));
+  while (messages_.contains(whole_)) ++whole_;
+  return true;
+}
+
+void RelayStore::Stream::empty(std::uint32_t number) {
+  std::vector<std::uint8_t>& content = messages_.at(number).content;
+  bytes_ -= content.size();
+  content = {};
+}
+
+const RelayMessage* RelayStore::Stream::find(std::uint32_t number) const {
+  const auto found = messages_.find(number);
+  return found == messages_.end() ? nullptr : &found->second;
+}
+
+std::optional<TeamPeer> RelayStore::origin(RobotId robot) const {
+  const auto found = origins_.find(robot);
+  if (found == origins_.end()) return std::nullopt;
+  return TeamPeer{robot, found->second.identity.boot};
+}
+
+// Of another process of one life the letters begin anew, since it tells all closures again.
+void RelayStore::become(Origin& origin, const RobotIdentity& identity) const {
+  const std::uint64_t former = origin.identity.boot;
+  origin.identity = identity;
+  if (former == identity.boot) return;
+  origin.letters = {};
+  if (!is_same_life(former, identity.boot)) origin.bags = origin.replies = {};
+}
+
+void RelayStore::heard(const RobotIdentity& peer) {
+  if (peer.robot == self_.robot) return;
+  const auto known = origins_.find(peer.robot);
+  if (known == origins_.end() && origins_.size() >= kMaxOrigins) return;
+  Origin& origin = known == origins_.end()
+                       ? origins_.emplace(peer.robot, Origin{.identity = peer}).first->second
+                       : known->second;
+  become(origin, peer);
+  origin.via.reset();
+  neighbours_[peer.robot] = {};
+  settle_unmet(peer.robot, true);
+  renew_ways();
+}
+
+void RelayStore::lost(RobotId robot, double now_s) {
+  if (neighbours_.erase(robot) == 0) return;
+  for (Recent& recent : std::exchange(recent_, {})) {
+    if (now_s - recent.sent_s > kDoubt_s) continue;
+    if (recent.message.to == robot) {
+      write_letter(recent.slot, std::move(recent.message));
+    } else {
+      recent_.push_back(std::move(recent));
+    }
+  }
+  renew_ways();
+}
+
+void RelayStore::keep_bag(RobotId robot, std::uint32_t number, std::vector<std::uint8_t> content) {
+  const auto known = origin(robot);
+  if (known)
+    (void)keep(&Origin::bags, kMaxBagBytes,
+               {.kind = RelayKind::kBag,
+                .origin = *known,
+                .number = number,
+                .content = std::move(content)});
+}
+
+void RelayStore::keep_reply(RobotId robot, std::uint32_t number,
+                            std::vector<std::uint8_t> content) {
+  const auto known = origin(robot);
+  if (!known) return;
+  // Answers choose keypoints for who asks: the one with the most serves others best.
+  const RelayMessage* before = origins_.at(robot).replies.find(number);
+  if (before != nullptr && before->content.size() >= content.size()) return;
+  RelayMessage reply{
+      .kind = RelayKind::kReply, .origin = *known, .number = number, .content = std::move(content)};
+  if (!origins_.at(robot).replies.put(std::move(reply), kMaxReplyBytes)) ++given_up_;
+}
+
+RelayArrival RelayStore::keep(Stream Origin::*stream, std::size_t max_bytes, RelayMessage message) {
+  Stream& kept = origins_.at(message.origin.robot).*stream;
+  if (kept.has(message.number)) return RelayArrival::kRepeated;
+  if (kept.put(std::move(message), max_bytes)) return RelayArrival::kNew;
+  ++given_up_;
+  return RelayArrival::kNoRoom;
+}
+
+void RelayStore::wrote(RelayKind kind, RobotId to, std::uint64_t slot,
+                       std::vector<std::uint8_t> content, double now_s) {
+  RelayMessage message{.kind = kind, .origin = self_, .to = to, .content = std::move(content)};
+  while (!recent_.empty() && now_s - recent_.front().sent_s > kDoubt_s) recent_.pop_front();
+  if (hears(to)) return recent_.push_back({now_s, slot, std::move(message)});
+  if (origins_.contains(to)) return write_letter(slot, std::move(message));
+  unmet_.push_back({now_s, slot, std::move(message)});
+  if (unmet_.size() <= kMaxUnmet) return;
+  unmet_.pop_back();
+  ++given_up_;
+}
+
+// What was told to a robot that is heard has been kept for it.
+void RelayStore::settle_unmet(RobotId robot, bool heard) {
+  for (Recent& unmet : std::exchange(unmet_, {})) {
+    if (unmet.message.to != robot) {
+      unmet_.push_back(std::move(unmet));
+    } else if (!heard) {
+      write_letter(unmet.slot, std::move(unmet.message));
+    }
+  }
+}
+
+void RelayStore::write_letter(std::uint64_t slot, RelayMessage message) {
+  message.number = own_letters_.whole();
+  const auto [last, first] =
+      own_slots_.try_emplace({message.kind, message.to, slot}, message.number);
+  if (!first) own_letters_.empty(std::exchange(last->second, message.number));
+  if (own_letters_.put(std::move(message), kMaxLetterBytes)) return;
+  ++given_up_;
+  own_slots_.erase(last);
+}
+
+void RelayStore::call(RelayKind kind, RobotId to, std::uint32_t number,
+                      std::vector<std::uint8_t> content) {
+  RelayMessage message{
+      .kind = kind, .origin = self_, .to = to, .number = number, .content = std::move(content)};
+  // Who asks asks again.
+  if (kind == RelayKind::kRequest && !next_hop(to, {})) return;
+  (void)route(std::move(message), {});
+}
+
+RelayArrival RelayStore::receive(const RelayParcel& parcel) {
+  const RelayMessage& message = *parcel.message;
+  const RobotId from = parcel.neighbour;
+  const RobotId robot = message.origin.robot;
+  if (!hears(from) || robot == self_.robot) return RelayArrival::kRefused;
+  if (message.kind == RelayKind::kIntroduction) return introduce(from, message);
+  if (origin(robot) != message.origin) return RelayArrival::kRefused;
+
+  const bool is_mine = message.to == self_.robot;
+  RelayArrival arrival = RelayArrival::kNew;
+  if (message.kind == RelayKind::kBag) {
+    if (hears(robot)) return RelayArrival::kRepeated;
+    arrival = keep(&Origin::bags, kMaxBagBytes, message);
+    origins_.at(robot).via = from;
+  } else if (is_letter(message.kind)) {
+    RelayMessage kept = message;
+    if (is_mine) kept.content = {};  // nobody else needs it
+    arrival = keep(&Origin::letters, kMaxLetterBytes, std::move(kept));
+  } else {
+    if (message.kind == RelayKind::kReply) keep_reply(robot, message.number, message.content);
+    if (!is_mine) return route(message, from);
+  }
+  const bool is_for_self = message.kind == RelayKind::kBag || is_mine;
+  if (arrival == RelayArrival::kNew && is_for_self && !message.content.empty())
+    output_.delivered.push_back(parcel.message);
+  return arrival;
+}
+
+RelayArrival RelayStore::introduce(RobotId from, const RelayMessage& message) {
+  const RobotIdentity identity{.robot = message.origin.robot,
+                               .name = {message.content.begin(), message.content.end()},
+                               .boot = message.origin.boot};
+  if (hears(identity.robot)) return RelayArrival::kRepeated;
+  const auto known = origins_.find(identity.robot);
+  if (known == origins_.end()) {
+    if (origins_.size() >= kMaxOrigins) return RelayArrival::kNoRoom;
+    origins_.emplace(identity.robot, Origin{.identity = identity, .via = from});
+    settle_unmet(identity.robot, false);
+  } else {
+    Origin& origin = known->second;
+    const bool knows_it = neighbours_.at(from).hears.contains(identity.robot);
+    if (origin.identity.boot == identity.boot) {
+      if (knows_it || !origin.via || !hears(*origin.via)) origin.via = from;
+      renew_ways();
+      return RelayArrival::kRepeated;
+    }
+    if (!knows_it && origin.via != from) return RelayArrival::kRefused;
+    become(origin, identity);
+    origin.via = from;
+    origin.reachable = false;
+  }
+  output_.met.push_back(identity);
+  renew_ways();
+  return RelayArrival::kNew;
+}
+
+void RelayStore::told(RobotId robot, const RelaySummary& summary, double now_s) {
+  const auto found = neighbours_.find(robot);
+  if (found == neighbours_.end()) return;
+  Neighbour& neighbour = found->second;
+  neighbour.hears = {summary.hears.begin(), summary.hears.end()};
+  neighbour.holds.clear();
+  for (const RelayHeld& held : summary.holds) neighbour.holds[held.origin.robot] = held;
+  renew_ways();
+  if (neighbour.hears.contains(self_.robot)) hand_on(robot, now_s);
+}
+
+void RelayStore::hand_on(RobotId to, double now_s) {
+  Neighbour& neighbour = neighbours_.at(to);
+  const auto own = neighbour.holds.find(self_.robot);
+  const bool knows_own = own != neighbour.holds.end() && own->second.origin == self_;
+  const Origin self{.identity = {.robot = self_.robot, .name = {}, .boot = self_.boot}};
+  hand_on(to, self, true, knows_own ? own->second.letters : 0, now_s);
+  for (const auto& [robot, origin] : origins_) {
+    if (robot == to) continue;
+    if (neighbour.hears.contains(robot)) {
+      neighbour.misses_s.erase(robot);
+      continue;
+    }
+    const double since_s = neighbour.misses_s.try_emplace(robot, now_s).first->second;
+    if (now_s - since_s >= kGrace_s) hand_on(to, origin, now_s);
+  }
+}
+
+void RelayStore::hand_on(RobotId to, const Origin& origin, double now_s) {
+  Neighbour& neighbour = neighbours_.at(to);
+  const TeamPeer peer{origin.identity.robot, origin.identity.boot};
+  const auto held = neighbour.holds.find(peer.robot);
+  if (held == neighbour.holds.end() || held->second.origin != peer) {
+    const auto [introduced, first] = neighbour.introduced_s.try_emplace(peer.robot, now_s);
+    if (!first && now_s - introduced->second < kPatience_s) return;
+    introduced->second = now_s;
+    const std::string& name = origin.identity.name;
+    return send(
+        to,
+        {.kind = RelayKind::kIntroduction, .origin = peer, .content = {name.begin(), name.end()}});
+  }
+  hand_on(to, origin, false, held->second.bags, now_s);
+  hand_on(to, origin, true, held->second.letters, now_s);
+}
+
+// From the first message on that it lacks, as many as may be under way.
+void RelayStore::hand_on(RobotId to, const Origin& origin, bool letters, std::uint32_t told,
+                         double now_s) {
+  Neighbour& neighbour = neighbours_.at(to);
+  const TeamPeer peer{origin.identity.robot, origin.identity.boot};
+  const bool is_own = peer == self_;
+  const Stream& stream = is_own ? own_letters_ : letters ? origin.letters : origin.bags;
+  Progress& progress =
+      neighbour.progress.try_emplace({peer.robot, letters}, Progress{told, told, now_s})
+          .first->second;
+  const bool stands_still = told == progress.told && told < stream.whole();
+  if (!stands_still) progress.since_s = now_s;
+  const bool overdue = now_s - progress.since_s >= kPatience_s;
+  progress.sent = overdue || told < progress.told ? told : std::max(told, progress.sent);
+  progress.told = told;
+  if (!is_own && !overdue && another_should(to, neighbour.holds.at(peer.robot))) return;
+  if (overdue) progress.since_s = now_s;
+
+  std::size_t under_way = 0;
+  for (std::uint32_t number = told; number < progress.sent; ++number)
+    if (const RelayMessage* sent = stream.find(number)) under_way += bytes_of(*sent);
+  for (; progress.sent < stream.whole() && under_way < kWindowBytes; ++progress.sent) {
+    RelayMessage message = *stream.find(progress.sent);
+    message.origin = peer;  // in its present process
+    under_way += bytes_of(message);
+    send(to, std::move(message));
+  }
+}
+
+// Of the robots that the neighbour hears and that hold what it lacks: one that hears the origin, or
+// has the lower id.
+bool RelayStore::another_should(RobotId to, const RelayHeld& held) const {
+  const RobotId origin = held.origin.robot;
+  const Neighbour& neighbour = neighbours_.at(to);
+  const std::pair own(!hears(origin), self_.robot);
+  return std::ranges::any_of(neighbours_, [&](const auto& entry) {
+    const auto& [robot, other] = entry;
+    if (robot == to || !other.hears.contains(to) || !neighbour.hears.contains(robot)) return false;
+    const bool at_source = other.hears.contains(origin);
+    const auto its = other.holds.find(origin);
+    const bool has_more = its != other.holds.end() && its->second.origin == held.origin &&
+                          (its->second.bags > held.bags || its->second.letters > held.letters);
+    return (at_source || has_more) && std::pair(!at_source, robot) < own;
+  });
+}
+
+std::optional<RobotId> RelayStore::next_hop(RobotId to, std::optional<RobotId> from) const {
+  if (hears(to)) return to;
+  for (const auto& [robot, neighbour] : neighbours_)
+    if (robot != from && neighbour.hears.contains(to) && neighbour.hears.contains(self_.robot))
+      return robot;
+  const auto known = origins_.find(to);
+  if (known == origins_.end() || !known->second.via || known->second.via == from ||
+      !hears(*known->second.via))
+    return std::nullopt;
+  return known->second.via;
+}
+
+RelayArrival RelayStore::route(RelayMessage message, std::optional<RobotId> from) {
+  if (from && message.hops >= kMaxHops) return RelayArrival::kRefused;
+  message.hops = static_cast<std::uint8_t>(message.hops + (from ? 1 : 0));
+  if (const auto next = next_hop(message.to, from)) {
+    send(*next, std::move(message));
+    return RelayArrival::kNew;
+  }
+  if (message.kind == RelayKind::kRequest && answer(message)) return RelayArrival::kNew;
+  auto& waiting = carried_[message.to];
+  const auto key = std::tuple(message.kind, message.origin.robot, message.number);
+  const auto before = waiting.find(key);
+  const std::size_t freed = before == waiting.end() ? 0 : bytes_of(before->second);
+  if (carried_bytes_ - freed + bytes_of(message) > kMaxCarriedBytes) {
+    ++given_up_;
+    return RelayArrival::kNoRoom;
+  }
+  carried_bytes_ += bytes_of(message) - freed;
+  waiting.insert_or_assign(key, std::move(message));
+  return RelayArrival::kNew;
+}
+
+bool RelayStore::answer(const RelayMessage& request) {
+  const auto asked = origins_.find(request.to);
+  if (asked == origins_.end()) return false;
+  const RelayMessage* kept = asked->second.replies.find(request.number);
+  const auto next = next_hop(request.origin.robot, {});
+  if (kept == nullptr || !next) return false;
+  RelayMessage reply = *kept;
+  reply.origin = *origin(request.to);
+  reply.to = request.origin.robot;
+  reply.hops = 0;
+  send(*next, std::move(reply));
+  return true;
+}
+
+void RelayStore::renew_ways() {
+  for (auto& [robot, origin] : origins_) {
+    const bool reachable = next_hop(robot, {}).has_value();
+    if (reachable && !std::exchange(origin.reachable, reachable) && !hears(robot))
+      output_.reachable.push_back(robot);
+    origin.reachable = reachable;
+  }
+  for (auto entry = carried_.begin(); entry != carried_.end();) {
+    const auto next = next_hop(entry->first, {});
+    if (!next) {
+      ++entry;
+      continue;
+    }
+    for (auto& [key, message] : entry->second) {
+      carried_bytes_ -= bytes_of(message);
+      send(*next, std::move(message));
+    }
+    entry = carried_.erase(entry);
+  }
+}
+
+RelaySummary RelayStore::summary() const {
+  RelaySummary summary;
+  for (const auto& [robot, neighbour] : neighbours_) summary.hears.push_back(robot);
+  for (const auto& [robot, origin] : origins_) {
+    const std::uint32_t bags = hears(robot) ? 0 : origin.bags.whole();
+    const std::uint32_t letters = origin.letters.whole();
+    if (!hears(robot) || letters > 0)
+      summary.holds.push_back({{robot, origin.identity.boot}, bags, letters});
+  }
+  return summary;
+}
+
+void RelayStore::send(RobotId neighbour, RelayMessage message) {
+  output_.parcels.push_back({neighbour, std::make_shared<const RelayMessage>(std::move(message))});
+}
+
+}  // namespace km

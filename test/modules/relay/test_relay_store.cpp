@@ -1,0 +1,413 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <map>
+#include <memory>
+#include <random>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "modules/relay/relay_store.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kPeriod_s = 0.5;  // of the summaries
+constexpr RobotId kA = 0, kB = 1, kC = 2, kD = 3;
+
+std::vector<std::uint8_t> octets(std::size_t size, std::uint8_t value = 7) {
+  std::vector<std::uint8_t> content(size, value);
+  return content;
+}
+
+std::string name_of(RobotId robot) {
+  return std::string("r").append(std::to_string(robot));
+}
+
+// Robots whose links are cut and mended; parcels arrive at once, or are lost.
+class Network {
+ public:
+  explicit Network(RobotId robots) {
+    for (RobotId robot = 0; robot < robots; ++robot) start(robot, first_boot(robot));
+  }
+
+  static std::uint64_t first_boot(RobotId robot) { return (std::uint64_t{robot} + 1) << 32U; }
+
+  void start(RobotId robot, std::uint64_t boot) {
+    boots_[robot] = boot;
+    stores_.erase(robot);
+    stores_.emplace(robot, RelayStore({robot, boot}));
+    read_[robot].clear();
+    met_[robot].clear();
+    for (const auto& [a, b] : std::set(links_))
+      if (a == robot || b == robot) {
+        at(a).heard(identity(b));
+        at(b).heard(identity(a));
+      }
+    settle();
+  }
+  void link(RobotId a, RobotId b) {
+    links_.emplace(a, b);
+    at(a).heard(identity(b));
+    at(b).heard(identity(a));
+    settle();
+  }
+  void cut(RobotId a, RobotId b) {
+    links_.erase({a, b});
+    at(a).lost(b, now_s_);
+    at(b).lost(a, now_s_);
+    settle();
+  }
+  // A bag as DDS carries it: to those that hear the robot.
+  void tell_bag(RobotId robot, std::uint32_t index) {
+    bags_[robot].insert(index);
+    for (const auto& [other, store] : stores_)
+      if (linked(robot, other)) at(other).keep_bag(robot, index, octets(600));
+  }
+  void run(double seconds) {
+    for (const double end_s = now_s_ + seconds; now_s_ < end_s; now_s_ += kPeriod_s) {
+      for (auto& [robot, store] : stores_)
+        for (auto& [other, to] : stores_)
+          if (linked(robot, other)) to.told(robot, store.summary(), now_s_);
+      settle();
+    }
+  }
+  // Which messages of a kind a robot was handed to read, in order.
+  [[nodiscard]] std::vector<std::uint32_t> read(RobotId robot, RelayKind kind) {
+    std::vector<std::uint32_t> numbers;
+    for (const RelayMessagePtr& message : read_[robot])
+      if (message->kind == kind) numbers.push_back(message->number);
+    return numbers;
+  }
+  [[nodiscard]] std::vector<RelayMessagePtr>& all_read(RobotId robot) { return read_[robot]; }
+  [[nodiscard]] const std::vector<RobotIdentity>& met(RobotId robot) { return met_[robot]; }
+  [[nodiscard]] const std::vector<RobotId>& reachable(RobotId robot) { return reachable_[robot]; }
+  [[nodiscard]] RelayStore& at(RobotId robot) { return stores_.at(robot); }
+  [[nodiscard]] std::size_t parcels() const { return parcels_; }
+  [[nodiscard]] std::size_t octets_sent() const { return octets_; }
+  void lose(double part) { loss_ = part; }
+
+ private:
+  [[nodiscard]] RobotIdentity identity(RobotId robot) const {
+    return {.robot = robot, .name = name_of(robot), .boot = boots_.at(robot)};
+  }
+  [[nodiscard]] bool linked(RobotId a, RobotId b) const {
+    return links_.contains({a, b}) || links_.contains({b, a});
+  }
+  // Carries what there is until nobody has anything to send.
+  void settle() {
+    for (bool more = true; more;) {
+      more = false;
+      for (auto& [robot, store] : stores_) {
+        RelayOutput output = store.take_output();
+        std::ranges::move(output.delivered, std::back_inserter(read_[robot]));
+        std::ranges::move(output.met, std::back_inserter(met_[robot]));
+        std::ranges::move(output.reachable, std::back_inserter(reachable_[robot]));
+        for (const RelayParcel& parcel : output.parcels) {
+          more = true;
+          ++parcels_;
+          octets_ += parcel.message->content.size();
+          if (!linked(robot, parcel.neighbour) || uniform_(random_) < loss_) continue;
+          (void)at(parcel.neighbour).receive({robot, parcel.message});
+        }
+      }
+    }
+  }
+
+  std::map<RobotId, std::uint64_t> boots_;
+  std::map<RobotId, RelayStore> stores_;
+  std::set<std::pair<RobotId, RobotId>> links_;
+  std::map<RobotId, std::set<std::uint32_t>> bags_;
+  std::map<RobotId, std::vector<RelayMessagePtr>> read_;
+  std::map<RobotId, std::vector<RobotIdentity>> met_;
+  std::map<RobotId, std::vector<RobotId>> reachable_;
+  std::mt19937 random_{5};
+  std::uniform_real_distribution<double> uniform_{0.0, 1.0};
+  double loss_ = 0.0;
+  double now_s_ = 0.0;
+  std::size_t parcels_ = 0;
+  std::size_t octets_ = 0;
+};
+
+std::vector<std::uint32_t> first(std::uint32_t count) {
+  std::vector<std::uint32_t> numbers(count);
+  for (std::uint32_t i = 0; i < count; ++i) numbers[i] = i;
+  return numbers;
+}
+
+}  // namespace
+
+TEST_CASE("Robots that all hear each other hand nothing on and hold nothing to tell", "[relay]") {
+  Network network(3);
+  network.link(kA, kB);
+  network.link(kA, kC);
+  network.link(kB, kC);
+  network.run(2.0);
+  for (std::uint32_t i = 0; i < 50; ++i) {
+    network.tell_bag(kA, i);
+    network.at(kA).wrote(RelayKind::kClosure, kB, i, octets(700), i);
+    network.run(kPeriod_s);
+  }
+  CHECK(network.parcels() == 0);
+  for (const RobotId robot : {kA, kB, kC}) {
+    CHECK(network.at(robot).summary().hears.size() == 2);
+    CHECK(network.at(robot).summary().holds.empty());
+  }
+}
+
+TEST_CASE("A robot gets each bag of one that only another has heard once and in order", "[relay]") {
+  Network network(3);
+  network.link(kA, kC);
+  for (std::uint32_t i = 0; i < 300; ++i) network.tell_bag(kA, i);
+  SECTION("at the same time") {}
+  SECTION("before") {
+    network.run(2.0);
+    network.cut(kA, kC);
+  }
+  network.link(kC, kB);
+  network.run(15.0);
+  REQUIRE(network.met(kB).size() == 1);
+  CHECK(network.met(kB)[0].boot == Network::first_boot(kA));
+  CHECK(network.met(kB)[0].name == "r0");
+  CHECK(network.read(kB, RelayKind::kBag) == first(300));
+  CHECK(network.octets_sent() < 300 * 600 + 100);  // and the names
+  CHECK(network.at(kB).summary().holds ==
+        std::vector<RelayHeld>{{{kA, Network::first_boot(kA)}, 300, 0}});
+}
+
+TEST_CASE("Bags go along a chain, and of two robots between only one hands them on", "[relay]") {
+  Network network(4);
+  SECTION("a chain of four") {
+    network.link(kA, kC);
+    network.link(kC, kD);
+    network.link(kD, kB);
+  }
+  SECTION("two between") {
+    network.link(kA, kC);
+    network.link(kA, kD);
+    network.link(kC, kD);
+    network.link(kC, kB);
+    network.link(kD, kB);
+  }
+  network.run(20.0);
+  const std::size_t before = network.octets_sent();
+  for (std::uint32_t i = 0; i < 100; ++i) {
+    network.tell_bag(kA, i);
+    network.run(kPeriod_s);
+  }
+  network.run(5.0);
+  CHECK(network.read(kB, RelayKind::kBag) == first(100));
+  const std::size_t handed_on = (network.octets_sent() - before) / 600;
+  CHECK(handed_on == (network.read(kD, RelayKind::kBag).empty() ? 100 : 200));
+}
+
+TEST_CASE("What is lost on the way is handed over again, and taken once", "[relay]") {
+  Network network(3);
+  network.lose(0.3);
+  network.link(kA, kC);
+  network.link(kC, kB);
+  for (std::uint32_t i = 0; i < 100; ++i) network.tell_bag(kA, i);
+  for (std::uint32_t i = 0; i < 20; ++i)
+    network.at(kB).wrote(RelayKind::kClosure, kA, i, octets(700), 0.0);
+  network.run(400.0);
+  std::vector<std::uint32_t> bags = network.read(kB, RelayKind::kBag);
+  std::vector<std::uint32_t> letters = network.read(kA, RelayKind::kClosure);
+  std::ranges::sort(bags);
+  std::ranges::sort(letters);
+  CHECK(bags == first(100));
+  CHECK(letters == first(20));
+}
+
+TEST_CASE("A closure reaches a robot that is met again later, once", "[relay]") {
+  Network network(3);
+  network.link(kA, kC);
+  network.run(1.0);
+  network.cut(kA, kC);
+  network.link(kB, kC);
+  const bool met_before = GENERATE(true, false);
+  CAPTURE(met_before);
+  if (met_before) network.run(8.0);
+  network.at(kB).wrote(RelayKind::kClosure, kA, 5, octets(700, 1), 9.0);
+  network.at(kB).wrote(RelayKind::kInlierSet, kA, 0, octets(20, 2), 9.0);
+  network.at(kB).wrote(RelayKind::kInlierSet, kA, 0, octets(30, 3), 9.0);
+  network.run(10.0);
+  SECTION("by who carries it, the writer being gone") {
+    network.cut(kB, kC);
+    network.link(kA, kC);
+  }
+  SECTION("by both at once") {
+    network.link(kA, kC);
+    network.link(kA, kB);
+  }
+  network.run(10.0);
+  CHECK(network.read(kA, RelayKind::kClosure) == first(1));
+  // The older set is of no use any more.
+  CHECK(network.read(kA, RelayKind::kInlierSet) == std::vector<std::uint32_t>{2});
+  CHECK(network.read(kC, RelayKind::kClosure).empty());
+}
+
+TEST_CASE("Nothing is handed to robots that soon hear each other", "[relay]") {
+  Network network(3);
+  for (std::uint32_t i = 0; i < 20; ++i) network.at(kB).wrote(RelayKind::kClosure, kA, i, {1}, 0.0);
+  network.link(kA, kC);
+  network.tell_bag(kA, 0);
+  network.link(kB, kC);
+  network.run(4.0);
+  network.link(kA, kB);
+  network.run(20.0);
+  network.cut(kA, kB);
+  network.run(4.0);
+  network.link(kA, kB);
+  network.run(20.0);
+  CHECK(network.parcels() == 0);
+}
+
+TEST_CASE("What was told just before a link fell silent becomes a letter", "[relay]") {
+  Network network(3);
+  network.link(kA, kB);
+  network.link(kA, kC);
+  network.link(kB, kC);
+  network.at(kB).wrote(RelayKind::kClosure, kA, 1, octets(700), 0.0);
+  network.run(40.0);
+  network.at(kB).wrote(RelayKind::kClosure, kA, 2, octets(700), 39.0);
+  CHECK(network.parcels() == 0);
+  network.cut(kA, kB);
+  network.run(20.0);
+  CHECK(network.read(kA, RelayKind::kClosure).size() == 1);
+}
+
+TEST_CASE("A request goes to its addressee and the answer comes back", "[relay]") {
+  Network network(4);
+  network.link(kA, kC);
+  network.link(kC, kD);
+  network.link(kD, kB);
+  network.run(20.0);
+  CHECK(network.reachable(kB) == std::vector<RobotId>{kC, kA});
+  network.at(kB).call(RelayKind::kRequest, kA, 17, octets(20));
+  network.run(kPeriod_s);
+  REQUIRE(network.read(kA, RelayKind::kRequest) == std::vector<std::uint32_t>{17});
+  CHECK(network.all_read(kA)[0]->origin == TeamPeer{kB, Network::first_boot(kB)});
+  network.at(kA).call(RelayKind::kReply, kB, 17, octets(9000));
+  network.run(kPeriod_s);
+  CHECK(network.read(kB, RelayKind::kReply) == std::vector<std::uint32_t>{17});
+  CHECK(network.all_read(kB).back()->origin == TeamPeer{kA, Network::first_boot(kA)});
+}
+
+TEST_CASE("Who has had a keyframe answers in place of a robot that is gone", "[relay]") {
+  Network network(3);
+  network.link(kA, kC);
+  network.tell_bag(kA, 0);
+  network.at(kC).keep_reply(kA, 17, octets(9000));
+  network.link(kC, kB);
+  network.run(8.0);
+  SECTION("it is there: it is asked itself") {
+    network.at(kB).call(RelayKind::kRequest, kA, 17, octets(20));
+    network.run(kPeriod_s);
+    CHECK(network.read(kA, RelayKind::kRequest).size() == 1);
+    CHECK(network.read(kB, RelayKind::kReply).empty());
+  }
+  SECTION("it is gone") {
+    network.cut(kA, kC);
+    network.at(kB).call(RelayKind::kRequest, kA, 17, octets(20));
+    network.run(kPeriod_s);
+    CHECK(network.read(kB, RelayKind::kReply) == std::vector<std::uint32_t>{17});
+  }
+  SECTION("it is gone, and nobody has had the keyframe: the request is carried, once") {
+    network.cut(kA, kC);
+    for (int i = 0; i < 3; ++i) network.at(kB).call(RelayKind::kRequest, kA, 18, octets(20));
+    network.run(kPeriod_s);
+    CHECK(network.read(kB, RelayKind::kReply).empty());
+    network.cut(kB, kC);
+    network.link(kA, kC);
+    network.run(kPeriod_s);
+    REQUIRE(network.read(kA, RelayKind::kRequest) == std::vector<std::uint32_t>{18});
+    network.at(kA).call(RelayKind::kReply, kB, 18, octets(9000));
+    network.run(kPeriod_s);
+    network.cut(kA, kC);
+    network.link(kB, kC);
+    network.run(kPeriod_s);
+    CHECK(network.read(kB, RelayKind::kReply) == std::vector<std::uint32_t>{18});
+  }
+}
+
+TEST_CASE("Another life of a robot that is not heard takes the place of the former", "[relay]") {
+  Network network(4);
+  network.link(kA, kC);
+  network.link(kC, kB);
+  network.link(kB, kD);
+  for (std::uint32_t i = 0; i < 10; ++i) network.tell_bag(kA, i);
+  network.run(20.0);
+  REQUIRE(network.read(kD, RelayKind::kBag) == first(10));
+  const std::uint64_t other_life = std::uint64_t{99} << 32U;
+  SECTION("and its bags are others") {
+    network.start(kA, other_life);
+    network.tell_bag(kA, 0);
+    network.run(20.0);
+    for (const RobotId robot : {kB, kD}) {
+      REQUIRE(network.met(robot).back().boot == other_life);
+      CHECK(network.read(robot, RelayKind::kBag).size() == 11);
+      CHECK(network.at(robot).origin(kA)->boot == other_life);
+    }
+  }
+  SECTION("and does not give way to it again where a robot has missed the change") {
+    network.cut(kB, kD);
+    network.start(kA, other_life);
+    network.tell_bag(kA, 0);
+    network.run(20.0);
+    CHECK(network.at(kD).origin(kA)->boot == Network::first_boot(kA));
+    network.link(kB, kD);
+    network.run(20.0);
+    CHECK(network.at(kB).origin(kA)->boot == other_life);
+    CHECK(network.at(kD).origin(kA)->boot == other_life);
+  }
+  SECTION("but of a life that goes on nothing is told again") {
+    network.start(kA, Network::first_boot(kA) + 1);
+    for (std::uint32_t i = 0; i < 12; ++i) network.tell_bag(kA, i);
+    network.run(20.0);
+    CHECK(network.read(kD, RelayKind::kBag) == first(12));
+  }
+}
+
+TEST_CASE("A neighbour is believed nothing about this robot or one that is heard", "[relay]") {
+  RelayStore store({kB, 2});
+  store.heard({.robot = kC, .name = "c", .boot = 3});
+  const auto receive = [&](RobotId from, RelayMessage message) {
+    return store.receive({from, std::make_shared<const RelayMessage>(std::move(message))});
+  };
+  const auto introduction = [](RobotId robot, std::uint64_t boot) {
+    return RelayMessage{.kind = RelayKind::kIntroduction, .origin = {robot, boot}};
+  };
+  CHECK(receive(kC, introduction(kB, 9)) == RelayArrival::kRefused);
+  CHECK(receive(kC, introduction(kC, 9)) == RelayArrival::kRepeated);
+  CHECK(store.origin(kC)->boot == 3);
+  CHECK(receive(kD, introduction(kA, 1)) == RelayArrival::kRefused);  // who is not heard
+  const RelayMessage bag{
+      .kind = RelayKind::kBag, .origin = {kA, 1}, .number = 0, .content = octets(9)};
+  CHECK(receive(kC, bag) == RelayArrival::kRefused);  // of a robot that is not known
+  CHECK(receive(kC, introduction(kA, 1)) == RelayArrival::kNew);
+  CHECK(receive(kC, bag) == RelayArrival::kNew);
+  CHECK(receive(kC, bag) == RelayArrival::kRepeated);
+  store.heard({.robot = kD, .name = "d", .boot = 4});
+  CHECK(receive(kD, introduction(kA, std::uint64_t{7} << 32U)) == RelayArrival::kRefused);
+  store.told(kD, {.hears = {kA}}, 0.0);
+  CHECK(receive(kD, introduction(kA, std::uint64_t{7} << 32U)) == RelayArrival::kNew);
+  store.heard({.robot = kA, .name = "a", .boot = std::uint64_t{7} << 32U});
+  RelayMessage of_heard = bag;
+  of_heard.origin.boot = std::uint64_t{7} << 32U;
+  CHECK(receive(kC, of_heard) == RelayArrival::kRepeated);
+}
+
+TEST_CASE("Full, a store gives up what is newest and says how much", "[relay]") {
+  Network network(2);
+  network.link(kA, kC - 1);
+  RelayStore& store = network.at(kB);
+  constexpr std::size_t kSize = 100'000;
+  const auto fit = static_cast<std::uint32_t>(RelayStore::kMaxBagBytes / (kSize + 96));
+  for (std::uint32_t i = 0; i < fit + 5; ++i) store.keep_bag(kA, i, octets(kSize));
+  CHECK(store.given_up() == 5);
+  store.lost(kA, 0.0);
+  CHECK(store.summary().holds == std::vector<RelayHeld>{{{kA, Network::first_boot(kA)}, fit, 0}});
+}
+
+}  // namespace km
