@@ -45,8 +45,16 @@ std::optional<TeamPeer> RelayStore::origin(RobotId robot) const {
   return TeamPeer{robot, found->second.identity.boot};
 }
 
+RelayStore::Origin* RelayStore::know(const RobotIdentity& identity) {
+  const auto known = origins_.find(identity.robot);
+  if (known == origins_.end() && origins_.size() >= kMaxOrigins) return nullptr;
+  Origin& origin = origins_.try_emplace(identity.robot, Origin{.identity = identity}).first->second;
+  become(origin, identity);
+  return &origin;
+}
+
 // Of another process of one life the letters begin anew, since it tells all closures again.
-void RelayStore::become(Origin& origin, const RobotIdentity& identity) const {
+void RelayStore::become(Origin& origin, const RobotIdentity& identity) {
   const std::uint64_t former = origin.identity.boot;
   origin.identity = identity;
   if (former == identity.boot) return;
@@ -55,14 +63,9 @@ void RelayStore::become(Origin& origin, const RobotIdentity& identity) const {
 }
 
 void RelayStore::heard(const RobotIdentity& peer) {
-  if (peer.robot == self_.robot) return;
-  const auto known = origins_.find(peer.robot);
-  if (known == origins_.end() && origins_.size() >= kMaxOrigins) return;
-  Origin& origin = known == origins_.end()
-                       ? origins_.emplace(peer.robot, Origin{.identity = peer}).first->second
-                       : known->second;
-  become(origin, peer);
-  origin.via.reset();
+  Origin* origin = peer.robot == self_.robot ? nullptr : know(peer);
+  if (origin == nullptr) return;
+  origin->via.reset();
   neighbours_[peer.robot] = {};
   settle_unmet(peer.robot, true);
   renew_ways();
@@ -81,14 +84,14 @@ void RelayStore::lost(RobotId robot, double now_s) {
   renew_ways();
 }
 
-void RelayStore::keep_bag(RobotId robot, std::uint32_t number, std::vector<std::uint8_t> content) {
-  const auto known = origin(robot);
-  if (known)
-    (void)keep(&Origin::bags, kMaxBagBytes,
-               {.kind = RelayKind::kBag,
-                .origin = *known,
-                .number = number,
-                .content = std::move(content)});
+void RelayStore::keep_bag(const RobotIdentity& origin, std::uint32_t number,
+                          std::vector<std::uint8_t> content) {
+  if (origin.robot == self_.robot || know(origin) == nullptr) return;
+  (void)keep(&Origin::bags, kMaxBagBytes,
+             {.kind = RelayKind::kBag,
+              .origin = {origin.robot, origin.boot},
+              .number = number,
+              .content = std::move(content)});
 }
 
 void RelayStore::keep_reply(RobotId robot, std::uint32_t number,
@@ -100,7 +103,8 @@ void RelayStore::keep_reply(RobotId robot, std::uint32_t number,
   if (before != nullptr && before->content.size() >= content.size()) return;
   RelayMessage reply{
       .kind = RelayKind::kReply, .origin = *known, .number = number, .content = std::move(content)};
-  if (!origins_.at(robot).replies.put(std::move(reply), kMaxReplyBytes)) ++given_up_;
+  if (!has_room_for(reply) || !origins_.at(robot).replies.put(std::move(reply), kMaxReplyBytes))
+    ++given_up_;
 }
 
 RelayArrival RelayStore::keep(Stream Origin::*stream, std::size_t max_bytes, RelayMessage message) {
@@ -161,6 +165,11 @@ RelayArrival RelayStore::receive(const RelayParcel& parcel) {
   if (message.kind == RelayKind::kIntroduction) return introduce(from, message);
   if (origin(robot) != message.origin) return RelayArrival::kRefused;
 
+  const bool is_kept = message.kind == RelayKind::kBag || is_letter(message.kind);
+  if (is_kept && !has_room_for(message)) {
+    ++given_up_;
+    return RelayArrival::kNoRoom;
+  }
   const bool is_mine = message.to == self_.robot;
   RelayArrival arrival = RelayArrival::kNew;
   if (message.kind == RelayKind::kBag) {
@@ -179,6 +188,15 @@ RelayArrival RelayStore::receive(const RelayParcel& parcel) {
   if (arrival == RelayArrival::kNew && is_for_self && !message.content.empty())
     output_.delivered.push_back(parcel.message);
   return arrival;
+}
+
+bool RelayStore::has_room_for(const RelayMessage& message) const {
+  if (hears(message.origin.robot)) return true;
+  std::size_t bytes = bytes_of(message);
+  for (const auto& [robot, origin] : origins_)
+    if (!hears(robot))
+      bytes += origin.bags.bytes() + origin.letters.bytes() + origin.replies.bytes();
+  return bytes <= kMaxFarBytes;
 }
 
 RelayArrival RelayStore::introduce(RobotId from, const RelayMessage& message) {

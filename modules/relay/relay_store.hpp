@@ -52,8 +52,9 @@ struct RelayOutput {
 /// those that hear it: so of two lives the older cannot come back from robots that have missed the
 /// change. Nothing is believed about this robot itself, nor about those that it hears.
 ///
-/// Memory is bounded for each origin and kind; full, what is newest is not taken and counts as
-/// given up. Deterministic; time comes in [s], any origin, not decreasing. Not thread-safe.
+/// Memory is bounded for each origin and kind, and for all that are not heard together; full, what
+/// is newest is not taken and counts as given up. Deterministic; time comes in [s], any origin, not
+/// decreasing. Not thread-safe.
 class RelayStore {
  public:
   static constexpr std::size_t kMaxOrigins = 64;
@@ -62,6 +63,8 @@ class RelayStore {
   static constexpr std::size_t kMaxBagBytes = 8U << 20U;
   static constexpr std::size_t kMaxLetterBytes = 4U << 20U;
   static constexpr std::size_t kMaxReplyBytes = 8U << 20U;
+  /// Held of all robots together that are not heard: whoever is heard can invent such.
+  static constexpr std::size_t kMaxFarBytes = 128U << 20U;
   /// Requests and answers carried for all addressees together.
   static constexpr std::size_t kMaxCarriedBytes = 4U << 20U;
   /// Under way to one neighbour of one origin's bags or letters.
@@ -80,8 +83,10 @@ class RelayStore {
   void heard(const RobotIdentity& peer);
   void lost(RobotId robot, double now_s);
 
-  /// A bag, or a keyframe asked for, that its origin told directly. Dropped unless it is known.
-  void keep_bag(RobotId origin, std::uint32_t number, std::vector<std::uint8_t> content);
+  /// A bag that its origin told directly; it may come before heard().
+  void keep_bag(const RobotIdentity& origin, std::uint32_t number,
+                std::vector<std::uint8_t> content);
+  /// Likewise a keyframe asked for, of a robot that is known.
   void keep_reply(RobotId origin, std::uint32_t number, std::vector<std::uint8_t> content);
 
   /// This robot has told `to` a closure or inlier set, directly if that is heard: a letter if not,
@@ -111,6 +116,7 @@ class RelayStore {
    public:
     [[nodiscard]] bool has(std::uint32_t number) const { return messages_.contains(number); }
     [[nodiscard]] std::uint32_t whole() const { return whole_; }
+    [[nodiscard]] std::size_t bytes() const { return bytes_; }
     /// False if that would be more than `max_bytes`.
     [[nodiscard]] bool put(RelayMessage message, std::size_t max_bytes);
     void empty(std::uint32_t number);
@@ -146,7 +152,9 @@ class RelayStore {
     RelayMessage message;
   };
 
-  void become(Origin& origin, const RobotIdentity& identity) const;
+  /// Null if there is one too many.
+  Origin* know(const RobotIdentity& identity);
+  static void become(Origin& origin, const RobotIdentity& identity);
   RelayArrival introduce(RobotId from, const RelayMessage& message);
   RelayArrival keep(Stream Origin::*stream, std::size_t max_bytes, RelayMessage message);
   void settle_unmet(RobotId robot, bool heard);
@@ -154,6 +162,7 @@ class RelayStore {
   void hand_on(RobotId to, double now_s);
   void hand_on(RobotId to, const Origin& origin, double now_s);
   void hand_on(RobotId to, const Origin& origin, bool letters, std::uint32_t told, double now_s);
+  [[nodiscard]] bool has_room_for(const RelayMessage& message) const;
   [[nodiscard]] bool another_should(RobotId to, const RelayHeld& held) const;
   RelayArrival route(RelayMessage message, std::optional<RobotId> from);
   [[nodiscard]] bool answer(const RelayMessage& request);

@@ -63,7 +63,7 @@ class Network {
   void tell_bag(RobotId robot, std::uint32_t index) {
     bags_[robot].insert(index);
     for (const auto& [other, store] : stores_)
-      if (linked(robot, other)) at(other).keep_bag(robot, index, octets(600));
+      if (linked(robot, other)) at(other).keep_bag(identity(robot), index, octets(600));
   }
   void run(double seconds) {
     for (const double end_s = now_s_ + seconds; now_s_ < end_s; now_s_ += kPeriod_s) {
@@ -88,10 +88,11 @@ class Network {
   [[nodiscard]] std::size_t octets_sent() const { return octets_; }
   void lose(double part) { loss_ = part; }
 
- private:
   [[nodiscard]] RobotIdentity identity(RobotId robot) const {
     return {.robot = robot, .name = name_of(robot), .boot = boots_.at(robot)};
   }
+
+ private:
   [[nodiscard]] bool linked(RobotId a, RobotId b) const {
     return links_.contains({a, b}) || links_.contains({b, a});
   }
@@ -174,6 +175,16 @@ TEST_CASE("A robot gets each bag of one that only another has heard once and in 
   CHECK(network.octets_sent() < 300 * 600 + 100);  // and the names
   CHECK(network.at(kB).summary().holds ==
         std::vector<RelayHeld>{{{kA, Network::first_boot(kA)}, 300, 0}});
+}
+
+TEST_CASE("A bag may come before it is known that its robot is heard", "[relay]") {
+  Network network(3);
+  network.at(kC).keep_bag(network.identity(kA), 0, octets(600));
+  CHECK_FALSE(network.at(kC).hears(kA));
+  network.link(kA, kC);
+  network.link(kB, kC);
+  network.run(10.0);
+  CHECK(network.read(kB, RelayKind::kBag) == first(1));
 }
 
 TEST_CASE("Bags go along a chain, and of two robots between only one hands them on", "[relay]") {
@@ -398,13 +409,38 @@ TEST_CASE("A neighbour is believed nothing about this robot or one that is heard
   CHECK(receive(kC, of_heard) == RelayArrival::kRepeated);
 }
 
+TEST_CASE("Robots that a neighbour invents take no more room than there is for all", "[relay]") {
+  RelayStore store({kB, 2});
+  store.heard({.robot = kC, .name = "c", .boot = 3});
+  constexpr std::size_t kSize = 1U << 20U;
+  std::size_t taken = 0;
+  for (RobotId robot = 10; robot < 60; ++robot) {
+    RelayMessage message{.kind = RelayKind::kIntroduction, .origin = {robot, 1}};
+    REQUIRE(store.receive({kC, std::make_shared<const RelayMessage>(message)}) ==
+            RelayArrival::kNew);
+    message.kind = RelayKind::kBag;
+    message.content = octets(kSize);
+    for (; message.number < 7; ++message.number)
+      if (store.receive({kC, std::make_shared<const RelayMessage>(message)}) == RelayArrival::kNew)
+        taken += kSize;
+    (void)store.take_output();
+  }
+  CHECK(taken > RelayStore::kMaxFarBytes - 2 * kSize);
+  CHECK(taken < RelayStore::kMaxFarBytes);
+  store.keep_bag({.robot = kA, .name = "a", .boot = 1}, 0, octets(kSize));
+  store.heard({.robot = kA, .name = "a", .boot = 1});
+  store.lost(kA, 0.0);
+  CHECK(store.summary().holds.front().bags == 1);
+}
+
 TEST_CASE("Full, a store gives up what is newest and says how much", "[relay]") {
   Network network(2);
   network.link(kA, kC - 1);
   RelayStore& store = network.at(kB);
   constexpr std::size_t kSize = 100'000;
   const auto fit = static_cast<std::uint32_t>(RelayStore::kMaxBagBytes / (kSize + 96));
-  for (std::uint32_t i = 0; i < fit + 5; ++i) store.keep_bag(kA, i, octets(kSize));
+  for (std::uint32_t i = 0; i < fit + 5; ++i)
+    store.keep_bag(network.identity(kA), i, octets(kSize));
   CHECK(store.given_up() == 5);
   store.lost(kA, 0.0);
   CHECK(store.summary().holds == std::vector<RelayHeld>{{{kA, Network::first_boot(kA)}, fit, 0}});
