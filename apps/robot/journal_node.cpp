@@ -49,7 +49,8 @@ JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
   topics.peer_closures.subscribe([this](const auto& closure) { worker_.post(FromPeer{closure}); });
   topics.outcomes.subscribe(post);
   topics.peer_events.subscribe([this](const auto& event) {
-    if (event->kind == PeerEventKind::kJoined || event->kind == PeerEventKind::kResumed)
+    using enum PeerEventKind;
+    if (event->kind == kJoined || event->kind == kTold || event->kind == kResumed)
       worker_.post(event);
   });
 }

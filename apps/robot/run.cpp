@@ -68,6 +68,8 @@ const char* to_word(PeerState state) {
       return "lost";
     case PeerState::kLeft:
       return "left";
+    case PeerState::kTold:
+      return "out of reach";
   }
   return "";
 }

@@ -18,6 +18,28 @@ void PeerTable::recall(const RobotIdentity& identity) {
   peers_.try_emplace(identity.robot, KnownPeer{{identity, PeerState::kLost, "unknown"}, Guid{}});
 }
 
+void PeerTable::tell(const RobotIdentity& identity) {
+  if (identity.robot == self_.robot) return;
+  const auto found = peers_.find(identity.robot);
+  if (found == peers_.end()) {
+    if (peers_.size() >= kMaxRobots) return;
+    peers_.emplace(identity.robot, KnownPeer{{identity, PeerState::kTold, "unknown"}, Guid{}});
+    return emit(PeerEventKind::kTold, identity, "told of by others", false);
+  }
+  KnownPeer& known = found->second;
+  const std::uint64_t former_boot = known.peer.identity.boot;
+  if (known.peer.state == PeerState::kAlive || former_boot == identity.boot) return;
+  const bool resumed = is_same_life(former_boot, identity.boot);
+  known = {{identity, PeerState::kTold, "unknown"}, Guid{}, known.arriving || !resumed};
+  emit(resumed ? PeerEventKind::kResumed : PeerEventKind::kRestarted, identity,
+       resumed ? "resumed, as others tell" : "restarted, as others tell", false);
+}
+
+bool PeerTable::is_arriving(RobotId robot) const {
+  const auto known = peers_.find(robot);
+  return known != peers_.end() && known->second.arriving;
+}
+
 void PeerTable::participant(const Guid& guid, std::string_view user_data,
                             const std::string& addresses) {
   Participant* found = remember(guid);
@@ -204,8 +226,9 @@ PeerTable::Participant* PeerTable::remember(const Guid& guid) {
   return &participants_[guid];
 }
 
-void PeerTable::emit(PeerEventKind kind, const RobotIdentity& identity, const std::string& text) {
-  events_.push_back({kind, identity, to_string(identity) + ' ' + text});
+void PeerTable::emit(PeerEventKind kind, const RobotIdentity& identity, const std::string& text,
+                     bool heard) {
+  events_.push_back({kind, identity, to_string(identity) + ' ' + text, heard});
 }
 
 }  // namespace km

@@ -14,8 +14,8 @@
 
 namespace km {
 
-/// kLost: went silent. kLeft: said good-bye.
-enum class PeerState { kAlive, kLost, kLeft };
+/// kLost: went silent. kLeft: said good-bye. kTold: known through others alone.
+enum class PeerState { kAlive, kLost, kLeft, kTold };
 
 /// Another robot of the team, as last heard of.
 struct Peer {
@@ -25,7 +25,8 @@ struct Peer {
 };
 
 enum class PeerEventKind {
-  kJoined,     ///< First heard of.
+  kJoined,     ///< First heard.
+  kTold,       ///< First told of, by others.
   kLost,       ///< Silent for longer than dds.liveliness_s.
   kReturned,   ///< Heard again, same boot.
   kResumed,    ///< Same robot id, other boot of the same life: its keyframes are as before.
@@ -50,6 +51,7 @@ struct PeerEvent {
   PeerEventKind kind;
   RobotIdentity identity;  ///< Of the peer; default where it could not be read.
   std::string text;        ///< One line for people.
+  bool heard = true;       ///< False of what others tell of it.
 };
 
 /// Who is there: turns what DDS reports about participants and the liveliness of their status
@@ -76,6 +78,10 @@ class PeerTable {
 
   /// A robot that was met before this process: it is lost, until it is heard.
   void recall(const RobotIdentity& identity);
+
+  /// Others hear this robot, or have heard it. Of one that is not heard here their word counts:
+  /// kTold if it is new, kResumed or kRestarted if it has been known by another process.
+  void tell(const RobotIdentity& identity);
 
   /// A participant announced itself (again) with this user data.
   void participant(const Guid& guid, std::string_view user_data, const std::string& addresses);
@@ -112,6 +118,8 @@ class PeerTable {
   [[nodiscard]] std::optional<TeamPeer> current(RobotId robot) const;
   /// True unless another process has taken the id over since.
   [[nodiscard]] bool is_current(const TeamPeer& sender) const;
+  /// True from when it is another life until told().
+  [[nodiscard]] bool is_arriving(RobotId robot) const;
 
  private:
   struct Participant {
@@ -134,7 +142,8 @@ class PeerTable {
   void take_over(KnownPeer& known, const Guid& guid, const Participant& participant);
   void give_way(const Guid& guid, PeerState state, PeerEventKind kind, const char* text);
   Participant* remember(const Guid& guid);
-  void emit(PeerEventKind kind, const RobotIdentity& identity, const std::string& text);
+  void emit(PeerEventKind kind, const RobotIdentity& identity, const std::string& text,
+            bool heard = true);
 
   RobotIdentity self_;
   Admit admit_;

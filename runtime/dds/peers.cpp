@@ -166,6 +166,19 @@ void Peers::recall(const RobotIdentity& identity) {
   table_.recall(identity);
 }
 
+void Peers::tell(const RobotIdentity& identity) {
+  {
+    const std::lock_guard lock(mutex_);
+    table_.tell(identity);
+  }
+  publish_events();
+}
+
+bool Peers::is_arriving(RobotId robot) const {
+  const std::lock_guard lock(mutex_);
+  return table_.is_arriving(robot);
+}
+
 std::vector<Peer> Peers::list() const {
   const std::lock_guard lock(mutex_);
   return table_.peers();

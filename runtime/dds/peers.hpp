@@ -69,6 +69,10 @@ class Peers {
   /// before start().
   void recall(const RobotIdentity& identity);
 
+  /// See PeerTable. Thread-safe.
+  void tell(const RobotIdentity& identity);
+  [[nodiscard]] bool is_arriving(RobotId robot) const;
+
   /// Robots of the team ever met by this one, ascending by id.
   [[nodiscard]] std::vector<Peer> list() const;
 

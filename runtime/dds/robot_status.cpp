@@ -35,6 +35,11 @@ Codec<RobotStatus>::Encoded Codec<RobotStatus>::encode(const RobotStatus& status
   wire.dataset_time_s = status.dataset_time_s;
   wire.keyframes = status.keyframes;
   wire.settled_links = status.settled_links;
+  encoded.hears = status.relay.hears;
+  for (const auto& [origin, bags, letters] : status.relay.holds)
+    encoded.holds.push_back({origin.robot, origin.boot, bags, letters});
+  borrow(wire.hears, encoded.hears);
+  borrow(wire.holds, encoded.holds);
   return encoded;
 }
 
@@ -46,9 +51,15 @@ Decoded<RobotStatus> Codec<RobotStatus>::decode(const Wire& wire, const TeamPeer
   if (!std::ranges::all_of(name, printable)) return Result::refuse("name is not printable");
   if (wire.phase > km_wire_PHASE_LEAVING) return Result::refuse("unknown phase");
   if (!std::isfinite(wire.dataset_time_s)) return Result::refuse("time is not finite");
+  const auto hears = elements_of(wire.hears, kMaxNamed);
+  const auto holds = elements_of(wire.holds, kMaxNamed);
+  if (!hears || !holds) return Result::refuse("it names too many robots");
+  RelaySummary relay{.hears = {hears->begin(), hears->end()}};
+  for (const km_wire_RelayHeld& held : *holds)
+    relay.holds.push_back({{held.robot, held.boot}, held.bags, held.letters});
   const auto phase = static_cast<RobotPhase>(wire.phase);
   return Result::accept({writer.robot, name, phase, wire.dataset_time_s, wire.keyframes,
-                         wire.settled_links, writer.boot});
+                         wire.settled_links, writer.boot, std::move(relay)});
 }
 
 RobotStatusNode::RobotStatusNode(std::function<RobotStatus()> provider,

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "modules/core/ids.hpp"
+#include "modules/core/relay_summary.hpp"
 #include "runtime/dds/codec.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
@@ -34,6 +35,7 @@ struct RobotStatus {
   /// what each neighbour tells of its own, so that also far ones are waited for.
   std::uint8_t settled_links = 0;
   std::uint64_t boot = 0;  ///< Of the process that told it.
+  RelaySummary relay = {};
 };
 
 /// How often a robot tells its status [s].
@@ -47,11 +49,15 @@ struct Codec<RobotStatus> {
   using Wire = km_wire_RobotStatus;
   static constexpr const char* kTopic = "robot_status";
   static constexpr std::uint16_t kVersion = 1;
-  static constexpr std::size_t kMaxBytes = 256;
+  /// Whom a status names at most as heard, and as known.
+  static constexpr std::size_t kMaxNamed = 64;
+  static constexpr std::size_t kMaxBytes = 256 + (2 + 24) * kMaxNamed;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_RobotStatus_desc; }
 
   struct Encoded {
     Wire wire{};
+    std::vector<std::uint16_t> hears;
+    std::vector<km_wire_RelayHeld> holds;
   };
   static MessageKey key_of(const RobotStatus& status);
   static Encoded encode(const RobotStatus& status);

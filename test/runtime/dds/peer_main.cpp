@@ -27,6 +27,8 @@ const char* name_of(PeerEventKind kind) {
   switch (kind) {
     case PeerEventKind::kJoined:
       return "joined";
+    case PeerEventKind::kTold:
+      return "told of";
     case PeerEventKind::kLost:
       return "lost";
     case PeerEventKind::kReturned:

@@ -54,6 +54,53 @@ TEST_CASE("A robot of an earlier process is lost until it is heard, and known by
   CHECK(table.peers()[0].addresses == "udp/10.0.0.7");
 }
 
+TEST_CASE("Of a robot that is not heard the word of others counts, until it is", "[peers]") {
+  constexpr std::uint64_t kLife = std::uint64_t{70} << kResumeBits;
+  constexpr std::uint64_t kOtherLife = std::uint64_t{71} << kResumeBits;
+  PeerTable table(kSelf);
+  const auto tell = [&](std::uint64_t boot) { table.tell({7, "peer", kProtocolVersion, boot}); };
+  table.tell({kSelf.robot, "self", kProtocolVersion, 3});
+  CHECK(table.peers().empty());
+  tell(kLife);
+  const std::vector<PeerEvent> told = table.take_events();
+  REQUIRE(told.size() == 1);
+  CHECK(told[0].kind == PeerEventKind::kTold);
+  CHECK_FALSE(told[0].heard);
+  CHECK(table.peers()[0].state == PeerState::kTold);
+  CHECK(table.current(7) == TeamPeer{7, kLife});
+  SECTION("the same again is no news") {
+    tell(kLife);
+    CHECK(kinds(table).empty());
+  }
+  SECTION("another process of its life") {
+    tell(kLife + 1);
+    CHECK(kinds(table) == Kinds{PeerEventKind::kResumed});
+    CHECK_FALSE(table.is_arriving(7));
+  }
+  SECTION("another life waits until all nodes know") {
+    tell(kOtherLife);
+    CHECK(kinds(table) == Kinds{PeerEventKind::kRestarted});
+    CHECK(table.is_arriving(7));
+    table.told({7, kOtherLife});
+    CHECK_FALSE(table.is_arriving(7));
+  }
+  SECTION("it is heard itself") {
+    const bool restarted = GENERATE(false, true);
+    CAPTURE(restarted);
+    const std::uint64_t boot = restarted ? kOtherLife : kLife;
+    table.participant(guid(2), data_of(7, boot), "udp/10.0.0.7");
+    table.alive(guid(2));
+    CHECK(kinds(table) == Kinds{restarted ? PeerEventKind::kRestarted : PeerEventKind::kReturned});
+    tell(kLife + 5);
+    CHECK(kinds(table).empty());
+    CHECK(table.current(7) == TeamPeer{7, boot});
+    table.silent(guid(2));
+    CHECK(kinds(table) == Kinds{PeerEventKind::kLost});
+    tell(boot);
+    CHECK(kinds(table).empty());
+  }
+}
+
 TEST_CASE("A robot joins once its identity and its liveliness are known, in either order",
           "[peers]") {
   PeerTable table(kSelf);
