@@ -65,6 +65,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   add_loop_closure(config);
   if (!std::holds_alternative<PastRun>(input.source)) add_journal(options, input.name, results);
   add_back_end(config);
+  add_relay();
   if (mapping) add_mesh_correction(config, options.output, results);
   add_network(share_meshes(config.mesh_chunks));
   add_records();
@@ -110,7 +111,7 @@ void Robot::add_journal(const RobotOptions& options, const std::string& input,
                                              .new_keyframes = topics_.new_keyframes,
                                              .new_closures = topics_.new_closures,
                                              .new_restarts = topics_.new_closure_restarts,
-                                             .peer_closures = topics_.shared_closures.from_peers(),
+                                             .peer_closures = topics_.peer_closures,
                                              .outcomes = topics_.outcomes,
                                              .peer_events = bridge_->peers().events(),
                                              .keyframes = topics_.keyframes,
@@ -149,7 +150,7 @@ void Robot::add_place_recognition(const RobotConfig& config) {
       std::make_shared<const Vocabulary>(load_vocabulary(find_shipped_file(config.run.vocabulary)));
   add<PlaceRecognitionNode>(false, config.place_recognition, identity_.robot, vocabulary_,
                             PlaceRecognitionTopics{.keyframes = topics_.keyframes,
-                                                   .peer_bows = topics_.bows.from_peers(),
+                                                   .peer_bows = topics_.peer_bows,
                                                    .peer_events = bridge_->peers().events(),
                                                    .own_bows = topics_.bows.to_peers(),
                                                    .candidates = topics_.candidates,
@@ -231,14 +232,14 @@ void Robot::add_loop_closure(const RobotConfig& config) {
                        LoopClosureTopics{.keyframes = topics_.keyframes,
                                          .candidates = topics_.candidates,
                                          .measured_closures = topics_.measured_closures,
-                                         .peer_requests = topics_.requests.from_peers(),
-                                         .peer_replies = topics_.replies.from_peers(),
-                                         .peer_events = bridge_->peers().events(),
+                                         .peer_requests = topics_.peer_requests,
+                                         .peer_replies = topics_.peer_replies,
+                                         .peer_events = topics_.ways,
                                          .restarts = topics_.candidate_restarts,
-                                         .peer_bows = topics_.bows.from_peers(),
+                                         .peer_bows = topics_.peer_bows,
                                          .restored = topics_.restored_outcomes,
-                                         .own_requests = topics_.requests.to_peers(),
-                                         .own_replies = topics_.replies.to_peers(),
+                                         .own_requests = topics_.own_requests,
+                                         .own_replies = topics_.own_replies,
                                          .own_closures = topics_.new_closures,
                                          .own_restarts = topics_.new_closure_restarts,
                                          .outcomes = topics_.outcomes});
@@ -246,7 +247,7 @@ void Robot::add_loop_closure(const RobotConfig& config) {
 
 void Robot::add_back_end(const RobotConfig& config) {
   forward<Closure>(topics_.own_closures, topics_.closures);
-  forward<Closure>(topics_.shared_closures.from_peers(), topics_.closures);
+  forward<Closure>(topics_.peer_closures, topics_.closures);
   pcm_ = &add<PcmNode>(false, config.pcm, identity_.robot,
                        PcmTopics{.closures = topics_.closures,
                                  .restarts = topics_.closure_restarts,
@@ -256,7 +257,7 @@ void Robot::add_back_end(const RobotConfig& config) {
                 TeamTopics{.odometry = topics_.keyframe_odometry,
                            .closures = topics_.closures,
                            .inlier_sets = topics_.own_inlier_sets,
-                           .peer_inlier_sets = topics_.shared_inlier_sets.from_peers(),
+                           .peer_inlier_sets = topics_.peer_inlier_sets,
                            .peer_events = bridge_->peers().events(),
                            .restarts = topics_.closure_restarts,
                            .peer_parcels = topics_.parcels.from_peers(),
@@ -264,6 +265,37 @@ void Robot::add_back_end(const RobotConfig& config) {
                            .trajectory = topics_.trajectory,
                            .progress = topics_.progress,
                            .verdicts = topics_.closure_verdicts});
+}
+
+// With keys nothing is relayed: nobody could tell whether what is handed on is its origin's.
+void Robot::add_relay() {
+  Topics& t = topics_;
+  const In<PeerEvent> peer_events = bridge_->peers().events();
+  forward<PeerEvent>(peer_events, t.ways);
+  relay_.emplace(TeamPeer{identity_.robot, identity_.boot}, seal_ == nullptr, bridge_->peers(),
+                 RelayTopics{.peer_events = peer_events,
+                             .statuses = t.status.from_peers(),
+                             .parcels = t.relay_parcels.from_peers(),
+                             .own_parcels = t.relay_parcels.to_peers(),
+                             .reached = t.ways});
+  relay_->join_bags<KeyframeBow>(t.bows.from_peers(), t.peer_bows,
+                                 [](const KeyframeBow& bow) { return bow.id; });
+  const auto around = []<typename T>(Topic<Addressed<T>>& own, AddressedCrossing<T>& crossing,
+                                     Topic<T>& all) {
+    return RelayedTopics<T>{own, crossing.to_peers(), crossing.from_peers(), all};
+  };
+  relay_->join_calls(
+      RelayKind::kRequest, around(t.own_requests, t.requests, t.peer_requests),
+      [](const KeyframeRequest& request) { return std::optional(request.keyframe); });
+  relay_->join_calls(RelayKind::kReply, around(t.own_replies, t.replies, t.peer_replies),
+                     [](const KeyframeReply& reply) {
+                       return reply.found ? std::optional(reply.keyframe.odometry.id)
+                                          : std::nullopt;
+                     });
+  relay_->join_letters(RelayKind::kClosure,
+                       around(t.told_closures, t.shared_closures, t.peer_closures));
+  relay_->join_letters(RelayKind::kInlierSet,
+                       around(t.told_inlier_sets, t.shared_inlier_sets, t.peer_inlier_sets));
 }
 
 void Robot::add_network(CrossingEnds meshes) {
@@ -279,23 +311,26 @@ void Robot::add_network(CrossingEnds meshes) {
   dds.exchange(t.shared_closures, kEvent, kGeometricVerification);
   dds.exchange(t.shared_inlier_sets, kState, kPoseGraphOptimization);
   dds.exchange(t.parcels, kRequest, kPoseGraphOptimization);
+  dds.exchange(t.relay_parcels, kRequest, kOther);
   dds.exchange(t.chunks, kState, kOther, meshes);
   dds.exchange(t.status, kStatus, kOther);
   // A closure, and whether it is an inlier, is of use to the robots it joins and to no others.
-  t.own_closures.subscribe([this, to = t.shared_closures.to_peers()](const auto& closure) {
-    const RobotId other = closure->to.id.robot;
-    if (other != closure->from.id.robot)
-      to.publish(Addressed<Closure>{other, closure, lives_.of(other)});
-  });
+  t.own_closures.subscribe(
+      [this, to = Out<Addressed<Closure>>(t.told_closures)](const auto& closure) {
+        const RobotId other = closure->to.id.robot;
+        if (other != closure->from.id.robot)
+          to.publish(Addressed<Closure>{other, closure, lives_.of(other)});
+      });
   const auto meet = [this](const auto& event) {
     lives_.meet({event->identity.robot, event->identity.boot});
   };
   t.closure_restarts.subscribe(meet);
-  t.own_inlier_sets.subscribe([to = t.shared_inlier_sets.to_peers()](const auto& set) {
-    if (set->a != set->b) to.publish(Addressed<InlierSet>{set->b, set});
-  });
+  t.own_inlier_sets.subscribe(
+      [to = Out<Addressed<InlierSet>>(t.told_inlier_sets)](const auto& set) {
+        if (set->a != set->b) to.publish(Addressed<InlierSet>{set->b, set});
+      });
   dds.peers().events().subscribe([this, meet](const auto& event) {
-    if (event->kind == PeerEventKind::kJoined) meet(event);
+    if (event->kind == PeerEventKind::kJoined || event->kind == PeerEventKind::kTold) meet(event);
     if (event->kind == PeerEventKind::kConflict && event->identity.robot == identity_.robot)
       id_taken_ = true;
   });
@@ -312,7 +347,7 @@ void Robot::add_records() {
   recorder_->record(topics_.outcomes);
   recorder_->record(topics_.restored_outcomes);
   recorder_->record(topics_.own_inlier_sets);
-  recorder_->record(topics_.shared_inlier_sets.from_peers());
+  recorder_->record(topics_.peer_inlier_sets);
   recorder_->record(topics_.trajectory);
   recorder_->record(topics_.progress);
   recorder_->record(topics_.closure_verdicts);
@@ -333,7 +368,8 @@ void Robot::add_records() {
 }
 
 RobotStatus Robot::own_status() const {
-  return {identity_.robot, identity_.name, phase_, dataset_time_s_, keyframes_, settled_links_};
+  return {identity_.robot, identity_.name, phase_,         dataset_time_s_,
+          keyframes_,      settled_links_, identity_.boot, relay_->summary()};
 }
 
 void Robot::freeze_record() {

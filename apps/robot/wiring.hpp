@@ -29,6 +29,7 @@
 #include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/pose_graph/graph_playback_node.hpp"
 #include "modules/pose_graph/parcel_codec.hpp"
+#include "modules/relay/relay_node.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/sensors/sensors_node.hpp"
 #include "runtime/dds/bridge.hpp"
@@ -65,12 +66,25 @@ struct Topics {
   Topic<OptimizerProgress> progress;
   Topic<ClosureVerdicts> closure_verdicts;
 
+  // What RelayNode takes to the crossings below or around them, and what comes from either.
+  Topic<PeerEvent> ways;  // peer events, and who can be asked now though it is not heard
+  Topic<KeyframeBow> peer_bows;
+  Topic<Addressed<KeyframeRequest>> own_requests;
+  Topic<KeyframeRequest> peer_requests;
+  Topic<Addressed<KeyframeReply>> own_replies;
+  Topic<KeyframeReply> peer_replies;
+  Topic<Addressed<Closure>> told_closures;
+  Topic<Closure> peer_closures;
+  Topic<Addressed<InlierSet>> told_inlier_sets;
+  Topic<InlierSet> peer_inlier_sets;
+
   Crossing<KeyframeBow> bows;
   AddressedCrossing<KeyframeRequest> requests;
   AddressedCrossing<KeyframeReply> replies;
   AddressedCrossing<Closure> shared_closures;
   AddressedCrossing<InlierSet> shared_inlier_sets;
   AddressedCrossing<TeamParcel> parcels;
+  AddressedCrossing<RelayParcel> relay_parcels;
   Crossing<MeshChunk> chunks;
   Crossing<RobotStatus> status;
 };
@@ -139,6 +153,7 @@ class Robot {
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_loop_closure(const RobotConfig& config);
   void add_back_end(const RobotConfig& config);
+  void add_relay();
   void add_network(CrossingEnds meshes);
   void add_records();
   [[nodiscard]] RobotStatus own_status() const;
@@ -173,6 +188,7 @@ class Robot {
   PcmNode* pcm_ = nullptr;
   RobotStatusNode* status_ = nullptr;
   DdsBridge* bridge_ = nullptr;
+  std::optional<RelayNode> relay_;
   Supervisor supervisor_;  // last member: stops the nodes before what they use
 };
 

@@ -10,6 +10,7 @@
 #include "modules/place_recognition/place_recognition_codec.hpp"
 #include "modules/pose_graph/parcel_codec.hpp"
 #include "modules/pose_graph/tree_letters.hpp"
+#include "modules/relay/relay_codec.hpp"
 #include "runtime/dds/envelope.hpp"
 #include "runtime/dds/robot_status.hpp"
 
@@ -70,6 +71,10 @@ TeamParcel parcel(TeamMessage message) {
   return {kWriter.robot, std::make_shared<const TeamMessage>(std::move(message))};
 }
 
+RelayParcel relayed(RelayMessage message) {
+  return {kWriter.robot, std::make_shared<const RelayMessage>(std::move(message))};
+}
+
 std::vector<TeamParcel> some_parcels() {
   const TeamPeer self{kWriter.robot, kWriter.boot};
   const TeamPeer far{9, 1};
@@ -120,7 +125,17 @@ std::vector<MessageReader> all_messages() {
                          .closures = {{{2, 1}, {5, 2}}, {{2, 1}, {5, 3}}}}}),
       topic<KeyframeBow>({{.id = {kWriter.robot, 4}, .words = {{3, 1}, {900, 4}, {70000, 1}}}}),
       topic<MeshChunk>({some_chunk()}),
-      topic<RobotStatus>({{.robot = kWriter.robot, .name = "beta", .settled_links = 3}}),
+      topic<RobotStatus>({{.robot = kWriter.robot,
+                           .name = "beta",
+                           .settled_links = 3,
+                           .relay = {.hears = {kReader, 9}, .holds = {{{11, 12}, 13, 14}}}}}),
+      topic<RelayParcel>(
+          {relayed({.kind = RelayKind::kIntroduction, .origin = {9, 1}, .content = {'c'}}),
+           relayed({.kind = RelayKind::kRequest,
+                    .origin = {9, 1},
+                    .to = kReader,
+                    .number = 3,
+                    .content = {1, 2, 3}})}),
       topic<TeamParcel>(some_parcels())};
   all.push_back({"letters up",
                  [](std::span<const std::uint8_t> bytes) { return decode_up(bytes).has_value(); },

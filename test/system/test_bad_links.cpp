@@ -152,6 +152,45 @@ TEST_CASE("A team in two parts ends in two frames and its table of links says wh
   }
 }
 
+TEST_CASE("Robots that never hear each other find closures through one that hears both",
+          "[system][namespaces]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  // c hears a alone, then b as well.
+  const std::string links = folder
+                                .write("links.yaml",
+                                       "pairs:\n"
+                                       "  - {from: a, to: b, outages: [{from_s: 0}]}\n"
+                                       "  - {from: b, to: c, outages: [{from_s: 0, to_s: 20}]}\n")
+                                .string();
+  const auto team =
+      folder.write("team.yaml", "config: " + fs::absolute("config/datasets/euroc.yaml").string() +
+                                    "\narguments: [--set, run.settle_s=40]\nrobots:\n"
+                                    "  - {id: 0, name: a, dataset: \"${DATASET}\", to: 7.5}\n"
+                                    "  - {id: 1, name: b, dataset: \"${DATASET}\", from: 7.5, "
+                                    "to: 15.0}\n"
+                                    "  - {id: 2, name: c, dataset: \"${DATASET}\", from: 4.0, "
+                                    "to: 11.0}\n");
+  const TeamRun run = run_team(team, *dataset, folder, "--links " + links);
+  CAPTURE(run.result.output);
+  if (!had_own_networks(run.result.output)) return;
+  REQUIRE(run.result.exit_code == 0);
+  for (const char* name : {"a", "b", "c"}) {
+    const RunSummary summary = read_summary(folder.path() / name / "summary.json");
+    CHECK(summary.pgo.members == std::vector<RobotId>{0, 1, 2});
+  }
+  // Of the closures between a and b each is in both files, once.
+  std::map<std::pair<KeyframeId, KeyframeId>, int> closures;
+  for (const char* name : {"a", "b"})
+    for (const RelativePose& edge : read_g2o(folder.path() / name / "pose_graph.g2o").edges)
+      if (edge.from.robot + edge.to.robot == 1 && edge.from.robot != edge.to.robot)
+        ++closures[{edge.from, edge.to}];
+  std::cout << closures.size() << " closures between robots that never hear each other\n";
+  CHECK(closures.size() >= 3);
+  for (const auto& [ends, count] : closures) CHECK(count == 2);
+}
+
 namespace {
 
 // One way in which links are bad, all through the run but for the outage.

@@ -1,0 +1,62 @@
+#include "modules/relay/relay_codec.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <span>
+#include <utility>
+
+namespace km {
+namespace {
+
+constexpr std::size_t kMaxName = 64;
+
+bool is_name(std::span<const std::uint8_t> bytes) {
+  const auto printable = [](std::uint8_t c) { return c >= ' ' && c <= '~' && c != ';'; };
+  return !bytes.empty() && bytes.size() <= kMaxName && std::ranges::all_of(bytes, printable);
+}
+
+}  // namespace
+
+MessageKey Codec<RelayParcel>::key_of(const RelayParcel& parcel) {
+  const RelayMessage& message = *parcel.message;
+  return message_key({static_cast<std::uint64_t>(message.kind), message.origin.robot,
+                      message.origin.boot, message.to, message.number});
+}
+
+Codec<RelayParcel>::Encoded Codec<RelayParcel>::encode(const RelayParcel& parcel) {
+  const RelayMessage& message = *parcel.message;
+  Encoded encoded;
+  encoded.content = message.content;
+  Wire& wire = encoded.wire;
+  wire.kind = static_cast<std::uint8_t>(message.kind);
+  wire.hops = message.hops;
+  wire.origin = message.origin.robot;
+  wire.to = message.to;
+  wire.boot = message.origin.boot;
+  wire.number = message.number;
+  borrow(wire.content, encoded.content);
+  return encoded;
+}
+
+Decoded<RelayParcel> Codec<RelayParcel>::decode(const Wire& wire, const TeamPeer& writer) {
+  using Result = Decoded<RelayParcel>;
+  if (wire.kind > static_cast<std::uint8_t>(RelayKind::kReply))
+    return Result::refuse("a kind that is not known");
+  const auto kind = static_cast<RelayKind>(wire.kind);
+  if (wire.boot == 0) return Result::refuse("of no process");
+  if (wire.origin == writer.robot && wire.boot != writer.boot)
+    return Result::refuse("told by a former process of the robot that sends it");
+  const auto content = elements_of(wire.content, kMaxRelayContent);
+  if (!content) return Result::refuse("the content is missing or too long");
+  if (kind == RelayKind::kIntroduction && !is_name(*content))
+    return Result::refuse("a name that no robot has");
+  return Result::accept({writer.robot, std::make_shared<const RelayMessage>(RelayMessage{
+                                           .kind = kind,
+                                           .origin = {wire.origin, wire.boot},
+                                           .to = wire.to,
+                                           .number = wire.number,
+                                           .hops = wire.hops,
+                                           .content = {content->begin(), content->end()}})});
+}
+
+}  // namespace km

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <relay.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "modules/relay/relay_message.hpp"
+#include "runtime/dds/codec.hpp"
+
+namespace km {
+
+/// The largest of the contents is an inlier set's.
+inline constexpr std::size_t kMaxRelayContent = 800'000;
+
+/// Sent as TopicKind::kRequest: what a link that is down for longer than dds.lease_s holds up is
+/// handed over again by the RelayStore.
+template <>
+struct Codec<RelayParcel> {
+  using Wire = km_wire_RelayParcel;
+  static constexpr const char* kTopic = "relay_parcels";
+  static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::size_t kMaxBytes = kMaxRelayContent + 64;
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_RelayParcel_desc; }
+
+  struct Encoded {
+    Wire wire{};
+    std::vector<std::uint8_t> content;
+  };
+  static MessageKey key_of(const RelayParcel& parcel);
+  static Encoded encode(const RelayParcel& parcel);
+  static Decoded<RelayParcel> decode(const Wire& wire, const TeamPeer& writer);
+};
+
+}  // namespace km

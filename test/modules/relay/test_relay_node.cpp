@@ -1,0 +1,194 @@
+#include <catch2/catch.hpp>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "modules/loop_closure/loop_closure_codec.hpp"
+#include "modules/outlier_rejection/outlier_rejection_codec.hpp"
+#include "modules/place_recognition/place_recognition_codec.hpp"
+#include "modules/relay/relay_node.hpp"
+#include "runtime/dds/participant.hpp"
+#include "test/runtime/dds/dds_fixture.hpp"
+#include "test/support/inbox.hpp"
+
+namespace km {
+namespace {
+
+TeamPeer process_of(RobotId robot) {
+  return {robot, (std::uint64_t{robot} + 1) << kResumeBits};
+}
+
+RobotIdentity identity_of(RobotId robot) {
+  return {.robot = robot, .name = robot_name(robot), .boot = process_of(robot).boot};
+}
+
+// What DDS would carry goes from topic to topic here.
+struct Relaying {
+  Relaying(const std::shared_ptr<const DdsDomain>& domain, RobotId robot, double& now_s,
+           bool relays = true)
+      : self(robot),
+        participant(domain, identity_of(robot)),
+        peers(participant),
+        node(process_of(robot), relays, peers, {events, statuses, parcels, own_parcels, reached},
+             [&now_s] { return now_s; }) {
+    node.join_bags<KeyframeBow>(heard_bows, bows, [](const KeyframeBow& bow) { return bow.id; });
+    node.join_calls(
+        RelayKind::kRequest,
+        RelayedTopics<KeyframeRequest>{own_requests, direct_requests, heard_requests, requests},
+        [](const KeyframeRequest& request) { return std::optional(request.keyframe); });
+    node.join_letters(RelayKind::kInlierSet,
+                      RelayedTopics<InlierSet>{told_sets, direct_sets, heard_sets, sets});
+  }
+
+  RobotId self;
+  DdsParticipant participant;
+  Peers peers;
+  Topic<PeerEvent> events, reached;
+  Topic<RobotStatus> statuses;
+  Topic<RelayParcel> parcels;
+  Topic<Addressed<RelayParcel>> own_parcels;
+  Topic<KeyframeBow> heard_bows, bows;
+  Topic<Addressed<KeyframeRequest>> own_requests, direct_requests;
+  Topic<KeyframeRequest> heard_requests, requests;
+  Topic<Addressed<InlierSet>> told_sets, direct_sets;
+  Topic<InlierSet> heard_sets, sets;
+  Inbox<KeyframeBow> got_bows{bows};
+  Inbox<KeyframeRequest> got_requests{requests};
+  Inbox<InlierSet> got_sets{sets};
+  Inbox<PeerEvent> got_ways{reached};
+  Inbox<Addressed<KeyframeRequest>> sent_directly{direct_requests};
+  Inbox<Addressed<InlierSet>> told_directly{direct_sets};
+  RelayNode node;
+};
+
+// Robots 0 and 1, which do not hear each other, and 2, which hears both.
+struct Chain {
+  explicit Chain(bool relays = true) {
+    for (RobotId robot = 0; robot < 3; ++robot)
+      robots.push_back(std::make_unique<Relaying>(domain, robot, now_s, relays));
+    for (auto& robot : robots)
+      robot->own_parcels.subscribe([this, from = robot->self](const auto& parcel) {
+        ++parcels;
+        robots[parcel->to]->parcels.publish(RelayParcel{from, parcel->message->message});
+      });
+    for (const RobotId end : {RobotId{0}, RobotId{1}}) {
+      robots[end]->events.publish(PeerEvent{PeerEventKind::kJoined, identity_of(2), {}});
+      robots[2]->events.publish(PeerEvent{PeerEventKind::kJoined, identity_of(end), {}});
+    }
+  }
+  // Statuses for a while.
+  void run(double seconds) {
+    for (const double end_s = now_s + seconds; now_s < end_s; now_s += kStatusPeriod_s)
+      for (const RobotId end : {RobotId{0}, RobotId{1}}) {
+        tell(end, 2);
+        tell(2, end);
+      }
+  }
+  void tell(RobotId from, RobotId to) {
+    robots[to]->statuses.publish(RobotStatus{
+        .robot = from, .name = robot_name(from), .relay = robots[from]->node.summary()});
+  }
+
+  double now_s = 0.0;
+  int parcels = 0;
+  std::shared_ptr<const DdsDomain> domain = std::make_shared<DdsDomain>(loopback_config());
+  std::vector<std::unique_ptr<Relaying>> robots;
+};
+
+}  // namespace
+
+TEST_CASE("What robots out of reach tell comes out where it would if they were heard", "[relay]") {
+  Chain chain;
+  Relaying &a = *chain.robots[0], &b = *chain.robots[1], &c = *chain.robots[2];
+  c.peers.tell(identity_of(0));  // as if DDS had discovered it
+  c.heard_bows.publish(KeyframeBow{.id = {0, 0}, .words = {{3, 1}}});
+  chain.run(20.0);
+  REQUIRE(c.got_bows.messages().size() == 1);
+  REQUIRE(b.got_bows.messages().size() == 1);
+  CHECK(b.got_bows.messages()[0].id == KeyframeId{0, 0});
+  CHECK(b.got_bows.messages()[0].words == BagOfWords{{3, 1}});
+  CHECK(b.peers.current(0) == process_of(0));
+  REQUIRE(b.got_ways.messages().size() == 1);
+  CHECK(b.got_ways.messages()[0].identity.robot == 0);
+  CHECK_FALSE(b.got_ways.messages()[0].heard);
+
+  const KeyframeRequest request{.requester = 1, .number = 4, .keyframe = {0, 0}, .own = 9};
+  b.own_requests.publish(
+      Addressed<KeyframeRequest>{0, std::make_shared<const KeyframeRequest>(request)});
+  REQUIRE(a.got_requests.messages().size() == 1);
+  CHECK(a.got_requests.messages()[0].requester == 1);
+  CHECK(a.got_requests.messages()[0].own == 9);
+  CHECK(b.sent_directly.messages().empty());
+  b.own_requests.publish(
+      Addressed<KeyframeRequest>{2, std::make_shared<const KeyframeRequest>(request)});
+  CHECK(b.sent_directly.messages().size() == 1);
+
+  const InlierSet set{.a = 0, .b = 1, .version = 1, .closures = {{{0, 1}, {1, 2}}}};
+  a.told_sets.publish(Addressed<InlierSet>{1, std::make_shared<const InlierSet>(set)});
+  chain.run(2.0);
+  REQUIRE(b.got_sets.messages().size() == 1);
+  CHECK(b.got_sets.messages()[0].closures == set.closures);
+  CHECK(a.told_directly.messages().size() == 1);
+}
+
+TEST_CASE("A robot that does not relay says nothing of it and leaves all to the bridge",
+          "[relay]") {
+  Chain chain(false);
+  chain.robots[2]->peers.tell(identity_of(0));
+  Relaying& b = *chain.robots[1];
+  chain.robots[2]->heard_bows.publish(KeyframeBow{.id = {0, 0}, .words = {{3, 1}}});
+  chain.run(20.0);
+  b.own_requests.publish(Addressed<KeyframeRequest>{0, std::make_shared<const KeyframeRequest>()});
+  b.told_sets.publish(Addressed<InlierSet>{0, std::make_shared<const InlierSet>()});
+  CHECK(chain.parcels == 0);
+  CHECK(chain.robots[2]->got_bows.messages().size() == 1);
+  CHECK(b.sent_directly.messages().size() == 1);
+  CHECK(b.told_directly.messages().size() == 1);
+  CHECK(chain.robots[2]->node.summary() == RelaySummary());
+}
+
+TEST_CASE("What a neighbour hands over is checked before anything else", "[relay]") {
+  const auto refusal_of = [](RelayMessage message) -> std::string {
+    const RelayParcel parcel{2, std::make_shared<const RelayMessage>(std::move(message))};
+    const auto encoded = Codec<RelayParcel>::encode(parcel);
+    const auto decoded = Codec<RelayParcel>::decode(encoded.wire, process_of(2));
+    if (!decoded.value) return decoded.refusal;
+    CHECK(*decoded.value->message == *parcel.message);
+    CHECK(decoded.value->neighbour == 2);
+    return {};
+  };
+  const RelayMessage sound{.kind = RelayKind::kReply,
+                           .origin = process_of(0),
+                           .to = 1,
+                           .number = 7,
+                           .hops = 2,
+                           .content = {1, 2, 3}};
+  CHECK(refusal_of(sound).empty());
+  RelayMessage wrong = sound;
+  SECTION("kind") {
+    wrong.kind = static_cast<RelayKind>(6);
+    CHECK(refusal_of(wrong) == "a kind that is not known");
+  }
+  SECTION("boot") {
+    wrong.origin.boot = 0;
+    CHECK(refusal_of(wrong) == "of no process");
+  }
+  SECTION("origin") {
+    wrong.origin = {2, 1};
+    CHECK(refusal_of(wrong) == "told by a former process of the robot that sends it");
+  }
+  SECTION("size") {
+    wrong.content.resize(kMaxRelayContent + 1);
+    CHECK(refusal_of(wrong) == "the content is missing or too long");
+  }
+  SECTION("name") {
+    wrong.kind = RelayKind::kIntroduction;
+    CHECK(refusal_of(wrong) == "a name that no robot has");
+    wrong.content = {'r', '1'};
+    CHECK(refusal_of(wrong).empty());
+  }
+}
+
+}  // namespace km
