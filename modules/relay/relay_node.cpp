@@ -86,10 +86,10 @@ std::optional<RobotIdentity> RelayNode::identity_of(RobotId robot) const {
   return std::nullopt;
 }
 
-bool RelayNode::is_out_of_reach(RobotId robot) const {
-  if (!relays_) return false;
+RelayWays RelayNode::ways_to(RobotId robot) const {
+  if (!relays_) return {};
   const std::lock_guard lock(mutex_);
-  return store_.origin(robot).has_value() && !store_.hears(robot);
+  return store_.ways_to(robot);
 }
 
 RelaySummary RelayNode::summary() const {

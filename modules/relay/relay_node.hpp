@@ -101,7 +101,7 @@ class RelayNode {
   void take(const PeerEvent& event);
   void take(const RelayParcel& parcel);
   [[nodiscard]] std::optional<RobotIdentity> identity_of(RobotId robot) const;
-  [[nodiscard]] bool is_out_of_reach(RobotId robot) const;
+  [[nodiscard]] RelayWays ways_to(RobotId robot) const;
 
   const bool relays_;
   Peers& peers_;
@@ -155,7 +155,9 @@ void RelayNode::join_calls(RelayKind kind, const RelayedTopics<T>& topics,
   });
   topics.own.subscribe([this, kind, direct = topics.direct, number_of](const auto& call) {
     const std::optional<KeyframeId> keyframe = number_of(*call->message);
-    if (!keyframe || !is_out_of_reach(call->to)) return direct.publish(call);
+    const RelayWays ways = ways_to(call->to);
+    if (ways.direct) direct.publish(call);
+    if (!ways.relay || !keyframe) return;
     act([&](RelayStore& store) {
       store.call(kind, call->to, keyframe->index, bytes_of(*call->message));
     });

@@ -53,6 +53,12 @@ RelayStore::Origin* RelayStore::know(const RobotIdentity& identity) {
   return &origin;
 }
 
+RelayWays RelayStore::ways_to(RobotId robot) const {
+  const auto known = origins_.find(robot);
+  if (known == origins_.end() || hears(robot)) return {};
+  return {.direct = known->second.was_heard, .relay = true};
+}
+
 // Of another process of one life the letters begin anew, since it tells all closures again.
 void RelayStore::become(Origin& origin, const RobotIdentity& identity) {
   const std::uint64_t former = origin.identity.boot;
@@ -66,6 +72,7 @@ void RelayStore::heard(const RobotIdentity& peer) {
   Origin* origin = peer.robot == self_.robot ? nullptr : know(peer);
   if (origin == nullptr) return;
   origin->via.reset();
+  origin->was_heard = true;
   neighbours_[peer.robot] = {};
   settle_unmet(peer.robot, true);
   renew_ways();
@@ -152,8 +159,8 @@ void RelayStore::call(RelayKind kind, RobotId to, std::uint32_t number,
                       std::vector<std::uint8_t> content) {
   RelayMessage message{
       .kind = kind, .origin = self_, .to = to, .number = number, .content = std::move(content)};
-  // Who asks asks again.
-  if (kind == RelayKind::kRequest && !next_hop(to, {})) return;
+  // Who asks asks again, and what DDS keeps need not be carried.
+  if (!next_hop(to, {}) && (kind == RelayKind::kRequest || ways_to(to).direct)) return;
   (void)route(std::move(message), {});
 }
 

@@ -27,6 +27,14 @@ enum class [[nodiscard]] RelayArrival{
     kNoRoom,    ///< Given up: its origin, or what is carried, has no room left.
 };
 
+/// How a message for one robot gets there.
+struct RelayWays {
+  bool direct = true;  ///< DDS carries it, or keeps it for a robot that was heard.
+  bool relay = false;
+
+  bool operator==(const RelayWays&) const = default;
+};
+
 /// What a RelayStore wants done.
 struct RelayOutput {
   std::vector<RelayParcel> parcels;        ///< To be sent.
@@ -94,7 +102,7 @@ class RelayStore {
   /// kind and `slot` to one robot the last counts.
   void wrote(RelayKind kind, RobotId to, std::uint64_t slot, std::vector<std::uint8_t> content,
              double now_s);
-  /// Sends a request or an answer to a robot that is not heard.
+  /// Sends a request or an answer to a robot that ways_to() says to be reached so.
   void call(RelayKind kind, RobotId to, std::uint32_t number, std::vector<std::uint8_t> content);
 
   /// What a neighbour tells of itself.
@@ -105,6 +113,7 @@ class RelayStore {
   [[nodiscard]] RelaySummary summary() const;
   [[nodiscard]] bool hears(RobotId robot) const { return neighbours_.contains(robot); }
   [[nodiscard]] std::optional<TeamPeer> origin(RobotId robot) const;
+  [[nodiscard]] RelayWays ways_to(RobotId robot) const;
   /// Since the last call.
   [[nodiscard]] RelayOutput take_output() { return std::exchange(output_, {}); }
   /// Messages that were not taken for want of room.
@@ -132,6 +141,7 @@ class RelayStore {
     RobotIdentity identity;
     std::optional<RobotId> via = {};  // who has introduced it, or handed over its last bag
     bool reachable = false;           // as last told
+    bool was_heard = false;
     Stream bags = {}, letters = {}, replies = {};
   };
   struct Progress {

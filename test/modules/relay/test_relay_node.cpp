@@ -124,6 +124,11 @@ TEST_CASE("What robots out of reach tell comes out where it would if they were h
   b.own_requests.publish(
       Addressed<KeyframeRequest>{2, std::make_shared<const KeyframeRequest>(request)});
   CHECK(b.sent_directly.messages().size() == 1);
+  b.events.publish(PeerEvent{PeerEventKind::kLost, identity_of(2), {}});
+  b.own_requests.publish(
+      Addressed<KeyframeRequest>{2, std::make_shared<const KeyframeRequest>(request)});
+  CHECK(b.sent_directly.messages().size() == 2);  // which DDS keeps
+  b.events.publish(PeerEvent{PeerEventKind::kReturned, identity_of(2), {}});
 
   const InlierSet set{.a = 0, .b = 1, .version = 1, .closures = {{{0, 1}, {1, 2}}}};
   a.told_sets.publish(Addressed<InlierSet>{1, std::make_shared<const InlierSet>(set)});

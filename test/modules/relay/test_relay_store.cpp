@@ -305,6 +305,21 @@ TEST_CASE("A request goes to its addressee and the answer comes back", "[relay]"
   CHECK(network.all_read(kB).back()->origin == TeamPeer{kA, Network::first_boot(kA)});
 }
 
+TEST_CASE("What DDS keeps for a robot that was heard is not carried as well", "[relay]") {
+  Network network(3);
+  network.link(kA, kB);
+  CHECK(network.at(kA).ways_to(kB) == RelayWays{.direct = true, .relay = false});
+  network.cut(kA, kB);
+  CHECK(network.at(kA).ways_to(kB) == RelayWays{.direct = true, .relay = true});
+  network.at(kA).call(RelayKind::kReply, kB, 17, octets(9000));
+  network.link(kA, kB);
+  network.run(5.0);
+  CHECK(network.parcels() == 0);
+  network.link(kB, kC);
+  network.run(10.0);
+  CHECK(network.at(kA).ways_to(kC) == RelayWays{.direct = false, .relay = true});
+}
+
 TEST_CASE("Who has had a keyframe answers in place of a robot that is gone", "[relay]") {
   Network network(3);
   network.link(kA, kC);
