@@ -241,10 +241,21 @@ class Watch {
   std::map<RobotId, Absentees::Known> known_peers() const {
     using enum Absentees::Contact;
     std::map<RobotId, Absentees::Known> known;
+    const auto contact_of = [](PeerState state) {
+      switch (state) {
+        case PeerState::kAlive:
+          return kHeard;
+        case PeerState::kLost:
+          return kSilent;
+        case PeerState::kTold:
+          return kTold;
+        case PeerState::kLeft:
+          break;
+      }
+      return kLeft;
+    };
     for (const Peer& peer : robot_.bridge().peers().list())
-      known[peer.identity.robot] = {peer.identity.name, peer.state == PeerState::kAlive  ? kHeard
-                                                        : peer.state == PeerState::kLost ? kSilent
-                                                                                         : kLeft};
+      known[peer.identity.robot] = {peer.identity.name, contact_of(peer.state)};
     for (const RobotStatus& status : robot_.status_node().peers()) {
       const auto peer = known.find(status.robot);
       if (status.phase == RobotPhase::kLeaving && peer != known.end() &&

@@ -69,8 +69,10 @@ void Absentees::update(double now_s, const std::map<RobotId, Known>& known,
   for (const auto& [robot, peer] : known) {
     if (peer.contact == Contact::kLeft || std::ranges::find(members, robot) != members.end())
       continue;
-    const Absence why = peer.contact == Contact::kSilent ? Absence::kSilent : Absence::kApart;
-    miss(robot, {.name = peer.name, .why = why}, missed);
+    const bool hearsay = peer.contact == Contact::kTold;
+    if (hearsay && !ever_members_.contains(robot)) continue;
+    const Absence why = peer.contact == Contact::kHeard ? Absence::kApart : Absence::kSilent;
+    miss(robot, {.name = peer.name, .why = why, .hearsay = hearsay}, missed);
   }
   for (const RobotId robot : ever_members_)
     if (!known.contains(robot) && std::ranges::find(members, robot) == members.end())

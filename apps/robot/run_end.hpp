@@ -67,8 +67,8 @@ struct MissedPeer {
 /// Keeps since when a robot misses others of its team. Pure: time comes in [s], any origin.
 class Absentees {
  public:
-  /// A robot that has been heard. kLeft: it said good-bye.
-  enum class Contact { kHeard, kSilent, kLeft };
+  /// kLeft: it said good-bye. kTold: only others have heard it.
+  enum class Contact { kHeard, kSilent, kLeft, kTold };
   struct Known {
     std::string name;
     Contact contact = Contact::kHeard;

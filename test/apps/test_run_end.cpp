@@ -198,6 +198,11 @@ TEST_CASE("A member that only others heard is missed once it cannot have left in
   CHECK(told(absentees, 3.0).empty());
   absentees.update(9.0, {{2, {"bob", kHeard}}}, std::vector<RobotId>{1, 2});
   CHECK(told(absentees, 3.0) == "robot 7 silent 3 ");
+  // Told of by name, as is one that has never been a member.
+  absentees.update(10.0, {{2, {"bob", kHeard}}, {7, {"carol", kTold}}, {9, {"dave", kTold}}},
+                   std::vector<RobotId>{1, 2});
+  CHECK(told(absentees, 3.0) == "carol silent 4 ");
+  CHECK(told(absentees, 5.0).empty());
 }
 
 TEST_CASE("Lost results are told with their reasons and have an exit code, the least of all",
