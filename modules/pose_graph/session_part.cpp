@@ -16,6 +16,11 @@ constexpr std::size_t kRememberedRounds = 16;
 constexpr std::size_t kMaxEarlyLetters = 1000;
 constexpr std::size_t kMaxEarlyBytes = 1U << 26U;
 
+// What weights may be at most, in those of a step of the lower median robot: of closures half the
+// sigma; odometry adds up, and a robot's own mean is held closer.
+constexpr double kMostPrecise = 4.0;
+constexpr double kBestOdometry = 1.25;
+
 void add_told(const MemberPoses& poses, std::map<KeyframeId, SE3>& told) {
   for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
     told[{poses.sender.robot, poses.keyframes[k]}] = poses.T_frame_kf[k].pose();
@@ -128,7 +133,37 @@ bool SessionPart::gather(const ToldPoses& told) {
     graph_.step_precision[robot] = poses.step_precision;
     combine_decisions(poses);
   }
+  if (suspicious_) limit_precisions();
   return true;
+}
+
+// Nobody measures much better than the team moves: whoever says so would overrule all others. All
+// members know the same steps, and limit alike.
+void SessionPart::limit_precisions() {
+  const Precision own = graph_.step_precision[self_.robot];
+  std::vector<double> kappas, taus;
+  for (const auto& [robot, step] : graph_.step_precision) {
+    kappas.push_back(step.kappa);
+    taus.push_back(step.tau);
+  }
+  const auto lower_median = [](std::vector<double>& values) {
+    const auto middle = values.begin() + (static_cast<std::ptrdiff_t>(values.size()) - 1) / 2;
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  };
+  const Precision usual{lower_median(kappas), lower_median(taus)};
+  const auto limited = [&](const Precision& p) {
+    return Precision{std::min(p.kappa, kMostPrecise * usual.kappa),
+                     std::min(p.tau, kMostPrecise * usual.tau)};
+  };
+  // Inside a robot what is better than the rest stays so.
+  for (PoseEdge& e : graph_.own) {
+    e.precision.kappa *= std::min(1.0, kBestOdometry * usual.kappa / own.kappa);
+    e.precision.tau *= std::min(1.0, kBestOdometry * usual.tau / own.tau);
+  }
+  for (auto* edges : {&graph_.between, &graph_.to_absent})
+    for (PoseEdge& e : *edges) e.precision = limited(e.precision);
+  for (auto& [robot, step] : graph_.step_precision) step = limited(step);
 }
 
 // Both ends of a closure come to the same: rejected if either says so, kept if both do.

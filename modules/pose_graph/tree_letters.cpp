@@ -90,6 +90,10 @@ void write(LetterWriter& w, const TreeSums& s) {
     w.varint(v.a);
     w.varint(v.b);
     w.varint(v.used);
+    w.single(v.motion.T);
+    for (const double x : v.motion.centre) w.f64(x);
+    w.f64(v.motion.radius_m);
+    w.f64(v.motion.spread_m);
   }
 }
 
@@ -104,11 +108,16 @@ TreeSums read_sums(LetterReader& r) {
     if (!s.lengths.empty() && bin <= s.lengths.rbegin()->first) r.fail();
     s.lengths[bin] = r.varint_as<std::uint32_t>();
   }
-  for (std::size_t n = r.count(kMaxElements, 3); n > 0; --n) {
+  for (std::size_t n = r.count(kMaxElements, 71); n > 0; --n) {
     PairVote v{.a = r.varint_as<RobotId>()};
     v.b = r.varint_as<RobotId>();
     if (!s.votes.empty() && !below(s.votes.back(), v)) r.fail();
     v.used = r.varint_as<std::uint32_t>();
+    v.motion.T = r.single();
+    for (double& x : v.motion.centre) x = r.number();
+    v.motion.radius_m = r.number();
+    v.motion.spread_m = r.number();
+    if (!(v.motion.radius_m >= 0.0 && v.motion.spread_m >= 0.0)) r.fail();
     s.votes.push_back(v);
   }
   return s;
@@ -315,6 +324,11 @@ std::vector<std::uint8_t> encode(const DownLetter& letter) {
                                  (v.free ? 8 : 0)));
   for (const double x : {v.scale, v.mu, v.barc, v.noise_scale, v.cost, v.gradient}) w.f64(x);
   for (const double x : v.drift) w.f64(x);
+  w.varint(v.moves.size());
+  for (const auto& [robot, T] : v.moves) {
+    w.varint(robot);
+    w.single(T);
+  }
   w.varint(static_cast<std::uint64_t>(letter.step.size()));
   w.doubles(letter.step);
   return w.release();
@@ -342,6 +356,10 @@ std::optional<DownLetter> decode_down(std::span<const std::uint8_t> bytes) {
                         v.noise_scale > 0.0 && v.gradient >= 0.0;
   if (!in_range) r.fail();
   for (double& x : v.drift) x = r.number();
+  for (std::size_t n = r.count(kMaxElements, 29); n > 0; --n) {
+    const auto robot = r.varint_as<RobotId>();
+    v.moves.emplace_back(robot, r.single());
+  }
   letter.step = r.doubles();
   return r.done() ? std::optional(std::move(letter)) : std::nullopt;
 }

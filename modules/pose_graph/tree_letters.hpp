@@ -11,6 +11,7 @@
 #include "modules/core/ids.hpp"
 #include "modules/pose_graph/block_matrix.hpp"
 #include "modules/pose_graph/edge_model.hpp"
+#include "modules/pose_graph/pair_consensus.hpp"
 #include "modules/pose_graph/team_messages.hpp"
 
 namespace km {
@@ -52,6 +53,7 @@ struct PairVote {
   RobotId a = 0;
   RobotId b = 0;
   std::uint32_t used = 0;  ///< Closures that take part.
+  PairMotion motion = {};  ///< Of b, at the start; if any are used.
 };
 
 /// Sums over a subtree.
@@ -112,6 +114,9 @@ struct TreeVerdict {
   double mu = 0.0;    ///< Of the next weights.
   double barc = 0.0;  ///< Largest residual of an inlier [sigma].
   double noise_scale = 1.0;
+  /// kCount, kStart: before anything else these robots are moved as a whole, see
+  /// better_placement(). Ascending.
+  std::vector<std::pair<RobotId, SinglePose>> moves = {};
   double cost = 0.0;  ///< Of the team at the accepted poses.
   double gradient = 0.0;
   /// A rigid motion of everything, to first order: rotation, translation, in the world.

@@ -195,7 +195,32 @@ void TreeNewton::count_closures(TreeSums& sums) const {
     if (peer != graph_.self)
       ++votes.try_emplace(peer, PairVote{graph_.self, peer}).first->second.used;
   }
-  for (const auto& [peer, vote] : votes) sums.votes.push_back(vote);
+  const Corroboration::PoseOf pose = [this](const KeyframeId& id) { return start_of(id); };
+  for (const auto& [peer, places] : by_peer()) {
+    const auto vote = votes.find(peer);
+    if (vote == votes.end()) continue;
+    std::vector<PoseEdge> closures;
+    for (const std::size_t k : places)
+      if (takes_part(known_[k])) closures.push_back(known_[k].edge);
+    if (const auto motion = motion_of_pair(closures, graph_.self, pose))
+      vote->second.motion = *motion;
+    sums.votes.push_back(vote->second);
+  }
+}
+
+// Public poses are told in single precision: moved, they are again what everyone has.
+void TreeNewton::move_robots(const std::vector<std::pair<RobotId, SinglePose>>& moves) {
+  std::set<KeyframeIndex> ends{0};
+  for (const PoseEdge& e : graph_.between) ends.insert(e.end_on(graph_.self).index);
+  for (const auto& [robot, move] : moves) {
+    const SE3 T = move.pose();
+    for (auto& [id, pose] : graph_.told)
+      if (id.robot == robot) pose = SinglePose::of(T * pose).pose();
+    if (robot != graph_.self) continue;
+    for (SE3& pose : graph_.start) pose = T * pose;
+    for (const KeyframeIndex k : ends) graph_.start[k] = SinglePose::of(graph_.start[k]).pose();
+    accepted_ = graph_.start;
+  }
 }
 
 UpLetter TreeNewton::first_letter() {
@@ -395,6 +420,7 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
     }
   };
   told_ = v;
+  if (!front_) move_robots(v.moves);
   switch (v.next) {
     case Next::kCount:
       find_isolated(default_threshold(options_.dimension) * v.noise_scale);

@@ -78,6 +78,7 @@ class TreeNewton final : public MemberSolver {
 
   [[nodiscard]] UpLetter first_letter();
   void count_closures(TreeSums& sums) const;
+  void move_robots(const std::vector<std::pair<RobotId, SinglePose>>& moves);
   [[nodiscard]] UpLetter equations();
   void weigh_candidates(TreeSums& sums);
   [[nodiscard]] std::vector<SolverLetter> go_up();

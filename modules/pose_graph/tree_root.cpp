@@ -20,7 +20,7 @@ constexpr double kLengthen = 4.0;
 // a row, to so many times what it was.
 constexpr int kMaxRises = 2;
 constexpr double kMaxRise = 1.5;
-constexpr double kRounding = 1e-13;  // of the cost: a smaller increase is none
+constexpr double kCostRounding = 1e-13;  // of the cost: a smaller increase is none
 constexpr int kMaxBacktracks = 12;
 constexpr int kMaxBacktracksUndecided = 8;
 // At a start by odometry nothing speaks against odometry. If that may be false, all edges are first
@@ -47,6 +47,16 @@ bool joined(const std::vector<RobotId>& robots, const std::vector<PairVote>& vot
   }
   return std::all_of(part.begin(), part.end(),
                      [&](const auto& entry) { return entry.second == part.begin()->second; });
+}
+
+std::vector<std::pair<RobotId, SinglePose>> moves_of(const std::vector<PairVote>& votes) {
+  PairMotions pairs;
+  for (const PairVote& v : votes)
+    if (v.used > 0) pairs[{v.a, v.b}] = v.motion;
+  std::vector<std::pair<RobotId, SinglePose>> moves;
+  for (const auto& [robot, T] : better_placement(pairs))
+    moves.emplace_back(robot, SinglePose::of(T));
+  return moves;
 }
 
 // The rigid motion that leaves `poses` no mean rotation or translation by `steps`. To first order
@@ -106,9 +116,10 @@ DownLetter TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   if (noise) noise_scale_ = noise->scale;
   const double margin = noise_scale_ < 1.0 ? std::min(1.0, kMargin * noise_scale_) : noise_scale_;
   barc_ = options_.barc > 0.0 ? options_.barc : margin * default_threshold(options_.dimension);
-  if (noise && noise->consistent >= kMostlyConsistent && sums.open > kFewIsolated)
-    return say(Next::kCount);
-  return start(false, sums);
+  const bool count = noise && noise->consistent >= kMostlyConsistent && sums.open > kFewIsolated;
+  DownLetter letter = count ? say(Next::kCount) : start(false, sums);
+  if (options_.robust && free_ && sums.open > 0) letter.verdict.moves = moves_of(sums.votes);
+  return letter;
 }
 
 DownLetter TreeRoot::start(bool set_aside, const TreeSums& sums) {
@@ -127,7 +138,7 @@ DownLetter TreeRoot::decide(const TreeSums& sums, std::uint32_t round, const Tre
   round_ = round;
   const bool may_rise = weighing_ != Weighing::kDecided && rises_ < kMaxRises;
   const double limit =
-      sums.base_cost * (may_rise ? kMaxRise : 1.0 + kRounding) + options_.absolute_tolerance;
+      sums.base_cost * (may_rise ? kMaxRise : 1.0 + kCostRounding) + options_.absolute_tolerance;
   if (!at_base_ && !(sums.cost <= limit)) return go_back();
   if (!at_base_) {
     retried_ = false;

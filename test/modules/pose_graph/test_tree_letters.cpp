@@ -28,7 +28,13 @@ TreeSums some_sums() {
                 .fixed = 0,
                 .poses = 4'000'000'000U,
                 .lengths = {{0, 1}, {90, 1'000'000}, {65535, 3}}};
-  sums.votes = {{.a = 1, .b = 2, .used = 12},
+  sums.votes = {{.a = 1,
+                 .b = 2,
+                 .used = 12,
+                 .motion = {.T = {.t = {1.0F, 2.0F, 3.0F}},
+                            .centre = {4.0, 5.0, 1.0 / 3.0},
+                            .radius_m = 6.0,
+                            .spread_m = 0.7}},
                 {.a = 1, .b = 60000, .used = 0},
                 {.a = 3, .b = 9, .used = 70000}};
   return sums;
@@ -94,6 +100,7 @@ DownLetter some_down_letter(TreeVerdict::Next next, TreeVerdict::Weighing weighi
                     .mu = 1e30,
                     .barc = 5.28,
                     .noise_scale = 1.0 / 3.0,
+                    .moves = {{7, {.t = {1.0F, 2.0F, 3.0F}}}, {9, {}}},
                     .cost = 1687.0,
                     .gradient = 1e-9,
                     .drift = {1.0, -2.0, 3.0, 0.0, 1e-200, 6.0}};
@@ -124,6 +131,11 @@ void check_same(const TreeSums& a, const TreeSums& b) {
     CHECK(a.votes[k].a == b.votes[k].a);
     CHECK(a.votes[k].b == b.votes[k].b);
     CHECK(a.votes[k].used == b.votes[k].used);
+    CHECK(a.votes[k].motion.T.t == b.votes[k].motion.T.t);
+    CHECK(a.votes[k].motion.T.q.coeffs() == b.votes[k].motion.T.q.coeffs());
+    CHECK(a.votes[k].motion.centre == b.votes[k].motion.centre);
+    CHECK(a.votes[k].motion.radius_m == b.votes[k].motion.radius_m);
+    CHECK(a.votes[k].motion.spread_m == b.votes[k].motion.spread_m);
   }
 }
 
@@ -220,6 +232,10 @@ TEST_CASE("A letter down the tree comes back as it was told", "[pose_graph]") {
   CHECK(v.mu == told.verdict.mu);
   CHECK(v.barc == told.verdict.barc);
   CHECK(v.noise_scale == told.verdict.noise_scale);
+  REQUIRE(v.moves.size() == 2);
+  CHECK(v.moves[0].first == 7);
+  CHECK(v.moves[0].second.t == told.verdict.moves[0].second.t);
+  CHECK(v.moves[1].first == 9);
   CHECK(v.cost == told.verdict.cost);
   CHECK(v.gradient == told.verdict.gradient);
   CHECK(v.drift == told.verdict.drift);
@@ -250,7 +266,8 @@ std::size_t held_by(const UpLetter& letter) {
 }
 
 std::size_t held_by(const DownLetter& letter) {
-  return sizeof(letter) + sizeof(double) * static_cast<std::size_t>(letter.step.size());
+  return sizeof(letter) + sizeof(letter.verdict.moves[0]) * letter.verdict.moves.capacity() +
+         sizeof(double) * static_cast<std::size_t>(letter.step.size());
 }
 
 // A coupling of two bytes may stand for a block of 36 numbers.
@@ -382,13 +399,16 @@ TEST_CASE("Counts that the letter cannot hold are refused", "[pose_graph]") {
     w.varint(count);
     CHECK_FALSE(decode_up(with_zeros(w)));
   }
-  ByteWriter w;
-  w.u8(2);
-  w.varint(1);
-  for (int k = 0; k < 3; ++k) w.u8(0);
-  for (int k = 0; k < 12; ++k) w.f64(1.0);
-  w.varint(count);  // of the step
-  CHECK_FALSE(decode_down(with_zeros(w)));
+  for (int field = 0; field < 2; ++field) {
+    ByteWriter w;
+    w.u8(2);
+    w.varint(1);
+    for (int k = 0; k < 3; ++k) w.u8(0);
+    for (int k = 0; k < 12; ++k) w.f64(1.0);
+    for (int k = 0; k < field; ++k) w.varint(0);  // moves
+    w.varint(count);                              // of moves; of the step
+    CHECK_FALSE(decode_down(with_zeros(w)));
+  }
   CHECK(largest_resident_kb() - before_kb < 64 * 1024);
 }
 

@@ -1,0 +1,153 @@
+#include "modules/pose_graph/pair_consensus.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <tuple>
+
+#include "modules/core/lie.hpp"
+#include "modules/pose_graph/frame_alignment.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kEnoughCandidates = 200;
+// Pairs with less spread than this [m] are no better for it.
+constexpr double kLeastSpread_m = 1e-3;
+// A pair that is off by so many spreads does not fit.
+constexpr double kOff = 4.0;
+// Robots are moved for so many more pairs that fit.
+constexpr double kBetter = 0.5;
+
+const PairMotion* find(const PairMotions& pairs, RobotId a, RobotId b) {
+  const auto found = pairs.find(std::minmax(a, b));
+  return found == pairs.end() ? nullptr : &found->second;
+}
+
+// From a to b: the motion of b if a stays.
+SE3 along(const PairMotions& pairs, RobotId a, RobotId b) {
+  const SE3 T = pairs.at(std::minmax(a, b)).T.pose();
+  return a < b ? T : T.inverse();
+}
+
+double length_m(const SE3& T, const PairMotion& pair) {
+  return (T * pair.centre - pair.centre).norm() + pair.radius_m * angle_of(T.linear());
+}
+
+double spread_m(const PairMotion& pair) {
+  return std::max(kLeastSpread_m, pair.spread_m);
+}
+
+// In [0, number of robots]: third robots on the way round which nothing is left over.
+double support(const PairMotions& pairs, const std::set<RobotId>& robots, RobotId a, RobotId b) {
+  const PairMotion& pair = pairs.at({a, b});
+  double sum = 0.0;
+  for (const RobotId k : robots) {
+    if (k == a || k == b) continue;
+    const PairMotion* ak = find(pairs, a, k);
+    const PairMotion* bk = find(pairs, b, k);
+    if (ak == nullptr || bk == nullptr) continue;
+    const SE3 round = along(pairs, a, k) * along(pairs, k, b) * pair.T.pose().inverse();
+    const double ratio = length_m(round, pair) / (spread_m(pair) + spread_m(*ak) + spread_m(*bk));
+    sum += 1.0 / (1.0 + ratio * ratio);
+  }
+  return sum;
+}
+
+std::map<RobotId, SE3> placed_by_tree(const PairMotions& pairs, const std::set<RobotId>& robots) {
+  std::vector<std::tuple<double, RobotId, RobotId>> order;
+  for (const auto& [pair, motion] : pairs)
+    order.emplace_back(-support(pairs, robots, pair.first, pair.second), pair.first, pair.second);
+  std::sort(order.begin(), order.end());
+  std::map<RobotId, SE3> placed{{*robots.begin(), SE3::Identity()}};
+  for (bool grown = true; grown;) {  // Prim: the best pair that leads to another robot
+    grown = false;
+    for (const auto& [less, a, b] : order) {
+      if (placed.contains(a) == placed.contains(b)) continue;
+      const auto [from, to] = placed.contains(a) ? std::pair(a, b) : std::pair(b, a);
+      placed[to] = placed.at(from) * along(pairs, from, to);
+      grown = true;
+      break;
+    }
+  }
+  return placed;
+}
+
+// Pairs that do not fit, each counted up to 1.
+double misfit(const PairMotions& pairs, const std::map<RobotId, SE3>& placed) {
+  double sum = 0.0;
+  for (const auto& [robots, pair] : pairs) {
+    const SE3 left = placed.at(robots.second).inverse() * placed.at(robots.first) * pair.T.pose();
+    const double ratio = length_m(left, pair) / (kOff * spread_m(pair));
+    sum += std::min(1.0, ratio * ratio);
+  }
+  return sum;
+}
+
+// As many robots as possible stay.
+void hold_most(const PairMotions& pairs, std::map<RobotId, SE3>& placed) {
+  const auto staying = [&](const SE3& T) {
+    std::set<RobotId> moving;
+    for (const auto& [robots, pair] : pairs)
+      for (const RobotId robot : {robots.first, robots.second})
+        if (length_m(T * placed.at(robot), pair) > kOff * spread_m(pair)) moving.insert(robot);
+    return placed.size() - moving.size();
+  };
+  SE3 best = SE3::Identity();
+  std::size_t most = 0;
+  for (const auto& [robot, T] : placed)
+    if (const std::size_t stay = staying(T.inverse()); stay > most) {
+      most = stay;
+      best = T.inverse();
+    }
+  for (auto& [robot, T] : placed) T = best * T;
+}
+
+}  // namespace
+
+std::optional<PairMotion> motion_of_pair(std::span<const PoseEdge> closures, RobotId a,
+                                         const std::function<SE3(const KeyframeId&)>& pose) {
+  if (closures.empty()) return std::nullopt;
+  const std::size_t stride = (closures.size() + kEnoughCandidates - 1) / kEnoughCandidates;
+  PairMotion result;
+  std::vector<std::pair<SE3, SE3>> ends;  // of b: where it is placed, where a's has it
+  for (std::size_t k = 0; k < closures.size(); k += stride) {
+    const PoseEdge& e = closures[k];
+    const SE3 T_a_b = e.from.robot == a ? e.T_from_to : e.T_from_to.inverse();
+    ends.emplace_back(pose(e.other(a)), pose(e.end_on(a)) * T_a_b);
+    result.centre += ends.back().first.translation();
+  }
+  result.centre /= static_cast<double>(ends.size());
+  const SE3 to_centre = make_pose(Eigen::Matrix3d::Identity(), result.centre);
+  std::vector<Eigen::MatrixXd> candidates;
+  for (const auto& [placed, measured] : ends) {
+    candidates.emplace_back((measured * placed.inverse() * to_centre).matrix().topRows<3>());
+    result.radius_m += (placed.translation() - result.centre).squaredNorm();
+  }
+  result.radius_m = std::sqrt(result.radius_m / static_cast<double>(ends.size()));
+  const auto alignment = align_frames(candidates, {});
+  const SE3 T = make_pose(alignment->L.leftCols<3>(), alignment->L.col(3)) * to_centre.inverse();
+  result.T = SinglePose::of(T);
+  std::vector<double> distances;
+  for (const auto& [placed, measured] : ends)
+    distances.push_back((T * placed.translation() - measured.translation()).norm());
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  result.spread_m = *middle;
+  return result;
+}
+
+std::map<RobotId, SE3> better_placement(const PairMotions& pairs) {
+  std::set<RobotId> robots;
+  for (const auto& [pair, motion] : pairs) robots.insert({pair.first, pair.second});
+  if (pairs.size() < robots.size() || robots.empty()) return {};  // no way round
+  std::map<RobotId, SE3> still;
+  for (const RobotId robot : robots) still[robot] = SE3::Identity();
+  std::map<RobotId, SE3> placed = placed_by_tree(pairs, robots);
+  if (placed.size() < robots.size() || misfit(pairs, placed) > misfit(pairs, still) - kBetter)
+    return {};
+  hold_most(pairs, placed);
+  return placed;
+}
+
+}  // namespace km

@@ -1,0 +1,89 @@
+#include <catch2/catch.hpp>
+#include <set>
+
+#include "modules/core/lie.hpp"
+#include "modules/pose_graph/pair_consensus.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kTolerance = 1e-6;  // relative, of single precision
+
+// Robots that are placed where `moved` says, off from where they belong; pairs whose closures know
+// where that is, up to their spread.
+PairMotions pairs_of(const std::map<RobotId, SE3>& moved) {
+  PairMotions pairs;
+  for (const auto& [a, T_a] : moved)
+    for (const auto& [b, T_b] : moved)
+      if (a < b)
+        pairs[{a, b}] = {.T = SinglePose::of(T_a * T_b.inverse()),
+                         .centre = {1.0 * a, 2.0 * b, 0.0},
+                         .radius_m = 5.0,
+                         .spread_m = 0.1};
+  return pairs;
+}
+
+SE3 shifted(double x_m) {
+  return make_pose(Eigen::Matrix3d::Identity(), {x_m, 0.0, 0.0});
+}
+
+}  // namespace
+
+TEST_CASE("robots that are placed where their closures say stay", "[pose_graph][pair_consensus]") {
+  CHECK(better_placement(pairs_of({{1, SE3::Identity()},
+                                   {2, SE3::Identity()},
+                                   {3, shifted(0.05)},
+                                   {4, SE3::Identity()}}))
+            .empty());
+}
+
+TEST_CASE("robots that one of four has placed wrongly are moved by the other pairs",
+          "[pose_graph][pair_consensus]") {
+  const RobotId liar = GENERATE(as<RobotId>(), 1, 2, 3, 4);
+  const double lie_m = GENERATE(5.0, 1000.0);
+  CAPTURE(liar, lie_m);
+  std::mt19937 rng(7);
+  std::map<RobotId, SE3> moved;
+  for (RobotId robot = 1; robot <= 4; ++robot)
+    moved[robot] = robot == liar ? SE3::Identity() : random_pose(rng, lie_m);
+  PairMotions pairs = pairs_of(moved);
+  for (auto& [robots, pair] : pairs)  // what the liar says fits where all are placed
+    if (robots.first == liar || robots.second == liar) pair.T = {};
+  const std::map<RobotId, SE3> moves = better_placement(pairs);
+  REQUIRE(moves.size() == 4);
+  for (const auto& [robots, pair] : pairs) {
+    if (robots.first == liar || robots.second == liar) continue;
+    const SE3 left = moves.at(robots.second).inverse() * moves.at(robots.first) * pair.T.pose();
+    CHECK(left.isApprox(SE3::Identity(), kTolerance * lie_m));
+  }
+}
+
+TEST_CASE("where pairs of robots close no circle nobody is moved", "[pose_graph][pair_consensus]") {
+  PairMotions pairs = pairs_of({{1, SE3::Identity()}, {2, shifted(50.0)}, {3, SE3::Identity()}});
+  pairs.erase({1, 3});
+  CHECK(better_placement(pairs).empty());
+}
+
+TEST_CASE("the motion of a pair is that of most closures", "[pose_graph][pair_consensus]") {
+  std::mt19937 rng(3);
+  const SE3 T = random_pose(rng, 30.0);
+  const SE3 off = make_pose(Eigen::Matrix3d::Identity(), {0.0, 60.0, 0.0});
+  std::map<KeyframeId, SE3> poses;
+  std::vector<PoseEdge> closures;
+  for (KeyframeIndex k = 0; k < 30; ++k) {
+    const SE3 a = poses[{2, k}] = random_pose(rng);
+    const SE3 b = poses[{5, k}] = random_pose(rng);
+    const SE3 T_a_b = a.inverse() * (k % 3 == 0 ? off * T : T) * b;
+    closures.push_back(k % 2 == 0 ? PoseEdge{{2, k}, {5, k}, T_a_b}
+                                  : PoseEdge{{5, k}, {2, k}, T_a_b.inverse()});
+  }
+  const auto motion =
+      motion_of_pair(closures, 2, [&](const KeyframeId& id) { return poses.at(id); });
+  REQUIRE(motion);
+  CHECK(motion->T.pose().isApprox(T, kTolerance));
+  CHECK(motion->spread_m < 1e-9);
+  CHECK_FALSE(motion_of_pair({}, 2, [](const KeyframeId&) { return SE3::Identity(); }));
+}
+
+}  // namespace km
