@@ -1,0 +1,282 @@
+#include <Eigen/Geometry>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <iostream>
+#include <limits>
+
+#include "modules/pose_graph/solver_choice.hpp"
+#include "test/support/team_network.hpp"
+
+// One robot of four runs the stock program on a graph that it has made up. What the three others
+// come to is compared with what they come to without it.
+
+namespace km {
+namespace {
+
+const std::vector<RobotId> kTeam{1, 2, 3, 4};
+constexpr std::uint32_t kKeyframes = 80;
+constexpr int kTrueClosures = 30;  // of each pair
+constexpr double kNoise_m = 0.1;   // of closures; of a step of odometry half of it
+constexpr double kNoise_rad = 0.01;
+
+// What a liar may cost the others.
+constexpr double kWorse = 1.05;
+constexpr double kWorse_m = 0.2;
+
+struct Lie {
+  RobotId liar = 1;
+  double offset_m = 0.0;
+  int closures = 0;
+  bool consistent = true;          ///< All that it says of one robot agrees.
+  double variance = 0.0;           ///< That it claims on every axis; 0: an honest one.
+  bool only_lies = false;          ///< No closure between it and others is true.
+  double stretched = 1.0;          ///< Its odometry, in length.
+  double odometry_variance = 0.0;  ///< As `variance`.
+};
+
+Precision precision_with(double noise_m, double noise_rad) {
+  return {0.5 / (noise_rad * noise_rad), 1.0 / (noise_m * noise_m)};
+}
+
+// With axes of the same variance.
+Precision precision_of_variance(double variance) {
+  return {0.5 / variance, 1.0 / variance};
+}
+
+// Four robots on rounds of a block of 20 m, each begun at another corner and a little further out.
+struct Walk {
+  TeamPoses truth = {};
+  TeamProblem problem = {};
+
+  explicit Walk(unsigned seed) {
+    std::mt19937 rng(seed);
+    for (const RobotId robot : kTeam) walk(robot, rng);
+    for (std::size_t a = 0; a < kTeam.size(); ++a)
+      for (std::size_t b = a; b < kTeam.size(); ++b) meet(kTeam[a], kTeam[b], rng);
+    problem.start = truth;
+    problem.edges = in_order(problem.edges);
+  }
+
+  [[nodiscard]] SE3 between(const KeyframeId& from, const KeyframeId& to) const {
+    return truth.at(from.robot)[from.index].inverse() * truth.at(to.robot)[to.index];
+  }
+
+ private:
+  static SE3 noisy(const SE3& T, double scale, std::mt19937& rng) {
+    Vector6 xi = random_vector<6>(rng);
+    xi.head<3>() *= scale * kNoise_rad;
+    xi.tail<3>() *= scale * kNoise_m;
+    return T * se3_exp(xi);
+  }
+  void measure(const KeyframeId& from, const KeyframeId& to, double scale, std::mt19937& rng) {
+    problem.edges.push_back({from, to, noisy(between(from, to), scale, rng),
+                             precision_with(scale * kNoise_m, scale * kNoise_rad)});
+  }
+  void walk(RobotId robot, std::mt19937& rng) {
+    constexpr std::uint32_t kSide = 20;
+    SE3 T = make_pose(Eigen::AngleAxisd(0.5 * M_PI * robot, Eigen::Vector3d::UnitZ()).matrix(),
+                      Eigen::Vector3d::Zero());
+    T = T * make_pose(Eigen::Matrix3d::Identity(), {-10.0, -10.0 - 0.3 * robot, 0.1 * robot});
+    for (std::uint32_t k = 0; k < kKeyframes; ++k) {
+      truth[robot].push_back(T);
+      if (k > 0) measure({robot, k - 1}, {robot, k}, 0.5, rng);
+      const double turn = k % kSide == kSide - 1 ? 0.5 * M_PI : 0.0;
+      T = T * make_pose(so3_exp({0.0, 0.0, turn}), {1.0, 0.0, 0.0});
+    }
+  }
+  void meet(RobotId a, RobotId b, std::mt19937& rng) {
+    std::vector<ClosureId> near;
+    for (std::uint32_t i = 0; i < kKeyframes; ++i)
+      for (std::uint32_t j = a == b ? i + 40 : 0; j < kKeyframes; ++j)
+        if ((truth[a][i].translation() - truth[b][j].translation()).norm() < 3.0)
+          near.push_back({{a, i}, {b, j}});
+    std::shuffle(near.begin(), near.end(), rng);
+    near.resize(std::min(near.size(), static_cast<std::size_t>(kTrueClosures)));
+    for (const ClosureId& id : near) measure(id.from, id.to, 1.0, rng);
+  }
+};
+
+Eigen::Vector3d direction(std::mt19937& rng) {
+  return random_vector<3>(rng).normalized();
+}
+
+// The team's graph with what the liar makes of its own.
+TeamProblem with_lie(const Walk& walk, const Lie& lie, unsigned seed) {
+  std::mt19937 rng(seed);
+  TeamProblem problem = walk.problem;
+  const Precision honest = precision_with(kNoise_m, kNoise_rad);
+  std::set<ClosureId> known;
+  if (lie.only_lies)
+    std::erase_if(problem.edges, [&](const PoseEdge& e) {
+      return e.from.robot != e.to.robot && (e.from.robot == lie.liar || e.to.robot == lie.liar);
+    });
+  for (PoseEdge& e : problem.edges) {
+    known.insert(e.id());
+    if (!is_step(e) || e.from.robot != lie.liar) continue;
+    e.T_from_to.translation() *= lie.stretched;
+    if (lie.odometry_variance > 0.0) e.precision = precision_of_variance(lie.odometry_variance);
+  }
+  std::map<RobotId, Eigen::Vector3d> moved;
+  std::vector<RobotId> others;
+  for (const RobotId robot : kTeam)
+    if (robot != lie.liar) {
+      others.push_back(robot);
+      moved[robot] = lie.offset_m * direction(rng);
+    }
+  std::uniform_int_distribution<std::uint32_t> any(0, kKeyframes - 1);
+  for (int told = 0; told < lie.closures;) {
+    const KeyframeId from{lie.liar, any(rng)};
+    const KeyframeId to{others[static_cast<std::size_t>(told) % others.size()], any(rng)};
+    if (!known.insert(closure_id(from, to)).second) continue;
+    ++told;
+    const Eigen::Vector3d off = lie.consistent ? moved[to.robot] : lie.offset_m * direction(rng);
+    SE3 T_world_to = walk.truth.at(to.robot)[to.index];
+    T_world_to.translation() += off;
+    problem.edges.push_back({from, to, walk.truth.at(from.robot)[from.index].inverse() * T_world_to,
+                             lie.variance > 0.0 ? precision_of_variance(lie.variance) : honest});
+  }
+  return problem;
+}
+
+// RMS distance of the honest robots' positions from the truth, after one alignment of all; infinite
+// if they are not in one frame.
+double error_m(const TeamNetwork& network, const Walk& walk, RobotId liar) {
+  Eigen::Matrix3Xd estimate(3, 0), truth(3, 0);
+  std::optional<TeamFrame> frame;
+  for (const auto& [id, robot] : network.robots) {
+    if (id == liar) continue;
+    if (frame.value_or(robot.agent->frame()) != robot.agent->frame())
+      return std::numeric_limits<double>::infinity();
+    frame = robot.agent->frame();
+    const auto& poses = robot.agent->poses();
+    for (std::size_t k = 0; k < poses.size(); ++k) {
+      estimate.conservativeResize(3, estimate.cols() + 1);
+      truth.conservativeResize(3, truth.cols() + 1);
+      estimate.rightCols<1>() = poses[k].translation();
+      truth.rightCols<1>() = walk.truth.at(id)[k].translation();
+    }
+  }
+  const Eigen::Matrix4d T = Eigen::umeyama(estimate, truth, false);
+  const Eigen::Matrix3Xd aligned =
+      (T.topLeftCorner<3, 3>() * estimate).colwise() + T.topRightCorner<3, 1>();
+  return std::sqrt((aligned - truth).colwise().squaredNorm().mean());
+}
+
+double error_of_team(const Walk& walk, const TeamProblem& problem, RobotId liar, bool with_liar) {
+  TeamNetwork network;
+  for (const RobotId robot : kTeam) {
+    if (robot == liar && !with_liar) continue;
+    TeamAgent& agent = network.add({robot, 1}, {}, solver_choice({}));
+    TeamProblem known = problem;
+    if (!with_liar)
+      std::erase_if(known.edges,
+                    [&](const PoseEdge& e) { return e.from.robot == liar || e.to.robot == liar; });
+    feed(agent, robot, known);
+  }
+  (void)network.run(200.0, [&] { return network.all_settled(); });
+  return error_m(network, walk, liar);
+}
+
+std::ostream& operator<<(std::ostream& out, const Lie& lie) {
+  out << "liar " << lie.liar << ", " << lie.closures << (lie.only_lies ? " (no true ones)" : "")
+      << (lie.consistent ? " consistent" : " random") << " off by " << lie.offset_m << " m";
+  if (lie.variance > 0.0) out << ", variance " << lie.variance;
+  if (lie.stretched != 1.0) out << ", odometry times " << lie.stretched;
+  if (lie.odometry_variance > 0.0) out << " of variance " << lie.odometry_variance;
+  return out;
+}
+
+class Team {
+ public:
+  /// Errors of the others [m]: without the liar, with it.
+  [[nodiscard]] double alone(RobotId liar) const {
+    return error_of_team(walk_, walk_.problem, liar, false);
+  }
+  [[nodiscard]] double with(const Lie& lie) const {
+    return error_of_team(walk_, with_lie(walk_, lie, kSeed), lie.liar, true);
+  }
+
+ private:
+  static constexpr unsigned kSeed = 1;
+  Walk walk_{kSeed};
+};
+
+double limit_m(double alone_m) {
+  return std::max(kWorse * alone_m, alone_m + kWorse_m);
+}
+
+// Says what each lie costs.
+void check_table(const std::vector<Lie>& lies) {
+  const Team team;
+  std::map<RobotId, double> alone;
+  for (const RobotId liar : {RobotId{1}, RobotId{4}}) {
+    alone[liar] = team.alone(liar);
+    std::cout << "without robot " << liar << ": " << alone[liar] << " m, if it is honest "
+              << team.with({.liar = liar}) << " m\n";
+  }
+  for (const Lie& lie : lies) {
+    const double error_m = team.with(lie);
+    CAPTURE(lie);
+    CHECK(error_m <= limit_m(alone[lie.liar]));
+    std::cout << lie << ": " << error_m << " m" << (error_m <= limit_m(alone[lie.liar]) ? "" : " !")
+              << std::endl;
+  }
+}
+
+constexpr double kHonest = 0.0;
+constexpr double kTiny = 1e-12;
+constexpr double kHuge = 1e11;     // in bounds
+constexpr double kTooHuge = 1e14;  // refused
+
+}  // namespace
+
+TEST_CASE("one liar of four costs the others little", "[pose_graph][liars]") {
+  const auto lie =
+      GENERATE(Lie{.liar = 1, .offset_m = 0.5, .closures = 100},
+               Lie{.liar = 4, .offset_m = 5.0, .closures = 100, .consistent = false},
+               Lie{.liar = 1, .offset_m = 50.0, .closures = 100},
+               Lie{.liar = 4, .offset_m = 1000.0, .closures = 1000},
+               Lie{.liar = 1, .offset_m = 5.0, .closures = 100, .variance = kTiny},
+               Lie{.liar = 4, .offset_m = 50.0, .closures = 100, .variance = kTiny},
+               Lie{.liar = 4, .offset_m = 1000.0, .closures = 100, .variance = kTooHuge},
+               Lie{.liar = 1, .stretched = 1.1, .odometry_variance = kTiny});
+  CAPTURE(lie);
+  const Team team;
+  CHECK(team.with(lie) <= limit_m(team.alone(lie.liar)));
+}
+
+TEST_CASE("table: closures of a liar", "[.][liars_long]") {
+  std::vector<Lie> lies;
+  for (const RobotId liar : {RobotId{1}, RobotId{4}})
+    for (const double variance : {kHonest, kTiny, kHuge, kTooHuge})
+      for (const bool consistent : {true, false})
+        for (const double offset_m : {0.5, 5.0, 50.0, 1000.0})
+          for (const int closures : {1, 10, 100, 1000})
+            lies.push_back({.liar = liar,
+                            .offset_m = offset_m,
+                            .closures = closures,
+                            .consistent = consistent,
+                            .variance = variance});
+  check_table(lies);
+}
+
+TEST_CASE("table: a liar of whom nothing is true", "[.][liars_long]") {
+  std::vector<Lie> lies;
+  for (const RobotId liar : {RobotId{1}, RobotId{4}})
+    for (const double offset_m : {0.5, 5.0, 50.0, 1000.0})
+      for (const int closures : {10, 100, 1000})
+        lies.push_back(
+            {.liar = liar, .offset_m = offset_m, .closures = closures, .only_lies = true});
+  check_table(lies);
+}
+
+TEST_CASE("table: odometry of a liar", "[.][liars_long]") {
+  std::vector<Lie> lies;
+  for (const RobotId liar : {RobotId{1}, RobotId{4}})
+    for (const double variance : {kHonest, kTiny, kHuge})
+      for (const double stretched : {1.02, 1.1, 1.5, 10.0})
+        lies.push_back({.liar = liar, .stretched = stretched, .odometry_variance = variance});
+  check_table(lies);
+}
+
+}  // namespace km
