@@ -14,7 +14,6 @@ namespace {
 
 constexpr std::uint32_t kSteps = 10;  // of odometry in a cycle, at most
 constexpr std::uint32_t kBeside = 5;  // keyframes, at both ends
-constexpr std::size_t kEnoughLengths = 300;
 constexpr double kLargestTurn = 0.25 * std::numbers::pi;
 
 std::uint32_t steps_between(const KeyframeId& a, const KeyframeId& b) {
@@ -67,7 +66,7 @@ double Corroboration::cycle_length(const Upward& one, const Upward& other) const
   return std::sqrt(in_plane.dot(Sigma.ldlt().solve(in_plane)));
 }
 
-void Corroboration::count_lengths(NoiseHistogram& histogram) const {
+void Corroboration::count_lengths(NoiseHistogram& histogram, std::size_t most) const {
   struct Cycle {
     std::uint32_t steps;
     std::size_t a;
@@ -83,7 +82,7 @@ void Corroboration::count_lengths(NoiseHistogram& histogram) const {
     }
   std::stable_sort(cycles.begin(), cycles.end(),
                    [](const Cycle& x, const Cycle& y) { return x.steps < y.steps; });
-  if (cycles.size() > kEnoughLengths) cycles.resize(kEnoughLengths);
+  if (cycles.size() > most) cycles.resize(most);
   for (const Cycle& c : cycles)
     count_length(histogram, cycle_length(closures_[c.a], closures_[c.b]));
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <map>
 #include <span>
@@ -30,10 +31,10 @@ class Corroboration {
                 const std::map<RobotId, Precision>& step, int dimension);
 
   /// Counts the Mahalanobis lengths of cycles through two closures a few keyframes apart at both
-  /// ends and the odometry between; those with least odometry first, and not more than a few
-  /// hundred. Cycles that turn by more than 45 degrees, as most with a false closure do, are left
+  /// ends and the odometry between; those with least odometry first, and not more than
+  /// `most`. Cycles that turn by more than 45 degrees, as most with a false closure do, are left
   /// out. What two closures beside each other have in common does not show.
-  void count_lengths(NoiseHistogram& histogram) const;
+  void count_lengths(NoiseHistogram& histogram, std::size_t most) const;
 
   /// Which closures stand alone: none beside them agrees up to `barc` [sigma], allowing for the
   /// noise of both and of the steps between.

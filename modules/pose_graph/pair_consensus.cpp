@@ -18,6 +18,24 @@ constexpr double kLeastSpread_m = 1e-3;
 constexpr double kOff = 4.0;
 // Robots are moved for so many more pairs that fit.
 constexpr double kBetter = 0.5;
+// Support from which on a pair is borne out: round a third robot two spreads are left over.
+constexpr double kBorneOut = 0.2;
+// Of the radius: closures of a pair that are more apart say nothing together.
+constexpr double kAgreeing = 0.25;
+
+// The pairs that have a vote.
+PairMotions agreeing(PairMotions pairs) {
+  std::erase_if(pairs, [](const auto& entry) {
+    return entry.second.spread_m > kAgreeing * entry.second.radius_m;
+  });
+  return pairs;
+}
+
+std::set<RobotId> robots_of(const PairMotions& pairs) {
+  std::set<RobotId> robots;
+  for (const auto& [pair, motion] : pairs) robots.insert({pair.first, pair.second});
+  return robots;
+}
 
 const PairMotion* find(const PairMotions& pairs, RobotId a, RobotId b) {
   const auto found = pairs.find(std::minmax(a, b));
@@ -128,6 +146,10 @@ std::optional<PairMotion> motion_of_pair(std::span<const PoseEdge> closures, Rob
   const auto alignment = align_frames(candidates, {});
   const SE3 T = make_pose(alignment->L.leftCols<3>(), alignment->L.col(3)) * to_centre.inverse();
   result.T = SinglePose::of(T);
+  for (const PoseEdge& e : closures) {
+    result.strength.kappa += e.precision.kappa;
+    result.strength.tau += e.precision.tau;
+  }
   std::vector<double> distances;
   for (const auto& [placed, measured] : ends)
     distances.push_back((T * placed.translation() - measured.translation()).norm());
@@ -137,9 +159,9 @@ std::optional<PairMotion> motion_of_pair(std::span<const PoseEdge> closures, Rob
   return result;
 }
 
-std::map<RobotId, SE3> better_placement(const PairMotions& pairs) {
-  std::set<RobotId> robots;
-  for (const auto& [pair, motion] : pairs) robots.insert({pair.first, pair.second});
+std::map<RobotId, SE3> better_placement(const PairMotions& all) {
+  const PairMotions pairs = agreeing(all);
+  const std::set<RobotId> robots = robots_of(pairs);
   if (pairs.size() < robots.size() || robots.empty()) return {};  // no way round
   std::map<RobotId, SE3> still;
   for (const RobotId robot : robots) still[robot] = SE3::Identity();
@@ -148,6 +170,32 @@ std::map<RobotId, SE3> better_placement(const PairMotions& pairs) {
     return {};
   hold_most(pairs, placed);
   return placed;
+}
+
+Precision lower_median(std::span<const Precision> values) {
+  const auto of = [&](double Precision::*weight) {
+    std::vector<double> weights;
+    for (const Precision& value : values) weights.push_back(value.*weight);
+    const auto middle = weights.begin() + (static_cast<std::ptrdiff_t>(weights.size()) - 1) / 2;
+    std::nth_element(weights.begin(), middle, weights.end());
+    return *middle;
+  };
+  return {of(&Precision::kappa), of(&Precision::tau)};
+}
+
+Precision usual_strength(const PairMotions& all) {
+  const PairMotions pairs = agreeing(all);
+  const std::set<RobotId> robots = robots_of(pairs);
+  if (robots.size() < kEnoughToOutvote) return kUnlimited;
+  std::map<RobotId, std::vector<Precision>> of_robot;
+  for (const auto& [ends, pair] : pairs) {
+    if (support(pairs, robots, ends.first, ends.second) < kBorneOut) continue;
+    for (const RobotId robot : {ends.first, ends.second}) of_robot[robot].push_back(pair.strength);
+  }
+  if (of_robot.empty()) return kUnlimited;
+  std::vector<Precision> medians;
+  for (const auto& [robot, strengths] : of_robot) medians.push_back(lower_median(strengths));
+  return lower_median(medians);
 }
 
 }  // namespace km

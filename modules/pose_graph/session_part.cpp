@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "modules/pose_graph/frame_entry.hpp"
+#include "modules/pose_graph/pair_consensus.hpp"
 
 namespace km {
 namespace {
@@ -20,6 +21,8 @@ constexpr std::size_t kMaxEarlyBytes = 1U << 26U;
 // sigma; odometry adds up, and a robot's own mean is held closer.
 constexpr double kMostPrecise = 4.0;
 constexpr double kBestOdometry = 1.25;
+// Of two nobody can say which one is usual.
+constexpr std::size_t kMajority = 3;
 
 void add_told(const MemberPoses& poses, std::map<KeyframeId, SE3>& told) {
   for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
@@ -140,18 +143,11 @@ bool SessionPart::gather(const ToldPoses& told) {
 // Nobody measures much better than the team moves: whoever says so would overrule all others. All
 // members know the same steps, and limit alike.
 void SessionPart::limit_precisions() {
+  if (graph_.step_precision.size() < kMajority) return;
   const Precision own = graph_.step_precision[self_.robot];
-  std::vector<double> kappas, taus;
-  for (const auto& [robot, step] : graph_.step_precision) {
-    kappas.push_back(step.kappa);
-    taus.push_back(step.tau);
-  }
-  const auto lower_median = [](std::vector<double>& values) {
-    const auto middle = values.begin() + (static_cast<std::ptrdiff_t>(values.size()) - 1) / 2;
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  };
-  const Precision usual{lower_median(kappas), lower_median(taus)};
+  std::vector<Precision> steps;
+  for (const auto& [robot, step] : graph_.step_precision) steps.push_back(step);
+  const Precision usual = lower_median(steps);
   const auto limited = [&](const Precision& p) {
     return Precision{std::min(p.kappa, kMostPrecise * usual.kappa),
                      std::min(p.tau, kMostPrecise * usual.tau)};

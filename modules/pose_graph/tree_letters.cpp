@@ -94,6 +94,8 @@ void write(LetterWriter& w, const TreeSums& s) {
     for (const double x : v.motion.centre) w.f64(x);
     w.f64(v.motion.radius_m);
     w.f64(v.motion.spread_m);
+    w.f64(v.motion.strength.kappa);
+    w.f64(v.motion.strength.tau);
   }
 }
 
@@ -108,7 +110,7 @@ TreeSums read_sums(LetterReader& r) {
     if (!s.lengths.empty() && bin <= s.lengths.rbegin()->first) r.fail();
     s.lengths[bin] = r.varint_as<std::uint32_t>();
   }
-  for (std::size_t n = r.count(kMaxElements, 71); n > 0; --n) {
+  for (std::size_t n = r.count(kMaxElements, 87); n > 0; --n) {
     PairVote v{.a = r.varint_as<RobotId>()};
     v.b = r.varint_as<RobotId>();
     if (!s.votes.empty() && !below(s.votes.back(), v)) r.fail();
@@ -117,7 +119,11 @@ TreeSums read_sums(LetterReader& r) {
     for (double& x : v.motion.centre) x = r.number();
     v.motion.radius_m = r.number();
     v.motion.spread_m = r.number();
-    if (!(v.motion.radius_m >= 0.0 && v.motion.spread_m >= 0.0)) r.fail();
+    v.motion.strength.kappa = r.number();
+    v.motion.strength.tau = r.number();
+    const bool in_range = v.motion.radius_m >= 0.0 && v.motion.spread_m >= 0.0 &&
+                          v.motion.strength.kappa >= 0.0 && v.motion.strength.tau >= 0.0;
+    if (!in_range) r.fail();
     s.votes.push_back(v);
   }
   return s;
@@ -322,7 +328,9 @@ std::vector<std::uint8_t> encode(const DownLetter& letter) {
   w.u8(static_cast<std::uint8_t>(v.weighing));
   w.u8(static_cast<std::uint8_t>((v.accept ? 1 : 0) + (v.full ? 2 : 0) + (v.set_aside ? 4 : 0) +
                                  (v.free ? 8 : 0)));
-  for (const double x : {v.scale, v.mu, v.barc, v.noise_scale, v.cost, v.gradient}) w.f64(x);
+  for (const double x : {v.scale, v.mu, v.barc, v.noise_scale, v.usual_pair.kappa, v.usual_pair.tau,
+                         v.cost, v.gradient})
+    w.f64(x);
   for (const double x : v.drift) w.f64(x);
   w.varint(v.moves.size());
   for (const auto& [robot, T] : v.moves) {
@@ -350,10 +358,12 @@ std::optional<DownLetter> decode_down(std::span<const std::uint8_t> bytes) {
   v.full = (flags & 2U) != 0;
   v.set_aside = (flags & 4U) != 0;
   v.free = (flags & 8U) != 0;
-  for (double* x : {&v.scale, &v.mu, &v.barc, &v.noise_scale, &v.cost, &v.gradient})
+  for (double* x : {&v.scale, &v.mu, &v.barc, &v.noise_scale, &v.usual_pair.kappa,
+                    &v.usual_pair.tau, &v.cost, &v.gradient})
     *x = r.number();
   const bool in_range = v.scale > 0.0 && v.scale <= 1.0 && v.mu >= 0.0 && v.barc >= 0.0 &&
-                        v.noise_scale > 0.0 && v.gradient >= 0.0;
+                        v.noise_scale > 0.0 && v.usual_pair.kappa > 0.0 && v.usual_pair.tau > 0.0 &&
+                        v.gradient >= 0.0;
   if (!in_range) r.fail();
   for (double& x : v.drift) x = r.number();
   for (std::size_t n = r.count(kMaxElements, 29); n > 0; --n) {

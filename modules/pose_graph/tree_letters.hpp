@@ -117,6 +117,9 @@ struct TreeVerdict {
   /// kCount, kStart: before anything else these robots are moved as a whole, see
   /// better_placement(). Ascending.
   std::vector<std::pair<RobotId, SinglePose>> moves = {};
+  /// kStart: how strong a pair of robots is as a rule, see usual_strength(). While closures are
+  /// weighed, no pair is much stronger.
+  Precision usual_pair = kUnlimited;
   double cost = 0.0;  ///< Of the team at the accepted poses.
   double gradient = 0.0;
   /// A rigid motion of everything, to first order: rotation, translation, in the world.

@@ -24,6 +24,12 @@ constexpr double kFloor = 1e-10;
 constexpr double kJoint = 1e-6;
 // Where numbers are not what they should be, for single precision overflows beyond.
 constexpr double kOutOfTheWorld_m = 1e15;
+// How strong a pair may be while closures are weighed, in that of the usual one: no pair outvotes
+// others. In the end, what is kept has its own weight.
+constexpr double kStrongest = 1.25;
+// Cycles of a pair that count for the noise; fewer where one robot is not to say it for all.
+constexpr std::size_t kEnoughLengths = 300;
+constexpr std::size_t kShareOfLengths = 60;
 
 SolverLetter letter_to(RobotId to, std::vector<std::uint8_t> bytes) {
   return {to, std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes))};
@@ -139,7 +145,26 @@ void TreeNewton::share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_
   }
 }
 
+// A limited pair has all of its closures weakened alike.
+std::map<RobotId, double> TreeNewton::shares_of_pairs() const {
+  std::map<RobotId, Precision> sums;
+  for (std::size_t k = graph_.own.size(); k < known_.size(); ++k) {
+    if (!takes_part(known_[k])) continue;
+    const PoseEdge& e = known_[k].edge;
+    Precision& sum =
+        sums.try_emplace(e.other(graph_.self).robot, Precision{0.0, 0.0}).first->second;
+    sum.kappa += e.precision.kappa;
+    sum.tau += e.precision.tau;
+  }
+  std::map<RobotId, double> shares;
+  for (const auto& [robot, sum] : sums)
+    shares[robot] = std::min(1.0, kStrongest * std::min(told_.usual_pair.kappa / sum.kappa,
+                                                        told_.usual_pair.tau / sum.tau));
+  return shares;
+}
+
 void TreeNewton::build_front() {
+  const std::map<RobotId, double> shares = shares_of_pairs();
   FrontGraph front{.self = graph_.self,
                    .poses = static_cast<Index>(graph_.start.size()),
                    .dimension = options_.dimension,
@@ -152,6 +177,8 @@ void TreeNewton::build_front() {
     if (!takes_part(known_[k]) || !known_[k].own) continue;
     front.edges.push_back(known_[k].edge);
     front_edge_.push_back(k);
+    if (k >= graph_.own.size())
+      known_[k].share = shares.at(known_[k].edge.other(graph_.self).robot);
   }
   for (const PoseEdge& e : graph_.to_absent) {
     const auto decided = graph_.decided.find(e.id());
@@ -172,7 +199,9 @@ std::vector<double> TreeNewton::front_weights(bool candidate) const {
   std::vector<double> weights;
   for (const std::size_t k : front_edge_) {
     const Known& known = known_[k];
-    const double weight = candidate ? known.candidate : known.weight;
+    const bool unlimited = candidate ? candidate_unlimited_ : unlimited_;
+    const double weight =
+        (candidate ? known.candidate : known.weight) * (unlimited ? 1.0 : known.share);
     weights.push_back(known.trust == Trust::kOpen ? std::max(weight, kFloor) : weight);
   }
   weights.resize(weights.size() + front_->graph().held.size(), 1.0);
@@ -230,6 +259,8 @@ UpLetter TreeNewton::first_letter() {
   sums.fixed = static_cast<std::uint32_t>(graph_.to_absent.size());
   count_closures(sums);
   if (!options_.robust || round_ > 0) return letter;
+  const std::size_t most =
+      place_.members.size() < kEnoughToOutvote ? kEnoughLengths : kShareOfLengths;
   const Corroboration::PoseOf pose = [this](const KeyframeId& id) { return start_of(id); };
   for (const auto& [peer, places] : by_peer()) {
     std::vector<PoseEdge> closures;
@@ -239,7 +270,7 @@ UpLetter TreeNewton::first_letter() {
         closures.push_back(known_[k].edge);
     // Once only: poses that were optimised agree with closures better than odometry does.
     Corroboration(closures, pose, graph_.step_precision, options_.dimension)
-        .count_lengths(graph_.lengths);
+        .count_lengths(graph_.lengths, most);
   }
   sums.lengths = graph_.lengths;
   return letter;
@@ -254,6 +285,7 @@ const SE3& TreeNewton::pose_at(const KeyframeId& id, const std::vector<SE3>& pos
 void TreeNewton::weigh_candidates(TreeSums& sums) {
   const double c2 = told_.barc * told_.barc;
   const bool decided = told_.weighing == Weighing::kDecided;
+  candidate_unlimited_ = decided;
   for (const std::size_t k : front_edge_) {
     Known& known = known_[k];
     known.candidate = known.weight;
@@ -391,6 +423,7 @@ void TreeNewton::accept() {
   base_ = at_hand_;
   accepted_.assign(base_.begin(), base_.begin() + static_cast<Index>(accepted_.size()));
   for (Known& k : known_) k.weight = k.candidate;
+  unlimited_ = candidate_unlimited_;
 }
 
 void TreeNewton::take_step(const VectorXd& step, const TreeVerdict& verdict,

@@ -63,6 +63,7 @@ class TreeNewton final : public MemberSolver {
     bool own = true;         ///< Among this robot's edges.
     double weight = 1.0;     ///< At the accepted poses.
     double candidate = 1.0;  ///< At those at hand.
+    double share = 1.0;      ///< Left of the weight until all is decided: its pair is limited.
   };
 
   void classify();
@@ -71,6 +72,7 @@ class TreeNewton final : public MemberSolver {
   [[nodiscard]] const SE3& start_of(const KeyframeId& id) const;
   [[nodiscard]] std::map<RobotId, std::vector<std::size_t>> by_peer() const;
   void find_isolated(double barc);
+  [[nodiscard]] std::map<RobotId, double> shares_of_pairs() const;
   void build_front();
   void share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_by);
   [[nodiscard]] const SE3& pose_at(const KeyframeId& id, const std::vector<SE3>& poses) const;
@@ -94,6 +96,9 @@ class TreeNewton final : public MemberSolver {
   std::vector<Known> known_;  // as SessionGraph::own, then ::between
   std::optional<TreeFront> front_;
   std::vector<std::size_t> front_edge_;  // which of known_ the front's edges are
+  // Pairs are no longer limited: at the accepted poses, at those at hand.
+  bool unlimited_ = false;
+  bool candidate_unlimited_ = false;
 
   Phase phase_ = Phase::kUp;
   std::uint32_t round_ = 0;

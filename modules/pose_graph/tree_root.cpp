@@ -49,12 +49,16 @@ bool joined(const std::vector<RobotId>& robots, const std::vector<PairVote>& vot
                      [&](const auto& entry) { return entry.second == part.begin()->second; });
 }
 
-std::vector<std::pair<RobotId, SinglePose>> moves_of(const std::vector<PairVote>& votes) {
+PairMotions motions_of(const std::vector<PairVote>& votes) {
   PairMotions pairs;
   for (const PairVote& v : votes)
     if (v.used > 0) pairs[{v.a, v.b}] = v.motion;
+  return pairs;
+}
+
+std::vector<std::pair<RobotId, SinglePose>> moves_of(const std::vector<PairVote>& votes) {
   std::vector<std::pair<RobotId, SinglePose>> moves;
-  for (const auto& [robot, T] : better_placement(pairs))
+  for (const auto& [robot, T] : better_placement(motions_of(votes)))
     moves.emplace_back(robot, SinglePose::of(T));
   return moves;
 }
@@ -86,6 +90,7 @@ DownLetter TreeRoot::say(Next next) const {
                     .mu = schedule_.mu(),
                     .barc = barc_,
                     .noise_scale = noise_scale_,
+                    .usual_pair = usual_pair_,
                     .cost = cost_,
                     .gradient = std::sqrt(std::max(0.0, decrement_))};
   return letter;
@@ -125,6 +130,7 @@ DownLetter TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
 DownLetter TreeRoot::start(bool set_aside, const TreeSums& sums) {
   schedule_.start(sums.largest, options_.robust ? sums.open : 0, barc_,
                   options_.reject_odometry ? kAllInSteps : 0);
+  if (options_.robust) usual_pair_ = usual_strength(motions_of(sums.votes));
   weighing_ = schedule_.decided()  ? Weighing::kDecided
               : schedule_.all_in() ? Weighing::kAllIn
                                    : Weighing::kWeigh;
@@ -166,12 +172,14 @@ DownLetter TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   // Decisions fall before the poses have come to rest: what these contradict is weighed again.
   if (schedule_.decided() && small && sums.changed > 0 && schedule_.reopen())
     last_decrement_.reset();
-  // Weights that were decided on before this way up: its equations are those of the end.
+  // Weights that were decided on before this way up: its equations are those of the end, unless
+  // pairs were still limited.
   const bool decided = schedule_.decided();
+  const bool unlimited = weighing_ == Weighing::kDecided || usual_pair_.tau >= kUnlimited.tau;
   weighing_ = decided              ? Weighing::kDecided
               : schedule_.all_in() ? Weighing::kAllIn
                                    : Weighing::kWeigh;
-  if ((decided && small) || round_ + 1 >= options_.max_rounds) return say(Next::kDone);
+  if ((decided && small && unlimited) || round_ + 1 >= options_.max_rounds) return say(Next::kDone);
   if (decided && worth_refreshing(decrement_)) {
     full_ = true;
     convex_ = false;

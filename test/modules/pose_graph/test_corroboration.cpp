@@ -57,10 +57,10 @@ class Lanes {
   }
   [[nodiscard]] std::vector<PoseEdge>& closures() { return closures_; }
 
-  [[nodiscard]] std::optional<NoiseScale> noise_scale() const {
+  [[nodiscard]] std::optional<NoiseScale> noise_scale(std::size_t most = 300) const {
     NoiseHistogram lengths;
     const Corroboration::PoseOf pose = [this](const KeyframeId& k) { return poses_.at(k); };
-    Corroboration(closures_, pose, step_, dimension_).count_lengths(lengths);
+    Corroboration(closures_, pose, step_, dimension_).count_lengths(lengths, most);
     return fit_noise(lengths, dimension_);
   }
   [[nodiscard]] std::set<ClosureId> isolated(const std::vector<PoseEdge>& closures) const {
@@ -129,6 +129,16 @@ TEST_CASE("The noise of closures is found from pairs of them", "[pose_graph]") {
     CHECK(found->consistent > 0.95);
   else
     CHECK(found->consistent < 0.99);
+}
+
+TEST_CASE("Of many cycles so many count as asked for", "[pose_graph]") {
+  Lanes lanes(3, 1.0, 1U);
+  for (int k = 0; k < kKeyframes; ++k) lanes.add_true(k, k, 1.0);
+  for (const std::size_t most : {20U, 60U}) {
+    const auto found = lanes.noise_scale(most);
+    REQUIRE(found);
+    CHECK(found->lengths == most);
+  }
 }
 
 TEST_CASE("Few closures do not tell their noise", "[pose_graph]") {

@@ -231,15 +231,19 @@ constexpr double kTooHuge = 1e14;  // refused
 }  // namespace
 
 TEST_CASE("one liar of four costs the others little", "[pose_graph][liars]") {
-  const auto lie =
-      GENERATE(Lie{.liar = 1, .offset_m = 0.5, .closures = 100},
-               Lie{.liar = 4, .offset_m = 5.0, .closures = 100, .consistent = false},
-               Lie{.liar = 1, .offset_m = 50.0, .closures = 100},
-               Lie{.liar = 4, .offset_m = 1000.0, .closures = 1000},
-               Lie{.liar = 1, .offset_m = 5.0, .closures = 100, .variance = kTiny},
-               Lie{.liar = 4, .offset_m = 50.0, .closures = 100, .variance = kTiny},
-               Lie{.liar = 4, .offset_m = 1000.0, .closures = 100, .variance = kTooHuge},
-               Lie{.liar = 1, .stretched = 1.1, .odometry_variance = kTiny});
+  const auto lie = GENERATE(
+      Lie{.liar = 1, .offset_m = 0.5, .closures = 100},
+      Lie{.liar = 4, .offset_m = 5.0, .closures = 100, .consistent = false},
+      Lie{.liar = 1, .offset_m = 50.0, .closures = 100},
+      Lie{.liar = 4, .offset_m = 1000.0, .closures = 1000},
+      Lie{.liar = 1, .offset_m = 5.0, .closures = 1000},
+      Lie{.liar = 4, .offset_m = 5.0, .closures = 1000, .only_lies = true},
+      Lie{.liar = 1, .offset_m = 50.0, .closures = 1000, .consistent = false},
+      Lie{.liar = 4, .offset_m = 1000.0, .closures = 1000, .consistent = false, .variance = kHuge},
+      Lie{.liar = 1, .offset_m = 5.0, .closures = 100, .variance = kTiny},
+      Lie{.liar = 4, .offset_m = 50.0, .closures = 100, .variance = kTiny},
+      Lie{.liar = 4, .offset_m = 1000.0, .closures = 100, .variance = kTooHuge},
+      Lie{.liar = 1, .stretched = 1.1, .odometry_variance = kTiny});
   CAPTURE(lie);
   const Team team;
   CHECK(team.with(lie) <= limit_m(team.alone(lie.liar)));

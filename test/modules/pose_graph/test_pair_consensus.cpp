@@ -24,6 +24,11 @@ PairMotions pairs_of(const std::map<RobotId, SE3>& moved) {
   return pairs;
 }
 
+PairMotions of_four() {
+  const SE3 still = SE3::Identity();
+  return pairs_of({{1, still}, {2, still}, {3, still}, {4, still}});
+}
+
 SE3 shifted(double x_m) {
   return make_pose(Eigen::Matrix3d::Identity(), {x_m, 0.0, 0.0});
 }
@@ -59,10 +64,62 @@ TEST_CASE("robots that one of four has placed wrongly are moved by the other pai
   }
 }
 
+TEST_CASE("pairs whose closures disagree have no vote", "[pose_graph][pair_consensus]") {
+  PairMotions pairs = pairs_of(
+      {{1, SE3::Identity()}, {2, shifted(50.0)}, {3, shifted(-50.0)}, {4, SE3::Identity()}});
+  for (auto& [robots, pair] : pairs)
+    if (robots.first == 1) pair.T = {};
+  CHECK_FALSE(better_placement(pairs).empty());
+  for (auto& [robots, pair] : pairs)
+    if (robots.first != 1) pair.spread_m = 0.3 * pair.radius_m;
+  CHECK(better_placement(pairs).empty());
+  CHECK(usual_strength(pairs).tau == kUnlimited.tau);
+}
+
 TEST_CASE("where pairs of robots close no circle nobody is moved", "[pose_graph][pair_consensus]") {
   PairMotions pairs = pairs_of({{1, SE3::Identity()}, {2, shifted(50.0)}, {3, SE3::Identity()}});
   pairs.erase({1, 3});
   CHECK(better_placement(pairs).empty());
+}
+
+TEST_CASE("how strong pairs are is not for one robot of four to say",
+          "[pose_graph][pair_consensus]") {
+  const RobotId liar = GENERATE(as<RobotId>(), 1, 2, 3, 4);
+  const double lie = GENERATE(0.0, 1e-9, 1e9);
+  CAPTURE(liar, lie);
+  PairMotions pairs = of_four();
+  double honest = 10.0;
+  for (auto& [robots, pair] : pairs) {
+    const bool lies = robots.first == liar || robots.second == liar;
+    pair.strength = lies ? Precision{lie, lie} : Precision{honest, 100.0 / honest};
+    if (!lies) honest += 1.0;
+  }
+  const Precision usual = usual_strength(pairs);
+  CHECK(usual.kappa >= 10.0);
+  CHECK(usual.kappa <= 12.0);
+  CHECK(usual.tau >= 100.0 / 12.0);
+  CHECK(usual.tau <= 10.0);
+}
+
+TEST_CASE("pairs are not limited where nobody could be outvoted", "[pose_graph][pair_consensus]") {
+  PairMotions pairs = of_four();
+  for (auto& [robots, pair] : pairs) pair.strength = {1.0, 1.0};
+  CHECK(usual_strength(pairs).tau == 1.0);
+  SECTION("in a team of three") {
+    std::erase_if(pairs, [](const auto& entry) { return entry.first.second == 4; });
+  }
+  SECTION("where pairs close no circle") {
+    std::erase_if(pairs, [](const auto& entry) { return entry.first.first != 1; });
+  }
+  SECTION("where they contradict each other all round") {
+    std::erase_if(pairs, [](const auto& entry) { return entry.first.first != 1; });
+    pairs[{2, 3}] = {.T = SinglePose::of(shifted(50.0)), .spread_m = 0.1, .strength = {1.0, 1.0}};
+  }
+  SECTION("in no team") {
+    pairs.clear();
+  }
+  CHECK(usual_strength(pairs).kappa == kUnlimited.kappa);
+  CHECK(usual_strength(pairs).tau == kUnlimited.tau);
 }
 
 TEST_CASE("the motion of a pair is that of most closures", "[pose_graph][pair_consensus]") {
@@ -75,14 +132,16 @@ TEST_CASE("the motion of a pair is that of most closures", "[pose_graph][pair_co
     const SE3 a = poses[{2, k}] = random_pose(rng);
     const SE3 b = poses[{5, k}] = random_pose(rng);
     const SE3 T_a_b = a.inverse() * (k % 3 == 0 ? off * T : T) * b;
-    closures.push_back(k % 2 == 0 ? PoseEdge{{2, k}, {5, k}, T_a_b}
-                                  : PoseEdge{{5, k}, {2, k}, T_a_b.inverse()});
+    closures.push_back(k % 2 == 0 ? PoseEdge{{2, k}, {5, k}, T_a_b, {2.0, 3.0}}
+                                  : PoseEdge{{5, k}, {2, k}, T_a_b.inverse(), {4.0, 5.0}});
   }
   const auto motion =
       motion_of_pair(closures, 2, [&](const KeyframeId& id) { return poses.at(id); });
   REQUIRE(motion);
   CHECK(motion->T.pose().isApprox(T, kTolerance));
   CHECK(motion->spread_m < 1e-9);
+  CHECK(motion->strength.kappa == Approx(15 * 2.0 + 15 * 4.0));
+  CHECK(motion->strength.tau == Approx(15 * 3.0 + 15 * 5.0));
   CHECK_FALSE(motion_of_pair({}, 2, [](const KeyframeId&) { return SE3::Identity(); }));
 }
 

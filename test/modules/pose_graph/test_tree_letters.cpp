@@ -34,7 +34,8 @@ TreeSums some_sums() {
                  .motion = {.T = {.t = {1.0F, 2.0F, 3.0F}},
                             .centre = {4.0, 5.0, 1.0 / 3.0},
                             .radius_m = 6.0,
-                            .spread_m = 0.7}},
+                            .spread_m = 0.7,
+                            .strength = {.kappa = 8.5, .tau = 1e-3}}},
                 {.a = 1, .b = 60000, .used = 0},
                 {.a = 3, .b = 9, .used = 70000}};
   return sums;
@@ -101,6 +102,7 @@ DownLetter some_down_letter(TreeVerdict::Next next, TreeVerdict::Weighing weighi
                     .barc = 5.28,
                     .noise_scale = 1.0 / 3.0,
                     .moves = {{7, {.t = {1.0F, 2.0F, 3.0F}}}, {9, {}}},
+                    .usual_pair = {.kappa = 12.5, .tau = 1e-7},
                     .cost = 1687.0,
                     .gradient = 1e-9,
                     .drift = {1.0, -2.0, 3.0, 0.0, 1e-200, 6.0}};
@@ -136,6 +138,8 @@ void check_same(const TreeSums& a, const TreeSums& b) {
     CHECK(a.votes[k].motion.centre == b.votes[k].motion.centre);
     CHECK(a.votes[k].motion.radius_m == b.votes[k].motion.radius_m);
     CHECK(a.votes[k].motion.spread_m == b.votes[k].motion.spread_m);
+    CHECK(a.votes[k].motion.strength.kappa == b.votes[k].motion.strength.kappa);
+    CHECK(a.votes[k].motion.strength.tau == b.votes[k].motion.strength.tau);
   }
 }
 
@@ -232,6 +236,8 @@ TEST_CASE("A letter down the tree comes back as it was told", "[pose_graph]") {
   CHECK(v.mu == told.verdict.mu);
   CHECK(v.barc == told.verdict.barc);
   CHECK(v.noise_scale == told.verdict.noise_scale);
+  CHECK(v.usual_pair.kappa == told.verdict.usual_pair.kappa);
+  CHECK(v.usual_pair.tau == told.verdict.usual_pair.tau);
   REQUIRE(v.moves.size() == 2);
   CHECK(v.moves[0].first == 7);
   CHECK(v.moves[0].second.t == told.verdict.moves[0].second.t);
@@ -404,7 +410,7 @@ TEST_CASE("Counts that the letter cannot hold are refused", "[pose_graph]") {
     w.u8(2);
     w.varint(1);
     for (int k = 0; k < 3; ++k) w.u8(0);
-    for (int k = 0; k < 12; ++k) w.f64(1.0);
+    for (int k = 0; k < 14; ++k) w.f64(1.0);
     for (int k = 0; k < field; ++k) w.varint(0);  // moves
     w.varint(count);                              // of moves; of the step
     CHECK_FALSE(decode_down(with_zeros(w)));
@@ -424,6 +430,8 @@ TEST_CASE("Verdicts with numbers out of range are refused", "[pose_graph]") {
   CHECK_FALSE(with([](TreeVerdict& v) { v.mu = -1.0; }));
   CHECK_FALSE(with([](TreeVerdict& v) { v.barc = -1.0; }));
   CHECK_FALSE(with([](TreeVerdict& v) { v.noise_scale = 0.0; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.usual_pair.kappa = 0.0; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.usual_pair.tau = -1.0; }));
   CHECK_FALSE(with([](TreeVerdict& v) { v.gradient = -1.0; }));
   CHECK_FALSE(with([](TreeVerdict& v) { v.cost = INFINITY; }));
 }
