@@ -162,7 +162,7 @@ std::optional<PairMotion> motion_of_pair(std::span<const PoseEdge> closures, Rob
 std::map<RobotId, SE3> better_placement(const PairMotions& all) {
   const PairMotions pairs = agreeing(all);
   const std::set<RobotId> robots = robots_of(pairs);
-  if (pairs.size() < robots.size() || robots.empty()) return {};  // no way round
+  if (robots.empty()) return {};
   std::map<RobotId, SE3> still;
   for (const RobotId robot : robots) still[robot] = SE3::Identity();
   std::map<RobotId, SE3> placed = placed_by_tree(pairs, robots);

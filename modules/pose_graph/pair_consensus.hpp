@@ -47,7 +47,8 @@ inline constexpr Precision kUnlimited{.kappa = std::numeric_limits<double>::max(
 /// odometry no single motion fits, and false closures agree on none. A pair is borne out by third
 /// robots on the way round which nothing is left over, robots are placed by the maximum spanning
 /// tree of what bears pairs out, and as many as possible stay where they are. Empty if that is not
-/// better by a pair, or if pairs with a vote do not join all of their robots. O(pairs * robots).
+/// better by a pair, or if pairs with a vote do not join all of their robots; where they close no
+/// circle, robots that only pairs without a vote had placed move. O(pairs * robots).
 [[nodiscard]] std::map<RobotId, SE3> better_placement(const PairMotions& pairs);
 
 /// Lower medians of kappa and of tau, each for itself. `values` are not empty.

@@ -140,10 +140,12 @@ std::vector<MessageReader> all_messages() {
   all.push_back({"letters up",
                  [](std::span<const std::uint8_t> bytes) { return decode_up(bytes).has_value(); },
                  {encode(some_up_letter(3)), encode(some_up_letter(6))}});
+  DownLetter down;
+  down.verdict.round = 2;
+  down.step = Eigen::VectorXd::LinSpaced(6, 0.0, 1.0);
   all.push_back({"letters down",
                  [](std::span<const std::uint8_t> bytes) { return decode_down(bytes).has_value(); },
-                 {encode(DownLetter{.verdict = {.round = 2},
-                                    .step = Eigen::VectorXd::LinSpaced(6, 0.0, 1.0)})}});
+                 {encode(down)}});
   return all;
 }
 

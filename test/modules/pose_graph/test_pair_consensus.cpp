@@ -76,10 +76,15 @@ TEST_CASE("pairs whose closures disagree have no vote", "[pose_graph][pair_conse
   CHECK(usual_strength(pairs).tau == kUnlimited.tau);
 }
 
-TEST_CASE("where pairs of robots close no circle nobody is moved", "[pose_graph][pair_consensus]") {
+TEST_CASE("robots that a pair without a vote has placed go where the others have them",
+          "[pose_graph][pair_consensus]") {
   PairMotions pairs = pairs_of({{1, SE3::Identity()}, {2, shifted(50.0)}, {3, SE3::Identity()}});
-  pairs.erase({1, 3});
-  CHECK(better_placement(pairs).empty());
+  pairs[{1, 3}].spread_m = pairs[{1, 3}].radius_m;
+  const std::map<RobotId, SE3> moves = better_placement(pairs);
+  REQUIRE(moves.size() == 3);
+  CHECK(moves.at(1).isApprox(SE3::Identity()));
+  CHECK(moves.at(2).isApprox(shifted(-50.0)));
+  CHECK(moves.at(3).isApprox(SE3::Identity()));
 }
 
 TEST_CASE("how strong pairs are is not for one robot of four to say",
