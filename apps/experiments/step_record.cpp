@@ -4,12 +4,13 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <string_view>
 #include <thread>
 
 #include "apps/output_file.hpp"
+#include "modules/core/bytes.hpp"
 #include "modules/core/json.hpp"
 
 #include "commit.hpp"  // written by the build
@@ -28,20 +29,25 @@ fs::path record_file(const fs::path& results, const std::string& step) {
   return results / "steps" / (step + ".json");
 }
 
-// FNV-1a (Fowler, Noll, Vo) over words of 8 bytes: it tells changes, it does not resist attacks.
+// It tells changes, it does not resist attacks.
 class Fingerprint {
  public:
   void add(const std::string& text) {
-    word(text.size());
-    bytes(text.data(), text.size());
+    mix_fnv1a(hash_, text.size());
+    mix(text);
   }
 
   void add_file(const fs::path& file) {
     std::ifstream in(file, std::ios::binary);
-    word(in ? 1 : 0);
+    mix_fnv1a(hash_, in ? 1 : 0);
     std::vector<char> buffer(1 << 16);
-    while (in.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || in.gcount() > 0)
-      bytes(buffer.data(), static_cast<std::size_t>(in.gcount()));
+    std::uint64_t size = 0;
+    while (in.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || in.gcount() > 0) {
+      const auto count = static_cast<std::size_t>(in.gcount());
+      mix({buffer.data(), count});
+      size += count;
+    }
+    mix_fnv1a(hash_, size);
   }
 
   std::string text() const {
@@ -51,20 +57,11 @@ class Fingerprint {
   }
 
  private:
-  void word(std::uint64_t value) {
-    hash_ = (hash_ ^ value) * 0x100000001b3ULL;
-    hash_ ^= hash_ >> 32;  // high bits of a word would stay high
-  }
-  void bytes(const char* data, std::size_t size) {
-    for (std::size_t at = 0; at < size; at += sizeof(std::uint64_t)) {
-      std::uint64_t value = 0;
-      std::memcpy(&value, data + at, std::min(sizeof value, size - at));
-      word(value);
-    }
-    word(size);
+  void mix(std::string_view bytes) {
+    mix_fnv1a(hash_, {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
   }
 
-  std::uint64_t hash_ = 0xcbf29ce484222325ULL;
+  std::uint64_t hash_ = kFnv1aBasis;
 };
 
 std::string line_value(const char* file, const std::string& key) {

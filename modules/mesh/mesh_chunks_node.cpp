@@ -1,6 +1,5 @@
 #include "modules/mesh/mesh_chunks_node.hpp"
 
-#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -17,8 +16,12 @@ constexpr std::size_t kQueue = 4096;
 // Chunks leave in small bursts: what may pass between two ticks.
 constexpr double kTick_s = 0.1;
 
-// Unused budget is kept this long, at least one chunk's worth.
+// Unused budget is kept this long.
 constexpr double kBurst_s = 0.5;
+
+TokenBucket full_budget(double bytes_per_s) {
+  return {bytes_per_s, kBurst_s * bytes_per_s, kBurst_s * bytes_per_s};
+}
 
 }  // namespace
 
@@ -27,6 +30,7 @@ MeshChunksNode::MeshChunksNode(const MeshChunksConfig& config, RobotId self, Out
       self_(self),
       chunks_(chunks),
       schedule_(config.min_move_m),
+      budget_bytes_(full_budget(config.max_bytes_per_s)),
       worker_(
           kQueue, Overflow::kBlock, [this](const Offer& offer) { step(offer, steady_now_s()); },
           MeshChunksConfig::kSection),
@@ -68,19 +72,12 @@ void MeshChunksNode::take(const Offer& offer) {
   schedule_.update(std::move(pieces.chunks));
 }
 
-// A token bucket: a chunk leaves when the budget is above zero, and may overdraw it once.
+// A chunk leaves while there is no debt, and may make one.
 void MeshChunksNode::send(double now_s) {
-  const double most = std::max(kBurst_s * config_.max_bytes_per_s, 1.0);
-  if (std::exchange(budget_started_, true))
-    budget_bytes_ += (now_s - budget_time_s_) * config_.max_bytes_per_s;
-  else
-    budget_bytes_ = most;
-  budget_bytes_ = std::min(budget_bytes_, most);
-  budget_time_s_ = now_s;
-  while (budget_bytes_ > 0.0) {
+  while (budget_bytes_.wait_s(0.0, now_s) <= 0.0) {
     std::optional<MeshChunk> chunk = schedule_.next();
     if (!chunk) return;
-    budget_bytes_ -= static_cast<double>(wire_bytes(*chunk));
+    budget_bytes_.spend(static_cast<double>(wire_bytes(*chunk)), now_s);
     chunks_.publish(*std::move(chunk));
   }
 }

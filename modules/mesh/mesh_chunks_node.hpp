@@ -13,6 +13,7 @@
 #include "modules/mesh/team_mesh.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
+#include "runtime/token_bucket.hpp"
 #include "runtime/topic.hpp"
 #include "runtime/worker.hpp"
 
@@ -57,9 +58,7 @@ class MeshChunksNode final : public Node {
   const RobotId self_;
   const Out<MeshChunk> chunks_;
   ChunkSchedule schedule_;
-  double budget_bytes_ = 0.0;  // may be sent now
-  double budget_time_s_ = 0.0;
-  bool budget_started_ = false;
+  TokenBucket budget_bytes_;
   std::atomic<std::size_t> waiting_ = 0;
   Worker<Offer> worker_;
   Periodic ticks_;  // last member: stops before the worker it posts to

@@ -375,9 +375,8 @@ bool RelayStore::answer(const RelayMessage& request) {
 void RelayStore::renew_ways() {
   for (auto& [robot, origin] : origins_) {
     const bool reachable = next_hop(robot, {}).has_value();
-    if (reachable && !std::exchange(origin.reachable, reachable) && !hears(robot))
-      output_.reachable.push_back(robot);
-    origin.reachable = reachable;
+    const bool before = std::exchange(origin.reachable, reachable);
+    if (reachable && !before && !hears(robot)) output_.reachable.push_back(robot);
   }
   for (auto entry = carried_.begin(); entry != carried_.end();) {
     const auto next = next_hop(entry->first, {});

@@ -52,8 +52,8 @@ class SendSchedule {
 
   void push(Entry entry, double now_s) {
     Lane& lane = lane_of(entry.priority);
-    if (limited_ && entry.newest_wins && replace(lane, entry)) return;
-    lane.messages.push_back({std::move(entry), now_s, lane.stops});
+    if (limited_ && entry.newest_wins && replace(entry)) return;
+    lane.messages.push_back({std::move(entry), now_s, lane.stops, lane.priority});
     const Entry& last = lane.messages.back().entry;
     lane.bytes += last.bytes;
     ++size_;
@@ -98,6 +98,7 @@ class SendSchedule {
     Entry entry;
     double since_s = 0.0;
     std::uint64_t stops = 0;  // of its lane when it came
+    SendPriority lane = SendPriority::kMesh;  // where it waits
   };
   struct Lane {
     SendPriority priority = SendPriority::kPresence;
@@ -121,14 +122,14 @@ class SendSchedule {
   }
 
   // In the place of the one it replaces, so that what changes often has its turn, too.
-  bool replace(Lane& lane, Entry& entry) {
+  bool replace(Entry& entry) {
     const auto found = newest_.find(name_of(entry));
     if (found == newest_.end()) return false;
     Entry& before = found->second->entry;
     HeldBack& held = held_[entry.topic];
     held.superseded.add(before.bytes);
     held.waiting.bytes += entry.bytes - before.bytes;
-    lane.bytes += entry.bytes - before.bytes;
+    lane_of(found->second->lane).bytes += entry.bytes - before.bytes;
     before = std::move(entry);
     return true;
   }
@@ -140,6 +141,7 @@ class SendSchedule {
     while (!words.messages.empty() && now_s - words.messages.front().since_s >= kNew_s) {
       Waiting& front = words.messages.front();
       front.stops = front.stops == words.stops ? backlog.stops : kHeld;
+      front.lane = backlog.priority;
       words.bytes -= front.entry.bytes;
       backlog.bytes += front.entry.bytes;
       backlog.messages.splice(backlog.messages.end(), words.messages, words.messages.begin());
