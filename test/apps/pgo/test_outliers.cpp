@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <set>
+#include <sstream>
 #include <string>
 
 #include "apps/pgo/outlier_study.hpp"
@@ -58,6 +59,26 @@ TEST_CASE("Clusters of false closures are added on request", "[outliers]") {
   CAPTURE(result.output);
   CHECK(result.exit_code == 0);
   CHECK_THAT(result.output, Contains("newton    0 %      6"));
+}
+
+TEST_CASE("Of several seeds outliers shows the worst", "[outliers]") {
+  const TemporaryFolder folder;
+  const std::string graph = folder.write("laps.g2o", laps_g2o()).string();
+  const auto rmse_of = [&](const std::string& seeds) {
+    const CommandResult result = run_command(
+        kOutliersTool + graph + " --robots 2 --shares 25 --methods none --seeds " + seeds);
+    CAPTURE(result.output);
+    REQUIRE(result.exit_code == 0);
+    std::istringstream row(result.output.substr(result.output.find("none")));
+    std::string method, percent;
+    double share = 0.0, wrong = 0.0, true_kept = 0.0, false_kept = 0.0, rmse_m = 0.0;
+    row >> method >> share >> percent >> wrong >> true_kept >> false_kept >> rmse_m;
+    REQUIRE(row);
+    return rmse_m;
+  };
+  const double worst_m = std::max({rmse_of("1"), rmse_of("2"), rmse_of("3")});
+  CHECK(worst_m > 0.1);
+  CHECK(rmse_of("1,2,3") == worst_m);
 }
 
 TEST_CASE("outliers says what is wrong with its input", "[outliers]") {
