@@ -12,6 +12,7 @@
 
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
+#include "runtime/thread.hpp"
 
 namespace km {
 
@@ -116,7 +117,7 @@ void Supervisor::begin_stop(Entry& entry) {
     watchdog_->has_ended(*node);
   });
   entry.stopped = stop.get_future();
-  std::thread(std::move(stop)).detach();  // for ever, if the node hangs
+  start_without_signals(std::move(stop)).detach();  // for ever, if the node hangs
 }
 
 // False if the node was given up and does not end for it.

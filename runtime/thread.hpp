@@ -1,13 +1,28 @@
 #pragma once
 
 #include <pthread.h>
+#include <signal.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <string>
+#include <thread>
+#include <utility>
 
 namespace km {
+
+/// A thread to which no signal to the process is delivered: others are there for those.
+template <typename Work>
+[[nodiscard]] std::thread start_without_signals(Work&& work) {
+  sigset_t all;
+  sigset_t before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);
+  std::thread thread(std::forward<Work>(work));
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  return thread;
+}
 
 /// Names the calling thread for debuggers and top; Linux keeps 15 characters.
 inline void name_this_thread(const std::string& name) {

@@ -1,14 +1,12 @@
 #include "runtime/unblocked_output.hpp"
 
 #include <poll.h>
-#include <pthread.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <condition_variable>
-#include <csignal>
 #include <cstdint>
 #include <deque>
 #include <mutex>
@@ -97,15 +95,9 @@ void OutputQueue::State::run() {
 }
 
 OutputQueue::OutputQueue(int descriptor, std::size_t capacity_bytes)
-    : state_(std::make_shared<State>(descriptor, capacity_bytes)) {
-  // Signals are for other threads, and a closed pipe is an error of a write here, not death.
-  sigset_t all;
-  sigset_t before;
-  sigfillset(&all);
-  pthread_sigmask(SIG_SETMASK, &all, &before);
-  writer_ = std::thread([state = state_] { state->run(); });
-  pthread_sigmask(SIG_SETMASK, &before, nullptr);
-}
+    : state_(std::make_shared<State>(descriptor, capacity_bytes)),
+      // A closed pipe is an error of a write here, not death.
+      writer_(start_without_signals([state = state_] { state->run(); })) {}
 
 OutputQueue::~OutputQueue() {
   const bool drained = drain(kGrace_s);

@@ -34,13 +34,16 @@ class ToyNode final : public Node {
   void stop() noexcept override {
     if (worker_.error() == nullptr) diary_.push_back("stop " + name_);
     worker_.stop();
+    pthread_sigmask(SIG_BLOCK, nullptr, &held_at_stop_);
   }
+  bool holds_at_stop(int signal) const { return sigismember(&held_at_stop_, signal) == 1; }
   std::exception_ptr error() const override { return worker_.error(); }
 
  private:
   std::string name_;
   std::vector<std::string>& diary_;
   Worker<bool> worker_;
+  sigset_t held_at_stop_{};
 };
 
 struct Run {
@@ -196,7 +199,7 @@ TEST_CASE("The first signal ends the run in order", "[supervisor]") {
   const auto before = std::signal(SIGHUP, SIG_DFL);  // the tests may run under nohup
   Run run;
   auto& [log, diary, signals, supervisor] = run;
-  supervisor.emplace<ToyNode>("camera", diary);
+  const ToyNode& camera = supervisor.emplace<ToyNode>("camera", diary);
   bool sent = false;
   const RunResult result = supervisor.run([&] {
     if (!std::exchange(sent, true)) kill(getpid(), signal);
@@ -205,6 +208,7 @@ TEST_CASE("The first signal ends the run in order", "[supervisor]") {
   std::signal(SIGHUP, before);
   CHECK(result.interrupted);
   CHECK(diary.back() == "stop camera");
+  CHECK(camera.holds_at_stop(signal));  // the thread that stops it may outlive the supervisor
 }
 
 TEST_CASE("A hang-up is not waited for where it was ignored before, as under nohup",
