@@ -15,6 +15,12 @@ namespace {
 constexpr double kMaxAhead_s = 1.0;  // of a sample before its image: a broken stamp would block all
 constexpr double kMaxCostPerObservation = 100.0;  // a fit has less than 1
 
+// An estimate of which so few landmarks come, of all that could be located, for so many images in a
+// row, is wrong: features fit nowhere. As a rule there are more landmarks than features.
+constexpr std::ptrdiff_t kSeenFeatures = 40;
+constexpr std::ptrdiff_t kFewOfSeen = 4;  // a quarter
+constexpr int kMostUnlocatedImages = 10;
+
 // The relative pose across a new start is hardly known: standard deviations [rad], [m].
 constexpr double kRestartRotation = 0.3;
 constexpr double kRestartTranslation = 1.0;
@@ -190,7 +196,15 @@ void Vio::continue_from_last_pose(std::vector<OdometryState>& states) const {
 
 void Vio::advance(const Held& held, VioResult& result) {
   result.smoother = smoother_.add(held.data);
-  if (!plausible(*result.smoother)) {
+  if (locates_points(*held.frame)) {
+    const auto& seen = held.data.tracked.features;
+    const auto locatable =
+        std::ranges::count_if(seen, [](const auto& f) { return f.right.has_value(); });
+    const bool lost =
+        locatable >= kSeenFeatures && kFewOfSeen * result.smoother->landmarks < locatable;
+    unlocated_images_ = lost ? unlocated_images_ + 1 : 0;
+  }
+  if (!plausible(*result.smoother) || unlocated_images_ > kMostUnlocatedImages) {
     ++statistics_.divergences;
     result.problem = VioProblem::kDiverged;
     restart(held);
@@ -216,6 +230,7 @@ bool Vio::plausible(const SmootherUpdate& update) const {
 void Vio::restart(Held held) {
   statistics_.images_without_pose += static_cast<int>(held_.size());
   running_ = false;
+  unlocated_images_ = 0;
   held_.clear();
   held_.push_back(std::move(held));
 }

@@ -129,9 +129,10 @@ void TrackStatistics::append_to(std::vector<ImageFigure>& figures) const {
   for (const std::size_t age : {10, 20, 40})
     if (const auto found = survival_.find(age); found != survival_.end())
       survival.add_quantiles(std::to_string(age) + " frames", found->second, {10});
+  std::string by_flow = std::to_string(kAgeByFlow);
+  by_flow += " frames, mean ";
   for (std::size_t bin = 0; bin < kFlowBinCount; ++bin)
-    survival.add(std::to_string(kAgeByFlow) + " frames, mean " + flow_bin_name(bin),
-                 ten_frames_by_flow_.mean(bin));
+    survival.add(by_flow + flow_bin_name(bin), ten_frames_by_flow_.mean(bin));
 
   FigureList step(figures, "KLT, one step of fresh corners");
   step.add("survive", mean_of(survived_));

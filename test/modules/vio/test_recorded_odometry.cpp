@@ -72,16 +72,21 @@ TEST_CASE("MH_01_easy: depth at a quarter of the rate will do", "[vio]") {
   CHECK(errors.rpe_deg < 0.3);
 }
 
+// From image `first` to image `last`, not included, there is no light.
+Recording darkened(Recording recording, std::size_t first, std::size_t last) {
+  for (std::size_t k = first; k < last; ++k) {
+    auto frame = std::make_shared<StereoFrame>(*recording.packets[k].frame);
+    std::fill(frame->left.pixels.begin(), frame->left.pixels.end(), std::uint8_t{0});
+    std::fill(frame->right.pixels.begin(), frame->right.pixels.end(), std::uint8_t{0});
+    recording.packets[k].frame = frame;
+  }
+  return recording;
+}
+
 TEST_CASE("MH_01_easy: a second of black images does not lose it", "[vio]") {
   const Recording* const data = recording();
   if (data == nullptr) return;
-  Recording black = *data;
-  for (std::size_t k = 36; k < 56; ++k) {
-    auto frame = std::make_shared<StereoFrame>(*black.packets[k].frame);
-    std::fill(frame->left.pixels.begin(), frame->left.pixels.end(), std::uint8_t{0});
-    std::fill(frame->right.pixels.begin(), frame->right.pixels.end(), std::uint8_t{0});
-    black.packets[k].frame = frame;
-  }
+  const Recording black = darkened(*data, 36, 56);
   const OdometryRun run = run_odometry(black, 0, black.packets.size(), TrackerConfig{}, {});
   CHECK(run.states.size() == black.packets.size());
   CHECK(run.statistics.starts == 1);
@@ -89,6 +94,28 @@ TEST_CASE("MH_01_easy: a second of black images does not lose it", "[vio]") {
   const OdometryErrors errors = odometry_errors(run.states, run.truth);
   CHECK(errors.ate_m < 0.03);
   CHECK(errors.max_m < 0.10);
+}
+
+// The velocity that is left after them fits nothing of what is seen then.
+TEST_CASE("MH_01_easy: after five seconds of black images with late stamps odometry sees again",
+          "[vio]") {
+  const auto folder = shared_data("euroc/MH_01_easy");
+  if (!folder) return;
+  constexpr Stamp kLate = 20'000'000;
+  Recording late = darkened(read_recording(*folder, 0.0, 11.0), 20, 120);
+  for (SensorPacket& packet : late.packets) {
+    auto frame = std::make_shared<StereoFrame>(*packet.frame);
+    frame->stamp += kLate;
+    packet.frame = frame;
+  }
+  const OdometryRun run = run_odometry(late, 0, late.packets.size(), TrackerConfig{}, {});
+  CHECK(run.statistics.starts == 2);
+  CHECK(run.statistics.divergences == 1);
+  constexpr std::size_t kLast = 60;  // three seconds
+  REQUIRE(run.states.size() > kLast);
+  const OdometryErrors errors =
+      odometry_errors(std::span(run.states).last(kLast), std::span(run.truth).last(kLast));
+  CHECK(errors.ate_m < 0.01);
 }
 
 // Makes `folder` a EuRoC folder of links to the images, which lie apart from their calibration in
