@@ -91,7 +91,9 @@ struct RobotOnSmallDisk {
 
   void start() {
     robot.emplace(robot_on_walk(long_walk(folder.path(), 0), output), log);
-    REQUIRE(wait_for_lines(output / "process.csv", 3));
+    const bool running = wait_for_lines(output / "process.csv", 3);
+    INFO(folder.read("log"));
+    REQUIRE(running);
   }
   [[nodiscard]] bool told(const std::string& file, const std::string& why) const {
     const std::string line = (output / file).string() + ": cannot be written: " + why;
