@@ -1,13 +1,6 @@
 #include "modules/sensors/dataset_reader.hpp"
 
-#include "modules/core/text_rows.hpp"
-
 namespace km {
-namespace {
-
-constexpr std::size_t kMaxExample = 500;  // room for the paths of two files
-
-}  // namespace
 
 const char* to_string(ReaderFault fault) {
   switch (fault) {
@@ -45,23 +38,6 @@ const char* to_string(ReaderFault fault) {
       return "label images with colours that are not in the palette";
   }
   return "unknown faults";
-}
-
-void ReaderReport::add(ReaderFault fault, const std::string& example) {
-  Entry& entry = entries_[fault];
-  if (entry.count++ == 0) entry.first = readable(example, kMaxExample);
-}
-
-std::size_t ReaderReport::count(ReaderFault fault) const {
-  const auto entry = entries_.find(fault);
-  return entry == entries_.end() ? 0 : entry->second.count;
-}
-
-std::string to_string(const ReaderReport& report) {
-  std::string text;
-  for (const auto& [fault, entry] : report.entries())
-    text += std::to_string(entry.count) + ' ' + to_string(fault) + ", first: " + entry.first + '\n';
-  return text;
 }
 
 }  // namespace km

@@ -1,12 +1,12 @@
 #pragma once
 
 #include <cstddef>
-#include <map>
 #include <optional>
 #include <stdexcept>
 #include <string>
 
 #include "modules/core/camera.hpp"
+#include "modules/core/fault_report.hpp"
 #include "modules/core/frame.hpp"
 
 namespace km {
@@ -36,26 +36,8 @@ enum class ReaderFault {
 /// A short plural for tables and log lines: "malformed rows".
 [[nodiscard]] const char* to_string(ReaderFault fault);
 
-/// Counts of what a reader met, with the first example of each kind, which names file and line.
-class ReaderReport {
- public:
-  struct Entry {
-    std::size_t count = 0;
-    std::string first;
-  };
-
-  void add(ReaderFault fault, const std::string& example);
-  [[nodiscard]] std::size_t count(ReaderFault fault) const;
-  [[nodiscard]] const std::map<ReaderFault, Entry>& entries() const { return entries_; }
-  [[nodiscard]] bool empty() const { return entries_.empty(); }
-
- private:
-  std::map<ReaderFault, Entry> entries_;
-};
-
-/// One line per kind of fault: "3 missing images, first: cam0/data.csv line 7: ...". Empty if there
-/// is none.
-[[nodiscard]] std::string to_string(const ReaderReport& report);
+/// Its examples name file and line.
+using ReaderReport = FaultReport<ReaderFault>;
 
 /// A recording that cannot be used at all. what() is one line that names the file, the line where
 /// there is one, and the value.
