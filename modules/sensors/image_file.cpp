@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "modules/core/image_size.hpp"
 #include "modules/core/input_file.hpp"
 
 namespace km {
@@ -25,35 +26,11 @@ bool is_truncated(std::string_view bytes) {
   return false;
 }
 
-int big_endian(std::string_view bytes) {
-  int value = 0;
-  for (const char byte : bytes) value = value << 8 | static_cast<unsigned char>(byte);
-  return value;
-}
-
-// The size in the frame header of a JPEG file: that of the first marker SOF0 to SOF15, of which
-// three are something else (ITU T.81, table B.1).
-std::optional<cv::Size> jpeg_size(std::string_view bytes) {
-  for (std::size_t at = 2; at + 9 <= bytes.size() && bytes[at] == '\xFF';) {
-    const int marker = static_cast<unsigned char>(bytes[at + 1]);
-    if (marker == 0xFF) {  // fills
-      ++at;
-      continue;
-    }
-    if (marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC)
-      return cv::Size(big_endian(bytes.substr(at + 7, 2)), big_endian(bytes.substr(at + 5, 2)));
-    at += 2 + static_cast<std::size_t>(big_endian(bytes.substr(at + 2, 2)));
-  }
-  return std::nullopt;
-}
-
-// The size that a PNG or JPEG file says it has: a decoder makes room for it before it looks
-// further, and OpenCV throws beyond 2^30 pixels. nullopt for what does not say.
+// As a decoder makes room for it before it looks further, and OpenCV throws beyond 2^30 pixels.
 std::optional<cv::Size> stated_size(std::string_view bytes) {
-  if (bytes.starts_with("\xFF\xD8")) return jpeg_size(bytes);
-  constexpr std::size_t kWidth = 16, kHeight = 20, kEnd = 24;  // of the chunk IHDR, the first
-  if (!bytes.starts_with("\x89PNG") || bytes.size() < kEnd) return std::nullopt;
-  return cv::Size(big_endian(bytes.substr(kWidth, 4)), big_endian(bytes.substr(kHeight, 4)));
+  const auto size = stated_image_size(bytes);
+  if (!size) return std::nullopt;
+  return cv::Size(static_cast<int>(size->width), static_cast<int>(size->height));
 }
 
 LoadedImage<cv::Mat> failure(ImageStatus status, const std::filesystem::path& file,

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace km {
+
+struct ImageSize {
+  std::uint32_t width = 0;   ///< [px]
+  std::uint32_t height = 0;  ///< [px]
+
+  bool operator==(const ImageSize&) const = default;
+};
+
+/// The size that the bytes of a PNG or JPEG file say it has, which no pixel is looked at for.
+/// nullopt for what does not say.
+[[nodiscard]] std::optional<ImageSize> stated_image_size(std::string_view bytes);
+
+}  // namespace km
