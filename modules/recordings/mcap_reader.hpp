@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "modules/recordings/bag_reader.hpp"
+#include "modules/recordings/chunk_merge.hpp"
+#include "modules/recordings/mcap_records.hpp"
+#include "modules/recordings/placed_report.hpp"
+#include "modules/recordings/random_access_file.hpp"
+
+namespace km {
+
+/// Reads MCAP files (mcap.dev/spec), version 0: messages in chunks (not compressed, lz4, zstd) and
+/// outside of them. Where the summary at the end describes all channels and chunks, a chunk is read
+/// when its time has come; else the whole file is read once before the first message. A file
+/// without an end, of a writer that was killed, gives what is whole in it. Checksums are compared
+/// where there are some: of the summary, of chunks, and of the data section if it has messages
+/// outside of chunks. Attachments, metadata and records of other kinds are passed over.
+class McapReader final : public BagReader {
+ public:
+  /// Throws InputFileError if `path` is no file or does not begin as MCAP files do.
+  explicit McapReader(const std::filesystem::path& path);
+
+  [[nodiscard]] const std::vector<BagChannel>& channels() const override { return channels_; }
+  [[nodiscard]] std::optional<BagMessage> next() override { return merge_->next(); }
+  [[nodiscard]] BagReport report() const override { return report_.faults(); }
+
+ private:
+  struct Summary {
+    std::vector<McapChunkIndex> chunks;  // in order of the file
+    std::optional<McapStatistics> statistics;
+  };
+
+  // The end of the data section; sets summary_ if it can be used in place of reading everything.
+  [[nodiscard]] std::uint64_t find_data_end();
+  void read_summary(std::uint64_t begin, std::uint64_t footer, const McapFooter& fields);
+  [[nodiscard]] const char* misfit_of(Summary& summary, std::uint64_t data_end) const;
+  [[nodiscard]] bool describes_all(const Summary& summary) const;
+  void use_summary();
+
+  // What lies between indexed chunks, or everything.
+  void walk(std::uint64_t begin, std::uint64_t end, bool has_end);
+  void note_bare_message(std::uint64_t begin, std::uint64_t end);
+  void note_chunk(std::uint64_t begin, std::uint64_t end);
+  void check_data_crc(std::uint64_t end, std::uint32_t crc);
+
+  [[nodiscard]] Chunk load(const ChunkPlace& place);
+  [[nodiscard]] std::vector<std::uint8_t> records_of(const ChunkPlace& place);
+  void add_definition(const McapRecordHeader& header, std::span<const std::uint8_t> bytes,
+                      std::uint64_t place);
+  void add_channel(const McapChannel& channel, std::uint64_t place);
+
+  RandomAccessFile file_;
+  PlacedReport report_{file_};
+  std::map<std::uint16_t, std::string> schemas_;
+  std::map<std::uint16_t, std::size_t> channel_of_;  // index into channels_
+  std::vector<BagChannel> channels_;
+  std::optional<Summary> summary_;
+  std::vector<ChunkPlace> places_;
+  std::unique_ptr<ChunkMerge> merge_;
+};
+
+}  // namespace km

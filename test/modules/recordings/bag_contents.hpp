@@ -1,0 +1,35 @@
+#pragma once
+
+#include <vector>
+
+#include "modules/recordings/bag_reader.hpp"
+
+namespace km {
+
+/// The messages that are left in a recording.
+inline std::vector<BagMessage> messages_of(BagReader& reader) {
+  std::vector<BagMessage> messages;
+  while (auto message = reader.next()) messages.push_back(*std::move(message));
+  return messages;
+}
+
+/// A message with what its channel says of it.
+struct ToldMessage {
+  std::string topic, type, encoding;
+  Stamp log_time = 0;
+  std::vector<std::uint8_t> bytes;
+
+  bool operator==(const ToldMessage&) const = default;
+};
+
+inline std::vector<ToldMessage> told_by(BagReader& reader) {
+  std::vector<ToldMessage> told;
+  for (BagMessage& message : messages_of(reader)) {
+    const BagChannel& channel = reader.channels().at(message.channel);
+    told.push_back({channel.topic, channel.type, channel.encoding, message.log_time,
+                    std::move(message.bytes)});
+  }
+  return told;
+}
+
+}  // namespace km

@@ -1,0 +1,81 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <random>
+
+#include "modules/recordings/chunk_merge.hpp"
+#include "test/modules/recordings/bag_contents.hpp"
+
+namespace km {
+namespace {
+
+struct Merged {
+  std::vector<BagMessage> messages;
+  std::vector<Stamp> lost;
+  std::size_t loads = 0;
+};
+
+// A chunk for each list of times; a message's bytes are its number, counted through all chunks.
+Merged merge(const std::vector<std::vector<Stamp>>& times, const std::vector<Stamp>& firsts,
+             std::uint64_t held_bytes = ChunkMerge::kHeld_bytes) {
+  std::vector<ChunkPlace> places;
+  std::vector<Chunk> chunks;
+  std::uint8_t number = 0;
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    places.push_back({.begin = i, .end = i + 1, .first = firsts[i]});
+    Chunk chunk;
+    for (const Stamp time : times[i]) {
+      chunk.entries.push_back({.log_time = time, .size = 1, .begin = chunk.bytes.size()});
+      chunk.bytes.push_back(number++);
+    }
+    chunks.push_back(chunk);
+  }
+  Merged merged;
+  ChunkMerge merger(
+      places,
+      [&](const ChunkPlace& place) {
+        ++merged.loads;
+        return chunks[place.begin];
+      },
+      [&](const ChunkPlace&, const Chunk::Entry& entry) { merged.lost.push_back(entry.log_time); },
+      held_bytes);
+  while (auto message = merger.next()) merged.messages.push_back(*std::move(message));
+  return merged;
+}
+
+TEST_CASE("Messages of chunks that overlap come in order of time and of the file", "[recordings]") {
+  // Few enough times that many are equal.
+  std::mt19937 rng(GENERATE(1U, 2U, 3U));
+  const std::uint64_t held_bytes = GENERATE(std::uint64_t{0}, std::uint64_t{25}, ~std::uint64_t{0});
+  std::vector<std::vector<Stamp>> times(12);
+  std::vector<Stamp> firsts;
+  std::vector<std::pair<Stamp, std::uint8_t>> expected;
+  std::uint8_t number = 0;
+  for (auto& chunk : times) {
+    const auto base = static_cast<Stamp>(rng() % 30);
+    for (auto k = rng() % 20; k > 0; --k) {
+      chunk.push_back(base + static_cast<Stamp>(rng() % 10));
+      expected.emplace_back(chunk.back(), number++);
+    }
+    firsts.push_back(chunk.empty() ? base : *std::min_element(chunk.begin(), chunk.end()));
+  }
+  std::sort(expected.begin(), expected.end());
+  const Merged merged = merge(times, firsts, held_bytes);
+  REQUIRE(merged.messages.size() == expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    CHECK(merged.messages[i].log_time == expected[i].first);
+    CHECK(merged.messages[i].bytes == std::vector{expected[i].second});
+  }
+  CHECK(merged.lost.empty());
+  CHECK((merged.loads == times.size()) == (held_bytes > 25));
+}
+
+TEST_CASE("A chunk that says it begins later than it does loses what is late", "[recordings]") {
+  const Merged merged = merge({{10, 20, 30}, {5, 15, 25}}, {10, 20});
+  CHECK(merged.lost == std::vector<Stamp>{5});  // 10 was given when the second chunk was due
+  REQUIRE(merged.messages.size() == 5);
+  CHECK(merged.messages[1].log_time == 15);
+}
+
+}  // namespace
+}  // namespace km

@@ -1,0 +1,243 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "modules/core/input_file.hpp"
+#include "modules/core/json.hpp"
+#include "modules/recordings/mcap_reader.hpp"
+#include "test/modules/recordings/listed_sum.hpp"
+#include "test/modules/recordings/mcap_file.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/spoilt_input.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Fields of a record of the conformance suite by name; numbers are strings there.
+struct ListedRecord {
+  explicit ListedRecord(const Json& record) : type(record.at("type")) {
+    for (const Json& field : record.at("fields")) fields[field.at(0)] = field.at(1);
+  }
+  [[nodiscard]] std::int64_t number(const std::string& name) const {
+    return std::stoll(fields.at(name).get<std::string>());
+  }
+  [[nodiscard]] std::string text(const std::string& name) const { return fields.at(name); }
+
+  std::string type;
+  std::map<std::string, Json> fields;
+};
+
+struct Listed {
+  std::vector<ToldMessage> messages;
+  std::size_t channels = 0;
+};
+
+// What the suite says a file has, in order of time.
+Listed listed_in(const fs::path& file) {
+  Listed listed;
+  std::map<std::int64_t, std::string> types;
+  std::map<std::int64_t, ListedRecord> channels;
+  const Json document = read_json(file);
+  for (const Json& json : document.at("records")) {
+    const ListedRecord record(json);
+    if (record.type == "DataEnd") break;
+    if (record.type == "Schema") types[record.number("id")] = record.text("name");
+    if (record.type == "Channel") channels.emplace(record.number("id"), record);
+    if (record.type != "Message") continue;
+    const ListedRecord& channel = channels.at(record.number("channel_id"));
+    ToldMessage message{.topic = channel.text("topic"),
+                        .type = types.at(channel.number("schema_id")),
+                        .encoding = channel.text("message_encoding"),
+                        .log_time = record.number("log_time"),
+                        .bytes = {}};
+    for (const Json& byte : record.fields.at("data"))
+      message.bytes.push_back(static_cast<std::uint8_t>(std::stoi(byte.get<std::string>())));
+    listed.messages.push_back(std::move(message));
+  }
+  std::stable_sort(listed.messages.begin(), listed.messages.end(),
+                   [](const auto& a, const auto& b) { return a.log_time < b.log_time; });
+  listed.channels = channels.size();
+  return listed;
+}
+
+std::vector<McapFile::Message> numbered_messages(std::size_t count, Stamp first) {
+  std::vector<McapFile::Message> messages;
+  for (std::size_t i = 0; i < count; ++i)
+    messages.push_back({.channel = static_cast<std::uint16_t>(1 + i % 2),
+                        .log_time = first + static_cast<Stamp>(i),
+                        .bytes = std::vector(i % 50, static_cast<std::uint8_t>(i))});
+  return messages;
+}
+
+// Two chunks that overlap in time, and two messages outside of them: 42 in all.
+McapFile mixed_file(const McapFile::Options& options) {
+  McapFile file(options);
+  file.add_chunk(numbered_messages(20, 1000), 1000);
+  file.add({.channel = 1, .log_time = 1005, .bytes = {1}});
+  file.add_chunk(numbered_messages(20, 990), 990);
+  file.add({.channel = 2, .log_time = 5, .bytes = {2}});
+  return file;
+}
+
+void check_order(const std::vector<BagMessage>& messages) {
+  CHECK(std::is_sorted(messages.begin(), messages.end(),
+                       [](const auto& a, const auto& b) { return a.log_time < b.log_time; }));
+}
+
+}  // namespace
+
+TEST_CASE("Every file of the MCAP conformance suite gives the messages that are listed",
+          "[recordings]") {
+  const auto folder = shared_data("ros_recordings/mcap/conformance");
+  if (!folder) return;
+  std::size_t files = 0;
+  std::size_t messages = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(*folder)) {
+    if (entry.path().extension() != ".mcap") continue;
+    CAPTURE(entry.path().string());
+    ++files;
+    const Listed listed = listed_in(fs::path(entry.path()).replace_extension(".json"));
+    McapReader reader(entry.path());
+    CHECK(reader.channels().size() == listed.channels);
+    std::uint64_t count = 0;
+    for (const BagChannel& channel : reader.channels()) count += channel.message_count;
+    CHECK(count == listed.messages.size());
+    const auto told = told_by(reader);
+    CHECK(told == listed.messages);
+    CHECK(to_string(reader.report()) == "");
+    messages += told.size();
+  }
+  CHECK(files == 342);
+  CHECK(messages == 1694);
+}
+
+TEST_CASE("A recording of rosbag2 with zstd is read whole", "[recordings]") {
+  const auto file = shared_data("ros_recordings/mcap/nav2_turtlebot.mcap");
+  if (!file) return;
+  McapReader summed(*file);
+  // Of the chunk that the program zstd unpacks.
+  CHECK(sum_of(summed) == ListedSum{8197, 0x100de38bbb1b});
+  McapReader reader(*file);
+  const auto messages = messages_of(reader);
+  check_order(messages);
+  std::map<std::string, std::uint64_t> counts;
+  for (const BagMessage& message : messages) ++counts[reader.channels()[message.channel].topic];
+  for (const BagChannel& channel : reader.channels()) {
+    CAPTURE(channel.topic);
+    CHECK(channel.encoding == "cdr");
+    CHECK(counts[channel.topic] == channel.message_count);
+  }
+  CHECK(to_string(reader.report()) == "");
+}
+
+TEST_CASE("Messages in and outside of chunks come in one order of time", "[recordings]") {
+  McapFile::Options options;
+  options.compression = GENERATE("", "lz4", "zstd");
+  options.has_crc = GENERATE(true, false);
+  options.has_summary = GENERATE(true, false);
+  options.repeats_channels = GENERATE(true, false);
+  CAPTURE(options.compression, options.has_crc, options.has_summary, options.repeats_channels);
+  const TemporaryFolder folder;
+  McapReader reader(folder.write("a.mcap", mixed_file(options).finish()));
+  REQUIRE(reader.channels().size() == 2);
+  CHECK(reader.channels()[0].topic == "/imu1");
+  CHECK(reader.channels()[0].type == "sensor_msgs/msg/Imu");
+  CHECK(reader.channels()[0].message_count == 21);
+  CHECK(reader.channels()[1].message_count == 21);
+  const auto messages = messages_of(reader);
+  check_order(messages);
+  REQUIRE(messages.size() == 42);
+  CHECK(messages.front().log_time == 5);
+  CHECK(messages.front().channel == 1);
+  CHECK(messages.front().bytes == std::vector<std::uint8_t>{2});
+  CHECK(messages[1].log_time == 990);
+  CHECK(to_string(reader.report()) == "");
+}
+
+TEST_CASE("Of a file that is cut what is whole is read", "[recordings]") {
+  McapFile::Options options;
+  options.compression = GENERATE("", "zstd");
+  const std::string whole = mixed_file(options).finish();
+  const TemporaryFolder folder;
+  std::size_t before = 0;
+  for (std::size_t size = 8; size < whole.size(); size += 7) {
+    CAPTURE(size);
+    McapReader reader(folder.write("a.mcap", whole.substr(0, size)));
+    const auto messages = messages_of(reader);
+    check_order(messages);
+    CHECK(messages.size() >= before);
+    before = messages.size();
+    CHECK(reader.report().count(BagFault::kTruncated) > 0);
+  }
+  CHECK(before == 42);
+}
+
+TEST_CASE("A chunk with another checksum than it says is lost with its place", "[recordings]") {
+  const bool has_summary = GENERATE(true, false);
+  McapFile file({.compression = "", .has_summary = has_summary});
+  file.add_chunk({{.channel = 1, .log_time = 1, .bytes = {'f', 'i', 'n', 'd'}}}, 1);
+  file.add_chunk({{.channel = 1, .log_time = 2, .bytes = {'k', 'e', 'p', 't'}}}, 2);
+  std::string bytes = file.finish();
+  bytes[bytes.find("find")] ^= 1;
+  const TemporaryFolder folder;
+  const fs::path path = folder.write("a.mcap", bytes);
+  McapReader reader(path);
+  CHECK(messages_of(reader).size() == 1);
+  const BagReport report = reader.report();
+  REQUIRE(report.count(BagFault::kChecksum) == 1);
+  CHECK_THAT(report.entries().at(BagFault::kChecksum).first,
+             Catch::StartsWith(path.string() + " byte "));
+}
+
+TEST_CASE("Messages outside of chunks are checked by the checksum of the data", "[recordings]") {
+  McapFile file({});
+  file.add({.channel = 1, .log_time = 1, .bytes = {'f', 'i', 'n', 'd'}});
+  std::string bytes = file.finish();
+  bytes[bytes.find("find")] ^= 1;
+  const TemporaryFolder folder;
+  McapReader reader(folder.write("a.mcap", bytes));
+  CHECK(messages_of(reader).size() == 1);
+  CHECK(reader.report().count(BagFault::kChecksum) == 1);
+}
+
+TEST_CASE("An index that says too late a time costs the messages that are late", "[recordings]") {
+  McapFile file({});
+  file.add_chunk(numbered_messages(10, 100), 100);
+  file.add_chunk(numbered_messages(10, 95), 105);
+  const TemporaryFolder folder;
+  McapReader reader(folder.write("a.mcap", file.finish()));
+  const auto messages = messages_of(reader);
+  check_order(messages);
+  CHECK(reader.report().count(BagFault::kUnordered) == 9);
+  CHECK(messages.size() == 11);
+}
+
+TEST_CASE("Spoilt MCAP files are refused or read in order", "[recordings]") {
+  McapFile::Options options;
+  options.compression = GENERATE("", "lz4", "zstd");
+  options.has_crc = GENERATE(true, false);
+  const TemporaryFolder folder;
+  check_spoilt<InputFileError>(mixed_file(options).finish(), folder.path().string(),
+                               [&](const std::string& bytes) {
+                                 McapReader reader(folder.write("a.mcap", bytes));
+                                 check_order(messages_of(reader));
+                                 const BagReport report = reader.report();
+                                 for (const auto& [fault, entry] : report.entries())
+                                   CHECK(entry.first.find("a.mcap byte ") != entry.first.npos);
+                               });
+}
+
+TEST_CASE("What is no MCAP file is refused by name", "[recordings]") {
+  check_no_files<InputFileError>(".mcap", [](const fs::path& path) { McapReader{path}; });
+  const TemporaryFolder folder;
+  CHECK_THROWS_WITH(McapReader(folder.write("a.mcap", "#ROSBAG V2.0\n")),
+                    Catch::Contains("a.mcap byte 0: does not begin as MCAP files"));
+  CHECK_THROWS_AS(McapReader(folder.write("b.mcap", "")), InputFileError);
+}
+
+}  // namespace km
