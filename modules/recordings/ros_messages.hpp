@@ -1,0 +1,114 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "modules/core/decoded.hpp"
+#include "modules/core/stamp.hpp"
+#include "modules/recordings/bag_reader.hpp"
+
+namespace km {
+
+/// Messages of ROS, field by field as they were recorded: units and frames are those of ROS (SI,
+/// REP 103), and nothing is checked but that the bytes are such a message. kType is the type's name
+/// in ROS 1.
+
+/// std_msgs/Header, with which most messages begin.
+struct RosHeader {
+  static constexpr std::string_view kType = "std_msgs/Header";
+  Stamp stamp = 0;
+  std::string frame;
+};
+
+struct RosImage {
+  static constexpr std::string_view kType = "sensor_msgs/Image";
+  RosHeader header;
+  std::uint32_t height = 0;  ///< [px]
+  std::uint32_t width = 0;   ///< [px]
+  std::string encoding;      ///< "mono8", "bgr8", "16UC1", ...
+  bool is_bigendian = false;
+  std::uint32_t step = 0;          ///< Length of a row [bytes].
+  std::vector<std::uint8_t> data;  ///< At least height * step.
+};
+
+struct RosCompressedImage {
+  static constexpr std::string_view kType = "sensor_msgs/CompressedImage";
+  RosHeader header;
+  std::string format;              ///< "jpeg", "rgb8; jpeg compressed bgr8", ...
+  std::vector<std::uint8_t> data;  ///< An image file.
+};
+
+struct RosImu {
+  static constexpr std::string_view kType = "sensor_msgs/Imu";
+  RosHeader header;
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+  std::array<double, 9> orientation_covariance{};  ///< Row-major, as all; -1 first: none is known.
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< [rad/s]
+  std::array<double, 9> angular_velocity_covariance{};
+  Eigen::Vector3d linear_acceleration = Eigen::Vector3d::Zero();  ///< [m/s^2]
+  std::array<double, 9> linear_acceleration_covariance{};
+};
+
+struct RosCameraInfo {
+  static constexpr std::string_view kType = "sensor_msgs/CameraInfo";
+  RosHeader header;
+  std::uint32_t height = 0;      ///< [px]
+  std::uint32_t width = 0;       ///< [px]
+  std::string distortion_model;  ///< "plumb_bob", "equidistant", ...
+  std::vector<double> D;
+  std::array<double, 9> K{};   ///< 3x3, row-major, as all.
+  std::array<double, 9> R{};   ///< 3x3.
+  std::array<double, 12> P{};  ///< 3x4.
+};
+
+/// geometry_msgs/Pose, and Transform, which has the same fields.
+struct RosPose {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< [m]
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+};
+
+struct RosPoseStamped {
+  static constexpr std::string_view kType = "geometry_msgs/PoseStamped";
+  RosHeader header;
+  RosPose pose;
+};
+
+struct RosOdometry {
+  static constexpr std::string_view kType = "nav_msgs/Odometry";
+  RosHeader header;
+  std::string child_frame;
+  RosPose pose;  ///< Of the child frame in the header's.
+  std::array<double, 36> pose_covariance{};
+  Eigen::Vector3d linear_velocity = Eigen::Vector3d::Zero();   ///< In the child frame [m/s].
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< In the child frame [rad/s].
+  std::array<double, 36> twist_covariance{};
+};
+
+/// geometry_msgs/TransformStamped.
+struct RosTransform {
+  RosHeader header;
+  std::string child_frame;
+  RosPose pose;  ///< Of the child frame in the header's.
+};
+
+struct RosTransforms {
+  static constexpr std::string_view kType = "tf2_msgs/TFMessage";
+  std::vector<RosTransform> transforms;
+};
+
+/// True if the channel's messages are of `type`, a name of ROS 1; ROS 2 writes "/msg/" in it.
+[[nodiscard]] bool is_of_type(const BagChannel& channel, std::string_view type);
+
+/// A message of a type above in the encoding that its channel says, "ros1" or "cdr". Refuses bytes
+/// that are not one, and images with fewer pixels than they say. A RosHeader is read from the
+/// beginning of any message that has one.
+template <typename Message>
+Decoded<Message> decode_ros(std::string_view encoding, std::span<const std::uint8_t> bytes);
+
+}  // namespace km
