@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "modules/recordings/bag_reader.hpp"
+
+namespace km {
+
+/// Channels of which no two have the same topic, type and encoding: a publisher that was started
+/// again, or another file of the recording, goes on with the same channel.
+class ChannelTable {
+ public:
+  /// Its index. Message counts are added up.
+  std::size_t add(const BagChannel& channel) {
+    const auto [known, is_new] = index_.try_emplace(
+        std::tuple(channel.topic, channel.type, channel.encoding), channels_.size());
+    if (is_new)
+      channels_.push_back(channel);
+    else
+      channels_[known->second].message_count += channel.message_count;
+    return known->second;
+  }
+
+  void add_messages(std::size_t index, std::uint64_t count) {
+    channels_[index].message_count += count;
+  }
+
+  [[nodiscard]] const std::vector<BagChannel>& channels() const { return channels_; }
+
+ private:
+  std::vector<BagChannel> channels_;
+  std::map<std::tuple<std::string, std::string, std::string>, std::size_t> index_;
+};
+
+}  // namespace km

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "modules/core/stamp.hpp"
+
+namespace km {
+
+/// Records of a bag of ROS 1, version 2.0 (wiki.ros.org/Bags/Format/2.0): a header of named fields
+/// and data, each behind its length in four bytes, little endian.
+enum class Ros1Opcode : std::uint8_t {
+  kMessage = 0x02,
+  kBagHeader = 0x03,
+  kIndexData = 0x04,
+  kChunk = 0x05,
+  kChunkInfo = 0x06,
+  kConnection = 0x07,
+};
+
+/// First bytes of a file.
+inline constexpr std::string_view kRos1Magic = "#ROSBAG V2.0\n";
+
+/// The fields of a record's header.
+class Ros1Fields {
+ public:
+  /// nullopt for bytes that are none. They outlive the result.
+  [[nodiscard]] static std::optional<Ros1Fields> parse(std::span<const std::uint8_t> bytes);
+
+  /// The record's kind.
+  [[nodiscard]] bool is(Ros1Opcode kind) const;
+  /// Numbers of that many bytes; nullopt if there is no such field, or of another size.
+  [[nodiscard]] std::optional<std::uint32_t> u32(const char* name) const;
+  [[nodiscard]] std::optional<std::uint64_t> u64(const char* name) const;
+  [[nodiscard]] std::optional<Stamp> time(const char* name) const;
+  [[nodiscard]] std::optional<std::string> text(const char* name) const;
+
+ private:
+  [[nodiscard]] std::span<const std::uint8_t> field(const char* name, std::size_t size) const;
+
+  std::map<std::string, std::span<const std::uint8_t>, std::less<>> fields_;
+};
+
+/// A record in a chunk or index.
+struct Ros1Record {
+  Ros1Fields fields;
+  std::span<const std::uint8_t> data;
+  std::uint64_t data_begin = 0;  ///< In the bytes that the record is from.
+};
+
+/// The record at `at`, which moves behind it; nullopt if it is none or the bytes end within it.
+[[nodiscard]] std::optional<Ros1Record> next_ros1_record(std::span<const std::uint8_t> bytes,
+                                                         std::uint64_t& at);
+
+struct Ros1Connection {
+  std::uint32_t id = 0;
+  std::string topic;
+  std::string type;
+};
+
+/// Where a chunk is, and how many messages of which connection it has.
+struct Ros1ChunkInfo {
+  std::uint64_t begin = 0;  ///< [bytes from the beginning of the file].
+  Stamp first = 0;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> counts;
+};
+
+[[nodiscard]] std::optional<Ros1Connection> parse_ros1_connection(const Ros1Record& record);
+[[nodiscard]] std::optional<Ros1ChunkInfo> parse_ros1_chunk_info(const Ros1Record& record);
+
+}  // namespace km

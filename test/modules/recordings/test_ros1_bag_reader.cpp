@@ -1,0 +1,279 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "modules/core/input_file.hpp"
+#include "modules/recordings/ros1_bag_reader.hpp"
+#include "modules/recordings/ros_messages.hpp"
+#include "test/modules/recordings/listed_sum.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/spoilt_input.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+using Bytes = std::vector<std::uint8_t>;
+
+// Writes small bags after the specification, without compression.
+class BagFile {
+ public:
+  struct Message {
+    std::uint32_t connection = 0;  // 0 or 1
+    std::uint32_t seconds = 0;
+    Bytes bytes;
+  };
+
+  BagFile() { file_.bytes(octets("#ROSBAG V2.0\n")); }
+
+  void add_chunk(const std::vector<Message>& messages) {
+    ByteWriter records;
+    std::array<std::uint32_t, 2> counts{};
+    std::uint32_t first = messages.front().seconds;
+    for (const std::uint32_t id : kConnections) put_connection(records, id);
+    for (const Message& message : messages) {
+      ByteWriter header;
+      field(header, "op", Bytes{2});
+      field(header, "conn", u32(message.connection));
+      field(header, "time", time(message.seconds));
+      put(records, header, message.bytes);
+      ++counts[message.connection];
+      first = std::min(first, message.seconds);
+    }
+    const Bytes data = records.release();
+    ByteWriter header;
+    field(header, "op", Bytes{5});
+    field(header, "compression", octets("none"));
+    field(header, "size", u32(static_cast<std::uint32_t>(data.size())));
+    chunks_.push_back({chunk_bytes_.size(), first, counts});
+    put(chunk_bytes_, header, data);
+  }
+
+  [[nodiscard]] std::string finish(bool has_index) {
+    const Bytes chunks = chunk_bytes_.release();
+    const std::uint64_t begin = file_.size() + kHeaderRecord_bytes;
+    ByteWriter header;
+    field(header, "op", Bytes{3});
+    ByteWriter position;
+    position.u64(has_index ? begin + chunks.size() : 0);
+    field(header, "index_pos", position.release());
+    field(header, "conn_count", u32(2));
+    field(header, "chunk_count", u32(static_cast<std::uint32_t>(chunks_.size())));
+    put(file_, header, Bytes(kHeaderRecord_bytes - 8 - header_size(header), ' '));
+    file_.bytes(chunks);
+    if (has_index) put_index(begin);
+    const Bytes whole = file_.release();
+    return {whole.begin(), whole.end()};
+  }
+
+ private:
+  static constexpr std::array<std::uint32_t, 2> kConnections = {0, 1};
+  static constexpr std::size_t kHeaderRecord_bytes = 4096;
+
+  struct ChunkPlaced {
+    std::uint64_t begin;
+    std::uint32_t first;
+    std::array<std::uint32_t, 2> counts;
+  };
+
+  static Bytes octets(const std::string& text) { return {text.begin(), text.end()}; }
+  static Bytes u32(std::uint32_t value) {
+    ByteWriter out;
+    out.u32(value);
+    return out.release();
+  }
+  static Bytes time(std::uint32_t seconds) {
+    ByteWriter out;
+    out.u32(seconds);
+    out.u32(0);
+    return out.release();
+  }
+  static std::size_t header_size(const ByteWriter& header) { return header.size(); }
+  static void field(ByteWriter& out, const std::string& name, const Bytes& value) {
+    out.u32(static_cast<std::uint32_t>(name.size() + 1 + value.size()));
+    out.bytes(octets(name + '='));
+    out.bytes(value);
+  }
+  static void put(ByteWriter& out, ByteWriter& header, const Bytes& data) {
+    out.u32(static_cast<std::uint32_t>(header.size()));
+    out.bytes(header.release());
+    out.u32(static_cast<std::uint32_t>(data.size()));
+    out.bytes(data);
+  }
+  static void put_connection(ByteWriter& out, std::uint32_t id) {
+    ByteWriter header;
+    field(header, "op", Bytes{7});
+    field(header, "conn", u32(id));
+    field(header, "topic", octets("/imu" + std::to_string(id)));
+    ByteWriter description;
+    field(description, "topic", octets("/imu"));
+    field(description, "type", octets("sensor_msgs/Imu"));
+    put(out, header, description.release());
+  }
+  void put_index(std::uint64_t chunks_begin) {
+    for (const std::uint32_t id : kConnections) put_connection(file_, id);
+    for (const ChunkPlaced& chunk : chunks_) {
+      ByteWriter position;
+      position.u64(chunks_begin + chunk.begin);
+      ByteWriter header;
+      field(header, "op", Bytes{6});
+      field(header, "ver", u32(1));
+      field(header, "chunk_pos", position.release());
+      field(header, "start_time", time(chunk.first));
+      field(header, "end_time", time(chunk.first));
+      field(header, "count", u32(2));
+      ByteWriter counts;
+      for (const std::uint32_t id : kConnections) {
+        counts.u32(id);
+        counts.u32(chunk.counts[id]);
+      }
+      put(file_, header, counts.release());
+    }
+  }
+
+  ByteWriter file_;
+  ByteWriter chunk_bytes_;
+  std::vector<ChunkPlaced> chunks_;
+};
+
+// Twelve messages in three chunks that overlap in time.
+std::string small_bag(bool has_index) {
+  BagFile file;
+  for (std::uint32_t chunk = 0; chunk < 3; ++chunk) {
+    std::vector<BagFile::Message> messages;
+    for (std::uint32_t i = 0; i < 4; ++i)
+      messages.push_back({.connection = i % 2,
+                          .seconds = 100 - 10 * chunk + 7 * i,
+                          .bytes = {static_cast<std::uint8_t>(4 * chunk + i)}});
+    file.add_chunk(messages);
+  }
+  return file.finish(has_index);
+}
+
+void check_bag_order(const std::vector<BagMessage>& messages) {
+  CHECK(std::is_sorted(messages.begin(), messages.end(),
+                       [](const auto& a, const auto& b) { return a.log_time < b.log_time; }));
+}
+
+}  // namespace
+
+TEST_CASE("Bags of ROS 1 give what ROS' own reader gives", "[recordings]") {
+  struct Known {
+    const char* file;
+    ListedSum sum;  // of Debian's python3-rosbag 1.15
+    std::size_t topics;
+  };
+  const Known known = GENERATE(Known{"ROS_example.bag", {26566, 0x33da0a80b6c3}, 3},
+                               Known{"example.bag", {8647, 0x10ddf7d3108e}, 9},
+                               Known{"example-bz2.bag", {8647, 0x10ddf7d3108e}, 9},
+                               Known{"example-lz4.bag", {8647, 0x10ddf7d3108e}, 9},
+                               Known{"example-unsorted-chunks.bag", {3, 0x16c97e68a}, 1},
+                               Known{"no-messages.bag", {0, 0}, 0},
+                               Known{"tf_example.bag", {518, 0x1044f91edf5}, 2},
+                               Known{"tilt_laser.bag", {4093, 0x7f5b5e52090}, 9});
+  CAPTURE(known.file);
+  const auto file = shared_data(std::string("ros_recordings/rosbag1/") + known.file);
+  if (!file) return;
+  Ros1BagReader summed(*file);
+  CHECK(sum_of(summed) == known.sum);
+  CHECK(to_string(summed.report()) == "");
+
+  Ros1BagReader reader(*file);
+  CHECK(reader.channels().size() == known.topics);
+  const auto messages = messages_of(reader);
+  check_bag_order(messages);
+  std::vector<std::uint64_t> counts(reader.channels().size());
+  for (const BagMessage& message : messages) ++counts[message.channel];
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    CHECK(counts[i] == reader.channels()[i].message_count);
+}
+
+TEST_CASE("Poses in a bag of ROS 1 are decoded", "[recordings]") {
+  const auto file = shared_data("ros_recordings/rosbag1/ROS_example.bag");
+  if (!file) return;
+  Ros1BagReader reader(*file);
+  for (auto message = reader.next(); message; message = reader.next()) {
+    const BagChannel& channel = reader.channels()[message->channel];
+    REQUIRE(is_of_type(channel, RosPoseStamped::kType));
+    const auto pose = decode_ros<RosPoseStamped>(channel.encoding, message->bytes);
+    REQUIRE(pose.value);
+    if (channel.topic != "groundtruth") continue;
+    // The first, as python3-rosbag shows it.
+    CHECK(pose.value->header.stamp == 1502792570283404827);
+    CHECK(pose.value->header.frame == "groundtruth");
+    CHECK(pose.value->pose.position.x() == -0.004899939787714927);
+    CHECK(pose.value->pose.orientation.w() == 0.9999926388911098);
+    return;
+  }
+  FAIL("no such topic");
+}
+
+TEST_CASE("A bag is read the same with and without an index", "[recordings]") {
+  const bool has_index = GENERATE(true, false);
+  const TemporaryFolder folder;
+  Ros1BagReader reader(folder.write("a.bag", small_bag(has_index)));
+  REQUIRE(reader.channels().size() == 2);
+  CHECK(reader.channels()[1].topic == "/imu1");
+  CHECK(reader.channels()[1].type == "sensor_msgs/Imu");
+  CHECK(reader.channels()[1].encoding == "ros1");
+  CHECK(reader.channels()[1].message_count == 6);
+  std::vector<std::uint8_t> order;
+  for (const BagMessage& message : messages_of(reader)) order.push_back(message.bytes.at(0));
+  // 80, 87, 90, 94, 97, 100, 101, 104, 107, 111, 114, 121 s
+  CHECK(order == std::vector<std::uint8_t>{8, 9, 4, 10, 5, 0, 11, 6, 1, 7, 2, 3});
+  CHECK(reader.report().count(BagFault::kIndex) == (has_index ? 0 : 1));
+}
+
+TEST_CASE("Of a bag that is cut the whole chunks are read", "[recordings]") {
+  const std::string whole = small_bag(GENERATE(true, false));
+  const TemporaryFolder folder;
+  std::size_t before = 0;
+  for (std::size_t size = 4200; size < whole.size(); size += 7) {
+    CAPTURE(size);
+    Ros1BagReader reader(folder.write("a.bag", whole.substr(0, size)));
+    const auto messages = messages_of(reader);
+    check_bag_order(messages);
+    CHECK(messages.size() % 4 == 0);
+    CHECK(messages.size() >= before);
+    CHECK(reader.report().count(BagFault::kIndex) == 1);
+    before = messages.size();
+  }
+  CHECK(before >= 8);
+}
+
+TEST_CASE("Spoilt bags are refused or read in order", "[recordings]") {
+  const TemporaryFolder folder;
+  check_spoilt<InputFileError>(small_bag(GENERATE(true, false)), folder.path().string(),
+                               [&](const std::string& bytes) {
+                                 Ros1BagReader reader(folder.write("a.bag", bytes));
+                                 check_bag_order(messages_of(reader));
+                                 const BagReport report = reader.report();
+                                 for (const auto& [fault, entry] : report.entries())
+                                   CHECK(entry.first.find("a.bag byte ") != entry.first.npos);
+                               });
+}
+
+TEST_CASE("Spoilt bags with compression are refused or read in order", "[recordings]") {
+  const auto file = shared_data("ros_recordings/rosbag1/" +
+                                GENERATE(std::string("tf_example.bag"), "no-messages.bag"));
+  if (!file) return;
+  const TemporaryFolder folder;
+  check_spoilt<InputFileError>(read_input_file(*file), folder.path().string(),
+                               [&](const std::string& bytes) {
+                                 Ros1BagReader reader(folder.write("a.bag", bytes));
+                                 check_bag_order(messages_of(reader));
+                               });
+}
+
+TEST_CASE("What is no bag of version 2 is refused by name", "[recordings]") {
+  check_no_files<InputFileError>(".bag", [](const fs::path& path) { Ros1BagReader{path}; });
+  const TemporaryFolder folder;
+  CHECK_THROWS_WITH(Ros1BagReader(folder.write("a.bag", "#ROSBAG V1.2\n")),
+                    Catch::Contains("a.bag byte 0: does not begin as bags of version 2.0"));
+  CHECK_THROWS_WITH(Ros1BagReader(folder.write("b.bag", "#ROSBAG V2.0\n")),
+                    Catch::Contains("b.bag byte 13: no bag header"));
+}
+
+}  // namespace km
