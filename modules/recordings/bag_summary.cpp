@@ -1,0 +1,139 @@
+#include "modules/recordings/bag_summary.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+
+#include "modules/recordings/channel_table.hpp"
+#include "modules/recordings/ros_messages.hpp"
+
+namespace km {
+namespace {
+
+// Types that begin with a header. geometry_msgs has it in those that end in "Stamped".
+constexpr std::array<std::string_view, 20> kTypesWithHeader = {
+    RosImage::kType,
+    RosCompressedImage::kType,
+    RosImu::kType,
+    RosCameraInfo::kType,
+    RosOdometry::kType,
+    "nav_msgs/Path",
+    "nav_msgs/OccupancyGrid",
+    "sensor_msgs/PointCloud",
+    "sensor_msgs/PointCloud2",
+    "sensor_msgs/LaserScan",
+    "sensor_msgs/NavSatFix",
+    "sensor_msgs/MagneticField",
+    "sensor_msgs/FluidPressure",
+    "sensor_msgs/Temperature",
+    "sensor_msgs/Range",
+    "sensor_msgs/JointState",
+    "sensor_msgs/Joy",
+    "sensor_msgs/TimeReference",
+    "sensor_msgs/BatteryState",
+    "sensor_msgs/RelativeHumidity",
+};
+
+bool has_header(const BagChannel& channel) {
+  if (channel.type.starts_with("geometry_msgs/") && channel.type.ends_with("Stamped")) return true;
+  return std::any_of(kTypesWithHeader.begin(), kTypesWithHeader.end(),
+                     [&](std::string_view type) { return is_of_type(channel, type); });
+}
+
+std::optional<TopicImage> image_in(const BagChannel& channel, const BagMessage& message) {
+  if (is_of_type(channel, RosImage::kType)) {
+    const auto image = decode_ros<RosImage>(channel.encoding, message.bytes);
+    if (!image.value) return std::nullopt;
+    return TopicImage{{image.value->width, image.value->height}, image.value->encoding};
+  }
+  const auto image = decode_ros<RosCompressedImage>(channel.encoding, message.bytes);
+  if (!image.value) return std::nullopt;
+  const auto& data = image.value->data;
+  const auto size = stated_image_size({reinterpret_cast<const char*>(data.data()), data.size()});
+  return TopicImage{size.value_or(ImageSize{}), image.value->format};
+}
+
+// By which the message is placed in time; nothing if it is not of its type.
+std::optional<Stamp> stamp_in(const BagChannel& channel, const BagMessage& message) {
+  if (is_of_type(channel, RosTransforms::kType)) {
+    const auto tree = decode_ros<RosTransforms>(channel.encoding, message.bytes);
+    if (!tree.value) return std::nullopt;
+    const auto& transforms = tree.value->transforms;
+    return transforms.empty() ? message.log_time : transforms.front().header.stamp;
+  }
+  const auto header = decode_ros<RosHeader>(channel.encoding, message.bytes);
+  return header.value ? std::optional(header.value->stamp) : std::nullopt;
+}
+
+TopicSummary begin_topic(const BagChannel& channel) {
+  const bool is_readable = channel.encoding == "ros1" || channel.encoding == "cdr";
+  const bool is_stamped = has_header(channel) || is_of_type(channel, RosTransforms::kType);
+  return {.topic = channel.topic,
+          .type = channel.type,
+          .encoding = channel.encoding,
+          .has_sensor_stamps = is_readable && is_stamped,
+          .stamps = {},
+          .is_image = is_readable && (is_of_type(channel, RosImage::kType) ||
+                                      is_of_type(channel, RosCompressedImage::kType)),
+          .image = {}};
+}
+
+void add_message(TopicSummary& topic, const BagChannel& channel, const BagMessage& message) {
+  const auto stamp =
+      topic.has_sensor_stamps ? stamp_in(channel, message) : std::optional(message.log_time);
+  if (!stamp) {
+    ++topic.undecoded;
+    return;
+  }
+  topic.stamps.push_back(*stamp);
+  if (topic.is_image && !topic.image) topic.image = image_in(channel, message);
+}
+
+}  // namespace
+
+std::vector<TopicSummary> summarise_topics(BagReader& reader) {
+  ChannelTable table;
+  std::vector<std::size_t> topic_of;
+  std::vector<TopicSummary> topics;
+  const auto add_channels = [&] {
+    for (std::size_t i = topic_of.size(); i < reader.channels().size(); ++i) {
+      topic_of.push_back(table.add(reader.channels()[i]));
+      if (topic_of.back() == topics.size()) topics.push_back(begin_topic(reader.channels()[i]));
+    }
+  };
+  add_channels();
+  while (const auto message = reader.next()) {
+    add_channels();
+    add_message(topics[topic_of[message->channel]], reader.channels()[message->channel], *message);
+  }
+  return topics;
+}
+
+std::vector<TopicPair> pairs_of_images(const std::vector<TopicSummary>& topics) {
+  struct Candidate {
+    const TopicSummary* topic;
+    double rate_hz;
+    std::vector<Stamp> sorted;
+  };
+  std::vector<Candidate> candidates;
+  for (const TopicSummary& topic : topics) {
+    const double rate_hz = stamp_statistics(topic.stamps).rate_hz;
+    if (!topic.is_image || !std::isfinite(rate_hz)) continue;
+    candidates.push_back({&topic, rate_hz, topic.stamps});
+    std::sort(candidates.back().sorted.begin(), candidates.back().sorted.end());
+  }
+  constexpr double kEqualRates = 0.05;
+  std::vector<TopicPair> pairs;
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    for (std::size_t j = i + 1; j < candidates.size(); ++j) {
+      const Candidate &a = candidates[i], &b = candidates[j];
+      const double fastest_hz = std::max(a.rate_hz, b.rate_hz);
+      if (std::abs(a.rate_hz - b.rate_hz) > kEqualRates * fastest_hz) continue;
+      pairs.push_back(
+          {a.topic->topic, b.topic->topic, stamp_agreement(a.sorted, b.sorted, 0.5 / fastest_hz)});
+    }
+  return pairs;
+}
+
+}  // namespace km
