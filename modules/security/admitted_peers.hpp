@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <string>
 #include <vector>
 
 #include "modules/core/robot_identity.hpp"
@@ -24,6 +25,7 @@ struct TeamKey {
 /// What is known of a process that was admitted.
 struct AdmittedPeer {
   Certificate certificate;
+  std::string credentials = {};  ///< As it shows them.
   ExchangeKey exchange{};
   SealingKey to_peer, from_peer;
   std::vector<TeamKey> team_keys;  ///< Its own, by number; none before its first key message.

@@ -129,22 +129,43 @@ const char* TeamSeal::admit(const RobotIdentity& identity, std::string_view text
   if (peer == self_) return "these are this process's own credentials";
   const Decoded<Credentials> parsed = parse_credentials(text);
   if (!parsed.value) return parsed.refusal;
-  const Credentials& shown = *parsed.value;
-  if (!std::ranges::equal(shown.authority, OctetView(authority_).first(shown.authority.size())))
-    return "credentials of another team";
+  const Decoded<Certificate> certificate = certified(*parsed.value, identity, now_s);
+  if (!certificate.value) return certificate.refusal;
   AdmittedPeer admitted;
-  admitted.certificate = claimed_certificate(shown, identity, team_);
-  admitted.exchange = shown.exchange;
-  if (!is_signed_by_robot(shown, identity))
-    return "credentials are not signed by the robot that they name";
-  if (const char* why = refusal_of(admitted.certificate, authority_, revocations_, now_s))
-    return why;
+  admitted.certificate = *certificate.value;
+  admitted.credentials = text;
+  admitted.exchange = parsed.value->exchange;
   if (!agree(peer, admitted)) return "credentials have an exchange key of small order";
   if (const AdmittedPeer* known = peers_.find(peer))
     return known->exchange == admitted.exchange ? nullptr
                                                 : "credentials have another key for the same boot";
   peers_.add(peer, std::move(admitted));
   return nullptr;
+}
+
+Decoded<Certificate> TeamSeal::certified(const RobotIdentity& identity, std::string_view text,
+                                         std::int64_t now_s) const {
+  const Decoded<Credentials> parsed = parse_credentials(text);
+  if (!parsed.value) return Decoded<Certificate>::refuse(parsed.refusal);
+  return certified(*parsed.value, identity, now_s);
+}
+
+Decoded<Certificate> TeamSeal::certified(const Credentials& shown, const RobotIdentity& identity,
+                                         std::int64_t now_s) const {
+  using Result = Decoded<Certificate>;
+  if (!std::ranges::equal(shown.authority, OctetView(authority_).first(shown.authority.size())))
+    return Result::refuse("credentials of another team");
+  if (!is_signed_by_robot(shown, identity))
+    return Result::refuse("credentials are not signed by the robot that they name");
+  Certificate certificate = claimed_certificate(shown, identity, team_);
+  if (const char* why = refusal_of(certificate, authority_, revocations_, now_s))
+    return Result::refuse(why);
+  return Result::accept(std::move(certificate));
+}
+
+std::optional<std::string> TeamSeal::credentials_of(const TeamPeer& peer) const {
+  const AdmittedPeer* admitted = peers_.find(peer);
+  return admitted == nullptr ? std::nullopt : std::optional(admitted->credentials);
 }
 
 // The keys in both directions, by X25519 and BLAKE2b over the shared secret and both public keys.

@@ -9,11 +9,13 @@
 #include <string_view>
 #include <vector>
 
+#include "modules/core/decoded.hpp"
 #include "modules/core/robot_identity.hpp"
 #include "modules/security/admitted_peers.hpp"
 #include "modules/security/credentials.hpp"
 #include "modules/security/key_folder.hpp"
 #include "modules/security/key_types.hpp"
+#include "modules/security/signing.hpp"
 
 namespace km {
 
@@ -96,6 +98,25 @@ class TeamSeal {
   [[nodiscard]] const char* admit(const RobotIdentity& identity, std::string_view credentials,
                                   std::int64_t now_s);
 
+  /// The certificate of a process that shows these credentials, whoever has passed them on: refused
+  /// as by admit(), but nothing is remembered, and nothing can be sealed for that process.
+  [[nodiscard]] Decoded<Certificate> certified(const RobotIdentity& identity,
+                                               std::string_view credentials,
+                                               std::int64_t now_s) const;
+
+  /// nullptr, or why a certificate that was good does not hold at `now_s` any more (a string
+  /// literal).
+  [[nodiscard]] const char* why_lapsed(const Certificate& certificate, std::int64_t now_s) const {
+    return lapse_of(certificate, revocations_, now_s);
+  }
+
+  /// What an admitted process has shown; nullopt if it is not admitted.
+  [[nodiscard]] std::optional<std::string> credentials_of(const TeamPeer& peer) const;
+
+  /// Signs with this robot's long-lived key. `statement` begins as statement() makes it, with a
+  /// kind that nothing else is signed under.
+  [[nodiscard]] Signature endorse(OctetView statement) const { return sign(statement, secret_); }
+
   [[nodiscard]] bool is_admitted(const TeamPeer& peer) const {
     return peers_.find(peer) != nullptr;
   }
@@ -126,6 +147,9 @@ class TeamSeal {
   [[nodiscard]] Opened open(const SealContext& context, OctetView sealed);
 
  private:
+  [[nodiscard]] Decoded<Certificate> certified(const Credentials& shown,
+                                               const RobotIdentity& identity,
+                                               std::int64_t now_s) const;
   bool agree(const TeamPeer& peer, AdmittedPeer& admitted) const;
   void draw_team_key();
   Octets seal_to_all(Octets associated, OctetView content) const;

@@ -14,7 +14,12 @@ std::string admission(ToyMember& to, const RobotKeys& keys, const RobotIdentity&
                       std::int64_t now_s = kToyNow_s) {
   const Credentials shown =
       make_credentials(keys.certificate, keys.authority, keys.secret, identity, {9});
-  return reason_of(to.seal.admit(identity, to_text(shown), now_s));
+  // What is passed on by others is believed as what is shown.
+  const auto certified = to.seal.certified(identity, to_text(shown), now_s);
+  const std::string refusal = reason_of(to.seal.admit(identity, to_text(shown), now_s));
+  CHECK(reason_of(certified.refusal) == refusal);
+  CHECK(certified.value.has_value() == refusal.empty());
+  return refusal;
 }
 
 TEST_CASE("A robot is admitted by its certificate, and no other", "[security]") {
@@ -134,6 +139,33 @@ TEST_CASE("A revoked robot is forgotten, refused, and cannot read on", "[securit
   CHECK(b.seal.open(to_all, *after).status == Status::kOpened);
   CHECK(b.seal.open(to_all, *before).status == Status::kOpened);
   CHECK_FALSE(a.seal.update(list, kToyNow_s).new_key);
+}
+
+TEST_CASE("A robot known by its credentials alone is not admitted, and lapses", "[security]") {
+  ToyTeam team;
+  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  const auto known = a.seal.certified(b.identity, b.seal.credentials(), kToyNow_s);
+  REQUIRE(known.value);
+  CHECK(known.value->key == b.keys.certificate.key);
+  CHECK_FALSE(a.seal.is_admitted(b.peer()));
+  CHECK_FALSE(a.seal.credentials_of(b.peer()));
+  REQUIRE(a.admit(b) == nullptr);
+  CHECK(a.seal.credentials_of(b.peer()) == b.seal.credentials());
+  CHECK(a.seal.why_lapsed(*known.value, kToyNow_s) == nullptr);
+  CHECK(reason_of(a.seal.why_lapsed(*known.value, kToyNow_s + 20 * kDay_s)) ==
+        "certificate has expired (are clocks right?)");
+  (void)a.seal.update(team.revoking({b.keys.certificate}), kToyNow_s);
+  CHECK(reason_of(a.seal.why_lapsed(*known.value, kToyNow_s)) == "certificate is revoked");
+  CHECK_FALSE(a.seal.credentials_of(b.peer()));
+}
+
+TEST_CASE("What a robot endorses is its own by its certificate", "[security]") {
+  const ToyTeam team;
+  const ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
+  const Octets said = statement("toy 1").release();
+  const Signature signature = a.seal.endorse(said);
+  CHECK(verify(said, signature, a.keys.certificate.key));
+  CHECK_FALSE(verify(said, signature, b.keys.certificate.key));
 }
 
 TEST_CASE("A new member reads what was sealed to all before a revocation", "[security]") {
