@@ -68,6 +68,19 @@ struct Pace {
   double burst = 1.0;  ///< At once, after a silence.
 };
 
+/// What else is done with the messages of a crossing. `content` is what is sealed of a message:
+/// its serialised form, and its tail.
+template <typename T>
+struct ContentGuard {
+  using Content = std::span<const std::uint8_t>;
+
+  /// Octets that `tail` puts behind every message; they are taken off before it is read.
+  std::size_t tail_bytes = 0;
+  std::function<std::vector<std::uint8_t>(const T& message, Content serialized)> tail = {};
+  /// Sees what arrives before others do: null, or why it is refused (a string literal).
+  std::function<const char*(const TeamPeer& sender, const T& message, Content content)> check = {};
+};
+
 /// Carries topics between robots: in-process Topic<T> <-> DDS topic, through Codec<T>.
 ///
 /// Wire it (exchange) before start(). What is published to the peers is encoded and written on the
@@ -93,10 +106,11 @@ class DdsBridge final : public Node {
   ~DdsBridge() override;
 
   /// Joins `crossing`, which outlives the bridge, to those of the other robots: with all of them,
-  /// or, if it is addressed, each message with the robot it is for and no other.
+  /// or, if it is addressed, each message with the robot it is for and no other. `guard` is called
+  /// by the threads of the bridge.
   template <typename T, typename Sent>
   void exchange(Crossing<T, Sent>& crossing, TopicKind kind, TrafficCategory category,
-                CrossingEnds ends = {}, Pace pace = {});
+                CrossingEnds ends = {}, Pace pace = {}, ContentGuard<T> guard = {});
 
   /// Sends this process's key for messages to all to every robot there is, where the team has
   /// keys. The bridge does so itself when a robot appears, and now and then. Thread-safe.
@@ -150,33 +164,46 @@ class DdsBridge final : public Node {
 namespace detail {
 
 template <typename T>
-Outgoing outgoing(OutgoingTopic& topic, const std::shared_ptr<const T>& message,
-                  std::optional<Addressee> to = {}) {
-  const auto encode = [message] {
+using GuardPtr = std::shared_ptr<const ContentGuard<T>>;
+
+template <typename T>
+Outgoing outgoing(OutgoingTopic& topic, const GuardPtr<T>& guard,
+                  const std::shared_ptr<const T>& message, std::optional<Addressee> to = {}) {
+  const auto encode = [guard, message] {
     const auto encoded = Codec<T>::encode(*message);
-    return serialize(Codec<T>::descriptor(), &encoded.wire);
+    auto content = serialize(Codec<T>::descriptor(), &encoded.wire);
+    if (guard->tail_bytes == 0) return content;
+    const auto tail = guard->tail(*message, content);
+    content.insert(content.end(), tail.begin(), tail.end());
+    return content;
   };
   return {.topic = &topic, .to = to, .key = Codec<T>::key_of(*message), .encode = encode};
 }
 
 template <typename T>
-Outgoing outgoing(OutgoingTopic& topic, const std::shared_ptr<const Addressed<T>>& message) {
-  return outgoing(topic, message->message, Addressee{message->to, message->boot});
+Outgoing outgoing(OutgoingTopic& topic, const GuardPtr<T>& guard,
+                  const std::shared_ptr<const Addressed<T>>& message) {
+  return outgoing(topic, guard, message->message, Addressee{message->to, message->boot});
 }
 
 // Publishes what `content` holds, or says why not.
 template <typename T>
 const char* publish_decoded(const Out<T>& to, const TeamPeer& sender,
-                            std::span<const std::uint8_t> content, std::shared_ptr<void> token) {
+                            std::span<const std::uint8_t> content, std::shared_ptr<void> token,
+                            const ContentGuard<T>& guard = {}) {
   struct Delivery {
     T message;
     std::shared_ptr<void> token;
   };
   WireSample sample(Codec<T>::descriptor());
-  if (!sample.read(content)) return "not deserializable";
+  if (content.size() < guard.tail_bytes) return "shorter than its tail";
+  if (!sample.read(content.first(content.size() - guard.tail_bytes))) return "not deserializable";
   using Wire = typename Codec<T>::Wire;
   Decoded<T> decoded = Codec<T>::decode(*static_cast<const Wire*>(sample.get()), sender);
   if (!decoded.value) return decoded.refusal;
+  if (guard.check) {
+    if (const char* refusal = guard.check(sender, *decoded.value, content)) return refusal;
+  }
   const auto delivery =
       std::make_shared<const Delivery>(std::move(*decoded.value), std::move(token));
   to.publish(std::shared_ptr<const T>(delivery, &delivery->message));
@@ -187,20 +214,23 @@ const char* publish_decoded(const Out<T>& to, const TeamPeer& sender,
 
 template <typename T, typename Sent>
 void DdsBridge::exchange(Crossing<T, Sent>& crossing, TopicKind kind, TrafficCategory category,
-                         CrossingEnds ends, Pace pace) {
-  const TopicSpec spec{Codec<T>::kTopic, Codec<T>::kVersion, Codec<T>::kMaxBytes, kind, category};
+                         CrossingEnds ends, Pace pace, ContentGuard<T> guard) {
+  const TopicSpec spec{Codec<T>::kTopic, Codec<T>::kVersion, Codec<T>::kMaxBytes + guard.tail_bytes,
+                       kind, category};
+  const auto shared = std::make_shared<const ContentGuard<T>>(std::move(guard));
   if (ends.send) {
     OutgoingTopic& topic = add_outgoing(spec);
-    crossing.own_.subscribe([this, &topic](const std::shared_ptr<const Sent>& message) {
-      sender_.post(detail::outgoing(topic, message));
+    crossing.own_.subscribe([this, &topic, shared](const std::shared_ptr<const Sent>& message) {
+      sender_.post(detail::outgoing(topic, shared, message));
     });
   }
   if (!ends.receive) return;
   constexpr bool kAddressed = !std::is_same_v<T, Sent>;
-  add_incoming(spec, kAddressed, pace,
-               [to = Out<T>(crossing.peers_)](const TeamPeer& sender, auto content, auto token) {
-                 return detail::publish_decoded(to, sender, content, std::move(token));
-               });
+  add_incoming(
+      spec, kAddressed, pace,
+      [to = Out<T>(crossing.peers_), shared](const TeamPeer& sender, auto content, auto token) {
+        return detail::publish_decoded(to, sender, content, std::move(token), *shared);
+      });
 }
 
 }  // namespace km

@@ -4,6 +4,19 @@
 #include "test/runtime/dds/dds_fixture.hpp"
 
 namespace km {
+
+struct MarkedPing : Ping {};
+
+template <>
+struct Codec<MarkedPing> : Codec<Ping> {
+  static constexpr const char* kTopic = "marked_pings";
+  static Decoded<MarkedPing> decode(const Wire& wire, const TeamPeer& writer) {
+    auto ping = Codec<Ping>::decode(wire, writer);
+    if (!ping.value) return Decoded<MarkedPing>::refuse(ping.refusal);
+    return Decoded<MarkedPing>::accept({*std::move(ping.value)});
+  }
+};
+
 namespace {
 
 TEST_CASE("What one robot publishes arrives at the other, unchanged and once", "[dds]") {
@@ -171,6 +184,36 @@ TEST_CASE("A hostile peer is counted by reason and harms nobody", "[dds]") {
   a.ping(0);  // the number that the foe tried to use up
   CHECK(b.received.wait_for(2).size() == 2);
   CHECK(b.bridge.error() == nullptr);
+}
+
+TEST_CASE("A guard puts a tail behind messages and sees them before anybody else", "[dds]") {
+  Crossing<MarkedPing> from_a, at_b;
+  Inbox<MarkedPing> got(at_b.from_peers());
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3), b(domain, 4);
+  // The tail: the number of octets before it, and one that is wrong for message 1.
+  const ContentGuard<MarkedPing> guard{
+      .tail_bytes = 2,
+      .tail = [](const MarkedPing& ping, auto serialized) -> std::vector<std::uint8_t> {
+        return {static_cast<std::uint8_t>(serialized.size()),
+                static_cast<std::uint8_t>(ping.index == 1 ? 0 : 7)};
+      },
+      .check = [](const TeamPeer& sender, const MarkedPing& ping, auto content) -> const char* {
+        const std::size_t before = content.size() - 2;
+        const bool is_right = content[before] == before && content.back() == 7;
+        return is_right && sender.robot == ping.robot ? nullptr : "its tail is wrong";
+      }};
+  a.bridge.exchange(from_a, TopicKind::kEvent, TrafficCategory::kOther, {}, {}, guard);
+  b.bridge.exchange(at_b, TopicKind::kEvent, TrafficCategory::kOther, {}, {}, guard);
+  a.start();
+  b.start();
+  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  for (std::uint32_t i = 0; i < 3; ++i) from_a.to_peers().publish(MarkedPing{{3, i, {1, 2, 3}}});
+  const auto pings = got.wait_for(2);
+  REQUIRE(pings.size() == 2);
+  CHECK(pings[1].index == 2);
+  CHECK(pings[1].payload == std::vector<std::uint8_t>{1, 2, 3});
+  CHECK(eventually([&] { return b.refused(Codec<MarkedPing>::kTopic) == 1; }));
 }
 
 TEST_CASE("Programs without an identity, or with a broken one, are not heard", "[dds]") {
