@@ -36,6 +36,10 @@ std::uint64_t boot_of(const RobotInput& input) {
   return goes_on ? next_boot(input.restored->boot) : random_boot_id();
 }
 
+std::optional<KeyframeId> keyframe_of(const KeyframeReply& reply) {
+  return reply.found ? std::optional(reply.keyframe.odometry.id) : std::nullopt;
+}
+
 }  // namespace
 
 template <typename NodeType, typename... Arguments>
@@ -267,19 +271,16 @@ void Robot::add_back_end(const RobotConfig& config) {
                            .verdicts = topics_.closure_verdicts});
 }
 
-// With keys nothing is relayed: nobody could tell whether what is handed on is its origin's.
 void Robot::add_relay() {
   Topics& t = topics_;
   const In<PeerEvent> peer_events = bridge_->peers().events();
   forward<PeerEvent>(peer_events, t.ways);
-  relay_.emplace(TeamPeer{identity_.robot, identity_.boot}, seal_ == nullptr, bridge_->peers(),
+  relay_.emplace(TeamPeer{identity_.robot, identity_.boot}, seal_.get(), bridge_->peers(),
                  RelayTopics{.peer_events = peer_events,
                              .statuses = t.status.from_peers(),
-                             .parcels = t.relay_parcels.from_peers(),
                              .own_parcels = t.relay_parcels.to_peers(),
                              .reached = t.ways});
-  relay_->join_bags<KeyframeBow>(t.bows.from_peers(), t.peer_bows,
-                                 [](const KeyframeBow& bow) { return bow.id; });
+  relay_->join_bags<KeyframeBow>(t.bows.from_peers(), t.peer_bows);
   const auto around = []<typename T>(Topic<Addressed<T>>& own, AddressedCrossing<T>& crossing,
                                      Topic<T>& all) {
     return RelayedTopics<T>{own, crossing.to_peers(), crossing.from_peers(), all};
@@ -288,10 +289,7 @@ void Robot::add_relay() {
       RelayKind::kRequest, around(t.own_requests, t.requests, t.peer_requests),
       [](const KeyframeRequest& request) { return std::optional(request.keyframe); });
   relay_->join_calls(RelayKind::kReply, around(t.own_replies, t.replies, t.peer_replies),
-                     [](const KeyframeReply& reply) {
-                       return reply.found ? std::optional(reply.keyframe.odometry.id)
-                                          : std::nullopt;
-                     });
+                     keyframe_of);
   relay_->join_letters(RelayKind::kClosure,
                        around(t.told_closures, t.shared_closures, t.peer_closures));
   relay_->join_letters(RelayKind::kInlierSet,
@@ -304,14 +302,17 @@ void Robot::add_network(CrossingEnds meshes) {
   DdsBridge& dds = *bridge_;
   Topics& t = topics_;
   // All that crosses between robots: for what, and what its bytes are counted under.
-  dds.exchange(t.bows, kEvent, kPlaceRecognition);
+  dds.exchange(t.bows, kEvent, kPlaceRecognition, {}, {},
+               relay_->guard<KeyframeBow>(
+                   RelayKind::kBag, [](const KeyframeBow& bow) { return std::optional(bow.id); }));
   // A request of 60 bytes is answered with up to 24 kB.
   dds.exchange(t.requests, kRequest, kGeometricVerification, {}, {.per_second = 30, .burst = 60});
-  dds.exchange(t.replies, kRequest, kGeometricVerification);
+  dds.exchange(t.replies, kRequest, kGeometricVerification, {}, {},
+               relay_->guard<KeyframeReply>(RelayKind::kReply, keyframe_of));
   dds.exchange(t.shared_closures, kEvent, kGeometricVerification);
   dds.exchange(t.shared_inlier_sets, kState, kPoseGraphOptimization);
   dds.exchange(t.parcels, kRequest, kPoseGraphOptimization);
-  dds.exchange(t.relay_parcels, kRequest, kOther);
+  dds.exchange(t.relay_parcels, kRequest, kOther, {}, {}, relay_->guard_parcels());
   dds.exchange(t.chunks, kState, kOther, meshes);
   dds.exchange(t.status, kStatus, kOther);
   // A closure, and whether it is an inlier, is of use to the robots it joins and to no others.

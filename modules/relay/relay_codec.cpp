@@ -1,21 +1,9 @@
 #include "modules/relay/relay_codec.hpp"
 
-#include <algorithm>
 #include <memory>
-#include <span>
 #include <utility>
 
 namespace km {
-namespace {
-
-constexpr std::size_t kMaxName = 64;
-
-bool is_name(std::span<const std::uint8_t> bytes) {
-  const auto printable = [](std::uint8_t c) { return c >= ' ' && c <= '~' && c != ';'; };
-  return !bytes.empty() && bytes.size() <= kMaxName && std::ranges::all_of(bytes, printable);
-}
-
-}  // namespace
 
 MessageKey Codec<RelayParcel>::key_of(const RelayParcel& parcel) {
   const RelayMessage& message = *parcel.message;
@@ -48,7 +36,7 @@ Decoded<RelayParcel> Codec<RelayParcel>::decode(const Wire& wire, const TeamPeer
     return Result::refuse("told by a former process of the robot that sends it");
   const auto content = elements_of(wire.content, kMaxRelayContent);
   if (!content) return Result::refuse("the content is missing or too long");
-  if (kind == RelayKind::kIntroduction && !is_name(*content))
+  if (kind == RelayKind::kIntroduction && !parse_introduction(*content))
     return Result::refuse("a name that no robot has");
   return Result::accept({writer.robot, std::make_shared<const RelayMessage>(RelayMessage{
                                            .kind = kind,

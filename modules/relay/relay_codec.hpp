@@ -6,13 +6,14 @@
 #include <cstdint>
 #include <vector>
 
+#include "modules/relay/relay_endorsement.hpp"
 #include "modules/relay/relay_message.hpp"
 #include "runtime/dds/codec.hpp"
 
 namespace km {
 
-/// The largest of the contents is an inlier set's.
-inline constexpr std::size_t kMaxRelayContent = 800'000;
+/// The largest of the contents is an inlier set's, with a signature.
+inline constexpr std::size_t kMaxRelayContent = 800'000 + kEndorsementBytes;
 
 /// Sent as TopicKind::kRequest: what a link that is down for longer than dds.lease_s holds up is
 /// handed over again by the RelayStore.

@@ -10,7 +10,7 @@ namespace km {
 
 /// In the order of their numbers on the wire.
 enum class RelayKind : std::uint8_t {
-  kIntroduction,  ///< The origin is there: `content` is its name.
+  kIntroduction,  ///< The origin is there: `content` is a RelayIntroduction.
   kBag,           ///< To all; `number` is the keyframe's index.
   kClosure,       ///< A letter to `to`; letters of an origin are numbered from 0, of either kind.
   kInlierSet,     ///< Likewise.
@@ -25,7 +25,9 @@ struct RelayMessage {
   RobotId to = 0;  ///< Not of kIntroduction and kBag.
   std::uint32_t number = 0;
   std::uint8_t hops = 0;  ///< Of a request or an answer: robots that have passed it on.
-  /// The topic's own type, serialised; of a letter that nobody needs any more, empty.
+  /// The topic's own type, serialised; of a letter that nobody needs any more, empty. In a team
+  /// with keys the origin's signature is behind it (relay_endorsement.hpp), but for an
+  /// introduction.
   std::vector<std::uint8_t> content = {};
 
   bool operator==(const RelayMessage&) const = default;

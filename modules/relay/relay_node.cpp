@@ -11,17 +11,48 @@ namespace {
 
 constexpr const char* kTag = "relay";
 
+std::int64_t today_s() {
+  return static_cast<std::int64_t>(wall_now_s());
+}
+
+std::optional<RelayKeys> keys_of(SharedSeal* seal) {
+  if (seal == nullptr) return std::nullopt;
+  return RelayKeys{
+      .endorse =
+          [seal](OctetView statement) {
+            return seal->with([&](const TeamSeal& team) { return team.endorse(statement); });
+          },
+      .credentials_of =
+          [seal](const TeamPeer& peer) {
+            return seal->with([&](const TeamSeal& team) { return team.credentials_of(peer); });
+          },
+      .certified =
+          [seal](const RobotIdentity& identity, const std::string& credentials) {
+            return seal->with([&](const TeamSeal& team) {
+              return team.certified(identity, credentials, today_s());
+            });
+          },
+      .why_lapsed =
+          [seal](const Certificate& certificate) {
+            return seal->with(
+                [&](const TeamSeal& team) { return team.why_lapsed(certificate, today_s()); });
+          }};
+}
+
 }  // namespace
 
-RelayNode::RelayNode(TeamPeer self, bool relays, Peers& peers, const RelayTopics& topics,
+RelayNode::RelayNode(TeamPeer self, SharedSeal* seal, Peers& peers, const RelayTopics& topics,
                      std::function<double()> now_s)
-    : relays_(relays), peers_(peers), topics_(topics), now_s_(std::move(now_s)), store_(self) {
-  if (!relays_) return;
+    : self_(self),
+      keys_(keys_of(seal)),
+      peers_(peers),
+      topics_(topics),
+      now_s_(std::move(now_s)),
+      store_(self, keys_) {
   topics.peer_events.subscribe([this](const auto& event) { take(*event); });
   topics.statuses.subscribe([this](const auto& status) {
     act([&](RelayStore& store) { store.told(status->robot, status->relay, now_s_()); });
   });
-  topics.parcels.subscribe([this](const auto& parcel) { take(*parcel); });
 }
 
 void RelayNode::take(const PeerEvent& event) {
@@ -44,13 +75,56 @@ void RelayNode::take(const PeerEvent& event) {
   });
 }
 
-void RelayNode::take(const RelayParcel& parcel) {
+ContentGuard<RelayParcel> RelayNode::guard_parcels() {
+  return {.check = [this](const TeamPeer& /*sender*/, const RelayParcel& parcel, auto /*content*/) {
+    return take(parcel);
+  }};
+}
+
+// Null, or why it is nobody's word. What this robot has missed something of is no fault.
+const char* RelayNode::take(const RelayParcel& parcel) {
+  RelayArrival arrival = RelayArrival::kNew;
+  const char* forged = nullptr;
   act([&](RelayStore& store) {
-    if (store.receive(parcel) == RelayArrival::kRefused)
-      log::limited(log::Level::kDebug, kTag, "refused " + std::to_string(parcel.neighbour))
-          << "robot " << parcel.neighbour << " hands over a message of robot "
-          << parcel.message->origin.robot << " that is not taken";
+    arrival = store.receive(parcel);
+    if (arrival == RelayArrival::kForged) forged = store.refusal();
   });
+  if (arrival == RelayArrival::kRefused)
+    log::limited(log::Level::kDebug, kTag, "refused " + std::to_string(parcel.neighbour))
+        << "robot " << parcel.neighbour << " hands over a message of robot "
+        << parcel.message->origin.robot << " that is not taken";
+  return forged;
+}
+
+// What was heard directly, for others; null, or why it is not its sender's to hand on.
+const char* RelayNode::keep(RelayKind kind, const TeamPeer& sender, std::uint32_t number,
+                            std::span<const std::uint8_t> content) {
+  const char* forged = nullptr;
+  const auto note = [&](const RelayStore& store, RelayArrival arrival) {
+    if (arrival == RelayArrival::kForged) forged = store.refusal();
+  };
+  std::vector<std::uint8_t> octets(content.begin(), content.end());
+  if (kind == RelayKind::kReply) {
+    act([&](RelayStore& store) {
+      note(store, store.keep_reply(sender, number, std::move(octets)));
+    });
+  } else if (const auto origin = identity_of(sender)) {
+    // A message may come before the event of its robot.
+    act([&](RelayStore& store) {
+      note(store, store.keep_bag(*origin, number, std::move(octets)));
+    });
+  }
+  return forged;
+}
+
+std::vector<std::uint8_t> RelayNode::signature_of(RelayKind kind, std::uint32_t number,
+                                                  std::span<const std::uint8_t> content) const {
+  const Signature signature = endorsement_of({.kind = kind,
+                                              .origin = self_,
+                                              .number = number,
+                                              .content = {content.begin(), content.end()}},
+                                             *keys_);
+  return {signature.begin(), signature.end()};
 }
 
 void RelayNode::carry_out(const RelayOutput& output, std::uint64_t given_up) {
@@ -80,14 +154,14 @@ void RelayNode::deliver(const RelayMessage& message) const {
         << "a message of robot " << message.origin.robot << " refused: " << refusal;
 }
 
-std::optional<RobotIdentity> RelayNode::identity_of(RobotId robot) const {
+std::optional<RobotIdentity> RelayNode::identity_of(const TeamPeer& robot) const {
   for (const Peer& peer : peers_.list())
-    if (peer.identity.robot == robot) return peer.identity;
+    if (peer.identity.robot == robot.robot && peer.identity.boot == robot.boot)
+      return peer.identity;
   return std::nullopt;
 }
 
 RelayWays RelayNode::ways_to(RobotId robot) const {
-  if (!relays_) return {};
   const std::lock_guard lock(mutex_);
   return store_.ways_to(robot);
 }

@@ -17,6 +17,7 @@
 #include "runtime/clock.hpp"
 #include "runtime/dds/bridge.hpp"
 #include "runtime/dds/robot_status.hpp"
+#include "runtime/dds/shared_seal.hpp"
 #include "runtime/topic.hpp"
 
 namespace km {
@@ -25,7 +26,6 @@ namespace km {
 struct RelayTopics {
   In<PeerEvent> peer_events;  ///< Who is heard directly.
   In<RobotStatus> statuses;   ///< Of those.
-  In<RelayParcel> parcels;    ///< From those.
   Out<Addressed<RelayParcel>> own_parcels;
   Out<PeerEvent> reached;  ///< kReturned, of robots that are not heard: ways lead there now.
 };
@@ -48,9 +48,9 @@ struct RelayedTopics {
 /// to, so that no node ever waits for another one through it. Thread-safe.
 class RelayNode {
  public:
-  /// Without `relays` all of it goes to the bridge and comes from there. `peers` and the topics
-  /// outlive it. `now_s` as for RelayStore, called by any thread.
-  RelayNode(TeamPeer self, bool relays, Peers& peers, const RelayTopics& topics,
+  /// `seal` is null without keys. It, `peers` and the topics outlive this. `now_s` as for
+  /// RelayStore, called by any thread.
+  RelayNode(TeamPeer self, SharedSeal* seal, Peers& peers, const RelayTopics& topics,
             std::function<double()> now_s = steady_now_s);
   RelayNode(const RelayNode&) = delete;
   RelayNode& operator=(const RelayNode&) = delete;
@@ -59,14 +59,23 @@ class RelayNode {
   // it is of no use to others.
 
   /// What each robot tells all: see RelayKind::kBag.
-  template <typename T, typename NumberOf>
-  void join_bags(In<T> heard, Out<T> to, const NumberOf& number_of);
+  template <typename T>
+  void join_bags(In<T> heard, Out<T> to);
   /// Closures or inlier sets. Those that replace each other have one Codec<T>::key_of().
   template <typename T>
   void join_letters(RelayKind kind, const RelayedTopics<T>& topics);
   /// Requests or replies.
   template <typename T, typename NumberOf>
   void join_calls(RelayKind kind, const RelayedTopics<T>& topics, const NumberOf& number_of);
+
+  // For the bridge, of crossings whose messages others may hand on: with keys each is signed for
+  // that as well, and only who has signed is heard. Who hears a message keeps it.
+
+  /// Of a crossing of bags or of replies.
+  template <typename T, typename NumberOf>
+  [[nodiscard]] ContentGuard<T> guard(RelayKind kind, const NumberOf& number_of);
+  /// Of the crossing of the relay itself: its messages are read here.
+  [[nodiscard]] ContentGuard<RelayParcel> guard_parcels();
 
   /// For the status.
   [[nodiscard]] RelaySummary summary() const;
@@ -99,11 +108,16 @@ class RelayNode {
   void carry_out(const RelayOutput& output, std::uint64_t given_up);
   void deliver(const RelayMessage& message) const;
   void take(const PeerEvent& event);
-  void take(const RelayParcel& parcel);
-  [[nodiscard]] std::optional<RobotIdentity> identity_of(RobotId robot) const;
+  [[nodiscard]] const char* take(const RelayParcel& parcel);
+  [[nodiscard]] const char* keep(RelayKind kind, const TeamPeer& sender, std::uint32_t number,
+                                 std::span<const std::uint8_t> content);
+  [[nodiscard]] std::vector<std::uint8_t> signature_of(RelayKind kind, std::uint32_t number,
+                                                       std::span<const std::uint8_t> content) const;
+  [[nodiscard]] std::optional<RobotIdentity> identity_of(const TeamPeer& robot) const;
   [[nodiscard]] RelayWays ways_to(RobotId robot) const;
 
-  const bool relays_;
+  const TeamPeer self_;
+  const std::optional<RelayKeys> keys_;
   Peers& peers_;
   const RelayTopics topics_;
   const std::function<double()> now_s_;
@@ -113,18 +127,25 @@ class RelayNode {
   RelayStore store_;
 };
 
-template <typename T, typename NumberOf>
-void RelayNode::join_bags(In<T> heard, Out<T> to, const NumberOf& number_of) {
+template <typename T>
+void RelayNode::join_bags(In<T> heard, Out<T> to) {
   deliver_as<T>(RelayKind::kBag, to);
-  heard.subscribe([this, to, number_of](const auto& message) {
-    if (relays_) {
-      const auto [robot, number] = number_of(*message);
-      // A message may come before the event of its robot.
-      if (const auto origin = identity_of(robot))
-        act([&](RelayStore& store) { store.keep_bag(*origin, number, bytes_of(*message)); });
-    }
-    to.publish(message);
-  });
+  heard.subscribe([to](const auto& message) { to.publish(message); });
+}
+
+template <typename T, typename NumberOf>
+ContentGuard<T> RelayNode::guard(RelayKind kind, const NumberOf& number_of) {
+  const auto check = [this, kind, number_of](const TeamPeer& sender, const T& message,
+                                             auto content) -> const char* {
+    const std::optional<KeyframeId> keyframe = number_of(message);
+    return keyframe ? keep(kind, sender, keyframe->index, content) : nullptr;
+  };
+  if (!keys_) return {.check = check};
+  const auto tail = [this, kind, number_of](const T& message, auto serialized) {
+    const std::optional<KeyframeId> keyframe = number_of(message);
+    return signature_of(kind, keyframe ? keyframe->index : 0, serialized);
+  };
+  return {.tail_bytes = kEndorsementBytes, .tail = tail, .check = check};
 }
 
 template <typename T>
@@ -133,7 +154,6 @@ void RelayNode::join_letters(RelayKind kind, const RelayedTopics<T>& topics) {
   topics.heard.subscribe([to = topics.all](const auto& message) { to.publish(message); });
   topics.own.subscribe([this, kind, direct = topics.direct](const auto& letter) {
     direct.publish(letter);
-    if (!relays_) return;
     const T& message = *letter->message;
     act([&](RelayStore& store) {
       store.wrote(kind, letter->to, Codec<T>::key_of(message), bytes_of(message), now_s_());
@@ -145,14 +165,7 @@ template <typename T, typename NumberOf>
 void RelayNode::join_calls(RelayKind kind, const RelayedTopics<T>& topics,
                            const NumberOf& number_of) {
   deliver_as<T>(kind, topics.all);
-  topics.heard.subscribe([this, kind, to = topics.all, number_of](const auto& message) {
-    const std::optional<KeyframeId> keyframe = number_of(*message);
-    if (relays_ && kind == RelayKind::kReply && keyframe)
-      act([&](RelayStore& store) {
-        store.keep_reply(keyframe->robot, keyframe->index, bytes_of(*message));
-      });
-    to.publish(message);
-  });
+  topics.heard.subscribe([to = topics.all](const auto& message) { to.publish(message); });
   topics.own.subscribe([this, kind, direct = topics.direct, number_of](const auto& call) {
     const std::optional<KeyframeId> keyframe = number_of(*call->message);
     const RelayWays ways = ways_to(call->to);

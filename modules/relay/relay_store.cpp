@@ -28,12 +28,6 @@ bool RelayStore::Stream::put(RelayMessage message, std::size_t max_bytes) {
   return true;
 }
 
-void RelayStore::Stream::empty(std::uint32_t number) {
-  std::vector<std::uint8_t>& content = messages_.at(number).content;
-  bytes_ -= content.size();
-  content = {};
-}
-
 const RelayMessage* RelayStore::Stream::find(std::uint32_t number) const {
   const auto found = messages_.find(number);
   return found == messages_.end() ? nullptr : &found->second;
@@ -49,8 +43,44 @@ RelayStore::Origin* RelayStore::know(const RobotIdentity& identity) {
   const auto known = origins_.find(identity.robot);
   if (known == origins_.end() && origins_.size() >= kMaxOrigins) return nullptr;
   Origin& origin = origins_.try_emplace(identity.robot, Origin{.identity = identity}).first->second;
-  become(origin, identity);
+  const bool stays = origin.identity.boot == identity.boot && origin.membership.certificate;
+  become(origin, identity, stays ? origin.membership : membership_of(identity));
   return &origin;
+}
+
+// Of a process that is heard.
+RelayStore::Membership RelayStore::membership_of(const RobotIdentity& identity) const {
+  if (!keys_) return {};
+  const auto credentials = keys_->credentials_of({identity.robot, identity.boot});
+  if (!credentials) return {};
+  return {*credentials, keys_->certified(identity, *credentials).value};
+}
+
+// Whether messages of this process can be told from others'. Of a robot that is heard they cannot
+// if its keys have just been forgotten.
+bool RelayStore::is_known(const TeamPeer& peer) const {
+  return origin(peer.robot) == peer &&
+         (!keys_ || origins_.at(peer.robot).membership.certificate.has_value());
+}
+
+// True for a message of a known process that this has not signed. Who is no member any more, and
+// not heard, is forgotten: nobody is to hand over more of it.
+bool RelayStore::is_forged(const RelayMessage& message) {
+  if (!keys_) return false;
+  const RobotId robot = message.origin.robot;
+  const Certificate& certificate = *origins_.at(robot).membership.certificate;
+  refusal_ = keys_->why_lapsed(certificate);
+  if (refusal_ != nullptr) {
+    if (!hears(robot)) origins_.erase(robot);
+    return true;
+  }
+  if (is_endorsed(message, certificate.key)) return false;
+  refusal_ = "not signed by its origin, or changed on its way";
+  return true;
+}
+
+void RelayStore::sign(RelayMessage& message) const {
+  if (keys_) endorse(message, *keys_);
 }
 
 RelayWays RelayStore::ways_to(RobotId robot) const {
@@ -60,12 +90,18 @@ RelayWays RelayStore::ways_to(RobotId robot) const {
 }
 
 // Of another process of one life the letters begin anew, since it tells all closures again.
-void RelayStore::become(Origin& origin, const RobotIdentity& identity) {
+// What it signed with another key nobody would take.
+void RelayStore::become(Origin& origin, const RobotIdentity& identity, Membership membership) {
   const std::uint64_t former = origin.identity.boot;
+  const auto key_of = [](const Membership& one) {
+    return one.certificate ? one.certificate->key : PublicKey{};
+  };
+  const bool other_key = key_of(origin.membership) != key_of(membership);
   origin.identity = identity;
+  origin.membership = std::move(membership);
   if (former == identity.boot) return;
   origin.letters = {};
-  if (!is_same_life(former, identity.boot)) origin.bags = origin.replies = {};
+  if (other_key || !is_same_life(former, identity.boot)) origin.bags = origin.replies = {};
 }
 
 void RelayStore::heard(const RobotIdentity& peer) {
@@ -91,27 +127,37 @@ void RelayStore::lost(RobotId robot, double now_s) {
   renew_ways();
 }
 
-void RelayStore::keep_bag(const RobotIdentity& origin, std::uint32_t number,
-                          std::vector<std::uint8_t> content) {
-  if (origin.robot == self_.robot || know(origin) == nullptr) return;
-  (void)keep(&Origin::bags, kMaxBagBytes,
-             {.kind = RelayKind::kBag,
-              .origin = {origin.robot, origin.boot},
-              .number = number,
-              .content = std::move(content)});
+RelayArrival RelayStore::keep_bag(const RobotIdentity& origin, std::uint32_t number,
+                                  std::vector<std::uint8_t> content) {
+  if (origin.robot == self_.robot) return RelayArrival::kRefused;
+  if (know(origin) == nullptr) return RelayArrival::kNoRoom;
+  RelayMessage bag{.kind = RelayKind::kBag,
+                   .origin = {origin.robot, origin.boot},
+                   .number = number,
+                   .content = std::move(content)};
+  if (!is_known(bag.origin)) return RelayArrival::kRefused;
+  if (is_forged(bag)) return RelayArrival::kForged;
+  return keep(&Origin::bags, kMaxBagBytes, std::move(bag));
 }
 
-void RelayStore::keep_reply(RobotId robot, std::uint32_t number,
-                            std::vector<std::uint8_t> content) {
-  const auto known = origin(robot);
-  if (!known) return;
-  // Answers choose keypoints for who asks: the one with the most serves others best.
-  const RelayMessage* before = origins_.at(robot).replies.find(number);
-  if (before != nullptr && before->content.size() >= content.size()) return;
+RelayArrival RelayStore::keep_reply(const TeamPeer& from, std::uint32_t number,
+                                    std::vector<std::uint8_t> content) {
+  const auto known = origin(from.robot);
+  if (!known || !is_same_life(known->boot, from.boot)) return RelayArrival::kRefused;
   RelayMessage reply{
       .kind = RelayKind::kReply, .origin = *known, .number = number, .content = std::move(content)};
-  if (!has_room_for(reply) || !origins_.at(robot).replies.put(std::move(reply), kMaxReplyBytes))
-    ++given_up_;
+  if (!is_known(reply.origin)) return RelayArrival::kRefused;
+  if (is_forged(reply)) return RelayArrival::kForged;
+  hold_reply(std::move(reply));
+  return RelayArrival::kNew;
+}
+
+void RelayStore::hold_reply(RelayMessage reply) {
+  Stream& replies = origins_.at(reply.origin.robot).replies;
+  // Answers choose keypoints for who asks: the one with the most serves others best.
+  const RelayMessage* before = replies.find(reply.number);
+  if (before != nullptr && before->content.size() >= reply.content.size()) return;
+  if (!has_room_for(reply) || !replies.put(std::move(reply), kMaxReplyBytes)) ++given_up_;
 }
 
 RelayArrival RelayStore::keep(Stream Origin::*stream, std::size_t max_bytes, RelayMessage message) {
@@ -149,7 +195,15 @@ void RelayStore::write_letter(std::uint64_t slot, RelayMessage message) {
   message.number = own_letters_.whole();
   const auto [last, first] =
       own_slots_.try_emplace({message.kind, message.to, slot}, message.number);
-  if (!first) own_letters_.empty(std::exchange(last->second, message.number));
+  if (!first) {
+    RelayMessage emptied{.kind = message.kind,
+                         .origin = self_,
+                         .to = message.to,
+                         .number = std::exchange(last->second, message.number)};
+    sign(emptied);
+    (void)own_letters_.put(std::move(emptied), kMaxLetterBytes);  // fits where there was more
+  }
+  sign(message);
   if (own_letters_.put(std::move(message), kMaxLetterBytes)) return;
   ++given_up_;
   own_slots_.erase(last);
@@ -161,6 +215,7 @@ void RelayStore::call(RelayKind kind, RobotId to, std::uint32_t number,
       .kind = kind, .origin = self_, .to = to, .number = number, .content = std::move(content)};
   // Who asks asks again, and what DDS keeps need not be carried.
   if (!next_hop(to, {}) && (kind == RelayKind::kRequest || ways_to(to).direct)) return;
+  sign(message);
   (void)route(std::move(message), {});
 }
 
@@ -170,7 +225,8 @@ RelayArrival RelayStore::receive(const RelayParcel& parcel) {
   const RobotId robot = message.origin.robot;
   if (!hears(from) || robot == self_.robot) return RelayArrival::kRefused;
   if (message.kind == RelayKind::kIntroduction) return introduce(from, message);
-  if (origin(robot) != message.origin) return RelayArrival::kRefused;
+  if (!is_known(message.origin)) return RelayArrival::kRefused;
+  if (is_forged(message)) return RelayArrival::kForged;
 
   const bool is_kept = message.kind == RelayKind::kBag || is_letter(message.kind);
   if (is_kept && !has_room_for(message)) {
@@ -185,16 +241,23 @@ RelayArrival RelayStore::receive(const RelayParcel& parcel) {
     origins_.at(robot).via = from;
   } else if (is_letter(message.kind)) {
     RelayMessage kept = message;
-    if (is_mine) kept.content = {};  // nobody else needs it
+    if (is_mine && !keys_) kept.content = {};  // nobody else needs it, but for its signature
     arrival = keep(&Origin::letters, kMaxLetterBytes, std::move(kept));
   } else {
-    if (message.kind == RelayKind::kReply) keep_reply(robot, message.number, message.content);
+    if (message.kind == RelayKind::kReply) hold_reply(message);
     if (!is_mine) return route(message, from);
   }
   const bool is_for_self = message.kind == RelayKind::kBag || is_mine;
-  if (arrival == RelayArrival::kNew && is_for_self && !message.content.empty())
-    output_.delivered.push_back(parcel.message);
+  if (arrival == RelayArrival::kNew && is_for_self) deliver(parcel.message);
   return arrival;
+}
+
+void RelayStore::deliver(const RelayMessagePtr& message) {
+  if (message->content.size() <= tail_bytes()) return;
+  if (!keys_) return output_.delivered.push_back(message);
+  RelayMessage plain = *message;
+  plain.content.resize(plain.content.size() - tail_bytes());
+  output_.delivered.push_back(std::make_shared<const RelayMessage>(std::move(plain)));
 }
 
 bool RelayStore::has_room_for(const RelayMessage& message) const {
@@ -207,15 +270,14 @@ bool RelayStore::has_room_for(const RelayMessage& message) const {
 }
 
 RelayArrival RelayStore::introduce(RobotId from, const RelayMessage& message) {
-  const RobotIdentity identity{.robot = message.origin.robot,
-                               .name = {message.content.begin(), message.content.end()},
-                               .boot = message.origin.boot};
+  const auto content = parse_introduction(message.content);
+  if (!content || (!keys_ && !content->credentials.empty())) return RelayArrival::kRefused;
+  const RobotIdentity identity{
+      .robot = message.origin.robot, .name = content->name, .boot = message.origin.boot};
   if (hears(identity.robot)) return RelayArrival::kRepeated;
   const auto known = origins_.find(identity.robot);
   if (known == origins_.end()) {
     if (origins_.size() >= kMaxOrigins) return RelayArrival::kNoRoom;
-    origins_.emplace(identity.robot, Origin{.identity = identity, .via = from});
-    settle_unmet(identity.robot, false);
   } else {
     Origin& origin = known->second;
     const bool knows_it = neighbours_.at(from).hears.contains(identity.robot);
@@ -225,10 +287,25 @@ RelayArrival RelayStore::introduce(RobotId from, const RelayMessage& message) {
       return RelayArrival::kRepeated;
     }
     if (!knows_it && origin.via != from) return RelayArrival::kRefused;
-    become(origin, identity);
-    origin.via = from;
-    origin.reachable = false;
   }
+  return meet(identity, content->credentials, from);
+}
+
+RelayArrival RelayStore::meet(const RobotIdentity& identity, const std::string& credentials,
+                              RobotId from) {
+  Membership membership{.credentials = credentials};
+  if (keys_) {
+    Decoded<Certificate> certified = keys_->certified(identity, credentials);
+    refusal_ = certified.refusal;
+    if (!certified.value) return RelayArrival::kForged;
+    membership.certificate = std::move(certified.value);
+  }
+  const auto [entry, is_new] = origins_.try_emplace(identity.robot, Origin{.identity = identity});
+  Origin& origin = entry->second;
+  become(origin, identity, std::move(membership));
+  origin.via = from;
+  origin.reachable = false;
+  if (is_new) settle_unmet(identity.robot, false);
   output_.met.push_back(identity);
   renew_ways();
   return RelayArrival::kNew;
@@ -270,10 +347,10 @@ void RelayStore::hand_on(RobotId to, const Origin& origin, double now_s) {
     const auto [introduced, first] = neighbour.introduced_s.try_emplace(peer.robot, now_s);
     if (!first && now_s - introduced->second < kPatience_s) return;
     introduced->second = now_s;
-    const std::string& name = origin.identity.name;
-    return send(
-        to,
-        {.kind = RelayKind::kIntroduction, .origin = peer, .content = {name.begin(), name.end()}});
+    if (keys_ && !origin.membership.certificate) return;  // nobody would believe it
+    return send(to, {.kind = RelayKind::kIntroduction,
+                     .origin = peer,
+                     .content = to_octets({origin.identity.name, origin.membership.credentials})});
   }
   hand_on(to, origin, false, held->second.bags, now_s);
   hand_on(to, origin, true, held->second.letters, now_s);

@@ -14,6 +14,7 @@
 
 #include "modules/core/relay_summary.hpp"
 #include "modules/core/robot_identity.hpp"
+#include "modules/relay/relay_endorsement.hpp"
 #include "modules/relay/relay_message.hpp"
 
 namespace km {
@@ -24,6 +25,7 @@ enum class [[nodiscard]] RelayArrival{
     kRepeated,  ///< Known already, or its origin is heard directly.
     kRefused,   ///< Its origin is not known in this life, or is this robot, or who hands it over is
                 ///< no neighbour.
+    kForged,    ///< Its origin has not signed it, or is no member, see RelayStore::refusal().
     kNoRoom,    ///< Given up: its origin, or what is carried, has no room left.
 };
 
@@ -60,6 +62,10 @@ struct RelayOutput {
 /// those that hear it: so of two lives the older cannot come back from robots that have missed the
 /// change. Nothing is believed about this robot itself, nor about those that it hears.
 ///
+/// With the keys of a team a robot is introduced with its certificate, and what each origin says
+/// carries its signature from where it is said to where it is read. All of it is checked before it
+/// is believed, kept or handed on: neighbours can hold things back, not change or invent them.
+///
 /// Memory is bounded for each origin and kind, and for all that are not heard together; full, what
 /// is newest is not taken and counts as given up. Deterministic; time comes in [s], any origin, not
 /// decreasing. Not thread-safe.
@@ -85,17 +91,21 @@ class RelayStore {
   /// What was sent to a robot so shortly before it fell silent may not have arrived.
   static constexpr double kDoubt_s = 30.0;
 
-  explicit RelayStore(TeamPeer self) : self_(self) {}
+  /// Without `keys` nothing is signed. With them what is kept of other robots comes signed and is
+  /// passed on so; what this robot says, and what it is given to read, is without signatures.
+  explicit RelayStore(TeamPeer self, std::optional<RelayKeys> keys = {})
+      : self_(self), keys_(std::move(keys)) {}
 
   /// A robot is heard directly from now on, or no more.
   void heard(const RobotIdentity& peer);
   void lost(RobotId robot, double now_s);
 
   /// A bag that its origin told directly; it may come before heard().
-  void keep_bag(const RobotIdentity& origin, std::uint32_t number,
-                std::vector<std::uint8_t> content);
+  RelayArrival keep_bag(const RobotIdentity& origin, std::uint32_t number,
+                        std::vector<std::uint8_t> content);
   /// Likewise a keyframe asked for, of a robot that is known.
-  void keep_reply(RobotId origin, std::uint32_t number, std::vector<std::uint8_t> content);
+  RelayArrival keep_reply(const TeamPeer& origin, std::uint32_t number,
+                          std::vector<std::uint8_t> content);
 
   /// This robot has told `to` a closure or inlier set, directly if that is heard: a letter if not,
   /// or if it falls silent soon; of a robot that has not been met yet that is seen then. Of one
@@ -109,6 +119,8 @@ class RelayStore {
   void told(RobotId neighbour, const RelaySummary& summary, double now_s);
   /// A message that it has handed over.
   RelayArrival receive(const RelayParcel& parcel);
+  /// Why the last message was kForged (a string literal).
+  [[nodiscard]] const char* refusal() const { return refusal_; }
 
   [[nodiscard]] RelaySummary summary() const;
   [[nodiscard]] bool hears(RobotId robot) const { return neighbours_.contains(robot); }
@@ -128,7 +140,6 @@ class RelayStore {
     [[nodiscard]] std::size_t bytes() const { return bytes_; }
     /// False if that would be more than `max_bytes`.
     [[nodiscard]] bool put(RelayMessage message, std::size_t max_bytes);
-    void empty(std::uint32_t number);
     /// Null unless it is there.
     [[nodiscard]] const RelayMessage* find(std::uint32_t number) const;
 
@@ -137,8 +148,14 @@ class RelayStore {
     std::uint32_t whole_ = 0;
     std::size_t bytes_ = 0;
   };
+  // What shows that an origin is one of the team: nothing without keys.
+  struct Membership {
+    std::string credentials = {};
+    std::optional<Certificate> certificate = {};
+  };
   struct Origin {
     RobotIdentity identity;
+    Membership membership = {};
     std::optional<RobotId> via = {};  // who has introduced it, or handed over its last bag
     bool reachable = false;           // as last told
     bool was_heard = false;
@@ -164,8 +181,16 @@ class RelayStore {
 
   /// Null if there is one too many.
   Origin* know(const RobotIdentity& identity);
-  static void become(Origin& origin, const RobotIdentity& identity);
+  [[nodiscard]] Membership membership_of(const RobotIdentity& identity) const;
+  static void become(Origin& origin, const RobotIdentity& identity, Membership membership);
+  [[nodiscard]] bool is_known(const TeamPeer& peer) const;
+  [[nodiscard]] bool is_forged(const RelayMessage& message);
+  void sign(RelayMessage& message) const;
+  [[nodiscard]] std::size_t tail_bytes() const { return keys_ ? kEndorsementBytes : 0; }
+  void deliver(const RelayMessagePtr& message);
+  void hold_reply(RelayMessage message);
   RelayArrival introduce(RobotId from, const RelayMessage& message);
+  RelayArrival meet(const RobotIdentity& identity, const std::string& credentials, RobotId from);
   RelayArrival keep(Stream Origin::*stream, std::size_t max_bytes, RelayMessage message);
   void settle_unmet(RobotId robot, bool heard);
   void write_letter(std::uint64_t slot, RelayMessage message);
@@ -181,6 +206,7 @@ class RelayStore {
   void send(RobotId neighbour, RelayMessage message);
 
   TeamPeer self_;
+  std::optional<RelayKeys> keys_;
   std::map<RobotId, Origin> origins_;
   std::map<RobotId, Neighbour> neighbours_;  // those heard
   Stream own_letters_;
@@ -192,6 +218,7 @@ class RelayStore {
   std::size_t carried_bytes_ = 0;
   RelayOutput output_;
   std::uint64_t given_up_ = 0;
+  const char* refusal_ = nullptr;
 };
 
 }  // namespace km

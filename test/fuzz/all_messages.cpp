@@ -11,6 +11,7 @@
 #include "modules/pose_graph/parcel_codec.hpp"
 #include "modules/pose_graph/tree_letters.hpp"
 #include "modules/relay/relay_codec.hpp"
+#include "modules/security/credentials.hpp"
 #include "runtime/dds/envelope.hpp"
 #include "runtime/dds/robot_status.hpp"
 
@@ -131,6 +132,9 @@ std::vector<MessageReader> all_messages() {
                            .relay = {.hears = {kReader, 9}, .holds = {{{11, 12}, 13, 14}}}}}),
       topic<RelayParcel>(
           {relayed({.kind = RelayKind::kIntroduction, .origin = {9, 1}, .content = {'c'}}),
+           relayed({.kind = RelayKind::kIntroduction,
+                    .origin = {9, 1},
+                    .content = to_octets({"c", std::string(kCredentialsLength, 'A')})}),
            relayed({.kind = RelayKind::kRequest,
                     .origin = {9, 1},
                     .to = kReader,

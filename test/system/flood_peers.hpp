@@ -12,6 +12,7 @@
 #include "modules/outlier_rejection/outlier_rejection_codec.hpp"
 #include "modules/place_recognition/place_recognition_codec.hpp"
 #include "modules/pose_graph/parcel_codec.hpp"
+#include "modules/relay/relay_endorsement.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 
 namespace km {
@@ -28,12 +29,13 @@ struct FloodPeer {
             {.own = statuses.to_peers(), .peers = statuses.from_peers()}),
         peer_events(bridge.peers().events()) {
     using enum TopicKind;
+    const bool has_keys = participant.seal() != nullptr;
     constexpr auto kOther = TrafficCategory::kOther;
     constexpr CrossingEnds kSpeaks{.receive = false};
     bridge.exchange(statuses, kStatus, kOther);
-    bridge.exchange(bows, kEvent, kOther, kSpeaks);
+    bridge.exchange(bows, kEvent, kOther, kSpeaks, {}, unsigned_guard<KeyframeBow>(has_keys));
     bridge.exchange(requests, kRequest, kOther, kSpeaks);
-    bridge.exchange(replies, kRequest, kOther);
+    bridge.exchange(replies, kRequest, kOther, {}, {}, unsigned_guard<KeyframeReply>(has_keys));
     bridge.exchange(closures, kEvent, kOther, kSpeaks);
     bridge.exchange(inlier_sets, kState, kOther, kSpeaks);
     bridge.exchange(parcels, kRequest, kOther);
@@ -73,6 +75,14 @@ struct FloodPeer {
     for (const PeerTraffic& t : bridge.traffic().peers)
       if (t.direction == Direction::kIn && t.peer == robot) sum += t.count.bytes;
     return sum;
+  }
+
+  // Room for the signature that goes behind messages where the team has keys, and none in it.
+  template <typename T>
+  static ContentGuard<T> unsigned_guard(bool has_keys) {
+    if (!has_keys) return {};
+    return {.tail_bytes = kEndorsementBytes,
+            .tail = [](const T&, auto) { return std::vector<std::uint8_t>(kEndorsementBytes); }};
   }
 
   DdsParticipant participant;

@@ -152,8 +152,9 @@ TEST_CASE("A team in two parts ends in two frames and its table of links says wh
   }
 }
 
-TEST_CASE("Robots that never hear each other find closures through one that hears both",
-          "[system][namespaces]") {
+namespace {
+
+void find_closures_between_ends(bool has_keys) {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -172,7 +173,14 @@ TEST_CASE("Robots that never hear each other find closures through one that hear
                                     "to: 15.0}\n"
                                     "  - {id: 2, name: c, dataset: \"${DATASET}\", from: 4.0, "
                                     "to: 11.0}\n");
-  const TeamRun run = run_team(team, *dataset, folder, "--links " + links);
+  std::string options = "--links " + links;
+  if (has_keys) {
+    const std::string keys = (folder.path() / "keys").string();
+    REQUIRE(run_command(KM_BIN_DIR "/kimera_multi_keys make " + keys + " --robots a:0,b:1,c:2")
+                .exit_code == 0);
+    options += " --security " + keys;
+  }
+  const TeamRun run = run_team(team, *dataset, folder, options);
   CAPTURE(run.result.output);
   if (!had_own_networks(run.result.output)) return;
   REQUIRE(run.result.exit_code == 0);
@@ -186,9 +194,22 @@ TEST_CASE("Robots that never hear each other find closures through one that hear
     for (const RelativePose& edge : read_g2o(folder.path() / name / "pose_graph.g2o").edges)
       if (edge.from.robot + edge.to.robot == 1 && edge.from.robot != edge.to.robot)
         ++closures[{edge.from, edge.to}];
-  std::cout << closures.size() << " closures between robots that never hear each other\n";
+  std::cout << closures.size() << " closures between robots that never hear each other"
+            << (has_keys ? ", with keys\n" : "\n");
   CHECK(closures.size() >= 3);
   for (const auto& [ends, count] : closures) CHECK(count == 2);
+}
+
+}  // namespace
+
+TEST_CASE("Robots that never hear each other find closures through one that hears both",
+          "[system][namespaces]") {
+  find_closures_between_ends(false);
+}
+
+TEST_CASE("Robots with keys that never hear each other find closures through one that hears both",
+          "[system][namespaces]") {
+  find_closures_between_ends(true);
 }
 
 namespace {

@@ -28,6 +28,7 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"loop_closure", {"images", "place_recognition"}},
     {"vio", {"images"}},
     {"pose_graph", {"outlier_rejection"}},
+    {"relay", {"security"}},
     {"pgo_study", {"pose_graph", "outlier_rejection"}},
     {"evaluation", {"images", "mesh"}},
     {"simulation", {"images", "mesh"}},

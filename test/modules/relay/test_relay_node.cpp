@@ -1,5 +1,5 @@
 #include <catch2/catch.hpp>
-#include <map>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,7 +9,9 @@
 #include "modules/outlier_rejection/outlier_rejection_codec.hpp"
 #include "modules/place_recognition/place_recognition_codec.hpp"
 #include "modules/relay/relay_node.hpp"
+#include "runtime/clock.hpp"
 #include "runtime/dds/participant.hpp"
+#include "test/modules/security/toy_team.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 #include "test/support/inbox.hpp"
 
@@ -24,16 +26,28 @@ RobotIdentity identity_of(RobotId robot) {
   return {.robot = robot, .name = robot_name(robot), .boot = process_of(robot).boot};
 }
 
+std::int64_t today_s() {
+  return static_cast<std::int64_t>(wall_now_s());
+}
+
+std::unique_ptr<SharedSeal> seal_of(const ToyTeam& team, RobotId robot) {
+  return std::make_unique<SharedSeal>(team.keys_of(robot, robot_name(robot), today_s() - 3600),
+                                      identity_of(robot), today_s());
+}
+
 // What DDS would carry goes from topic to topic here.
 struct Relaying {
   Relaying(const std::shared_ptr<const DdsDomain>& domain, RobotId robot, double& now_s,
-           bool relays = true)
+           std::unique_ptr<SharedSeal> keys)
       : self(robot),
         participant(domain, identity_of(robot)),
         peers(participant),
-        node(process_of(robot), relays, peers, {events, statuses, parcels, own_parcels, reached},
-             [&now_s] { return now_s; }) {
-    node.join_bags<KeyframeBow>(heard_bows, bows, [](const KeyframeBow& bow) { return bow.id; });
+        seal(std::move(keys)),
+        node(process_of(robot), seal.get(), peers, {events, statuses, own_parcels, reached},
+             [&now_s] { return now_s; }),
+        bow_guard(node.guard<KeyframeBow>(
+            RelayKind::kBag, [](const KeyframeBow& bow) { return std::optional(bow.id); })) {
+    node.join_bags<KeyframeBow>(heard_bows, bows);
     node.join_calls(
         RelayKind::kRequest,
         RelayedTopics<KeyframeRequest>{own_requests, direct_requests, heard_requests, requests},
@@ -42,12 +56,26 @@ struct Relaying {
                       RelayedTopics<InlierSet>{told_sets, direct_sets, heard_sets, sets});
   }
 
+  // As the bridge sends and takes a message to all.
+  [[nodiscard]] Octets said(const KeyframeBow& bow) const {
+    const auto encoded = Codec<KeyframeBow>::encode(bow);
+    Octets content = serialize(Codec<KeyframeBow>::descriptor(), &encoded.wire);
+    if (bow_guard.tail_bytes == 0) return content;
+    const Octets tail = bow_guard.tail(bow, content);
+    content.insert(content.end(), tail.begin(), tail.end());
+    return content;
+  }
+  [[nodiscard]] std::string hear(const TeamPeer& sender, const Octets& content) {
+    return reason_of(
+        detail::publish_decoded<KeyframeBow>(heard_bows, sender, content, nullptr, bow_guard));
+  }
+
   RobotId self;
   DdsParticipant participant;
   Peers peers;
+  std::unique_ptr<SharedSeal> seal;
   Topic<PeerEvent> events, reached;
   Topic<RobotStatus> statuses;
-  Topic<RelayParcel> parcels;
   Topic<Addressed<RelayParcel>> own_parcels;
   Topic<KeyframeBow> heard_bows, bows;
   Topic<Addressed<KeyframeRequest>> own_requests, direct_requests;
@@ -61,22 +89,38 @@ struct Relaying {
   Inbox<Addressed<KeyframeRequest>> sent_directly{direct_requests};
   Inbox<Addressed<InlierSet>> told_directly{direct_sets};
   RelayNode node;
+  ContentGuard<KeyframeBow> bow_guard;
 };
 
 // Robots 0 and 1, which do not hear each other, and 2, which hears both.
 struct Chain {
-  explicit Chain(bool relays = true) {
+  explicit Chain(bool has_keys) {
     for (RobotId robot = 0; robot < 3; ++robot)
-      robots.push_back(std::make_unique<Relaying>(domain, robot, now_s, relays));
+      robots.push_back(std::make_unique<Relaying>(domain, robot, now_s,
+                                                  has_keys ? seal_of(team, robot) : nullptr));
     for (auto& robot : robots)
       robot->own_parcels.subscribe([this, from = robot->self](const auto& parcel) {
-        ++parcels;
-        robots[parcel->to]->parcels.publish(RelayParcel{from, parcel->message->message});
+        RelayMessage message = *parcel->message->message;
+        if (change) change(message);
+        const RelayParcel arrived{from, std::make_shared<const RelayMessage>(std::move(message))};
+        Relaying& to = *robots[parcel->to];
+        if (const char* why = to.node.guard_parcels().check(process_of(from), arrived, {}))
+          refusals.emplace_back(why);
       });
     for (const RobotId end : {RobotId{0}, RobotId{1}}) {
+      if (has_keys) {
+        admit(end, 2);
+        admit(2, end);
+      }
       robots[end]->events.publish(PeerEvent{PeerEventKind::kJoined, identity_of(2), {}});
       robots[2]->events.publish(PeerEvent{PeerEventKind::kJoined, identity_of(end), {}});
     }
+  }
+  void admit(RobotId to, RobotId from) {
+    const char* why = robots[to]->seal->with([&](TeamSeal& seal) {
+      return seal.admit(identity_of(from), robots[from]->seal->credentials(), today_s());
+    });
+    REQUIRE(why == nullptr);
   }
   // Statuses for a while.
   void run(double seconds) {
@@ -92,7 +136,9 @@ struct Chain {
   }
 
   double now_s = 0.0;
-  int parcels = 0;
+  ToyTeam team;
+  std::function<void(RelayMessage&)> change;  // of what is handed over
+  std::vector<std::string> refusals;
   std::shared_ptr<const DdsDomain> domain = std::make_shared<DdsDomain>(loopback_config());
   std::vector<std::unique_ptr<Relaying>> robots;
 };
@@ -100,10 +146,13 @@ struct Chain {
 }  // namespace
 
 TEST_CASE("What robots out of reach tell comes out where it would if they were heard", "[relay]") {
-  Chain chain;
+  const bool has_keys = GENERATE(false, true);
+  CAPTURE(has_keys);
+  Chain chain(has_keys);
   Relaying &a = *chain.robots[0], &b = *chain.robots[1], &c = *chain.robots[2];
   c.peers.tell(identity_of(0));  // as if DDS had discovered it
-  c.heard_bows.publish(KeyframeBow{.id = {0, 0}, .words = {{3, 1}}});
+  const Octets bow = a.said({.id = {0, 0}, .words = {{3, 1}}});
+  REQUIRE(c.hear(process_of(0), bow).empty());
   chain.run(20.0);
   REQUIRE(c.got_bows.messages().size() == 1);
   REQUIRE(b.got_bows.messages().size() == 1);
@@ -138,20 +187,26 @@ TEST_CASE("What robots out of reach tell comes out where it would if they were h
   CHECK(a.told_directly.messages().size() == 1);
 }
 
-TEST_CASE("A robot that does not relay says nothing of it and leaves all to the bridge",
-          "[relay]") {
-  Chain chain(false);
-  chain.robots[2]->peers.tell(identity_of(0));
-  Relaying& b = *chain.robots[1];
-  chain.robots[2]->heard_bows.publish(KeyframeBow{.id = {0, 0}, .words = {{3, 1}}});
+TEST_CASE("With keys nothing that its origin has not signed is heard or taken", "[relay]") {
+  Chain chain(true);
+  Relaying &a = *chain.robots[0], &b = *chain.robots[1], &c = *chain.robots[2];
+  c.peers.tell(identity_of(0));
+  Octets bow = a.said({.id = {0, 0}, .words = {{3, 1}}});
+  REQUIRE(c.hear(process_of(0), bow).empty());
+  chain.change = [](RelayMessage& message) {
+    if (message.kind == RelayKind::kBag) message.content.front() ^= 1U;
+  };
   chain.run(20.0);
-  b.own_requests.publish(Addressed<KeyframeRequest>{0, std::make_shared<const KeyframeRequest>()});
-  b.told_sets.publish(Addressed<InlierSet>{0, std::make_shared<const InlierSet>()});
-  CHECK(chain.parcels == 0);
-  CHECK(chain.robots[2]->got_bows.messages().size() == 1);
-  CHECK(b.sent_directly.messages().size() == 1);
-  CHECK(b.told_directly.messages().size() == 1);
-  CHECK(chain.robots[2]->node.summary() == RelaySummary());
+  CHECK(b.peers.current(0) == process_of(0));
+  CHECK(b.got_bows.messages().empty());
+  REQUIRE_FALSE(chain.refusals.empty());
+  CHECK(chain.refusals[0] == "not signed by its origin, or changed on its way");
+
+  bow = a.said({.id = {0, 1}, .words = {{3, 1}}});
+  bow.back() ^= 1U;
+  CHECK(c.hear(process_of(0), bow) == "not signed by its origin, or changed on its way");
+  CHECK(c.hear(process_of(0), {1, 2, 3}) == "shorter than its tail");
+  CHECK(c.got_bows.messages().size() == 1);
 }
 
 TEST_CASE("What a neighbour hands over is checked before anything else", "[relay]") {
@@ -193,6 +248,8 @@ TEST_CASE("What a neighbour hands over is checked before anything else", "[relay
     CHECK(refusal_of(wrong) == "a name that no robot has");
     wrong.content = {'r', '1'};
     CHECK(refusal_of(wrong).empty());
+    wrong.content.push_back(';');
+    CHECK(refusal_of(wrong) == "a name that no robot has");
   }
 }
 

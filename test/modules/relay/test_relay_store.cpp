@@ -1,135 +1,14 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
-#include <map>
 #include <memory>
-#include <random>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "modules/relay/relay_store.hpp"
+#include "test/modules/relay/relay_network.hpp"
 
 namespace km {
 namespace {
-
-constexpr double kPeriod_s = 0.5;  // of the summaries
-constexpr RobotId kA = 0, kB = 1, kC = 2, kD = 3;
-
-std::vector<std::uint8_t> octets(std::size_t size, std::uint8_t value = 7) {
-  std::vector<std::uint8_t> content(size, value);
-  return content;
-}
-
-std::string name_of(RobotId robot) {
-  return std::string("r").append(std::to_string(robot));
-}
-
-// Robots whose links are cut and mended; parcels arrive at once, or are lost.
-class Network {
- public:
-  explicit Network(RobotId robots) {
-    for (RobotId robot = 0; robot < robots; ++robot) start(robot, first_boot(robot));
-  }
-
-  static std::uint64_t first_boot(RobotId robot) { return (std::uint64_t{robot} + 1) << 32U; }
-
-  void start(RobotId robot, std::uint64_t boot) {
-    boots_[robot] = boot;
-    stores_.erase(robot);
-    stores_.emplace(robot, RelayStore({robot, boot}));
-    read_[robot].clear();
-    met_[robot].clear();
-    for (const auto& [a, b] : std::set(links_))
-      if (a == robot || b == robot) {
-        at(a).heard(identity(b));
-        at(b).heard(identity(a));
-      }
-    settle();
-  }
-  void link(RobotId a, RobotId b) {
-    links_.emplace(a, b);
-    at(a).heard(identity(b));
-    at(b).heard(identity(a));
-    settle();
-  }
-  void cut(RobotId a, RobotId b) {
-    links_.erase({a, b});
-    at(a).lost(b, now_s_);
-    at(b).lost(a, now_s_);
-    settle();
-  }
-  // A bag as DDS carries it: to those that hear the robot.
-  void tell_bag(RobotId robot, std::uint32_t index) {
-    bags_[robot].insert(index);
-    for (const auto& [other, store] : stores_)
-      if (linked(robot, other)) at(other).keep_bag(identity(robot), index, octets(600));
-  }
-  void run(double seconds) {
-    for (const double end_s = now_s_ + seconds; now_s_ < end_s; now_s_ += kPeriod_s) {
-      for (auto& [robot, store] : stores_)
-        for (auto& [other, to] : stores_)
-          if (linked(robot, other)) to.told(robot, store.summary(), now_s_);
-      settle();
-    }
-  }
-  // Which messages of a kind a robot was handed to read, in order.
-  [[nodiscard]] std::vector<std::uint32_t> read(RobotId robot, RelayKind kind) {
-    std::vector<std::uint32_t> numbers;
-    for (const RelayMessagePtr& message : read_[robot])
-      if (message->kind == kind) numbers.push_back(message->number);
-    return numbers;
-  }
-  [[nodiscard]] std::vector<RelayMessagePtr>& all_read(RobotId robot) { return read_[robot]; }
-  [[nodiscard]] const std::vector<RobotIdentity>& met(RobotId robot) { return met_[robot]; }
-  [[nodiscard]] const std::vector<RobotId>& reachable(RobotId robot) { return reachable_[robot]; }
-  [[nodiscard]] RelayStore& at(RobotId robot) { return stores_.at(robot); }
-  [[nodiscard]] std::size_t parcels() const { return parcels_; }
-  [[nodiscard]] std::size_t octets_sent() const { return octets_; }
-  void lose(double part) { loss_ = part; }
-
-  [[nodiscard]] RobotIdentity identity(RobotId robot) const {
-    return {.robot = robot, .name = name_of(robot), .boot = boots_.at(robot)};
-  }
-
- private:
-  [[nodiscard]] bool linked(RobotId a, RobotId b) const {
-    return links_.contains({a, b}) || links_.contains({b, a});
-  }
-  // Carries what there is until nobody has anything to send.
-  void settle() {
-    for (bool more = true; more;) {
-      more = false;
-      for (auto& [robot, store] : stores_) {
-        RelayOutput output = store.take_output();
-        std::ranges::move(output.delivered, std::back_inserter(read_[robot]));
-        std::ranges::move(output.met, std::back_inserter(met_[robot]));
-        std::ranges::move(output.reachable, std::back_inserter(reachable_[robot]));
-        for (const RelayParcel& parcel : output.parcels) {
-          more = true;
-          ++parcels_;
-          octets_ += parcel.message->content.size();
-          if (!linked(robot, parcel.neighbour) || uniform_(random_) < loss_) continue;
-          (void)at(parcel.neighbour).receive({robot, parcel.message});
-        }
-      }
-    }
-  }
-
-  std::map<RobotId, std::uint64_t> boots_;
-  std::map<RobotId, RelayStore> stores_;
-  std::set<std::pair<RobotId, RobotId>> links_;
-  std::map<RobotId, std::set<std::uint32_t>> bags_;
-  std::map<RobotId, std::vector<RelayMessagePtr>> read_;
-  std::map<RobotId, std::vector<RobotIdentity>> met_;
-  std::map<RobotId, std::vector<RobotId>> reachable_;
-  std::mt19937 random_{5};
-  std::uniform_real_distribution<double> uniform_{0.0, 1.0};
-  double loss_ = 0.0;
-  double now_s_ = 0.0;
-  std::size_t parcels_ = 0;
-  std::size_t octets_ = 0;
-};
 
 std::vector<std::uint32_t> first(std::uint32_t count) {
   std::vector<std::uint32_t> numbers(count);
@@ -140,7 +19,9 @@ std::vector<std::uint32_t> first(std::uint32_t count) {
 }  // namespace
 
 TEST_CASE("Robots that all hear each other hand nothing on and hold nothing to tell", "[relay]") {
-  Network network(3);
+  const bool has_keys = GENERATE(false, true);
+  CAPTURE(has_keys);
+  Network network(3, has_keys);
   network.link(kA, kB);
   network.link(kA, kC);
   network.link(kB, kC);
@@ -158,7 +39,9 @@ TEST_CASE("Robots that all hear each other hand nothing on and hold nothing to t
 }
 
 TEST_CASE("A robot gets each bag of one that only another has heard once and in order", "[relay]") {
-  Network network(3);
+  const bool has_keys = GENERATE(false, true);
+  CAPTURE(has_keys);
+  Network network(3, has_keys);
   network.link(kA, kC);
   for (std::uint32_t i = 0; i < 300; ++i) network.tell_bag(kA, i);
   SECTION("at the same time") {}
@@ -172,14 +55,16 @@ TEST_CASE("A robot gets each bag of one that only another has heard once and in 
   CHECK(network.met(kB)[0].boot == Network::first_boot(kA));
   CHECK(network.met(kB)[0].name == "r0");
   CHECK(network.read(kB, RelayKind::kBag) == first(300));
-  CHECK(network.octets_sent() < 300 * 600 + 100);  // and the names
+  const std::size_t signature = has_keys ? kEndorsementBytes : 0;
+  const std::size_t introductions = has_keys ? 2 * 300 : 100;
+  CHECK(network.octets_sent() < 300 * (600 + signature) + introductions);
   CHECK(network.at(kB).summary().holds ==
         std::vector<RelayHeld>{{{kA, Network::first_boot(kA)}, 300, 0}});
 }
 
 TEST_CASE("A bag may come before it is known that its robot is heard", "[relay]") {
   Network network(3);
-  network.at(kC).keep_bag(network.identity(kA), 0, octets(600));
+  CHECK(network.at(kC).keep_bag(network.identity(kA), 0, octets(600)) == RelayArrival::kNew);
   CHECK_FALSE(network.at(kC).hears(kA));
   network.link(kA, kC);
   network.link(kB, kC);
@@ -188,7 +73,9 @@ TEST_CASE("A bag may come before it is known that its robot is heard", "[relay]"
 }
 
 TEST_CASE("Bags go along a chain, and of two robots between only one hands them on", "[relay]") {
-  Network network(4);
+  const bool has_keys = GENERATE(false, true);
+  CAPTURE(has_keys);
+  Network network(4, has_keys);
   SECTION("a chain of four") {
     network.link(kA, kC);
     network.link(kC, kD);
@@ -209,12 +96,15 @@ TEST_CASE("Bags go along a chain, and of two robots between only one hands them 
   }
   network.run(5.0);
   CHECK(network.read(kB, RelayKind::kBag) == first(100));
-  const std::size_t handed_on = (network.octets_sent() - before) / 600;
+  const std::size_t handed_on =
+      (network.octets_sent() - before) / (600 + (has_keys ? kEndorsementBytes : 0));
   CHECK(handed_on == (network.read(kD, RelayKind::kBag).empty() ? 100 : 200));
 }
 
 TEST_CASE("What is lost on the way is handed over again, and taken once", "[relay]") {
-  Network network(3);
+  const bool has_keys = GENERATE(false, true);
+  CAPTURE(has_keys);
+  Network network(3, has_keys);
   network.lose(0.3);
   network.link(kA, kC);
   network.link(kC, kB);
@@ -231,7 +121,9 @@ TEST_CASE("What is lost on the way is handed over again, and taken once", "[rela
 }
 
 TEST_CASE("A closure reaches a robot that is met again later, once", "[relay]") {
-  Network network(3);
+  const bool has_keys = GENERATE(false, true);
+  CAPTURE(has_keys);
+  Network network(3, has_keys);
   network.link(kA, kC);
   network.run(1.0);
   network.cut(kA, kC);
@@ -289,7 +181,9 @@ TEST_CASE("What was told just before a link fell silent becomes a letter", "[rel
 }
 
 TEST_CASE("A request goes to its addressee and the answer comes back", "[relay]") {
-  Network network(4);
+  const bool has_keys = GENERATE(false, true);
+  CAPTURE(has_keys);
+  Network network(4, has_keys);
   network.link(kA, kC);
   network.link(kC, kD);
   network.link(kD, kB);
@@ -321,10 +215,12 @@ TEST_CASE("What DDS keeps for a robot that was heard is not carried as well", "[
 }
 
 TEST_CASE("Who has had a keyframe answers in place of a robot that is gone", "[relay]") {
-  Network network(3);
+  const bool has_keys = GENERATE(false, true);
+  CAPTURE(has_keys);
+  Network network(3, has_keys);
   network.link(kA, kC);
   network.tell_bag(kA, 0);
-  network.at(kC).keep_reply(kA, 17, octets(9000));
+  network.tell_reply(kA, kC, 17);
   network.link(kC, kB);
   network.run(8.0);
   SECTION("it is there: it is asked itself") {
@@ -358,7 +254,9 @@ TEST_CASE("Who has had a keyframe answers in place of a robot that is gone", "[r
 }
 
 TEST_CASE("Another life of a robot that is not heard takes the place of the former", "[relay]") {
-  Network network(4);
+  const bool has_keys = GENERATE(false, true);
+  CAPTURE(has_keys);
+  Network network(4, has_keys);
   network.link(kA, kC);
   network.link(kC, kB);
   network.link(kB, kD);
@@ -402,7 +300,8 @@ TEST_CASE("A neighbour is believed nothing about this robot or one that is heard
     return store.receive({from, std::make_shared<const RelayMessage>(std::move(message))});
   };
   const auto introduction = [](RobotId robot, std::uint64_t boot) {
-    return RelayMessage{.kind = RelayKind::kIntroduction, .origin = {robot, boot}};
+    return RelayMessage{
+        .kind = RelayKind::kIntroduction, .origin = {robot, boot}, .content = {'r'}};
   };
   CHECK(receive(kC, introduction(kB, 9)) == RelayArrival::kRefused);
   CHECK(receive(kC, introduction(kC, 9)) == RelayArrival::kRepeated);
@@ -430,7 +329,7 @@ TEST_CASE("Robots that a neighbour invents take no more room than there is for a
   constexpr std::size_t kSize = 1U << 20U;
   std::size_t taken = 0;
   for (RobotId robot = 10; robot < 60; ++robot) {
-    RelayMessage message{.kind = RelayKind::kIntroduction, .origin = {robot, 1}};
+    RelayMessage message{.kind = RelayKind::kIntroduction, .origin = {robot, 1}, .content = {'r'}};
     REQUIRE(store.receive({kC, std::make_shared<const RelayMessage>(message)}) ==
             RelayArrival::kNew);
     message.kind = RelayKind::kBag;
@@ -442,7 +341,8 @@ TEST_CASE("Robots that a neighbour invents take no more room than there is for a
   }
   CHECK(taken > RelayStore::kMaxFarBytes - 2 * kSize);
   CHECK(taken < RelayStore::kMaxFarBytes);
-  store.keep_bag({.robot = kA, .name = "a", .boot = 1}, 0, octets(kSize));
+  CHECK(store.keep_bag({.robot = kA, .name = "a", .boot = 1}, 0, octets(kSize)) ==
+        RelayArrival::kNew);
   store.heard({.robot = kA, .name = "a", .boot = 1});
   store.lost(kA, 0.0);
   CHECK(store.summary().holds.front().bags == 1);
@@ -455,7 +355,8 @@ TEST_CASE("Full, a store gives up what is newest and says how much", "[relay]") 
   constexpr std::size_t kSize = 100'000;
   const auto fit = static_cast<std::uint32_t>(RelayStore::kMaxBagBytes / (kSize + 96));
   for (std::uint32_t i = 0; i < fit + 5; ++i)
-    store.keep_bag(network.identity(kA), i, octets(kSize));
+    CHECK(store.keep_bag(network.identity(kA), i, octets(kSize)) ==
+          (i < fit ? RelayArrival::kNew : RelayArrival::kNoRoom));
   CHECK(store.given_up() == 5);
   store.lost(kA, 0.0);
   CHECK(store.summary().holds == std::vector<RelayHeld>{{{kA, Network::first_boot(kA)}, fit, 0}});

@@ -1,0 +1,195 @@
+#pragma once
+
+#include <algorithm>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <random>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "modules/relay/relay_store.hpp"
+#include "test/modules/security/toy_team.hpp"
+
+namespace km {
+
+inline constexpr double kPeriod_s = 0.5;  // of the summaries
+inline constexpr RobotId kA = 0, kB = 1, kC = 2, kD = 3;
+
+inline std::vector<std::uint8_t> octets(std::size_t size, std::uint8_t value = 7) {
+  std::vector<std::uint8_t> content(size, value);
+  return content;
+}
+
+inline std::string name_of(RobotId robot) {
+  return std::string("r").append(std::to_string(robot));
+}
+
+/// What a process of a toy team is asked by its relay.
+inline RelayKeys relay_keys(const TeamSeal& seal) {
+  return {
+      .endorse = [&](OctetView statement) { return seal.endorse(statement); },
+      .credentials_of = [&](const TeamPeer& peer) { return seal.credentials_of(peer); },
+      .certified =
+          [&](const RobotIdentity& identity, const std::string& credentials) {
+            return seal.certified(identity, credentials, kToyNow_s);
+          },
+      .why_lapsed =
+          [&](const Certificate& certificate) { return seal.why_lapsed(certificate, kToyNow_s); },
+  };
+}
+
+/// Robots whose links are cut and mended; parcels arrive at once, or are lost.
+class Network {
+ public:
+  explicit Network(RobotId robots, bool has_keys = false) : has_keys_(has_keys) {
+    for (RobotId robot = 0; robot < robots; ++robot) start(robot, first_boot(robot));
+  }
+
+  static std::uint64_t first_boot(RobotId robot) { return (std::uint64_t{robot} + 1) << 32U; }
+
+  void start(RobotId robot, std::uint64_t boot) {
+    boots_[robot] = boot;
+    stores_.erase(robot);
+    if (has_keys_) {
+      auto& member = members_[robot];
+      member = member ? std::make_unique<ToyMember>(*member, boot)
+                      : std::make_unique<ToyMember>(team_, robot, name_of(robot), boot);
+    }
+    stores_.emplace(robot, RelayStore({robot, boot}, keys_of(robot)));
+    read_[robot].clear();
+    met_[robot].clear();
+    for (const auto& [a, b] : std::set(links_))
+      if (a == robot || b == robot) meet(a, b);
+    settle();
+  }
+  void link(RobotId a, RobotId b) {
+    links_.emplace(a, b);
+    meet(a, b);
+    settle();
+  }
+  void cut(RobotId a, RobotId b) {
+    links_.erase({a, b});
+    at(a).lost(b, now_s_);
+    at(b).lost(a, now_s_);
+    settle();
+  }
+  // A bag as DDS carries it: to those that hear the robot.
+  void tell_bag(RobotId robot, std::uint32_t index) {
+    const auto content = told({.kind = RelayKind::kBag,
+                               .origin = {robot, boots_.at(robot)},
+                               .number = index,
+                               .content = octets(600)});
+    for (const auto& [other, store] : stores_)
+      if (linked(robot, other)) (void)at(other).keep_bag(identity(robot), index, content);
+  }
+  // Likewise a keyframe, to one that has asked for it.
+  void tell_reply(RobotId robot, RobotId to, std::uint32_t index) {
+    const TeamPeer origin{robot, boots_.at(robot)};
+    (void)at(to).keep_reply(origin, index,
+                            told({.kind = RelayKind::kReply,
+                                  .origin = origin,
+                                  .to = to,
+                                  .number = index,
+                                  .content = octets(9000)}));
+  }
+  void run(double seconds) {
+    for (const double end_s = now_s_ + seconds; now_s_ < end_s; now_s_ += kPeriod_s) {
+      for (auto& [robot, store] : stores_)
+        for (auto& [other, to] : stores_)
+          if (linked(robot, other)) to.told(robot, store.summary(), now_s_);
+      settle();
+    }
+  }
+  // Which messages of a kind a robot was handed to read, in order.
+  [[nodiscard]] std::vector<std::uint32_t> read(RobotId robot, RelayKind kind) {
+    std::vector<std::uint32_t> numbers;
+    for (const RelayMessagePtr& message : read_[robot])
+      if (message->kind == kind) numbers.push_back(message->number);
+    return numbers;
+  }
+  [[nodiscard]] std::vector<RelayMessagePtr>& all_read(RobotId robot) { return read_[robot]; }
+  [[nodiscard]] const std::vector<RobotIdentity>& met(RobotId robot) { return met_[robot]; }
+  [[nodiscard]] const std::vector<RobotId>& reachable(RobotId robot) { return reachable_[robot]; }
+  [[nodiscard]] RelayStore& at(RobotId robot) { return stores_.at(robot); }
+  [[nodiscard]] std::size_t parcels() const { return parcels_; }
+  [[nodiscard]] std::size_t octets_sent() const { return octets_; }
+  void lose(double part) { loss_ = part; }
+  /// Of what is told; see ToyTeam.
+  [[nodiscard]] ToyTeam& team() { return team_; }
+  [[nodiscard]] ToyMember& member(RobotId robot) { return *members_.at(robot); }
+  /// What a robot hands over is changed on its way.
+  void tamper(std::function<void(RelayMessage&)> change) { change_ = std::move(change); }
+  [[nodiscard]] const std::vector<std::string>& refusals(RobotId robot) { return refusals_[robot]; }
+
+  [[nodiscard]] RobotIdentity identity(RobotId robot) const {
+    return {.robot = robot, .name = name_of(robot), .boot = boots_.at(robot)};
+  }
+
+ private:
+  [[nodiscard]] bool linked(RobotId a, RobotId b) const {
+    return links_.contains({a, b}) || links_.contains({b, a});
+  }
+  void meet(RobotId a, RobotId b) {
+    if (has_keys_) {
+      (void)member(a).admit(member(b));
+      (void)member(b).admit(member(a));
+    }
+    at(a).heard(identity(b));
+    at(b).heard(identity(a));
+  }
+  [[nodiscard]] std::optional<RelayKeys> keys_of(RobotId robot) {
+    return has_keys_ ? std::optional(relay_keys(member(robot).seal)) : std::nullopt;
+  }
+  [[nodiscard]] std::vector<std::uint8_t> told(RelayMessage message) {
+    if (has_keys_) endorse(message, *keys_of(message.origin.robot));
+    return message.content;
+  }
+  // Carries what there is until nobody has anything to send.
+  void settle() {
+    for (bool more = true; more;) {
+      more = false;
+      for (auto& [robot, store] : stores_) {
+        RelayOutput output = store.take_output();
+        std::ranges::move(output.delivered, std::back_inserter(read_[robot]));
+        std::ranges::move(output.met, std::back_inserter(met_[robot]));
+        std::ranges::move(output.reachable, std::back_inserter(reachable_[robot]));
+        for (const RelayParcel& parcel : output.parcels) {
+          more = true;
+          ++parcels_;
+          octets_ += parcel.message->content.size();
+          if (!linked(robot, parcel.neighbour) || uniform_(random_) < loss_) continue;
+          RelayMessage message = *parcel.message;
+          if (change_) change_(message);
+          RelayStore& to = at(parcel.neighbour);
+          if (to.receive({robot, std::make_shared<const RelayMessage>(std::move(message))}) ==
+              RelayArrival::kForged)
+            refusals_[parcel.neighbour].emplace_back(to.refusal());
+        }
+      }
+    }
+  }
+
+  bool has_keys_;
+  ToyTeam team_;
+  std::map<RobotId, std::unique_ptr<ToyMember>> members_;
+  std::map<RobotId, std::uint64_t> boots_;
+  std::map<RobotId, RelayStore> stores_;
+  std::set<std::pair<RobotId, RobotId>> links_;
+  std::map<RobotId, std::vector<RelayMessagePtr>> read_;
+  std::map<RobotId, std::vector<RobotIdentity>> met_;
+  std::map<RobotId, std::vector<RobotId>> reachable_;
+  std::map<RobotId, std::vector<std::string>> refusals_;
+  std::function<void(RelayMessage&)> change_;
+  std::mt19937 random_{5};
+  std::uniform_real_distribution<double> uniform_{0.0, 1.0};
+  double loss_ = 0.0;
+  double now_s_ = 0.0;
+  std::size_t parcels_ = 0;
+  std::size_t octets_ = 0;
+};
+
+}  // namespace km

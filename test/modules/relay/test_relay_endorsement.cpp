@@ -1,0 +1,267 @@
+#include <catch2/catch.hpp>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "test/modules/relay/relay_network.hpp"
+
+namespace km {
+namespace {
+
+constexpr TeamPeer kOrigin{kA, (std::uint64_t{5} << kResumeBits) + 2};
+
+RelayMessage some_message(RelayKind kind) {
+  return {.kind = kind, .origin = kOrigin, .to = kB, .number = 17, .content = octets(40)};
+}
+
+// A robot with keys that hears c, which has introduced a.
+struct Hearing {
+  Hearing() {
+    REQUIRE(b.admit(c) == nullptr);
+    store.heard(c.identity);
+  }
+  RelayArrival receive(RelayMessage message) {
+    return store.receive({kC, std::make_shared<const RelayMessage>(std::move(message))});
+  }
+  RelayArrival introduce(const ToyMember& robot) {
+    return receive({.kind = RelayKind::kIntroduction,
+                    .origin = robot.peer(),
+                    .content = to_octets({robot.identity.name, robot.seal.credentials()})});
+  }
+  static RelayMessage said_by(const ToyMember& robot, RelayKind kind, std::uint32_t number = 0) {
+    RelayMessage message{
+        .kind = kind, .origin = robot.peer(), .to = kB, .number = number, .content = octets(40)};
+    endorse(message, relay_keys(robot.seal));
+    return message;
+  }
+
+  ToyTeam team;
+  ToyMember a{team, kA, "alpha", kOrigin.boot}, b{team, kB, "beta"}, c{team, kC, "gamma"};
+  RelayStore store{b.peer(), relay_keys(b.seal)};
+};
+
+TEST_CASE("A signature is for one message of one robot", "[relay]") {
+  const ToyTeam team;
+  const ToyMember a(team, kA, "alpha"), c(team, kC, "gamma");
+  const RelayKind kind = GENERATE(RelayKind::kBag, RelayKind::kClosure, RelayKind::kInlierSet,
+                                  RelayKind::kRequest, RelayKind::kReply);
+  CAPTURE(static_cast<int>(kind));
+  const bool lasts = kind == RelayKind::kBag || kind == RelayKind::kReply;
+  RelayMessage message = some_message(kind);
+  endorse(message, relay_keys(a.seal));
+  REQUIRE(message.content.size() == 40 + kEndorsementBytes);
+  const auto holds = [&] { return is_endorsed(message, a.keys.certificate.key); };
+  REQUIRE(holds());
+  CHECK_FALSE(is_endorsed(message, c.keys.certificate.key));
+  SECTION("every octet counts") {
+    for (std::uint8_t& octet : message.content) {
+      octet ^= 1U;
+      CHECK_FALSE(holds());
+      octet ^= 1U;
+    }
+    message.content.pop_back();
+    CHECK_FALSE(holds());
+    message.content.clear();
+    CHECK_FALSE(holds());
+  }
+  SECTION("its kind") {
+    for (int other = 1; other <= static_cast<int>(RelayKind::kReply); ++other) {
+      message.kind = static_cast<RelayKind>(other);
+      CHECK(holds() == (message.kind == kind));
+    }
+  }
+  SECTION("its origin and number") {
+    message.origin.robot = kC;
+    CHECK_FALSE(holds());
+    message.origin.robot = kA;
+    ++message.number;
+    CHECK_FALSE(holds());
+  }
+  SECTION("the origin's life, and its process but for what lasts as long as that") {
+    message.origin.boot = next_boot(kOrigin.boot);
+    CHECK(holds() == lasts);
+    message.origin.boot = kOrigin.boot + (std::uint64_t{1} << kResumeBits);
+    CHECK_FALSE(holds());
+  }
+  SECTION("its addressee but for what goes to all that ask") {
+    message.to = kD;
+    CHECK(holds() == lasts);
+  }
+  SECTION("not how far it has come") {
+    message.hops = 9;
+    CHECK(holds());
+  }
+}
+
+TEST_CASE("An introduction is a name and what its robot shows or nothing else", "[relay]") {
+  const ToyTeam team;
+  const ToyMember a(team, kA, "alpha");
+  const auto text = [](const std::string& content) {
+    return parse_introduction(Octets(content.begin(), content.end()));
+  };
+  for (const RelayIntroduction& one :
+       {RelayIntroduction{"alpha"}, RelayIntroduction{"alpha", a.seal.credentials()}})
+    CHECK(parse_introduction(to_octets(one)) == one);
+  CHECK(text(std::string(64, 'n')));
+  CHECK_FALSE(text(""));
+  CHECK_FALSE(text(std::string(65, 'n')));
+  CHECK_FALSE(text("al\npha"));
+  CHECK_FALSE(text("alpha;"));
+  CHECK_FALSE(text(";" + a.seal.credentials()));
+  CHECK_FALSE(text("alpha;" + a.seal.credentials() + "x"));
+}
+
+TEST_CASE("A robot out of reach is believed by its certificate and no other", "[relay]") {
+  Hearing hearing;
+  RelayStore& store = hearing.store;
+  const auto is_forged = [&](const ToyMember& robot, const char* why) {
+    CHECK(hearing.introduce(robot) == RelayArrival::kForged);
+    CHECK(store.refusal() == std::string(why));
+    CHECK_FALSE(store.origin(robot.peer().robot));
+  };
+  SECTION("a member") {
+    CHECK(hearing.introduce(hearing.a) == RelayArrival::kNew);
+    CHECK(hearing.introduce(hearing.a) == RelayArrival::kRepeated);
+    REQUIRE(store.take_output().met.size() == 1);
+    CHECK(store.origin(kA) == kOrigin);
+  }
+  SECTION("of another authority") {
+    const ToyTeam others("survey");
+    is_forged(ToyMember(others, kA, "alpha"), "credentials of another team");
+  }
+  SECTION("that is revoked") {
+    (void)hearing.b.seal.update(hearing.team.revoking({hearing.a.keys.certificate}), kToyNow_s);
+    is_forged(hearing.a, "certificate is revoked");
+  }
+  SECTION("with another name or boot than it has signed, or nothing") {
+    const std::string& shown = hearing.a.seal.credentials();
+    for (const auto& [boot, introduction] :
+         std::vector<std::pair<std::uint64_t, RelayIntroduction>>{
+             {kOrigin.boot, {"beta", shown}},
+             {kOrigin.boot + 1, {"alpha", shown}},
+             {kOrigin.boot, {"alpha"}}})
+      CHECK(hearing.receive({.kind = RelayKind::kIntroduction,
+                             .origin = {kA, boot},
+                             .content = to_octets(introduction)}) == RelayArrival::kForged);
+    CHECK_FALSE(store.origin(kA));
+  }
+  CHECK(store.take_output().delivered.empty());
+}
+
+TEST_CASE("What a neighbour forges or changes is refused before it is kept", "[relay]") {
+  Hearing hearing;
+  RelayStore& store = hearing.store;
+  REQUIRE(hearing.introduce(hearing.a) == RelayArrival::kNew);
+  (void)store.take_output();
+  const RelayKind kind = GENERATE(RelayKind::kBag, RelayKind::kClosure, RelayKind::kInlierSet,
+                                  RelayKind::kRequest, RelayKind::kReply);
+  CAPTURE(static_cast<int>(kind));
+  RelayMessage message = Hearing::said_by(hearing.a, kind);
+  SECTION("as it was said") {
+    CHECK(hearing.receive(message) == RelayArrival::kNew);
+    const RelayOutput output = store.take_output();
+    REQUIRE(output.delivered.size() == 1);
+    CHECK(output.delivered[0]->content == octets(40));
+    return;
+  }
+  SECTION("changed") {
+    message.content[3] ^= 1U;
+    CHECK(hearing.receive(message) == RelayArrival::kForged);
+  }
+  SECTION("without a signature") {
+    message.content = octets(40);
+    CHECK(hearing.receive(message) == RelayArrival::kForged);
+  }
+  SECTION("signed by the neighbour") {
+    message.content = octets(40);
+    endorse(message, relay_keys(hearing.c.seal));
+    CHECK(hearing.receive(message) == RelayArrival::kForged);
+  }
+  SECTION("under another number") {
+    message.number = 3;
+    CHECK(hearing.receive(message) == RelayArrival::kForged);
+  }
+  SECTION("said by a former life") {
+    const ToyMember former(hearing.a, std::uint64_t{4} << kResumeBits);
+    message = Hearing::said_by(former, kind);
+    CHECK(hearing.receive(message) == RelayArrival::kRefused);
+    message.origin = kOrigin;
+    CHECK(hearing.receive(message) == RelayArrival::kForged);
+  }
+  CHECK(store.summary().holds == std::vector<RelayHeld>{{kOrigin, 0, 0}});
+  const RelayOutput output = store.take_output();
+  CHECK(output.delivered.empty());
+  CHECK(output.parcels.empty());
+}
+
+TEST_CASE("A robot that is revoked is not believed any more and forgotten", "[relay]") {
+  Hearing hearing;
+  RelayStore& store = hearing.store;
+  REQUIRE(hearing.introduce(hearing.a) == RelayArrival::kNew);
+  CHECK(hearing.receive(Hearing::said_by(hearing.a, RelayKind::kBag, 0)) == RelayArrival::kNew);
+  (void)hearing.b.seal.update(hearing.team.revoking({hearing.a.keys.certificate}), kToyNow_s);
+  CHECK(hearing.receive(Hearing::said_by(hearing.a, RelayKind::kBag, 1)) == RelayArrival::kForged);
+  CHECK(store.refusal() == std::string("certificate is revoked"));
+  CHECK(store.summary().holds.empty());
+  CHECK(store.take_output().delivered.size() == 1);
+  CHECK(hearing.introduce(hearing.a) == RelayArrival::kForged);
+}
+
+TEST_CASE("What is heard is kept for others only with its own signature", "[relay]") {
+  Hearing hearing;
+  RelayStore& store = hearing.store;
+  const auto keep = [&](const RelayMessage& said) {
+    return said.kind == RelayKind::kBag
+               ? store.keep_bag(hearing.c.identity, said.number, said.content)
+               : store.keep_reply(hearing.c.peer(), said.number, said.content);
+  };
+  const RelayKind kind = GENERATE(RelayKind::kBag, RelayKind::kReply);
+  CHECK(keep(Hearing::said_by(hearing.c, kind)) == RelayArrival::kNew);
+  RelayMessage other = Hearing::said_by(hearing.c, kind, 1);
+  other.content[0] ^= 1U;
+  CHECK(keep(other) == RelayArrival::kForged);
+  other = Hearing::said_by(hearing.c, kind, 1);
+  other.number = 2;
+  CHECK(keep(other) == RelayArrival::kForged);
+}
+
+TEST_CASE("What a robot has said with keys that it has no more is told anew", "[relay]") {
+  Hearing hearing;
+  RelayStore& store = hearing.store;
+  CHECK(store.keep_bag(hearing.c.identity, 0,
+                       Hearing::said_by(hearing.c, RelayKind::kBag).content) == RelayArrival::kNew);
+  const bool renewed = GENERATE(false, true);
+  const std::uint64_t boot = next_boot(hearing.c.identity.boot);
+  const ToyMember next =
+      renewed ? ToyMember(hearing.team, kC, "gamma", boot) : ToyMember(hearing.c, boot);
+  REQUIRE(hearing.b.admit(next) == nullptr);
+  store.heard(next.identity);
+  CHECK(store.keep_bag(next.identity, 0, Hearing::said_by(next, RelayKind::kBag).content) ==
+        (renewed ? RelayArrival::kNew : RelayArrival::kRepeated));
+}
+
+TEST_CASE("A neighbour that changes what it hands on is not believed and harms nobody else",
+          "[relay]") {
+  Network network(4, true);
+  network.link(kA, kC);
+  network.link(kC, kB);
+  for (std::uint32_t i = 0; i < 20; ++i) network.tell_bag(kA, i);
+  network.at(kA).wrote(RelayKind::kClosure, kB, 1, octets(700), 0.0);
+  network.tamper([](RelayMessage& message) {
+    if (message.kind != RelayKind::kIntroduction) message.content.back() ^= 1U;
+  });
+  network.run(20.0);
+  CHECK(network.all_read(kB).empty());
+  CHECK(network.refusals(kB).size() > 20);
+  for (const std::string& why : network.refusals(kB))
+    CHECK(why == "not signed by its origin, or changed on its way");
+  // Another one hands on the same as it is.
+  network.tamper({});
+  network.run(20.0);
+  CHECK(network.read(kB, RelayKind::kBag).size() == 20);
+  CHECK(network.read(kB, RelayKind::kClosure).size() == 1);
+}
+
+}  // namespace
+}  // namespace km
