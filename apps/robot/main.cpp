@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <sstream>
 
+#include "apps/robot/inspect.hpp"
 #include "apps/robot/robot_config.hpp"
 #include "apps/robot/run.hpp"
 #include "runtime/log.hpp"
@@ -33,6 +34,8 @@ Examples
   A robot that finds itself in the map of an earlier run, which takes part as robot 0:
     kimera_multi_robot --robot 0 --session results/a --output results/yesterday
     kimera_multi_robot --config config/datasets/euroc.yaml --robot 1 --dataset MH_02_easy --output results/b
+  What is in a recording, and how regular its stamps are:
+    kimera_multi_robot --inspect recording.bag
   The back-end alone, on a recorded pose graph:
     kimera_multi_robot --config config/datasets/tunnels.yaml --robot 3 --graph robot3.csv --rate max --output results/3
 
@@ -62,6 +65,11 @@ void print_config(const RobotOptions& options) {
   } catch (const ConfigError& error) {
     throw CLI::ValidationError("--print-config", error.what());
   }
+  throw CLI::Success();
+}
+
+void print_recording(const std::string& path) {
+  std::cout << inspect_recording(path);
   throw CLI::Success();
 }
 
@@ -143,6 +151,10 @@ RobotOptions parse_options(int argc, char** argv) {
   app.add_flag_callback(
       "--print-config", [&options] { print_config(options); },
       "Print the configuration that the options before this one make, with bounds, and exit");
+  app.add_option_function<std::string>(
+      "--inspect", print_recording,
+      "Print what is in a recording and exit: a bag of ROS 1 (.bag), one of ROS 2 (folder or "
+      ".db3), an MCAP file (.mcap), or a EuRoC folder");
   app.add_option("--log", options.log_level, "error, warn, info or debug")
       ->check(CLI::IsMember({"error", "warn", "info", "debug"}))
       ->capture_default_str();

@@ -110,5 +110,7 @@ struct RosTransforms {
 /// beginning of any message that has one.
 template <typename Message>
 Decoded<Message> decode_ros(std::string_view encoding, std::span<const std::uint8_t> bytes);
+template <>
+Decoded<RosHeader> decode_ros(std::string_view encoding, std::span<const std::uint8_t> bytes);
 
 }  // namespace km

@@ -1,5 +1,6 @@
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -171,6 +172,17 @@ TEST_CASE("Inertial samples that end in the middle do not end the robot", "[syst
   CAPTURE(result.output);
   CHECK(result.exit_code == 0);
   CHECK_THAT(result.output, Catch::Contains("1 gaps between inertial samples"));
+}
+
+TEST_CASE("What is no recording ends --inspect as bad input with one line", "[system]") {
+  const TemporaryFolder folder;
+  const fs::path file = folder.write("a.bag", "#ROSBAG V1.2\n");
+  const CommandResult result =
+      run_command(KM_BIN_DIR "/kimera_multi_robot --inspect " + file.string());
+  CHECK(result.exit_code == 1);
+  CHECK_THAT(result.output,
+             Catch::StartsWith("kimera_multi_robot: " + file.string() + " byte 0: "));
+  CHECK(std::count(result.output.begin(), result.output.end(), '\n') == 1);
 }
 
 TEST_CASE("Noise that no sensor has is refused before the run", "[system]") {

@@ -1,0 +1,121 @@
+#include "apps/robot/inspect.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <iomanip>
+#include <sstream>
+#include <vector>
+
+#include "modules/core/input_file.hpp"
+#include "modules/core/text_rows.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/recordings/bag_summary.hpp"
+#include "modules/recordings/open_bag.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Rows = std::vector<std::vector<std::string>>;
+
+// Seconds with so many decimals that milliseconds of a clock that counts from 1970 are seen.
+std::string seconds_text(Stamp stamp) {
+  constexpr Stamp kMillisecond_ns = 1'000'000;
+  const Stamp ms = stamp / kMillisecond_ns;
+  std::ostringstream text;
+  text << (ms < 0 ? "-" : "") << std::abs(ms / 1000) << '.' << std::setw(3) << std::setfill('0')
+       << std::abs(ms % 1000);
+  return text.str();
+}
+
+std::string image_text(const TopicSummary& topic) {
+  const bool was_looked_at = topic.is_image && !topic.encoding.empty() && !topic.stamps.empty();
+  if (!topic.image) return was_looked_at ? "not decodable" : "-";
+  const ImageSize size = topic.image->size;
+  const std::string pixels =
+      size == ImageSize{} ? "" : std::to_string(size.width) + 'x' + std::to_string(size.height);
+  return readable(pixels + ' ' + topic.image->encoding, 40);
+}
+
+std::string topic_table(const std::vector<TopicSummary>& topics) {
+  Rows rows = {{"topic", "type", "messages", "first [s]", "last [s]", "rate [Hz]",
+                "largest gap [s]", "jitter [ms]", "unordered", "stamps of", "image"}};
+  for (const TopicSummary& topic : topics) {
+    const StampStatistics stamps = stamp_statistics(topic.stamps);
+    const bool is_empty = stamps.count == 0;
+    rows.push_back({readable(topic.topic, 80), readable(topic.type, 60),
+                    std::to_string(stamps.count), is_empty ? "-" : seconds_text(stamps.first),
+                    is_empty ? "-" : seconds_text(stamps.last), fixed(stamps.rate_hz, 2),
+                    fixed(stamps.largest_gap_s, 3), fixed(1e3 * stamps.jitter_s, 2),
+                    std::to_string(stamps.unordered), topic.has_sensor_stamps ? "sensor" : "log",
+                    image_text(topic)});
+  }
+  return align_columns(rows);
+}
+
+std::string pair_table(const std::vector<TopicPair>& pairs) {
+  Rows rows = {{"images of equal rate", "pairs", "equal stamps", "second - first [ms]",
+                "largest deviation [ms]", "only first", "only second"}};
+  for (const TopicPair& pair : pairs) {
+    const StampAgreement& found = pair.agreement;
+    rows.push_back({readable(pair.first + ' ' + pair.second, 160), std::to_string(found.pairs),
+                    std::to_string(found.equal), fixed(1e3 * found.median_offset_s, 3),
+                    fixed(1e3 * found.largest_deviation_s, 3), std::to_string(found.only_first),
+                    std::to_string(found.only_second)});
+  }
+  return align_columns(rows);
+}
+
+std::string text_of(const std::vector<TopicSummary>& topics) {
+  std::string text = topic_table(topics);
+  if (const auto pairs = pairs_of_images(topics); !pairs.empty()) text += '\n' + pair_table(pairs);
+  for (const TopicSummary& topic : topics)
+    if (topic.undecoded > 0)
+      text += readable(topic.topic) + ": " + std::to_string(topic.undecoded) +
+              " messages that are not of their type\n";
+  return text;
+}
+
+// Topics of a EuRoC folder: what has a data.csv, whose rows begin with a stamp.
+std::vector<TopicSummary> euroc_topics(const fs::path& folder) {
+  std::vector<fs::path> places;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error))
+    if (is_file(entry->path() / "data.csv")) places.push_back(entry->path());
+  std::sort(places.begin(), places.end());
+  std::vector<TopicSummary> topics;
+  for (const fs::path& place : places) {
+    TopicSummary topic{.topic = place.filename().string(),
+                       .type = "data.csv",
+                       .encoding = {},
+                       .has_sensor_stamps = true,
+                       .stamps = {},
+                       .is_image = place.filename().string().starts_with("cam"),
+                       .image = {}};
+    const std::string text = read_input_file(place / "data.csv");
+    for (const TextRow& row : split_rows(text)) {
+      const auto stamp = parse_int64(row.fields.front());
+      if (stamp) topic.stamps.push_back(*stamp);
+    }
+    topics.push_back(std::move(topic));
+  }
+  return topics;
+}
+
+}  // namespace
+
+std::string inspect_recording(const fs::path& path) {
+  if (is_folder(path) && !may_be_bag(path)) {
+    const auto topics = euroc_topics(is_folder(path / "mav0") ? path / "mav0" : path);
+    if (topics.empty())
+      throw InputFileError(path.string() + ": neither .db3 or .mcap files nor a EuRoC recording");
+    return text_of(topics);
+  }
+  const auto reader = open_bag(path);
+  const std::string text = text_of(summarise_topics(*reader));
+  return text + to_string(reader->report());
+}
+
+}  // namespace km
