@@ -23,7 +23,7 @@ enum class VioProblem {
   kInertialGap,     ///< Too long without inertial samples: a new start from the last pose.
   /// The estimate was impossible, or had no place for what is seen: a new start from the last pose.
   kDiverged,
-  kStartTimeout,    ///< Could not start: the oldest images held back are given up, without a pose.
+  kStartTimeout,  ///< Could not start: the oldest images held back are given up, without a pose.
 };
 
 /// Counts since construction.
@@ -108,7 +108,7 @@ class Vio {
   std::optional<Stamp> last_image_;
   std::vector<Held> held_;  // Not empty: starting.
   bool running_ = false;
-  int unlocated_images_ = 0;  // In a row: with many features and hardly a landmark.
+  int unlocated_images_ = 0;           // In a row: with many features and hardly a landmark.
   std::optional<OdometryState> last_;  // Last state that was given out.
   std::optional<KeyframeOdometry> last_keyframe_;
   SE3 T_chain_odom_ = SE3::Identity();  // From live odometry to the chain of keyframes.

@@ -97,7 +97,7 @@ class SendSchedule {
   struct Waiting {
     Entry entry;
     double since_s = 0.0;
-    std::uint64_t stops = 0;  // of its lane when it came
+    std::uint64_t stops = 0;                  // of its lane when it came
     SendPriority lane = SendPriority::kMesh;  // where it waits
   };
   struct Lane {
