@@ -18,10 +18,12 @@ class FaultReport {
     std::string first;  ///< Names the place; one line.
   };
 
-  void add(Fault fault, const std::string& example) {
+  /// `count` of them, at least one.
+  void add(Fault fault, const std::string& example, std::size_t count = 1) {
     constexpr std::size_t kMaxExample = 500;  // room for the paths of two files
     Entry& entry = entries_[fault];
-    if (entry.count++ == 0) entry.first = readable(example, kMaxExample);
+    if (entry.count == 0) entry.first = readable(example, kMaxExample);
+    entry.count += count;
   }
 
   /// What another reader met, too.

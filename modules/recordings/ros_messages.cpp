@@ -1,95 +1,104 @@
 #include "modules/recordings/ros_messages.hpp"
 
+#include <concepts>
+#include <type_traits>
+
 #include "modules/recordings/ros_wire.hpp"
 
 namespace km {
 namespace {
 
-// Fields stand in the order of ROS' definitions: github.com/ros2/common_interfaces.
+// Fields stand in the order of ROS' definitions: github.com/ros2/common_interfaces. One list of
+// them serves for reading, by a RosWire into a message, and for writing, by a RosWriter out of a
+// constant one.
+template <typename Message, typename Type>
+concept Is = std::same_as<std::remove_const_t<Message>, Type>;
 
-void read(RosWire& wire, RosHeader& header) {
+void fields(auto& wire, Is<RosHeader> auto& header) {
   wire.skip_sequence();
-  header.stamp = wire.stamp();
-  header.frame = wire.text();
+  wire.stamp(header.stamp);
+  wire.text(header.frame);
 }
 
-void read(RosWire& wire, Eigen::Vector3d& vector) {
+void fields(auto& wire, Is<Eigen::Vector3d> auto& vector) {
   wire.f64(std::span(vector.data(), 3));
 }
 
 // x, y, z, w, as Eigen keeps them.
-void read(RosWire& wire, Eigen::Quaterniond& rotation) {
+void fields(auto& wire, Is<Eigen::Quaterniond> auto& rotation) {
   wire.f64(std::span(rotation.coeffs().data(), 4));
 }
 
-void read(RosWire& wire, RosPose& pose) {
-  read(wire, pose.position);
-  read(wire, pose.orientation);
+void fields(auto& wire, Is<RosPose> auto& pose) {
+  fields(wire, pose.position);
+  fields(wire, pose.orientation);
 }
 
-void read(RosWire& wire, RosImage& image) {
-  read(wire, image.header);
-  image.height = wire.u32();
-  image.width = wire.u32();
-  image.encoding = wire.text();
-  image.is_bigendian = wire.u8() != 0;
-  image.step = wire.u32();
-  image.data = wire.octets();
+void fields(auto& wire, Is<RosImage> auto& image) {
+  fields(wire, image.header);
+  wire.u32(image.height);
+  wire.u32(image.width);
+  wire.text(image.encoding);
+  wire.flag(image.is_bigendian);
+  wire.u32(image.step);
+  wire.octets(image.data);
   if (image.data.size() < std::uint64_t{image.step} * image.height) wire.fail();
 }
 
-void read(RosWire& wire, RosCompressedImage& image) {
-  read(wire, image.header);
-  image.format = wire.text();
-  image.data = wire.octets();
+void fields(auto& wire, Is<RosCompressedImage> auto& image) {
+  fields(wire, image.header);
+  wire.text(image.format);
+  wire.octets(image.data);
 }
 
-void read(RosWire& wire, RosImu& imu) {
-  read(wire, imu.header);
-  read(wire, imu.orientation);
+void fields(auto& wire, Is<RosImu> auto& imu) {
+  fields(wire, imu.header);
+  fields(wire, imu.orientation);
   wire.f64(imu.orientation_covariance);
-  read(wire, imu.angular_velocity);
+  fields(wire, imu.angular_velocity);
   wire.f64(imu.angular_velocity_covariance);
-  read(wire, imu.linear_acceleration);
+  fields(wire, imu.linear_acceleration);
   wire.f64(imu.linear_acceleration_covariance);
 }
 
-void read(RosWire& wire, RosCameraInfo& camera) {
-  read(wire, camera.header);
-  camera.height = wire.u32();
-  camera.width = wire.u32();
-  camera.distortion_model = wire.text();
-  camera.D = wire.doubles();
+void fields(auto& wire, Is<RosCameraInfo> auto& camera) {
+  fields(wire, camera.header);
+  wire.u32(camera.height);
+  wire.u32(camera.width);
+  wire.text(camera.distortion_model);
+  wire.doubles(camera.D);
   wire.f64(camera.K);
   wire.f64(camera.R);
   wire.f64(camera.P);
   // Binning in x and y; of the region of interest x, y, height and width.
-  for (int k = 0; k < 6; ++k) static_cast<void>(wire.u32());
-  static_cast<void>(wire.u8());  // whether the region is to be rectified
+  std::array<std::uint32_t, 6> unused{};
+  for (std::uint32_t& value : unused) wire.u32(value);
+  bool is_region_rectified = false;
+  wire.flag(is_region_rectified);
 }
 
-void read(RosWire& wire, RosPoseStamped& pose) {
-  read(wire, pose.header);
-  read(wire, pose.pose);
+void fields(auto& wire, Is<RosPoseStamped> auto& pose) {
+  fields(wire, pose.header);
+  fields(wire, pose.pose);
 }
 
-void read(RosWire& wire, RosOdometry& odometry) {
-  read(wire, odometry.header);
-  odometry.child_frame = wire.text();
-  read(wire, odometry.pose);
+void fields(auto& wire, Is<RosOdometry> auto& odometry) {
+  fields(wire, odometry.header);
+  wire.text(odometry.child_frame);
+  fields(wire, odometry.pose);
   wire.f64(odometry.pose_covariance);
-  read(wire, odometry.linear_velocity);
-  read(wire, odometry.angular_velocity);
+  fields(wire, odometry.linear_velocity);
+  fields(wire, odometry.angular_velocity);
   wire.f64(odometry.twist_covariance);
 }
 
-void read(RosWire& wire, RosTransforms& message) {
+void fields(auto& wire, Is<RosTransforms> auto& message) {
   constexpr std::size_t kLeast_bytes = 7 * sizeof(double);
-  message.transforms.resize(wire.count(kLeast_bytes));
-  for (RosTransform& transform : message.transforms) {
-    read(wire, transform.header);
-    transform.child_frame = wire.text();
-    read(wire, transform.pose);
+  wire.resize(message.transforms, kLeast_bytes);
+  for (auto& transform : message.transforms) {
+    fields(wire, transform.header);
+    wire.text(transform.child_frame);
+    fields(wire, transform.pose);
   }
 }
 
@@ -111,7 +120,7 @@ Decoded<Message> decode_ros(std::string_view encoding, std::span<const std::uint
   auto wire = RosWire::open(encoding, bytes);
   if (!wire.value) return Decoded<Message>::refuse(wire.refusal);
   Message message;
-  read(*wire.value, message);
+  fields(*wire.value, message);
   if (const char* const problem = wire.value->problem()) return Decoded<Message>::refuse(problem);
   return Decoded<Message>::accept(std::move(message));
 }
@@ -121,17 +130,31 @@ Decoded<RosHeader> decode_ros(std::string_view encoding, std::span<const std::ui
   auto wire = RosWire::open(encoding, bytes);
   if (!wire.value) return Decoded<RosHeader>::refuse(wire.refusal);
   RosHeader header;
-  read(*wire.value, header);
+  fields(*wire.value, header);
   if (wire.value->failed()) return Decoded<RosHeader>::refuse("a message without a header");
   return Decoded<RosHeader>::accept(std::move(header));
 }
 
+template <typename Message>
+std::vector<std::uint8_t> encode_ros(const Message& message) {
+  RosWriter wire;
+  fields(wire, message);
+  return wire.release();
+}
+
 template Decoded<RosImage> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosImage&);
 template Decoded<RosCompressedImage> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosCompressedImage&);
 template Decoded<RosImu> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosImu&);
 template Decoded<RosCameraInfo> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosCameraInfo&);
 template Decoded<RosPoseStamped> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosPoseStamped&);
 template Decoded<RosOdometry> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosOdometry&);
 template Decoded<RosTransforms> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosTransforms&);
 
 }  // namespace km

@@ -113,4 +113,8 @@ Decoded<Message> decode_ros(std::string_view encoding, std::span<const std::uint
 template <>
 Decoded<RosHeader> decode_ros(std::string_view encoding, std::span<const std::uint8_t> bytes);
 
+/// A message of a type above as ROS 2 writes it: little-endian CDR with its encapsulation header.
+template <typename Message>
+[[nodiscard]] std::vector<std::uint8_t> encode_ros(const Message& message);
+
 }  // namespace km

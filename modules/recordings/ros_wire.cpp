@@ -32,47 +32,42 @@ std::uint64_t RosWire::number(std::size_t size) {
   return value;
 }
 
-double RosWire::f64() {
-  return std::bit_cast<double>(number(8));
-}
-
 void RosWire::f64(std::span<double> values) {
-  for (double& value : values) value = f64();
+  for (double& value : values) value = std::bit_cast<double>(number(8));
 }
 
-std::string RosWire::text() {
-  const auto octets = reader_.bytes(u32());
+void RosWire::text(std::string& value) {
+  const auto octets = reader_.bytes(number(4));
   const bool has_end = is_cdr_ && !octets.empty();  // some writers leave out that of an empty text
   if (has_end && octets.back() != 0) reader_.fail();
-  return {octets.begin(), octets.end() - (has_end ? 1 : 0)};
+  value.assign(octets.begin(), octets.end() - (has_end ? 1 : 0));
 }
 
-std::vector<std::uint8_t> RosWire::octets() {
-  const auto octets = reader_.bytes(u32());
-  return {octets.begin(), octets.end()};
+void RosWire::octets(std::vector<std::uint8_t>& values) {
+  const auto octets = reader_.bytes(number(4));
+  values.assign(octets.begin(), octets.end());
 }
 
-std::vector<double> RosWire::doubles() {
-  std::vector<double> values(count(sizeof(double)));
+void RosWire::doubles(std::vector<double>& values) {
+  resize(values, sizeof(double));
   f64(values);
-  return values;
 }
 
 std::size_t RosWire::count(std::size_t bytes_per_element) {
-  const std::uint32_t elements = u32();
+  const std::uint64_t elements = number(4);
   return elements <= reader_.left() / bytes_per_element ? elements : reader_.fail();
 }
 
 void RosWire::skip_sequence() {
-  if (!is_cdr_) static_cast<void>(u32());
+  if (!is_cdr_) static_cast<void>(number(4));
 }
 
-Stamp RosWire::stamp() {
-  const std::uint32_t seconds = u32();
-  const std::uint32_t rest_ns = u32();
+void RosWire::stamp(Stamp& value) {
+  const auto seconds = static_cast<std::uint32_t>(number(4));
+  const auto rest_ns = static_cast<std::uint32_t>(number(4));
   // Signed in ROS 2, unsigned in ROS 1.
   const Stamp whole = is_cdr_ ? Stamp{static_cast<std::int32_t>(seconds)} : Stamp{seconds};
-  return whole * kSecond_ns + rest_ns;
+  value = whole * kSecond_ns + rest_ns;
 }
 
 const char* RosWire::problem() const {
@@ -80,6 +75,40 @@ const char* RosWire::problem() const {
   if (reader_.failed()) return "a message that is cut or not of its type";
   if (reader_.left() > (is_cdr_ ? kMostPadding_bytes : 0)) return "a message longer than its type";
   return nullptr;
+}
+
+void RosWriter::number(std::uint64_t value, std::size_t size) {
+  constexpr std::size_t kEncapsulation_bytes = 4;
+  while ((bytes_.size() - kEncapsulation_bytes) % size != 0) bytes_.push_back(0);
+  for (std::size_t k = 0; k < size; ++k)
+    bytes_.push_back(static_cast<std::uint8_t>(value >> (8U * k)));
+}
+
+void RosWriter::f64(std::span<const double> values) {
+  for (const double value : values) number(std::bit_cast<std::uint64_t>(value), 8);
+}
+
+void RosWriter::text(const std::string& value) {
+  u32(static_cast<std::uint32_t>(value.size() + 1));
+  bytes_.insert(bytes_.end(), value.begin(), value.end());
+  u8(0);
+}
+
+void RosWriter::octets(const std::vector<std::uint8_t>& values) {
+  u32(static_cast<std::uint32_t>(values.size()));
+  bytes_.insert(bytes_.end(), values.begin(), values.end());
+}
+
+void RosWriter::doubles(const std::vector<double>& values) {
+  u32(static_cast<std::uint32_t>(values.size()));
+  f64(values);
+}
+
+void RosWriter::stamp(Stamp value) {
+  Stamp seconds = value / kSecond_ns, rest_ns = value % kSecond_ns;
+  if (rest_ns < 0) --seconds, rest_ns += kSecond_ns;
+  u32(static_cast<std::uint32_t>(seconds));
+  u32(static_cast<std::uint32_t>(rest_ns));
 }
 
 }  // namespace km

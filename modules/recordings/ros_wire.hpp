@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "modules/core/bytes.hpp"
@@ -25,21 +26,24 @@ class RosWire {
   /// Refuses other encodings, and encapsulations with parameter lists or of XCDR version 2.
   static Decoded<RosWire> open(std::string_view encoding, std::span<const std::uint8_t> bytes);
 
-  [[nodiscard]] std::uint8_t u8() { return reader_.u8(); }
-  [[nodiscard]] std::uint32_t u32() { return static_cast<std::uint32_t>(number(4)); }
-  [[nodiscard]] double f64();
+  void u8(std::uint8_t& value) { value = reader_.u8(); }
+  void flag(bool& value) { value = reader_.u8() != 0; }
+  void u32(std::uint32_t& value) { value = static_cast<std::uint32_t>(number(4)); }
   void f64(std::span<double> values);
-  [[nodiscard]] std::string text();
+  void text(std::string& value);
   /// uint8[].
-  [[nodiscard]] std::vector<std::uint8_t> octets();
+  void octets(std::vector<std::uint8_t>& values);
   /// float64[].
-  [[nodiscard]] std::vector<double> doubles();
+  void doubles(std::vector<double>& values);
   /// How many elements follow, each of at least `bytes_per_element`: fails for more than can be.
-  [[nodiscard]] std::size_t count(std::size_t bytes_per_element);
+  template <typename Element>
+  void resize(std::vector<Element>& elements, std::size_t bytes_per_element) {
+    elements.resize(count(bytes_per_element));
+  }
   /// std_msgs/Header's number, which only ROS 1 has.
   void skip_sequence();
   /// builtin_interfaces/Time [ns].
-  [[nodiscard]] Stamp stamp();
+  void stamp(Stamp& value);
 
   /// Why what was read is no message: it is cut or goes on; null if it is one.
   [[nodiscard]] const char* problem() const;
@@ -51,11 +55,39 @@ class RosWire {
       : reader_(bytes), size_(bytes.size()), is_cdr_(is_cdr), is_big_endian_(is_big_endian) {}
 
   [[nodiscard]] std::uint64_t number(std::size_t size);
+  [[nodiscard]] std::size_t count(std::size_t bytes_per_element);
 
   ByteReader reader_;
   std::size_t size_;
   bool is_cdr_;
   bool is_big_endian_;
+};
+
+/// Writes what RosWire reads, as little-endian CDR.
+class RosWriter {
+ public:
+  void u8(std::uint8_t value) { bytes_.push_back(value); }
+  void flag(bool value) { u8(value ? 1 : 0); }
+  void u32(std::uint32_t value) { number(value, 4); }
+  void f64(std::span<const double> values);
+  void text(const std::string& value);
+  void octets(const std::vector<std::uint8_t>& values);
+  void doubles(const std::vector<double>& values);
+  template <typename Element>
+  void resize(const std::vector<Element>& elements, std::size_t /*bytes_per_element*/) {
+    u32(static_cast<std::uint32_t>(elements.size()));
+  }
+  void skip_sequence() {}
+  void stamp(Stamp value);
+  void fail() {}
+
+  /// With the encapsulation header.
+  [[nodiscard]] std::vector<std::uint8_t> release() { return std::move(bytes_); }
+
+ private:
+  void number(std::uint64_t value, std::size_t size);
+
+  std::vector<std::uint8_t> bytes_ = {0, 1, 0, 0};
 };
 
 }  // namespace km

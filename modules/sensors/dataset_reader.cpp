@@ -36,6 +36,12 @@ const char* to_string(ReaderFault fault) {
       return "depth or label images without a frame";
     case ReaderFault::kUnknownColor:
       return "label images with colours that are not in the palette";
+    case ReaderFault::kMalformedMessage:
+      return "messages that are not of their type";
+    case ReaderFault::kNoAcceleration:
+      return "samples of the gyroscope without an acceleration";
+    case ReaderFault::kDamagedBag:
+      return "damaged pieces of the recording";
   }
   return "unknown faults";
 }

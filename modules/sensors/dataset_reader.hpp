@@ -4,6 +4,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "modules/core/camera.hpp"
 #include "modules/core/fault_report.hpp"
@@ -31,6 +32,9 @@ enum class ReaderFault {
   kWrongImageFormat,   ///< Not the bits or channels of its kind: depth, labels.
   kImageWithoutFrame,  ///< A depth or label image that belongs to no frame.
   kUnknownColor,       ///< A label image with colours that are not in the palette.
+  kMalformedMessage,   ///< A message of a bag that is not of its type.
+  kNoAcceleration,     ///< A sample of a gyroscope with none of the accelerometer around it.
+  kDamagedBag,         ///< A piece of a bag that cannot be read (see BagFault).
 };
 
 /// A short plural for tables and log lines: "malformed rows".
@@ -57,7 +61,10 @@ class DatasetReader {
   [[nodiscard]] virtual std::optional<SensorPacket> next() = 0;
 
   /// Faults met so far.
-  [[nodiscard]] virtual const ReaderReport& report() const = 0;
+  [[nodiscard]] virtual ReaderReport report() const = 0;
+
+  /// What a user should know of how it is read, a line each; complete with the first packet.
+  [[nodiscard]] virtual std::vector<std::string> remarks() const { return {}; }
 
   /// Frames that next() can give at most.
   [[nodiscard]] virtual std::size_t pair_count() const = 0;

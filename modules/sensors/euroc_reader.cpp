@@ -15,8 +15,6 @@
 namespace km {
 namespace {
 
-constexpr double kGapPeriods = 2.5;  // one lost sample is no gap
-
 std::variant<ImuSample, RowFault> parse_imu(const TextRow& row) {
   Vector6 values;
   for (int i = 0; i < 6; ++i) {
@@ -35,18 +33,12 @@ std::variant<ImuSample, RowFault> parse_imu(const TextRow& row) {
   return RowFault{ReaderFault::kImplausible, why.str()};
 }
 
-std::vector<ImuSample> read_imu(const std::filesystem::path& file, ReaderReport& report) {
-  std::vector<ImuSample> samples;
-  for (const auto& row : read_ordered_rows<ImuSample>(file, 7, report, parse_imu)) {
-    samples.push_back(row.value);
-    samples.back().stamp = row.stamp;
-  }
-  if (samples.empty()) throw DatasetError(file.string() + ": holds no inertial sample");
-  return samples;
-}
-
-bool is_before(const ImuSample& sample, Stamp stamp) {
-  return sample.stamp < stamp;
+ImuStream read_imu(const std::filesystem::path& file, ReaderReport& report) {
+  ImuStream stream;
+  for (const auto& row : read_ordered_rows<ImuSample>(file, 7, report, parse_imu))
+    stream.add({row.stamp, row.value.gyro, row.value.accel});
+  if (stream.is_empty()) throw DatasetError(file.string() + ": holds no inertial sample");
+  return stream;
 }
 
 bool is_rgbd(const SensorRig& rig) {
@@ -71,25 +63,26 @@ EurocReader::EurocReader(const std::filesystem::path& folder, EurocCalibration c
     : mav0_(find_mav0(folder)),
       rig_(std::move(calibration.rig)),
       side_images_(mav0_, rig_.depth, calibration.depth_scale_m, options.labels),
-      pairs_(is_rgbd(rig_) ? list_euroc_lefts(mav0_, report_)
+      files_(is_rgbd(rig_) ? StereoPairFiles{list_euroc_lefts(mav0_, report_), {}}
                            : list_euroc_pairs(mav0_, options.stereo_tolerance_s, report_)),
       imu_(read_imu(mav0_ / "imu0" / "data.csv", report_)),
-      recording_start_(pairs_.front().stamp) {
+      recording_start_(files_.pairs.front().stamp) {
   if (!(options.from_s < options.to_s))
     throw std::invalid_argument("EurocReader: the window from " + std::to_string(options.from_s) +
                                 " s to " + std::to_string(options.to_s) + " s is empty");
-  side_images_.list(options.stereo_tolerance_s, pairs_, report_);
+  side_images_.list(options.stereo_tolerance_s.value_or(Synchrony().tolerance_s), files_.pairs,
+                    report_);
   select(options);
 }
 
 void EurocReader::select(const EurocOptions& options) {
-  const double end_s = seconds_between(recording_start_, pairs_.back().stamp);
-  std::erase_if(pairs_, [&](const StereoPairFile& pair) {
+  const double end_s = seconds_between(recording_start_, files_.pairs.back().stamp);
+  std::erase_if(files_.pairs, [&](const StereoPairFile& pair) {
     const double t_s = seconds_between(recording_start_, pair.stamp);
     return t_s < options.from_s || t_s >= options.to_s ||
            (options.not_before && pair.stamp < *options.not_before);
   });
-  if (!pairs_.empty()) return;
+  if (!files_.pairs.empty()) return;
   std::ostringstream message;
   message << mav0_.string() << ": no stereo pair from " << options.from_s << " s to "
           << options.to_s << " s; the recording has them from 0 s to " << end_s << " s";
@@ -97,34 +90,30 @@ void EurocReader::select(const EurocOptions& options) {
 }
 
 bool EurocReader::has_imu(const StereoPairFile& pair) {
-  if (imu_.front().stamp <= pair.stamp && pair.stamp <= imu_.back().stamp) return true;
-  report_.add(ReaderFault::kPairWithoutImu,
-              at_line(mav0_ / "cam0" / "data.csv", pair.line) + ": the inertial samples " +
-                  (pair.stamp < imu_.front().stamp ? "start later" : "end before it"));
+  const bool starts_by = imu_.starts_by(pair.stamp);
+  if (starts_by && imu_.reaches(pair.stamp)) return true;
+  report_.add(ReaderFault::kPairWithoutImu, at_line(mav0_ / "cam0" / "data.csv", pair.line) +
+                                                ": the inertial samples " +
+                                                (starts_by ? "end before it" : "start later"));
   return false;
 }
 
 std::vector<ImuSample> EurocReader::imu_until(Stamp stamp) {
-  const auto last = std::lower_bound(imu_.begin(), imu_.end(), stamp, is_before);
-  const auto first =
-      last_imu_ ? imu_.begin() + static_cast<std::ptrdiff_t>(*last_imu_)
-                : std::lower_bound(imu_.begin(), last, stamp - nanoseconds(kLeadIn_s), is_before);
-  last_imu_ = static_cast<std::size_t>(last - imu_.begin());
+  std::vector<ImuSample> samples = imu_.until(stamp);
+  for (const ImuGap& gap : imu_gaps(samples, rig_.imu.rate_hz))
+    report_.add(ReaderFault::kImuGap,
+                (mav0_ / "imu0" / "data.csv").string() + ": " + to_string(gap));
+  return samples;
+}
 
-  const double max_period_s = kGapPeriods / rig_.imu.rate_hz;
-  for (auto sample = first; sample != last; ++sample) {
-    const double period_s = seconds_between(sample->stamp, std::next(sample)->stamp);
-    if (period_s > max_period_s)
-      report_.add(ReaderFault::kImuGap, (mav0_ / "imu0" / "data.csv").string() + ": " +
-                                            std::to_string(period_s) + " s after " +
-                                            std::to_string(sample->stamp));
-  }
-  return {first, std::next(last)};
+std::vector<std::string> EurocReader::remarks() const {
+  if (!is_remarkable(files_.synchrony)) return {};
+  return {to_string(files_.synchrony, "right")};
 }
 
 std::optional<SensorPacket> EurocReader::next() {
-  while (next_pair_ < pairs_.size()) {
-    const StereoPairFile& pair = pairs_[next_pair_++];
+  while (next_pair_ < files_.pairs.size()) {
+    const StereoPairFile& pair = files_.pairs[next_pair_++];
     if (!has_imu(pair)) continue;
     StereoPairResult loaded = load_stereo_pair(pair, rig_.stereo);
     if (loaded.status != ImageStatus::kOk) {

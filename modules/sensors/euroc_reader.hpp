@@ -8,6 +8,7 @@
 
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/frame_files.hpp"
+#include "modules/sensors/imu_stream.hpp"
 
 namespace km {
 
@@ -22,9 +23,10 @@ struct EurocOptions {
   double from_s = 0.0;                                    ///< First instant that belongs to it.
   double to_s = std::numeric_limits<double>::infinity();  ///< First that does not.
   std::optional<Stamp> not_before = {};                   ///< No frame before this instant.
-  double stereo_tolerance_s = 1e-3;  ///< Left to right (depth, label) stamp, at most.
-  bool depth = false;                ///< Depth images also beside a right camera (open_euroc()).
-  bool labels = false;               ///< Label images.
+  /// Left to right (depth, label) stamp, at most; nullopt: see find_synchrony().
+  std::optional<double> stereo_tolerance_s = {};
+  bool depth = false;   ///< Depth images also beside a right camera (open_euroc()).
+  bool labels = false;  ///< Label images.
 };
 
 /// The folder of a EuRoC recording that holds cam0 and imu0: `folder`/mav0, or `folder` itself.
@@ -36,12 +38,10 @@ struct EurocOptions {
 /// channel. Labels: label0, 8-bit ids, or colours of label_palette.csv beside it. Both may come at
 /// a lower rate than images: a frame then has none.
 ///
-/// The first packet starts up to kLeadIn_s before its frame, also where that lies before `from_s`:
-/// odometry can begin with what the inertial sensor felt before the first image.
+/// The first packet starts up to ImuStream::kLeadIn_s before its frame, also where that lies before
+/// `from_s`.
 class EurocReader final : public DatasetReader {
  public:
-  static constexpr double kLeadIn_s = 1.0;
-
   /// `folder` as find_mav0() takes it; open_euroc() of the codec reads the calibration from it.
   /// Reads the lists, no image. Depth images are read if the rig has a depth range. Throws
   /// DatasetError for what is missing or unusable, labels asked for included, and for a window
@@ -51,8 +51,10 @@ class EurocReader final : public DatasetReader {
 
   [[nodiscard]] const SensorRig& rig() const override { return rig_; }
   [[nodiscard]] std::optional<SensorPacket> next() override;
-  [[nodiscard]] const ReaderReport& report() const override { return report_; }
-  [[nodiscard]] std::size_t pair_count() const override { return pairs_.size(); }
+  [[nodiscard]] ReaderReport report() const override { return report_; }
+  [[nodiscard]] std::size_t pair_count() const override { return files_.pairs.size(); }
+
+  [[nodiscard]] std::vector<std::string> remarks() const override;
 
   /// Of the labels; empty if none are read, or for ids without one.
   [[nodiscard]] const LabelPalette& label_palette() const { return side_images_.palette(); }
@@ -61,8 +63,8 @@ class EurocReader final : public DatasetReader {
   [[nodiscard]] Stamp recording_start() const { return recording_start_; }
 
   /// First and last frame of the window.
-  [[nodiscard]] Stamp first_stamp() const { return pairs_.front().stamp; }
-  [[nodiscard]] Stamp last_stamp() const { return pairs_.back().stamp; }
+  [[nodiscard]] Stamp first_stamp() const { return files_.pairs.front().stamp; }
+  [[nodiscard]] Stamp last_stamp() const { return files_.pairs.back().stamp; }
 
  private:
   void select(const EurocOptions& options);
@@ -73,11 +75,10 @@ class EurocReader final : public DatasetReader {
   ReaderReport report_;
   SensorRig rig_;
   SideImages side_images_;
-  std::vector<StereoPairFile> pairs_;  // of the window
-  std::vector<ImuSample> imu_;         // of the recording
+  StereoPairFiles files_;  // of the window
+  ImuStream imu_;          // of the recording
   Stamp recording_start_ = 0;
   std::size_t next_pair_ = 0;
-  std::optional<std::size_t> last_imu_;  // last sample of the packet before
 };
 
 }  // namespace km

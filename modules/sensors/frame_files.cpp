@@ -33,6 +33,12 @@ std::vector<ListedImage> list_images(const std::filesystem::path& camera, Reader
   return images;
 }
 
+std::vector<Stamp> stamps_of(const std::vector<ListedImage>& images) {
+  std::vector<Stamp> stamps;
+  for (const ListedImage& image : images) stamps.push_back(image.stamp);
+  return stamps;
+}
+
 LabelPalette read_palette(const std::filesystem::path& file) {
   if (is_absent(file)) return {};
   try {
@@ -44,10 +50,12 @@ LabelPalette read_palette(const std::filesystem::path& file) {
 
 }  // namespace
 
-std::vector<StereoPairFile> list_euroc_pairs(const std::filesystem::path& mav0, double tolerance_s,
-                                             ReaderReport& report) {
+StereoPairFiles list_euroc_pairs(const std::filesystem::path& mav0,
+                                 std::optional<double> tolerance_s, ReaderReport& report) {
   const auto lefts = list_images(mav0 / "cam0", report);
   const auto rights = list_images(mav0 / "cam1", report);
+  const Synchrony synchrony = tolerance_s ? Synchrony{.tolerance_s = *tolerance_s}
+                                          : find_synchrony(stamps_of(lefts), stamps_of(rights));
   const auto lonely = [&](ReaderFault fault, const char* camera, const ListedImage& image) {
     report.add(fault, at_line(mav0 / camera / "data.csv", image.line) + ": " +
                           image.file.filename().string());
@@ -58,10 +66,11 @@ std::vector<StereoPairFile> list_euroc_pairs(const std::filesystem::path& mav0, 
   while (left != lefts.end() || right != rights.end()) {
     const bool no_left = left == lefts.end();
     const bool no_right = right == rights.end();
-    const double offset_s = no_left || no_right ? 0.0 : seconds_between(left->stamp, right->stamp);
-    if (no_right || offset_s > tolerance_s) {
+    const double off_s =
+        no_left || no_right ? 0.0 : seconds_between(left->stamp, right->stamp) - synchrony.offset_s;
+    if (no_right || off_s > synchrony.tolerance_s) {
       lonely(ReaderFault::kLeftWithoutRight, "cam0", *left++);
-    } else if (no_left || offset_s < -tolerance_s) {
+    } else if (no_left || off_s < -synchrony.tolerance_s) {
       lonely(ReaderFault::kRightWithoutLeft, "cam1", *right++);
     } else {
       pairs.push_back({left->stamp, left->file, right->file, left->line, {}, {}});
@@ -70,8 +79,8 @@ std::vector<StereoPairFile> list_euroc_pairs(const std::filesystem::path& mav0, 
   }
   if (pairs.empty())
     throw DatasetError(mav0.string() + ": no image of cam0 has one of cam1 within " +
-                       std::to_string(tolerance_s) + " s");
-  return pairs;
+                       std::to_string(synchrony.tolerance_s) + " s");
+  return {std::move(pairs), synchrony};
 }
 
 std::vector<StereoPairFile> list_euroc_lefts(const std::filesystem::path& mav0,

@@ -9,6 +9,7 @@
 #include "modules/core/label_palette.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/image_file.hpp"
+#include "modules/sensors/synchrony.hpp"
 
 namespace km {
 
@@ -22,12 +23,19 @@ struct StereoPairFile {
   std::filesystem::path labels;  ///< Empty: none.
 };
 
+/// Stereo pairs, ascending, and how their stamps go together.
+struct StereoPairFiles {
+  std::vector<StereoPairFile> pairs;
+  Synchrony synchrony;
+};
+
 /// The stereo pairs of a EuRoC folder: rows `stamp [ns], file` of cam0/data.csv and cam1/data.csv,
-/// matched by stamps at most `tolerance_s` apart; ascending. Faulty rows and images without a
-/// partner are counted in `report`. Throws DatasetError if a list is missing or holds no image.
-[[nodiscard]] std::vector<StereoPairFile> list_euroc_pairs(const std::filesystem::path& mav0,
-                                                           double tolerance_s,
-                                                           ReaderReport& report);
+/// matched by stamps at most `tolerance_s` apart, or, without it, as find_synchrony() finds them to
+/// be. Faulty rows and images without a partner are counted in `report`. Throws DatasetError if a
+/// list is missing or holds no image.
+[[nodiscard]] StereoPairFiles list_euroc_pairs(const std::filesystem::path& mav0,
+                                               std::optional<double> tolerance_s,
+                                               ReaderReport& report);
 
 /// The left images of a EuRoC folder alone, for an RGB-D rig. Faults and errors as above.
 [[nodiscard]] std::vector<StereoPairFile> list_euroc_lefts(const std::filesystem::path& mav0,

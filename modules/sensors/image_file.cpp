@@ -33,11 +33,6 @@ std::optional<cv::Size> stated_size(std::string_view bytes) {
   return cv::Size(static_cast<int>(size->width), static_cast<int>(size->height));
 }
 
-LoadedImage<cv::Mat> failure(ImageStatus status, const std::filesystem::path& file,
-                             const std::string& why) {
-  return {status, file.string() + ": " + why, {}};
-}
-
 std::string text(const cv::Size& size) {
   return std::to_string(size.width) + 'x' + std::to_string(size.height);
 }
@@ -79,31 +74,46 @@ ReaderFault fault_of(ImageStatus status) {
 
 ImageResult load_gray_image(const std::filesystem::path& file, int width, int height) {
   LoadedImage<cv::Mat> loaded = decode_image(file, cv::IMREAD_GRAYSCALE, {width, height});
-  if (loaded.status != ImageStatus::kOk) return failure_of<GrayImage>(std::move(loaded));
+  if (loaded.status != ImageStatus::kOk) return failure_of<GrayImage>(loaded);
   const cv::Mat& decoded = loaded.image;
   return {ImageStatus::kOk, {}, {width, height, {decoded.datastart, decoded.dataend}}};
+}
+
+LoadedImage<cv::Mat> image_failure(ImageStatus status, const std::string& place,
+                                   const std::string& why) {
+  return {status, place + ": " + why, {}};
+}
+
+LoadedImage<cv::Mat> wrong_size(const std::string& place, const cv::Size& found,
+                                const cv::Size& size) {
+  return image_failure(ImageStatus::kWrongSize, place,
+                       text(found) + " px, the calibration says " + text(size));
 }
 
 LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file, int flags,
                                   const cv::Size& size) {
   if (!is_file(file))
-    return failure(ImageStatus::kMissing, file,
-                   "no such image" + (is_absent(file) ? "" : ": " + problem_of_file(file)));
-  std::string bytes;
+    return image_failure(ImageStatus::kMissing, file.string(),
+                         "no such image" + (is_absent(file) ? "" : ": " + problem_of_file(file)));
   try {
-    bytes = read_input_file(file, kMaxEncoded_bytes);
+    return decode_image(read_input_file(file, kMaxEncoded_bytes), file.string(), flags, size);
   } catch (const InputFileError& error) {
     return {ImageStatus::kUnreadable, error.what(), {}};
   }
-  if (bytes.empty()) return failure(ImageStatus::kUnreadable, file, "empty file");
-  if (is_truncated(bytes)) return failure(ImageStatus::kUnreadable, file, "truncated image");
-  const auto wrong_size = [&](const cv::Size& found) {
-    return failure(ImageStatus::kWrongSize, file,
-                   text(found) + " px, the calibration says " + text(size));
-  };
-  if (const auto stated = stated_size(bytes); stated && *stated != size) return wrong_size(*stated);
+}
 
-  const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8UC1, bytes.data());
+LoadedImage<cv::Mat> decode_image(std::string_view bytes, const std::string& place, int flags,
+                                  const cv::Size& size) {
+  const auto unreadable = [&place](const std::string& why) {
+    return image_failure(ImageStatus::kUnreadable, place, why);
+  };
+  if (bytes.empty()) return unreadable("empty file");
+  if (is_truncated(bytes)) return unreadable("truncated image");
+  if (const auto stated = stated_size(bytes); stated && *stated != size)
+    return wrong_size(place, *stated, size);
+
+  const cv::_InputArray encoded(reinterpret_cast<const std::uint8_t*>(bytes.data()),
+                                static_cast<int>(bytes.size()));
   // IMREAD_UNCHANGED is -1, orientation included: a flag more would make it another mode.
   const int mode = flags == cv::IMREAD_UNCHANGED
                        ? flags
@@ -112,34 +122,47 @@ LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file, int flags,
   try {
     decoded = cv::imdecode(encoded, mode);
   } catch (const cv::Exception& error) {
-    return failure(ImageStatus::kUnreadable, file, "cannot be decoded: " + error.err);
+    return unreadable("cannot be decoded: " + error.err);
   }
-  if (decoded.empty())
-    return failure(ImageStatus::kUnreadable, file, "not an image that can be decoded");
-  if (decoded.size() != size) return wrong_size(decoded.size());
+  if (decoded.empty()) return unreadable("not an image that can be decoded");
+  if (decoded.size() != size) return wrong_size(place, decoded.size(), size);
   return {ImageStatus::kOk, {}, std::move(decoded)};
 }
 
 DepthResult load_depth_image(const std::filesystem::path& file, int width, int height,
                              double scale_m, const DepthRange& range) {
-  LoadedImage<cv::Mat> loaded = decode_image(file, cv::IMREAD_UNCHANGED, {width, height});
-  if (loaded.status != ImageStatus::kOk) return failure_of<DepthImage>(std::move(loaded));
-  const cv::Mat& decoded = loaded.image;
-  if (decoded.type() != CV_16UC1)
-    return {ImageStatus::kWrongFormat,
-            file.string() + ": " + std::to_string(8 * decoded.elemSize1()) + " bits and " +
-                std::to_string(decoded.channels()) +
-                " channels, depth is an image of 16 bits and one channel",
-            {}};
-  DepthResult result;
-  result.image = {width, height, {decoded.begin<std::uint16_t>(), decoded.end<std::uint16_t>()}};
-  const double scale_mm = 1e3 * scale_m, min_mm = 1e3 * range.min_m;
+  return depth_image_of(decode_image(file, cv::IMREAD_UNCHANGED, {width, height}), file.string(),
+                        scale_m, range);
+}
+
+DepthResult depth_image_of(const LoadedImage<cv::Mat>& decoded, const std::string& place,
+                           double scale_m, const DepthRange& range) {
+  if (decoded.status != ImageStatus::kOk) return failure_of<DepthImage>(decoded);
+  const cv::Mat& image = decoded.image;
+  const double min_mm = 1e3 * range.min_m;
   const double max_mm = std::min(1e3 * range.max_m, kMaxStored_mm);
-  for (std::uint16_t& value : result.image.millimetres) {
-    const double depth_mm = scale_mm * value;
-    const bool measured =
-        value != 0 && value != kNoMeasurement && depth_mm >= min_mm && depth_mm <= max_mm;
-    value = measured ? static_cast<std::uint16_t>(depth_mm + 0.5) : std::uint16_t{0};
+  const auto stored = [&](double depth_mm) {
+    const bool measured = depth_mm > 0.0 && depth_mm >= min_mm && depth_mm <= max_mm;  // not NaN
+    return measured ? static_cast<std::uint16_t>(depth_mm + 0.5) : std::uint16_t{0};
+  };
+  DepthResult result;
+  result.image = {image.cols, image.rows, std::vector<std::uint16_t>(image.total())};
+  std::uint16_t* const values = result.image.millimetres.data();
+  if (image.type() == CV_16UC1) {
+    const double scale_mm = 1e3 * scale_m;
+    std::transform(image.begin<std::uint16_t>(), image.end<std::uint16_t>(), values,
+                   [&](std::uint16_t units) {
+                     return units == kNoMeasurement ? std::uint16_t{0} : stored(scale_mm * units);
+                   });
+  } else if (image.type() == CV_32FC1) {
+    std::transform(image.begin<float>(), image.end<float>(), values,
+                   [&](float depth_m) { return stored(1e3 * static_cast<double>(depth_m)); });
+  } else {
+    return {ImageStatus::kWrongFormat,
+            place + ": " + std::to_string(8 * image.elemSize1()) + " bits and " +
+                std::to_string(image.channels()) +
+                " channels, depth is an image of 16 bits and one channel, or of metres",
+            {}};
   }
   return result;
 }
@@ -147,7 +170,7 @@ DepthResult load_depth_image(const std::filesystem::path& file, int width, int h
 LabelResult load_label_image(const std::filesystem::path& file, int width, int height,
                              const LabelPalette& palette) {
   LoadedImage<cv::Mat> loaded = decode_image(file, cv::IMREAD_UNCHANGED, {width, height});
-  if (loaded.status != ImageStatus::kOk) return {failure_of<LabelImage>(std::move(loaded)), 0};
+  if (loaded.status != ImageStatus::kOk) return {failure_of<LabelImage>(loaded), 0};
   const cv::Mat& decoded = loaded.image;
   LabelResult result;
   result.image = {width, height, {}};

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 #include <string>
+#include <string_view>
 
 #include "modules/core/camera.hpp"
 #include "modules/core/frame.hpp"
@@ -36,10 +37,22 @@ using ImageResult = LoadedImage<GrayImage>;
 [[nodiscard]] LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file, int flags,
                                                 const cv::Size& size);
 
+/// Likewise, of the bytes of such a file, which come from `place`.
+[[nodiscard]] LoadedImage<cv::Mat> decode_image(std::string_view bytes, const std::string& place,
+                                                int flags, const cv::Size& size);
+
+/// Why an image cannot be used: "PLACE: WHY".
+[[nodiscard]] LoadedImage<cv::Mat> image_failure(ImageStatus status, const std::string& place,
+                                                 const std::string& why);
+
+/// Why an image is none of this size.
+[[nodiscard]] LoadedImage<cv::Mat> wrong_size(const std::string& place, const cv::Size& found,
+                                              const cv::Size& size);
+
 /// What decode_image() said, for an image of another type.
 template <typename Image>
-[[nodiscard]] LoadedImage<Image> failure_of(LoadedImage<cv::Mat> decoded) {
-  return {decoded.status, std::move(decoded.problem), {}};
+[[nodiscard]] LoadedImage<Image> failure_of(const LoadedImage<cv::Mat>& decoded) {
+  return {decoded.status, decoded.problem, {}};
 }
 
 using DepthResult = LoadedImage<DepthImage>;
@@ -48,6 +61,12 @@ using DepthResult = LoadedImage<DepthImage>;
 /// 0, 65535 (what many sensors write), and what lies outside `range` or beyond 65.535 m.
 [[nodiscard]] DepthResult load_depth_image(const std::filesystem::path& file, int width, int height,
                                            double scale_m, const DepthRange& range);
+
+/// Likewise, of an image from `place` that is decoded already; one of 32-bit floating point numbers
+/// is in metres, whatever the scale.
+[[nodiscard]] DepthResult depth_image_of(const LoadedImage<cv::Mat>& decoded,
+                                         const std::string& place, double scale_m,
+                                         const DepthRange& range);
 
 struct LabelResult : LoadedImage<LabelImage> {
   std::size_t unknown_pixels = 0;  ///< Of a colour that the palette does not have: id 0.

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "modules/core/config.hpp"
 
 namespace km {
@@ -8,7 +10,7 @@ namespace km {
 struct SensorsConfig {
   static constexpr const char* kSection = "sensors";
 
-  double stereo_tolerance_s = 1e-3;
+  std::optional<double> stereo_tolerance_s;
   int read_ahead = 8;
   double max_lag_s = 0.5;
   bool depth = false;
@@ -16,7 +18,8 @@ struct SensorsConfig {
 
   void visit_fields(auto& visitor) {
     visitor.field("stereo_tolerance_s", stereo_tolerance_s, {0.0, 0.1},
-                  "[s] largest difference between the stamps of left and right");
+                  "[s] largest difference between the stamps of left and right; none: it follows "
+                  "from the first stamps, as does a constant difference");
     visitor.field("read_ahead", read_ahead, {1, 1000},
                   "stereo pairs decoded ahead of the one being published, so that nobody waits");
     visitor.field("max_lag_s", max_lag_s, {0.0, 1e6},

@@ -64,6 +64,7 @@ void SensorsNode::stop() noexcept {
 }
 
 void SensorsNode::decode() {
+  bool has_remarked = false;
   try {
     while (!stopped_) {
       auto packet = [this] {
@@ -71,6 +72,8 @@ void SensorsNode::decode() {
         const auto scope = reading_.measure();
         return reader_->next();
       }();
+      if (!std::exchange(has_remarked, true))
+        for (const std::string& remark : reader_->remarks()) log::info(name()) << remark;
       if (!packet) {
         worker_.post(EndOfData{reader_->report()});
         return;

@@ -1,6 +1,7 @@
 #include "modules/sensors/stamp_order.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <optional>
@@ -97,6 +98,30 @@ std::vector<StampVerdict> judge_stamps(std::span<const Stamp> stamps) {
     if (after && before) verdicts[i] = StampVerdict::kJump;
   }
   return verdicts;
+}
+
+StampVerdict StampOrder::judge(Stamp stamp) {
+  const Stamp pause = nanoseconds(kLongestPause_s);
+  // Stamps of messages are any numbers: their differences may have no place in a Stamp.
+  const auto is_near = [pause](Stamp a, Stamp b) {
+    return std::abs(static_cast<double>(a) - static_cast<double>(b)) <= static_cast<double>(pause);
+  };
+  if (!last_ || is_near(*last_, stamp)) {
+    jumps_ = 0;
+    if (last_ && stamp == *last_) return StampVerdict::kRepeated;
+    if (last_ && stamp < *last_) return StampVerdict::kUnordered;
+    last_ = stamp;
+    good_ = std::min(good_ + 1, kNewTimes);
+    return StampVerdict::kGood;
+  }
+  const bool goes_on = jumps_ > 0 && stamp > *jump_ && is_near(*jump_, stamp);
+  jumps_ = goes_on ? jumps_ + 1 : 1;
+  jump_ = stamp;
+  if (jumps_ < kNewTimes || (stamp < *last_ && good_ == kNewTimes)) return StampVerdict::kJump;
+  last_ = stamp;
+  good_ = 1;
+  jumps_ = 0;
+  return StampVerdict::kGood;
 }
 
 }  // namespace km

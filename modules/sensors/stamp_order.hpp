@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -23,5 +24,21 @@ enum class StampVerdict {
 /// wrong one, however far off, costs itself and not what follows it. Good is a longest subsequence
 /// that ascends strictly and in steps of at most kLongestPause_s. O(n log n).
 [[nodiscard]] std::vector<StampVerdict> judge_stamps(std::span<const Stamp> stamps);
+
+/// Judges the stamps of a stream, each as it comes. Good are those that ascend in steps of at most
+/// kLongestPause_s. Where kNewTimes stamps in a row jump to the same other time, the clock was set:
+/// from there on that time is the stream's, unless it is earlier than what was good for longer.
+class StampOrder {
+ public:
+  static constexpr int kNewTimes = 3;
+
+  [[nodiscard]] StampVerdict judge(Stamp stamp);
+
+ private:
+  std::optional<Stamp> last_;  // good
+  int good_ = 0;               // since the clock was set, at most kNewTimes
+  std::optional<Stamp> jump_;  // the last that jumped
+  int jumps_ = 0;              // in a row, to one other time
+};
 
 }  // namespace km

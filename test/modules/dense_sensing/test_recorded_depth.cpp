@@ -34,7 +34,7 @@ TEST_CASE("Dense depth agrees with triangulated corners on MH_01", "[stereo_dept
   const auto folder = shared_data("euroc/MH_01_easy");
   if (!folder) return;
   ReaderReport report;
-  auto pairs = list_euroc_pairs(*folder / "mav0", 0.001, report);
+  auto pairs = list_euroc_pairs(*folder / "mav0", 0.001, report).pairs;
   pairs.resize(300);  // 15 s
   check(pairs, read_euroc_rig(*folder / "mav0").stereo, 30, {.downscale = GENERATE(1, 2)});
 }

@@ -52,7 +52,7 @@ inline std::vector<RecordedKeyframe> load_mh_01(const std::filesystem::path& seq
   const auto truth = read_trajectory(sequence / "mav0/state_groundtruth_estimate0");
   ReaderReport report;
   std::vector<RecordedKeyframe> keyframes;
-  const auto pairs = list_euroc_pairs(sequence / "mav0", 0.001, report);
+  const auto pairs = list_euroc_pairs(sequence / "mav0", 0.001, report).pairs;
   Stamp next = pairs.front().stamp;
   for (const StereoPairFile& files : pairs) {
     if (files.stamp < next || seconds_between(pairs.front().stamp, files.stamp) >= 15.0) continue;

@@ -20,7 +20,7 @@ class FakeReader final : public DatasetReader {
       : count_(count), period_s_(period_s), fails_(fails) {}
 
   const SensorRig& rig() const override { return rig_; }
-  const ReaderReport& report() const override { return report_; }
+  ReaderReport report() const override { return report_; }
   std::size_t pair_count() const override { return static_cast<std::size_t>(count_); }
   std::optional<SensorPacket> next() override {
     if (read_ == count_ && fails_) throw DatasetError("disk gone");

@@ -51,7 +51,8 @@ void check_recording(EurocReader& reader) {
       if (i > 0) CHECK(packet.imu[i - 1].stamp < packet.imu[i].stamp);
     }
   }
-  for (const auto& [fault, entry] : reader.report().entries()) {
+  const ReaderReport report = reader.report();
+  for (const auto& [fault, entry] : report.entries()) {
     CAPTURE(to_string(fault), entry.first);
     CHECK(entry.first.find("/mav0/") != entry.first.npos);
     CHECK(entry.first.size() < 1000);
@@ -111,7 +112,8 @@ TEST_CASE("A bad row is lost and counted with its line, and no other", "[sensors
   EurocReader reader = open_euroc(folder.root());
   CHECK(packets_of(reader).size() == row.packets);
   REQUIRE(reader.report().count(row.fault) == 1);
-  CHECK_THAT(reader.report().entries().at(row.fault).first,
+  const ReaderReport report = reader.report();
+  CHECK_THAT(report.entries().at(row.fault).first,
              Catch::Contains(std::string(row.file) + " line " + std::to_string(row.line)));
   CHECK(reader.report().count(ReaderFault::kImuGap) == 0);
 }

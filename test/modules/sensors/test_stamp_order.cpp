@@ -1,6 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <limits>
 #include <random>
 
 #include "modules/sensors/stamp_order.hpp"
@@ -70,6 +71,31 @@ TEST_CASE("No choice of stamps in order keeps more", "[sensors]") {
     last = stamps[i];
   }
   CHECK(std::count(verdicts.begin(), verdicts.end(), kGood) == most);
+}
+
+Verdicts judged_as_they_come(const std::vector<Stamp>& stamps) {
+  StampOrder order;
+  Verdicts verdicts;
+  for (const Stamp stamp : stamps) verdicts.push_back(order.judge(stamp));
+  return verdicts;
+}
+
+TEST_CASE("Stamps of a stream are judged as they come", "[sensors]") {
+  CHECK(judged_as_they_come({10, 20, 20, 15, 30}) ==
+        Verdicts{kGood, kGood, kRepeated, kUnordered, kGood});
+  CHECK(judged_as_they_come({10, 20, kDay, 30, -kDay, 40}) ==
+        Verdicts{kGood, kGood, kJump, kGood, kJump, kGood});
+  const Stamp least = std::numeric_limits<Stamp>::min(), most = std::numeric_limits<Stamp>::max();
+  CHECK(judged_as_they_come({10, least, most, 20}) == Verdicts{kGood, kJump, kJump, kGood});
+}
+
+TEST_CASE("The clock of a stream may be set, but not back behind what was used", "[sensors]") {
+  // Forward, as by a time server; also where it began with a stamp of no clock at all.
+  CHECK(judged_as_they_come({10, 20, 30, 40, kDay, kDay + 1, kDay + 2, kDay + 3}) ==
+        Verdicts{kGood, kGood, kGood, kGood, kJump, kJump, kGood, kGood});
+  CHECK(judged_as_they_come({kDay, 10, 20, 30, 40}) == Verdicts{kGood, kJump, kJump, kGood, kGood});
+  CHECK(judged_as_they_come({kDay, kDay + 1, kDay + 2, 10, 20, 30, 40, kDay + 3}) ==
+        Verdicts{kGood, kGood, kGood, kJump, kJump, kJump, kJump, kGood});
 }
 
 }  // namespace

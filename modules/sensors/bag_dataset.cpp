@@ -1,0 +1,261 @@
+#include "modules/sensors/bag_dataset.hpp"
+
+#include <algorithm>
+#include <sstream>
+#include <utility>
+
+#include "modules/core/imu_limits.hpp"
+#include "modules/core/text_rows.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/recordings/ros_messages.hpp"
+#include "modules/sensors/ros_image.hpp"
+
+namespace km {
+namespace {
+
+// A frame that has come waits so long, by the log, for inertial samples up to it.
+constexpr double kImuPatience_s = 2.0;
+
+bool is_imu(const BagChannel& channel) {
+  return is_of_type(channel, RosImu::kType);
+}
+
+// " /a, /b", or " none".
+std::string names_of(const std::vector<BagChannel>& channels, bool (*is_kind)(const BagChannel&)) {
+  std::string names;
+  for (const BagChannel& channel : channels)
+    if (is_kind(channel)) names += (names.empty() ? " " : ", ") + readable(channel.topic, 80);
+  return names.empty() ? " none" : names;
+}
+
+ReaderFault fault_of(StampVerdict verdict) {
+  switch (verdict) {
+    case StampVerdict::kRepeated:
+      return ReaderFault::kRepeatedStamp;
+    case StampVerdict::kJump:
+      return ReaderFault::kJumpingStamp;
+    default:
+      return ReaderFault::kUnorderedStamp;
+  }
+}
+
+cv::Size size_of(const StereoRig& rig, std::size_t camera) {
+  return {rig.cameras[camera].width, rig.cameras[camera].height};
+}
+
+}  // namespace
+
+BagDataset::BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig,
+                       std::optional<double> stereo_tolerance_s, const BagWindow& window)
+    : name_(std::move(name)),
+      bag_(std::move(bag)),
+      rig_(std::move(rig)),
+      window_(window),
+      joiner_(!rig_.topics.right.empty(), !rig_.topics.depth.empty(), stereo_tolerance_s) {
+  find_topics();
+  first_ = read_packet();
+  if (first_) return;
+  std::ostringstream message;
+  message << name_ << ": no frame with inertial samples";
+  if (start_) message << " from " << window.from_s << " s to " << window.to_s << " s";
+  std::istringstream faults(to_string(report()));
+  for (std::string line; std::getline(faults, line);) message << "; " << line;
+  throw DatasetError(message.str());
+}
+
+void BagDataset::find_topics() {
+  const SensorTopicNames& topics = rig_.topics;
+  role_of_.assign(bag_->channels().size(), Role::kNone);
+  const std::pair<const std::string&, Role> wanted[] = {
+      {topics.left, Role::kLeft}, {topics.right, Role::kRight}, {topics.depth, Role::kDepth},
+      {topics.imu, Role::kImu},   {topics.gyro, Role::kGyro},   {topics.accel, Role::kAccel}};
+  for (const auto& [topic, role] : wanted)
+    if (!topic.empty()) assign(topic, role);
+  const auto count = [this](Role role) {
+    std::uint64_t messages = 0;
+    for (std::size_t k = 0; k < role_of_.size(); ++k)
+      if (role_of_[k] == role) messages += bag_->channels()[k].message_count;
+    return messages;
+  };
+  pair_count_ = count(Role::kLeft);
+  if (!topics.right.empty()) pair_count_ = std::min(pair_count_, count(Role::kRight));
+}
+
+void BagDataset::assign(const std::string& topic, Role role) {
+  const auto& channels = bag_->channels();
+  const bool is_image = role == Role::kLeft || role == Role::kRight || role == Role::kDepth;
+  const auto is_kind = is_image ? has_images : is_imu;
+  bool is_there = false;
+  for (std::size_t k = 0; k < channels.size(); ++k) {
+    if (channels[k].topic != topic) continue;
+    if (!is_kind(channels[k]))
+      throw DatasetError(name_ + ": topic " + readable(topic, 80) + " has messages of " +
+                         readable(channels[k].type, 80) + ", not of sensor_msgs/" +
+                         (is_image ? "Image or CompressedImage" : "Imu"));
+    role_of_[k] = role;
+    is_there = true;
+  }
+  if (!is_there)
+    throw DatasetError(name_ + ": no topic " + readable(topic, 80) + "; topics with " +
+                       (is_image ? "images:" : "inertial samples:") + names_of(channels, is_kind));
+}
+
+std::string BagDataset::place_of(const BagMessage& message) const {
+  return name_ + ": " + readable(bag_->channels()[message.channel].topic, 80) + " recorded at " +
+         std::to_string(message.log_time);
+}
+
+bool BagDataset::read_message() {
+  if (ended_) return false;
+  auto message = bag_->next();
+  if (!message) {
+    ended_ = true;
+    joiner_.finish();
+    return false;
+  }
+  newest_log_time_ = std::max(newest_log_time_, message->log_time);
+  role_of_.resize(bag_->channels().size(), Role::kNone);
+  const Role role = role_of_[message->channel];
+  if (role != Role::kNone) take(role, std::move(*message));
+  return true;
+}
+
+void BagDataset::take(Role role, BagMessage message) {
+  const auto header =
+      decode_ros<RosHeader>(bag_->channels()[message.channel].encoding, message.bytes);
+  if (!header.value) {
+    report_.add(ReaderFault::kMalformedMessage, place_of(message) + ": " + header.refusal);
+    return;
+  }
+  Stamp stamp = header.value->stamp;
+  const StampVerdict verdict = order_[static_cast<std::size_t>(role)].judge(stamp);
+  if (verdict != StampVerdict::kGood) {
+    report_.add(fault_of(verdict), place_of(message) + ": stamp " + std::to_string(stamp));
+    return;
+  }
+  if (role == Role::kImu || role == Role::kGyro || role == Role::kAccel) {
+    take_imu(role, stamp, message);
+    return;
+  }
+  stamp += nanoseconds(rig_.image_time_offset_s);
+  const ImageRole image = role == Role::kLeft    ? ImageRole::kLeft
+                          : role == Role::kRight ? ImageRole::kRight
+                                                 : ImageRole::kDepth;
+  joiner_.add(image, stamp, std::move(message));
+}
+
+void BagDataset::take_imu(Role role, Stamp stamp, const BagMessage& message) {
+  const auto imu = decode_ros<RosImu>(bag_->channels()[message.channel].encoding, message.bytes);
+  if (!imu.value) {
+    report_.add(ReaderFault::kMalformedMessage, place_of(message) + ": " + imu.refusal);
+    return;
+  }
+  ImuSample sample{stamp, imu.value->angular_velocity, imu.value->linear_acceleration};
+  if (role == Role::kGyro) sample.accel.setZero();
+  if (role == Role::kAccel) sample.gyro.setZero();
+  const bool is_finite = sample.gyro.allFinite() && sample.accel.allFinite();
+  if (!is_plausible(sample)) {
+    report_.add(is_finite ? ReaderFault::kImplausible : ReaderFault::kNotFinite, place_of(message));
+    return;
+  }
+  if (role == Role::kImu) imu_.add(sample);
+  if (role == Role::kGyro) imu_joiner_.add_gyro({stamp, sample.gyro});
+  if (role == Role::kAccel) imu_joiner_.add_accel({stamp, sample.accel});
+  while (const auto joined = imu_joiner_.next()) imu_.add(*joined);
+}
+
+std::optional<JoinedFrame> BagDataset::next_frame() {
+  auto frame = joiner_.next();
+  while (!frame && read_message()) frame = joiner_.next();
+  return frame ? frame : joiner_.next();  // the end completes frames, too
+}
+
+bool BagDataset::has_imu(const JoinedFrame& frame) {
+  while (!imu_.reaches(frame.stamp) &&
+         seconds_between(frame.left.log_time, newest_log_time_) < kImuPatience_s &&
+         read_message()) {
+  }
+  const bool starts_by = imu_.starts_by(frame.stamp);
+  if (starts_by && imu_.reaches(frame.stamp)) return true;
+  report_.add(ReaderFault::kPairWithoutImu, place_of(frame.left) + ": the inertial samples " +
+                                                (starts_by ? "end before it" : "start later"));
+  return false;
+}
+
+std::optional<StereoFrame> BagDataset::decode(const JoinedFrame& joined) {
+  StereoFrame frame;
+  frame.stamp = joined.stamp;
+  const auto gray = [&](const BagMessage& message, std::size_t camera, GrayImage& image) {
+    ImageResult result = gray_of_message(bag_->channels()[message.channel], message,
+                                         place_of(message), size_of(rig_.sensors.stereo, camera));
+    if (result.status != ImageStatus::kOk) report_.add(fault_of(result.status), result.problem);
+    image = std::move(result.image);
+    return result.status == ImageStatus::kOk;
+  };
+  if (!gray(joined.left, 0, frame.left)) return std::nullopt;
+  if (joined.right && !gray(*joined.right, 1, frame.right)) return std::nullopt;
+  if (!joined.depth || !rig_.sensors.depth) return frame;
+  DepthResult depth = depth_of_message(bag_->channels()[joined.depth->channel], *joined.depth,
+                                       place_of(*joined.depth), size_of(rig_.sensors.stereo, 0),
+                                       rig_.depth_scale_m, *rig_.sensors.depth);
+  if (depth.status == ImageStatus::kOk)
+    frame.depth = std::make_shared<const DepthImage>(std::move(depth.image));
+  else
+    report_.add(fault_of(depth.status), depth.problem);
+  return frame;
+}
+
+std::optional<SensorPacket> BagDataset::read_packet() {
+  while (const auto joined = next_frame()) {
+    if (!start_) start_ = joined->stamp;
+    const double t_s = seconds_between(*start_, joined->stamp);
+    if (t_s >= window_.to_s) return std::nullopt;
+    if (t_s < window_.from_s || (window_.not_before && joined->stamp < *window_.not_before)) {
+      imu_.begin_at(joined->stamp);
+      continue;
+    }
+    if (!has_imu(*joined)) continue;
+    auto frame = decode(*joined);
+    if (!frame) continue;
+    auto samples = imu_.until(joined->stamp);
+    count_gaps(samples);
+    return SensorPacket{std::make_shared<const StereoFrame>(std::move(*frame)), std::move(samples)};
+  }
+  return std::nullopt;
+}
+
+void BagDataset::count_gaps(const std::vector<ImuSample>& samples) {
+  for (const ImuGap& gap : imu_gaps(samples, rig_.sensors.imu.rate_hz))
+    report_.add(ReaderFault::kImuGap, name_ + ": " + to_string(gap));
+}
+
+std::optional<SensorPacket> BagDataset::next() {
+  if (is_over_) return std::nullopt;
+  std::optional<SensorPacket> packet = first_ ? std::exchange(first_, std::nullopt) : read_packet();
+  is_over_ = !packet;
+  return packet;
+}
+
+ReaderReport BagDataset::report() const {
+  ReaderReport all = report_;
+  all.add(joiner_.report());
+  if (imu_joiner_.lost() > 0)
+    all.add(ReaderFault::kNoAcceleration, name_ + ": " + rig_.topics.gyro, imu_joiner_.lost());
+  const BagReport damage = bag_->report();
+  for (const auto& [fault, entry] : damage.entries())
+    all.add(ReaderFault::kDamagedBag, std::string(to_string(fault)) + ": " + entry.first,
+            entry.count);
+  return all;
+}
+
+std::vector<std::string> BagDataset::remarks() const {
+  std::vector<std::string> lines;
+  const auto say = [&lines](const std::optional<Synchrony>& synchrony, const char* other) {
+    if (synchrony && is_remarkable(*synchrony)) lines.push_back(to_string(*synchrony, other));
+  };
+  say(joiner_.right_synchrony(), "right");
+  say(joiner_.depth_synchrony(), "depth");
+  return lines;
+}
+
+}  // namespace km

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "modules/recordings/bag_reader.hpp"
+#include "modules/sensors/dataset_reader.hpp"
+#include "modules/sensors/frame_joiner.hpp"
+#include "modules/sensors/imu_stream.hpp"
+#include "modules/sensors/stamp_order.hpp"
+
+namespace km {
+
+/// Which topics are a robot's sensors. Either `imu`, or `gyro` and `accel`: sensors with stamps of
+/// their own (see ImuJoiner), each as sensor_msgs/Imu. Without `right` the rig is an RGB-D one.
+struct SensorTopicNames {
+  std::string left, right, depth;
+  std::string imu, gyro, accel;
+};
+
+/// What a recording does not say of its sensors, or not in one place.
+struct Rig {
+  SensorTopicNames topics;
+  SensorRig sensors;
+  double depth_scale_m = 1e-3;       ///< Of a unit in depth images of 16 bits [m].
+  double image_time_offset_s = 0.0;  ///< Added to the stamps of images: then they are the IMU's.
+};
+
+/// Part of a recording, in seconds since its first frame.
+struct BagWindow {
+  double from_s = 0.0;                                    ///< First instant that belongs to it.
+  double to_s = std::numeric_limits<double>::infinity();  ///< First that does not.
+  std::optional<Stamp> not_before = {};                   ///< No frame before this instant.
+};
+
+/// Reads sensor packets from the messages of a bag, as they come: sensor_msgs/Image and
+/// CompressedImage, and sensor_msgs/Imu, whose stamps are those of their headers. Bad messages are
+/// skipped and counted.
+class BagDataset final : public DatasetReader {
+ public:
+  /// `name` begins messages: the path of the bag. `stereo_tolerance_s`: see FrameJoiner. Reads up
+  /// to the first packet. Throws DatasetError for topics that the bag does not have or that are of
+  /// another type, naming those that it has, and where the window has no frame.
+  BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig,
+             std::optional<double> stereo_tolerance_s, const BagWindow& window = {});
+
+  [[nodiscard]] const SensorRig& rig() const override { return rig_.sensors; }
+  [[nodiscard]] std::optional<SensorPacket> next() override;
+  [[nodiscard]] ReaderReport report() const override;
+  [[nodiscard]] std::size_t pair_count() const override { return pair_count_; }
+  [[nodiscard]] std::vector<std::string> remarks() const override;
+
+ private:
+  enum class Role { kNone, kLeft, kRight, kDepth, kImu, kGyro, kAccel };
+  static constexpr std::size_t kRoles = 7;
+
+  void find_topics();
+  void assign(const std::string& topic, Role role);
+  [[nodiscard]] bool read_message();
+  void take(Role role, BagMessage message);
+  void take_imu(Role role, Stamp stamp, const BagMessage& message);
+  [[nodiscard]] std::optional<JoinedFrame> next_frame();
+  [[nodiscard]] bool has_imu(const JoinedFrame& frame);
+  [[nodiscard]] std::optional<StereoFrame> decode(const JoinedFrame& joined);
+  [[nodiscard]] std::optional<SensorPacket> read_packet();
+  void count_gaps(const std::vector<ImuSample>& samples);
+  [[nodiscard]] std::string place_of(const BagMessage& message) const;
+
+  std::string name_;
+  std::unique_ptr<BagReader> bag_;
+  Rig rig_;
+  BagWindow window_;
+  std::vector<Role> role_of_;  // by channel
+  StampOrder order_[kRoles];
+  FrameJoiner joiner_;
+  ImuStream imu_;
+  ImuJoiner imu_joiner_;
+  ReaderReport report_;
+  std::size_t pair_count_ = 0;
+  std::optional<Stamp> start_;  // of the recording: its first frame
+  Stamp newest_log_time_ = 0;
+  bool ended_ = false;                 // the bag
+  bool is_over_ = false;               // the window
+  std::optional<SensorPacket> first_;  // read ahead
+};
+
+}  // namespace km

@@ -1,0 +1,65 @@
+#include "modules/sensors/imu_stream.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+namespace km {
+
+void ImuStream::add(const ImuSample& sample) {
+  if (!first_) first_ = sample.stamp;
+  samples_.push_back(sample);
+}
+
+std::vector<ImuSample> ImuStream::until(Stamp stamp) {
+  if (!has_begun_) begin_at(stamp);
+  has_begun_ = true;
+  const auto last = std::ranges::lower_bound(samples_, stamp, {}, &ImuSample::stamp);
+  std::vector<ImuSample> packet(samples_.begin(), std::next(last));
+  samples_.erase(samples_.begin(), last);
+  return packet;
+}
+
+void ImuStream::begin_at(Stamp stamp) {
+  if (has_begun_) return;
+  const Stamp first = stamp - nanoseconds(kLeadIn_s);
+  samples_.erase(samples_.begin(),
+                 std::ranges::lower_bound(samples_, first, {}, &ImuSample::stamp));
+}
+
+std::vector<ImuGap> imu_gaps(std::span<const ImuSample> samples, double rate_hz) {
+  constexpr double kPeriods = 2.5;
+  std::vector<ImuGap> gaps;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    const double length_s = seconds_between(samples[i - 1].stamp, samples[i].stamp);
+    if (length_s > kPeriods / rate_hz) gaps.push_back({samples[i - 1].stamp, length_s});
+  }
+  return gaps;
+}
+
+std::string to_string(const ImuGap& gap) {
+  return std::to_string(gap.length_s) + " s after " + std::to_string(gap.after);
+}
+
+std::optional<ImuSample> ImuJoiner::next() {
+  while (!gyro_.empty() && !accel_.empty()) {
+    const Reading& turn = gyro_.front();
+    while (accel_.size() > 1 && accel_[1].stamp <= turn.stamp) accel_.pop_front();
+    const Reading& before = accel_.front();
+    const bool started_later = before.stamp > turn.stamp;
+    if (!started_later && before.stamp < turn.stamp && accel_.size() < 2) return std::nullopt;
+    const Reading& after = before.stamp == turn.stamp ? before : accel_[started_later ? 0 : 1];
+    const double step_s = seconds_between(before.stamp, after.stamp);
+    const Stamp stamp = turn.stamp;
+    const Eigen::Vector3d gyro = turn.value;
+    gyro_.pop_front();
+    if (started_later || step_s > kLongestStep_s) {
+      ++lost_;
+      continue;
+    }
+    const double share = step_s > 0.0 ? seconds_between(before.stamp, stamp) / step_s : 0.0;
+    return ImuSample{stamp, gyro, before.value + share * (after.value - before.value)};
+  }
+  return std::nullopt;
+}
+
+}  // namespace km

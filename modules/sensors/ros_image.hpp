@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+
+#include "modules/core/camera.hpp"
+#include "modules/recordings/bag_reader.hpp"
+#include "modules/sensors/image_file.hpp"
+
+namespace km {
+
+/// True for sensor_msgs/Image and sensor_msgs/CompressedImage, of ROS 1 or 2.
+[[nodiscard]] bool has_images(const BagChannel& channel);
+
+/// The grey values of an image message. Encodings: mono8, mono16 (its higher byte), bgr8, rgb8,
+/// bgra8, rgba8, bayer_*8, yuv422 (UYVY), yuv422_yuy2, the 8UC1, 8UC3, 8UC4 and 16UC1 of OpenCV
+/// likewise, and compressed images of any format that OpenCV decodes. kUnreadable: not such a
+/// message; kWrongFormat: another encoding. `place` begins the problem.
+[[nodiscard]] ImageResult gray_of_message(const BagChannel& channel, const BagMessage& message,
+                                          const std::string& place, const cv::Size& size);
+
+/// Depth from a message: 16UC1 or mono16 in units of `scale_m` [m], 32FC1 in metres, or a PNG image
+/// of 16 bits, also with image_transport's header of compressedDepth before it.
+[[nodiscard]] DepthResult depth_of_message(const BagChannel& channel, const BagMessage& message,
+                                           const std::string& place, const cv::Size& size,
+                                           double scale_m, const DepthRange& range);
+
+}  // namespace km

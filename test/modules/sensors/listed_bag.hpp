@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "modules/recordings/bag_reader.hpp"
+#include "modules/recordings/ros_messages.hpp"
+
+namespace km {
+
+/// A recording of ROS 2 whose messages a test lists in order of log time.
+class ListedBag final : public BagReader {
+ public:
+  /// Of a type of ros_messages.hpp; logged at the stamp of its header, `late_s` later.
+  template <typename Message>
+  void add(const std::string& topic, const Message& message, double late_s = 0.0) {
+    add_bytes(topic, Message::kType, message.header.stamp + nanoseconds(late_s),
+              encode_ros(message));
+  }
+
+  void add_bytes(const std::string& topic, std::string_view type, Stamp log_time,
+                 std::vector<std::uint8_t> bytes) {
+    std::size_t channel = 0;
+    while (channel < channels_.size() && channels_[channel].topic != topic) ++channel;
+    if (channel == channels_.size()) channels_.push_back({topic, std::string(type), "cdr", 0});
+    ++channels_[channel].message_count;
+    messages_.push_back({channel, log_time, std::move(bytes)});
+  }
+
+  [[nodiscard]] const std::vector<BagChannel>& channels() const override { return channels_; }
+  [[nodiscard]] std::optional<BagMessage> next() override {
+    if (next_ == messages_.size()) return std::nullopt;
+    return messages_[next_++];
+  }
+  [[nodiscard]] BagReport report() const override { return {}; }
+
+ private:
+  std::vector<BagChannel> channels_;
+  std::vector<BagMessage> messages_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace km

@@ -1,0 +1,376 @@
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "modules/core/input_file.hpp"
+#include "modules/sensors/bag_dataset.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/frame_files.hpp"
+#include "modules/sensors/ros_image.hpp"
+#include "test/modules/sensors/listed_bag.hpp"
+#include "test/support/shared_data.hpp"
+
+namespace km {
+namespace {
+
+constexpr Stamp kFirst = 10'000'000'000;
+constexpr Stamp kFramePeriod = 50'000'000, kSamplePeriod = 5'000'000;
+constexpr int kWidth = 6, kHeight = 4;
+
+Rig small_rig() {
+  Rig rig;
+  rig.topics = {
+      .left = "/left", .right = "/right", .depth = {}, .imu = "/imu", .gyro = {}, .accel = {}};
+  for (PinholeCamera& camera : rig.sensors.stereo.cameras)
+    camera = {.width = kWidth, .height = kHeight, .fx = 5, .fy = 5, .cx = 3, .cy = 2};
+  rig.sensors.stereo.cameras[1].T_body_cam.translation().x() = 0.1;
+  return rig;
+}
+
+RosImage image(Stamp stamp, std::uint8_t grey) {
+  return {.header = {stamp, "camera"},
+          .height = kHeight,
+          .width = kWidth,
+          .encoding = "mono8",
+          .is_bigendian = false,
+          .step = kWidth,
+          .data = std::vector<std::uint8_t>(kWidth * kHeight, grey)};
+}
+
+RosImu imu(Stamp stamp) {
+  RosImu message;
+  message.header.stamp = stamp;
+  message.angular_velocity = {1e-9 * static_cast<double>(stamp - kFirst), 0, 0};
+  message.linear_acceleration = {0, 0, 9.81};
+  return message;
+}
+
+struct Plan {
+  int frames = 40;
+  Stamp right_late = 0;  // after the left stamp
+  std::vector<int> rights_lost = {};
+  bool has_imu = true;
+};
+
+std::unique_ptr<ListedBag> recording(const Plan& plan) {
+  auto bag = std::make_unique<ListedBag>();
+  const Stamp end = kFirst + plan.frames * kFramePeriod;
+  for (Stamp stamp = kFirst - 1'500'000'000; stamp <= end; stamp += kSamplePeriod) {
+    if (plan.has_imu) bag->add("/imu", imu(stamp));
+    const auto frame = static_cast<int>((stamp - kFirst) / kFramePeriod);
+    if (stamp < kFirst || (stamp - kFirst) % kFramePeriod != 0 || frame == plan.frames) continue;
+    bag->add("/left", image(stamp, static_cast<std::uint8_t>(frame)));
+    if (std::ranges::find(plan.rights_lost, frame) == plan.rights_lost.end())
+      bag->add("/right", image(stamp + plan.right_late, static_cast<std::uint8_t>(100 + frame)));
+  }
+  return bag;
+}
+
+std::vector<SensorPacket> packets_of(DatasetReader& reader) {
+  std::vector<SensorPacket> packets;
+  while (auto packet = reader.next()) packets.push_back(*std::move(packet));
+  return packets;
+}
+
+TEST_CASE("Messages of a bag become packets without a hole between them", "[sensors][bag]") {
+  BagDataset dataset("test.bag", recording({}), small_rig(), {});
+  CHECK(dataset.pair_count() == 40);
+  const auto packets = packets_of(dataset);
+  REQUIRE(packets.size() == 40);
+  for (std::size_t k = 0; k < packets.size(); ++k) {
+    const SensorPacket& packet = packets[k];
+    const Stamp stamp = kFirst + static_cast<Stamp>(k) * kFramePeriod;
+    CAPTURE(k);
+    CHECK(packet.frame->stamp == stamp);
+    CHECK(packet.frame->left.pixels == std::vector<std::uint8_t>(24, static_cast<std::uint8_t>(k)));
+    CHECK(packet.frame->right.pixels.front() == 100 + k);
+    CHECK(packet.imu.size() == (k == 0 ? 201U : 11U));  // a second before the first frame
+    CHECK(packet.imu.back().stamp == stamp);
+    CHECK(packet.imu.back().gyro.x() == Approx(0.05 * static_cast<double>(k)).margin(1e-12));
+  }
+  CHECK(dataset.report().empty());
+  CHECK(dataset.remarks().empty());
+}
+
+TEST_CASE("A camera that is stamped late by a constant is paired, and it is said",
+          "[sensors][bag]") {
+  BagDataset dataset("test.bag", recording({.right_late = 2'000'000}), small_rig(), {});
+  CHECK(packets_of(dataset).size() == 40);
+  CHECK(dataset.report().empty());
+  REQUIRE(dataset.remarks().size() == 1);
+  CHECK(dataset.remarks()[0] ==
+        "the right image is stamped 2.00 ms after the left one, within 1.00 ms");
+  // As was asked for, it is not.
+  CHECK_THROWS_WITH(BagDataset("test.bag", recording({.right_late = 2'000'000}), small_rig(), 1e-3),
+                    Catch::Matchers::Contains("left images without a right one"));
+}
+
+TEST_CASE("A frame whose right image is lost is counted, the others stay", "[sensors][bag]") {
+  const std::vector<int> lost =
+      GENERATE(std::vector{0}, std::vector{7}, std::vector{30, 31}, std::vector{39});
+  const Stamp late = GENERATE(0, 2'000'000);
+  BagDataset dataset("test.bag", recording({.right_late = late, .rights_lost = lost}), small_rig(),
+                     {});
+  const auto packets = packets_of(dataset);
+  CHECK(packets.size() == 40 - lost.size());
+  for (const SensorPacket& packet : packets)
+    CHECK(packet.frame->right.pixels[0] == packet.frame->left.pixels[0] + 100);
+  CHECK(dataset.report().count(ReaderFault::kLeftWithoutRight) == lost.size());
+  CHECK(dataset.report().entries().size() == 1);
+}
+
+TEST_CASE("A window of a bag begins with the second before it", "[sensors][bag]") {
+  BagDataset dataset("test.bag", recording({}), small_rig(), {}, {.from_s = 0.5, .to_s = 1.0});
+  const auto packets = packets_of(dataset);
+  REQUIRE(packets.size() == 10);
+  CHECK(packets.front().frame->stamp == kFirst + 10 * kFramePeriod);
+  CHECK(packets.front().imu.size() == 201);
+  CHECK(!dataset.next());
+  BagDataset resumed("test.bag", recording({}), small_rig(), {},
+                     {.not_before = kFirst + 30 * kFramePeriod});
+  CHECK(packets_of(resumed).size() == 10);
+  CHECK_THROWS_WITH(
+      BagDataset("test.bag", recording({}), small_rig(), {}, {.from_s = 50.0}),
+      Catch::Matchers::StartsWith("test.bag: no frame") && Catch::Matchers::Contains("from 50 s"));
+}
+
+TEST_CASE("Topics that are not there are refused with those that are", "[sensors][bag]") {
+  Rig rig = small_rig();
+  rig.topics.right = "/rihgt";
+  CHECK_THROWS_WITH(BagDataset("test.bag", recording({}), rig, {}),
+                    "test.bag: no topic /rihgt; topics with images: /left, /right");
+  rig.topics.right = "/imu";
+  CHECK_THROWS_WITH(BagDataset("test.bag", recording({}), rig, {}),
+                    Catch::Matchers::Contains("/imu has messages of sensor_msgs/Imu"));
+  CHECK_THROWS_WITH(BagDataset("test.bag", recording({.has_imu = false}), small_rig(), {}),
+                    "test.bag: no topic /imu; topics with inertial samples: none");
+}
+
+TEST_CASE("Bad messages of a bag cost themselves", "[sensors][bag]") {
+  auto bag = recording({.frames = 0});
+  for (int k = 0; k < 30; ++k) {
+    const Stamp stamp = kFirst + k * kFramePeriod;
+    for (Stamp at = stamp + kSamplePeriod; at <= stamp + kFramePeriod; at += kSamplePeriod)
+      bag->add("/imu", imu(at));
+    RosImage left = image(stamp, 1);
+    if (k == 3) left.width = 5;
+    if (k == 4) left.encoding = "nv21";
+    if (k == 5) left.header.stamp -= 10 * kFramePeriod;
+    if (k == 6) left.header.stamp += 86'400'000'000'000;
+    bag->add("/left", left, k == 6 ? -86'400.0 : 0.0);
+    bag->add("/right", image(stamp, 2));
+    if (k == 8) bag->add_bytes("/left", RosImage::kType, stamp, {0, 1, 0, 0, 7});
+    if (k != 9) continue;
+    RosImu spoilt = imu(stamp + kFramePeriod + 1);
+    spoilt.linear_acceleration.x() = std::numeric_limits<double>::quiet_NaN();
+    bag->add("/imu", spoilt);
+    spoilt.linear_acceleration.x() = 1e30;
+    spoilt.header.stamp += 1;
+    bag->add("/imu", spoilt);
+  }
+  BagDataset dataset("test.bag", std::move(bag), small_rig(), {});
+  CHECK(packets_of(dataset).size() == 26);
+  const ReaderReport report = dataset.report();
+  for (const ReaderFault fault :
+       {ReaderFault::kWrongImageSize, ReaderFault::kWrongImageFormat, ReaderFault::kUnorderedStamp,
+        ReaderFault::kJumpingStamp, ReaderFault::kMalformedMessage, ReaderFault::kNotFinite,
+        ReaderFault::kImplausible}) {
+    CAPTURE(to_string(fault));
+    CHECK(report.count(fault) == 1);
+  }
+  CHECK(report.count(ReaderFault::kRightWithoutLeft) == 2);
+  CHECK(to_string(report).find("test.bag: /left recorded at 10150000000: 5x4 px") !=
+        std::string::npos);
+}
+
+TEST_CASE("Gyroscope and accelerometer with stamps of their own are joined", "[sensors][bag]") {
+  auto bag = std::make_unique<ListedBag>();
+  constexpr Stamp kGyroPeriod = 2'500'000, kAccelPeriod = 16'000'000;
+  for (Stamp at = 0; at < 3'000'000'000; at += 500'000) {
+    const Stamp stamp = kFirst + at;
+    const double t = 1e-9 * static_cast<double>(at);
+    RosImu message;
+    message.header.stamp = stamp;
+    message.angular_velocity.y() = t;
+    message.linear_acceleration.z() = 9.81 + 2.0 * t;
+    if (at % kGyroPeriod == 0) bag->add("/gyro", message);
+    if (at % kAccelPeriod == 3'000'000) bag->add("/accel", message);
+    if (at % kFramePeriod != 0) continue;
+    bag->add("/left", image(stamp, 1));
+    bag->add("/right", image(stamp, 2));
+  }
+  Rig rig = small_rig();
+  rig.topics.imu.clear();
+  rig.topics.gyro = "/gyro";
+  rig.topics.accel = "/accel";
+  BagDataset dataset("test.bag", std::move(bag), rig, {});
+  const auto packets = packets_of(dataset);
+  CHECK(packets.size() == 59);  // the first lies before the first acceleration
+  for (const SensorPacket& packet : packets)
+    for (const ImuSample& sample : packet.imu) {
+      const double t = seconds_between(kFirst, sample.stamp);
+      CHECK(sample.gyro.y() == Approx(t));
+      CHECK(sample.accel.z() == Approx(9.81 + 2.0 * t).epsilon(1e-12));
+    }
+  CHECK(dataset.report().count(ReaderFault::kNoAcceleration) == 2);
+  CHECK(dataset.report().count(ReaderFault::kPairWithoutImu) == 1);
+}
+
+TEST_CASE("Depth of a bag joins its frame, at a lower rate too", "[sensors][bag]") {
+  Rig rig = small_rig();
+  rig.topics.right.clear();
+  rig.topics.depth = "/depth";
+  rig.sensors.stereo = rgbd_rig(rig.sensors.stereo.cameras[0], 0.1);
+  rig.sensors.depth = DepthRange{};
+  const bool in_metres = GENERATE(false, true);
+  auto bag = std::make_unique<ListedBag>();
+  for (int k = 0; k < 40; ++k) {
+    const Stamp stamp = kFirst + k * kFramePeriod;
+    bag->add("/imu", imu(stamp));
+    bag->add("/left", image(stamp, 1));
+    if (k % 4 != 0) continue;
+    RosImage depth = image(stamp + 8'000'000, 0);
+    if (in_metres) {
+      const float value = 1.5F;
+      depth.encoding = "32FC1";
+      depth.step = 4 * kWidth;
+      depth.data.resize(std::size_t{4} * kWidth * kHeight);
+      for (std::size_t i = 0; i < depth.data.size(); i += 4)
+        std::memcpy(depth.data.data() + i, &value, 4);
+    } else {
+      depth.encoding = "16UC1";
+      depth.step = 2 * kWidth;
+      depth.is_bigendian = true;
+      depth.data.clear();
+      for (int i = 0; i < kWidth * kHeight; ++i)
+        depth.data.insert(depth.data.end(), {1500 / 256, 1500 % 256});
+    }
+    bag->add("/depth", depth, 0.02);
+  }
+  BagDataset dataset("test.bag", std::move(bag), rig, {});
+  const auto packets = packets_of(dataset);
+  REQUIRE(packets.size() == 40);
+  for (std::size_t k = 0; k < packets.size(); ++k) {
+    CAPTURE(k);
+    REQUIRE((packets[k].frame->depth != nullptr) == (k % 4 == 0));
+    if (packets[k].frame->depth)
+      CHECK(packets[k].frame->depth->millimetres == std::vector<std::uint16_t>(24, 1500));
+  }
+  CHECK(dataset.remarks().size() == 1);
+}
+
+TEST_CASE("Images of every usual encoding become the same grey", "[sensors][bag]") {
+  struct Kind {
+    const char* encoding;
+    std::vector<std::uint8_t> pixel;  // of one grey, 90
+  };
+  const Kind kind = GENERATE(
+      Kind{"mono8", {90}}, Kind{"8UC1", {90}}, Kind{"bgr8", {90, 90, 90}},
+      Kind{"rgb8", {90, 90, 90}}, Kind{"bgra8", {90, 90, 90, 7}}, Kind{"rgba8", {90, 90, 90, 7}},
+      Kind{"8UC3", {90, 90, 90}}, Kind{"bayer_rggb8", {90}}, Kind{"bayer_bggr8", {90}},
+      Kind{"bayer_gbrg8", {90}}, Kind{"bayer_grbg8", {90}}, Kind{"mono16", {90, 90}},
+      Kind{"yuv422", {128, 90}}, Kind{"yuv422_yuy2", {90, 128}});
+  CAPTURE(kind.encoding);
+  RosImage message = image(kFirst, 0);
+  message.encoding = kind.encoding;
+  message.step = static_cast<std::uint32_t>(kWidth * kind.pixel.size() + 3);  // padded rows
+  message.data.clear();
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x)
+      message.data.insert(message.data.end(), kind.pixel.begin(), kind.pixel.end());
+    message.data.insert(message.data.end(), {1, 2, 3});
+  }
+  const BagChannel channel{"/left", "sensor_msgs/msg/Image", "cdr", 1};
+  const ImageResult gray =
+      gray_of_message(channel, {0, kFirst, encode_ros(message)}, "here", {kWidth, kHeight});
+  CAPTURE(gray.problem);
+  REQUIRE(gray.status == ImageStatus::kOk);
+  CHECK(gray.image.pixels == std::vector<std::uint8_t>(kWidth * kHeight, 90));
+}
+
+TEST_CASE("Colours of a Bayer pattern are where its name says", "[sensors][bag]") {
+  // A red scene: red pixels see it, blue and green ones do not.
+  RosImage message = image(kFirst, 0);
+  message.encoding = "bayer_rggb8";
+  for (std::size_t y = 0; y < kHeight; y += 2)
+    for (std::size_t x = 0; x < kWidth; x += 2) message.data[y * kWidth + x] = 200;
+  const BagChannel channel{"/left", "sensor_msgs/msg/Image", "cdr", 1};
+  const auto inner_gray = [&](const char* encoding) {
+    message.encoding = encoding;
+    const auto gray =
+        gray_of_message(channel, {0, kFirst, encode_ros(message)}, "here", {kWidth, kHeight});
+    return static_cast<int>(gray.image.pixels[2 * kWidth + 2]);
+  };
+  CHECK(inner_gray("bayer_rggb8") == Approx(0.299 * 200).margin(1.0));  // ITU-R BT.601
+  CHECK(inner_gray("bayer_bggr8") == Approx(0.114 * 200).margin(1.0));
+}
+
+// The messages that a recorder would have written of a EuRoC folder.
+std::unique_ptr<ListedBag> bag_of(const std::filesystem::path& mav0, std::size_t frames) {
+  ReaderReport report;
+  const auto pairs = list_euroc_pairs(mav0, {}, report).pairs;
+  struct Entry {
+    Stamp stamp;
+    std::string topic;
+    std::filesystem::path file;
+  };
+  std::vector<Entry> entries;
+  for (std::size_t k = 0; k < frames; ++k) {
+    entries.push_back({pairs[k].stamp, "/left", pairs[k].left});
+    entries.push_back({pairs[k].stamp, "/right", pairs[k].right});
+  }
+  EurocReader all = open_euroc(mav0.parent_path());
+  auto bag = std::make_unique<ListedBag>();
+  auto entry = entries.begin();
+  for (std::size_t k = 0; k < frames; ++k) {
+    const auto packet = all.next();
+    for (std::size_t i = k == 0 ? 0 : 1; i < packet->imu.size(); ++i) {
+      const ImuSample& sample = packet->imu[i];
+      RosImu message;
+      message.header.stamp = sample.stamp;
+      message.angular_velocity = sample.gyro;
+      message.linear_acceleration = sample.accel;
+      bag->add("/imu", message);
+    }
+    for (; entry != entries.end() && entry->stamp <= packet->imu.back().stamp; ++entry) {
+      const std::string bytes = read_input_file(entry->file);
+      bag->add(entry->topic,
+               RosCompressedImage{{entry->stamp, "cam"}, "jpeg", {bytes.begin(), bytes.end()}});
+    }
+  }
+  return bag;
+}
+
+TEST_CASE("Recorded MH_01 gives the same packets from a bag as from its folder",
+          "[sensors][bag][recorded]") {
+  const auto root = shared_data("euroc/MH_01_easy");
+  if (!root) return;
+  constexpr std::size_t kFrames = 60;
+  Rig rig;
+  rig.topics = {
+      .left = "/left", .right = "/right", .depth = {}, .imu = "/imu", .gyro = {}, .accel = {}};
+  rig.sensors = read_euroc_rig(*root / "mav0");
+  BagDataset bag("MH_01.bag", bag_of(*root / "mav0", kFrames), rig, {});
+  EurocReader folder = open_euroc(*root);
+  for (std::size_t k = 0; k < kFrames; ++k) {
+    const auto a = bag.next(), b = folder.next();
+    REQUIRE(a);
+    REQUIRE(b);
+    CAPTURE(k);
+    CHECK(a->frame->stamp == b->frame->stamp);
+    CHECK(a->frame->left.pixels == b->frame->left.pixels);
+    CHECK(a->frame->right.pixels == b->frame->right.pixels);
+    REQUIRE(a->imu.size() == b->imu.size());
+    for (std::size_t i = 0; i < a->imu.size(); ++i) {
+      CHECK(a->imu[i].stamp == b->imu[i].stamp);
+      CHECK(a->imu[i].gyro == b->imu[i].gyro);
+      CHECK(a->imu[i].accel == b->imu[i].accel);
+    }
+  }
+  CHECK(!bag.next());
+}
+
+}  // namespace
+}  // namespace km
