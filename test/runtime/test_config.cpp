@@ -23,8 +23,10 @@ struct ToyConfig {
   std::string name = "a \"b\": c";
   Colour colour = Colour::kGreen;
   std::vector<std::string> hosts = {"x"};
+  std::optional<double> limit_m = 2.0;
 
   void visit_fields(auto& visitor) {
+    visitor.field("limit_m", limit_m, {0.0, 5.0}, "the farthest, if there is one");
     visitor.field("count", count, {1, 10}, "how many");
     visitor.field("length_m", length_m, {0.0, 1.0});
     visitor.field("level", level, {0, 200});
@@ -49,6 +51,15 @@ std::string complaint(const std::string& yaml) try {
   return "";
 } catch (const ConfigError& error) {
   return error.what();
+}
+
+TEST_CASE("A key without a value is none of a value that may be absent", "[config]") {
+  ConfigLayers layers;
+  layers.add_text("toy:\n  limit_m:\n", "a.yaml");
+  CHECK(!loaded(layers).limit_m);
+  CHECK_THAT(complaint("toy:\n  limit_m: far\n"),
+             Catch::Matchers::Contains("a.yaml:2: toy.limit_m = far is not a number"));
+  CHECK_THAT(complaint("toy:\n  count:\n"), Catch::Matchers::Contains("not a whole number"));
 }
 
 TEST_CASE("A key that is absent keeps its default", "[config]") {
