@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "modules/core/config.hpp"
@@ -40,6 +41,9 @@ template <typename T, typename Accepted>
 /// it writes of fields that have values can be read back and gives the same values.
 class ConfigText : public FieldVisitor<ConfigText> {
  public:
+  /// `indent`: before every line.
+  explicit ConfigText(std::string indent = "  ") : indent_(std::move(indent)) {}
+
   template <typename T, typename Accepted>
   void visit(const char* key, const T& value, const Accepted& accepted, const char* text) {
     line(key, yaml_text(value, accepted), text, accepted.text());
@@ -73,7 +77,7 @@ class ConfigText : public FieldVisitor<ConfigText> {
   void line(const char* key, const std::string& value, const std::string& text,
             const std::string& accepted);
 
-  std::string indent_ = "  ";
+  std::string indent_;
   std::string text_;
 };
 

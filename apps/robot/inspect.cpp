@@ -6,9 +6,11 @@
 #include <sstream>
 #include <vector>
 
+#include "apps/robot/rig_proposal.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/core/text_table.hpp"
+#include "modules/core/write_file.hpp"
 #include "modules/recordings/bag_summary.hpp"
 #include "modules/recordings/open_bag.hpp"
 
@@ -116,6 +118,16 @@ std::string inspect_recording(const fs::path& path) {
   const auto reader = open_bag(path);
   const std::string text = text_of(summarise_topics(*reader));
   return text + to_string(reader->report());
+}
+
+std::string inspect_recording(const fs::path& path, const fs::path& rig) {
+  if (!is_absent(rig)) throw InputFileError(rig.string() + ": is there already: name another file");
+  const auto reader = open_bag(path);
+  const auto topics = summarise_topics(*reader);
+  write_file(rig, "# The sensors in " + path.string() + ": see that they are the right ones.\n" +
+                      rig_file_text(propose_rig(topics)));
+  return text_of(topics) + to_string(reader->report()) + "\nwritten: " + rig.string() +
+         ": look at its topics, and name the calibration\n";
 }
 
 }  // namespace km

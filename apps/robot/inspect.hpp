@@ -11,4 +11,10 @@ namespace km {
 /// what is none.
 [[nodiscard]] std::string inspect_recording(const std::filesystem::path& path);
 
+/// Likewise, of a bag, and writes `rig`, a rig file (see RigFile) with the topics that are most
+/// likely its sensors. Throws InputFileError if `rig` is there already, too, and what write_file()
+/// throws.
+[[nodiscard]] std::string inspect_recording(const std::filesystem::path& path,
+                                            const std::filesystem::path& rig);
+
 }  // namespace km

@@ -34,8 +34,9 @@ Examples
   A robot that finds itself in the map of an earlier run, which takes part as robot 0:
     kimera_multi_robot --robot 0 --session results/a --output results/yesterday
     kimera_multi_robot --config config/datasets/euroc.yaml --robot 1 --dataset MH_02_easy --output results/b
-  What is in a recording, and how regular its stamps are:
-    kimera_multi_robot --inspect recording.bag
+  What is in a recording, and how regular its stamps are; and a robot on it, its topics as rig.yaml says:
+    kimera_multi_robot --inspect recording.bag rig.yaml
+    kimera_multi_robot --robot 0 --dataset recording.bag --rig rig.yaml --output results/a
   The back-end alone, on a recorded pose graph:
     kimera_multi_robot --config config/datasets/tunnels.yaml --robot 3 --graph robot3.csv --rate max --output results/3
 
@@ -68,8 +69,9 @@ void print_config(const RobotOptions& options) {
   throw CLI::Success();
 }
 
-void print_recording(const std::string& path) {
-  std::cout << inspect_recording(path);
+void print_recording(const std::vector<std::string>& paths) {
+  std::cout << (paths.size() == 1 ? inspect_recording(paths[0])
+                                  : inspect_recording(paths[0], paths[1]));
   throw CLI::Success();
 }
 
@@ -77,8 +79,9 @@ void add_input(CLI::App& app, RobotOptions& options) {
   auto* group = app.add_option_group("Input", "What the robot perceives");
   group
       ->add_option("--dataset", options.dataset,
-                   "EuRoC/ASL folder: cam0, cam1 (or depth0), imu0, or mav0/")
-      ->check(CLI::ExistingDirectory);
+                   "EuRoC/ASL folder: cam0, cam1 (or depth0), imu0, or mav0/; or with --rig a bag "
+                   "of ROS 1 (.bag) or ROS 2 (folder, .db3, .mcap)")
+      ->check(CLI::ExistingPath);
   group->add_option("--graph", options.graph, "Recorded pose graph of one robot (.g2o or .csv)")
       ->check(CLI::ExistingFile);
   group
@@ -87,6 +90,9 @@ void add_input(CLI::App& app, RobotOptions& options) {
                    "themselves in its map")
       ->check(CLI::ExistingDirectory);
   group->require_option(1);
+  app.add_option("--rig", options.rig,
+                 "For a bag: file that says which topics are the sensors, and their calibration")
+      ->check(CLI::ExistingFile);
   app.add_option("--from", options.from_s, "Start of the part to play [s since the first image]");
   app.add_option("--to", options.to_s, "End of the part to play [s since the first image]");
   app.add_option_function<std::string>(
@@ -151,10 +157,13 @@ RobotOptions parse_options(int argc, char** argv) {
   app.add_flag_callback(
       "--print-config", [&options] { print_config(options); },
       "Print the configuration that the options before this one make, with bounds, and exit");
-  app.add_option_function<std::string>(
-      "--inspect", print_recording,
-      "Print what is in a recording and exit: a bag of ROS 1 (.bag), one of ROS 2 (folder or "
-      ".db3), an MCAP file (.mcap), or a EuRoC folder");
+  app.add_option_function<std::vector<std::string>>(
+         "--inspect", print_recording,
+         "Print what is in a recording and exit: a bag of ROS 1 (.bag), one of ROS 2 (folder or "
+         ".db3), an MCAP file (.mcap), or a EuRoC folder; with a second file, write a rig file "
+         "to it")
+      ->expected(1, 2)
+      ->type_name("RECORDING [RIG]");
   app.add_option("--log", options.log_level, "error, warn, info or debug")
       ->check(CLI::IsMember({"error", "warn", "info", "debug"}))
       ->capture_default_str();

@@ -35,7 +35,8 @@ struct RobotOptions {
   RobotId robot = 0;
   std::string name;  ///< "robot<id>" if not given.
 
-  std::filesystem::path dataset;  ///< EuRoC/ASL folder; exclusive with `graph`.
+  std::filesystem::path dataset;  ///< EuRoC/ASL folder, or a bag; exclusive with `graph`.
+  std::filesystem::path rig;      ///< Of a bag: which topics are the sensors (see RigFile).
   std::filesystem::path graph;    ///< Recorded pose graph, g2o or CSV.
   std::filesystem::path session;  ///< Results of a run of the past; exclusive with both.
   std::optional<double> from_s;   ///< Part of the recording [s since its first image].

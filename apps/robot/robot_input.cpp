@@ -8,8 +8,11 @@
 #include "apps/result_files.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/mesh/map_file.hpp"
+#include "modules/recordings/open_bag.hpp"
+#include "modules/sensors/bag_dataset.hpp"
 #include "modules/sensors/euroc_reader.hpp"
 #include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/rig_file_codec.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -59,15 +62,36 @@ RestoredRun open_session(const RobotOptions& options) {
   return alone_as(options.robot, std::move(run));
 }
 
+std::unique_ptr<DatasetReader> open_bag_dataset(const RobotOptions& options,
+                                                const RobotConfig& config,
+                                                std::optional<Stamp> not_before) {
+  if (options.rig.empty())
+    throw std::invalid_argument(
+        options.dataset.string() +
+        ": --rig FILE must tell which of its topics are the sensors; --inspect " +
+        options.dataset.string() + " rig.yaml writes one to complete");
+  const BagWindow window{.from_s = options.from_s.value_or(0.0),
+                         .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
+                         .not_before = not_before};
+  return std::make_unique<BagDataset>(options.dataset.string(), open_bag(options.dataset),
+                                      read_rig_file(options.rig), config.sensors.stereo_tolerance_s,
+                                      window);
+}
+
 std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const RobotConfig& config,
                                             const std::optional<MappingPlan>& mapping,
                                             const std::optional<RestoredRun>& restored) {
+  const auto not_before = restored ? std::optional(restored->odometry.back().stamp) : std::nullopt;
+  if (may_be_bag(options.dataset)) return open_bag_dataset(options, config, not_before);
+  if (!options.rig.empty())
+    throw std::invalid_argument("--rig " + options.rig.string() + " is for a bag, " +
+                                options.dataset.string() + " is none");
   EurocOptions euroc{.from_s = options.from_s.value_or(0.0),
                      .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
+                     .not_before = not_before,
                      .stereo_tolerance_s = config.sensors.stereo_tolerance_s,
                      .depth = config.sensors.depth || (mapping && mapping->reads_depth()),
                      .labels = config.sensors.labels || (mapping && mapping->reads_labels())};
-  if (restored) euroc.not_before = restored->odometry.back().stamp;
   return std::make_unique<EurocReader>(open_euroc(options.dataset, euroc));
 }
 

@@ -137,7 +137,7 @@ void BagDataset::take(Role role, BagMessage message) {
     take_imu(role, stamp, message);
     return;
   }
-  stamp += nanoseconds(rig_.image_time_offset_s);
+  stamp += nanoseconds(rig_.camera_time_offset_s);
   const ImageRole image = role == Role::kLeft    ? ImageRole::kLeft
                           : role == Role::kRight ? ImageRole::kRight
                                                  : ImageRole::kDepth;

@@ -1,0 +1,95 @@
+#include "apps/robot/rig_proposal.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "modules/recordings/ros_messages.hpp"
+
+namespace km {
+namespace {
+
+bool has_word(const TopicSummary& topic, std::string_view word) {
+  std::string name = topic.topic;
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
+  return name.find(word) != name.npos;
+}
+
+bool is_depth(const TopicSummary& topic) {
+  if (!topic.is_image) return false;
+  const std::string encoding = topic.image ? topic.image->encoding : "";
+  return encoding == "16UC1" || encoding == "32FC1" || has_word(topic, "depth");
+}
+
+// What names the left one of two cameras, and the right one.
+constexpr std::array<std::pair<const char*, const char*>, 4> kSides = {
+    {{"left", "right"}, {"infra1", "infra2"}, {"cam0", "cam1"}, {"cam_0", "cam_1"}}};
+
+bool are_sides(const TopicSummary& left, const TopicSummary& right) {
+  return std::ranges::any_of(kSides, [&](const auto& side) {
+    return has_word(left, side.first) && has_word(right, side.second);
+  });
+}
+
+const TopicSummary& named(const std::vector<TopicSummary>& topics, const std::string& name) {
+  return *std::ranges::find(topics, name, &TopicSummary::topic);
+}
+
+// Two cameras whose names say that they are the sides of one, else any two that are as often
+// together as any.
+void propose_stereo(const std::vector<TopicSummary>& topics, RigFile& rig) {
+  std::size_t best = 0;
+  for (const TopicPair& pair : pairs_of_images(topics)) {
+    const TopicSummary* left = &named(topics, pair.first);
+    const TopicSummary* right = &named(topics, pair.second);
+    if (is_depth(*left) || is_depth(*right)) continue;
+    if (are_sides(*right, *left)) std::swap(left, right);
+    const std::size_t merit = 1 + pair.agreement.pairs + (are_sides(*left, *right) ? 1U << 30U : 0);
+    if (merit <= best) continue;
+    best = merit;
+    rig.left.topic = left->topic;
+    rig.right.topic = right->topic;
+  }
+}
+
+void propose_depth(const std::vector<TopicSummary>& topics, RigFile& rig) {
+  const auto depth = std::ranges::find_if(topics, is_depth);
+  if (depth == topics.end()) return;
+  const auto camera = std::ranges::find_if(
+      topics, [](const TopicSummary& topic) { return topic.is_image && !is_depth(topic); });
+  if (rig.left.topic.empty() && camera != topics.end()) rig.left.topic = camera->topic;
+  rig.depth.topic = depth->topic;
+}
+
+// Of several the one whose name begins most like that of the left camera: "/Alpha/...".
+void propose_imu(const std::vector<TopicSummary>& topics, RigFile& rig) {
+  const auto likeness = [&rig](const std::string& topic) {
+    const std::string& left = rig.left.topic;
+    const auto end = std::ranges::mismatch(left, topic).in1;
+    return std::ranges::count(left.begin(), end, '/');
+  };
+  for (const TopicSummary& topic : topics) {
+    const bool is_imu = is_of_type({topic.topic, topic.type, topic.encoding, 0}, RosImu::kType);
+    if (!is_imu || topic.stamps.empty()) continue;
+    std::string& place = has_word(topic, "gyro")    ? rig.imu.gyro_topic
+                         : has_word(topic, "accel") ? rig.imu.accel_topic
+                                                    : rig.imu.topic;
+    if (place.empty() || likeness(topic.topic) > likeness(place)) place = topic.topic;
+  }
+  if (!rig.imu.topic.empty()) rig.imu.gyro_topic = rig.imu.accel_topic = "";
+}
+
+}  // namespace
+
+RigFile propose_rig(const std::vector<TopicSummary>& topics) {
+  RigFile rig;
+  propose_stereo(topics, rig);
+  propose_depth(topics, rig);
+  propose_imu(topics, rig);
+  return rig;
+}
+
+}  // namespace km

@@ -1,0 +1,76 @@
+#include <catch2/catch.hpp>
+
+#include "apps/robot/inspect.hpp"
+#include "apps/robot/rig_proposal.hpp"
+#include "modules/core/input_file.hpp"
+#include "modules/recordings/open_bag.hpp"
+#include "modules/recordings/ros_messages.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+TopicSummary topic(const std::string& name, std::string_view type, double rate_hz,
+                   const std::string& image = "") {
+  TopicSummary summary{.topic = name,
+                       .type = std::string(type),
+                       .encoding = "ros1",
+                       .has_sensor_stamps = true,
+                       .stamps = {},
+                       .is_image = !image.empty(),
+                       .image = {}};
+  if (summary.is_image) summary.image = TopicImage{{640, 480}, image};
+  for (int k = 0; k < 100; ++k) summary.stamps.push_back(nanoseconds(k / rate_hz));
+  return summary;
+}
+
+}  // namespace
+
+TEST_CASE("A rig is proposed by types, rates and names", "[robot]") {
+  const auto image = RosImage::kType, imu = RosImu::kType;
+  RigFile rig = propose_rig(
+      {topic("/thermal", image, 9.0, "mono8"), topic("/cam1/image_raw", image, 20.0, "mono8"),
+       topic("/cam0/image_raw", image, 20.0, "mono8"), topic("/imu0", imu, 200.0)});
+  CHECK(rig.left.topic == "/cam0/image_raw");
+  CHECK(rig.right.topic == "/cam1/image_raw");
+  CHECK(rig.imu.topic == "/imu0");
+  CHECK(rig.depth.topic.empty());
+
+  // As a RealSense's driver names them: left and right infrared, colour, gyroscope apart.
+  rig = propose_rig({topic("/camera/color/image_raw", image, 30.0, "rgb8"),
+                     topic("/camera/infra1/image_rect_raw", image, 30.0, "mono8"),
+                     topic("/camera/infra2/image_rect_raw", image, 30.0, "mono8"),
+                     topic("/camera/gyro/sample", imu, 400.0),
+                     topic("/camera/accel/sample", imu, 250.0)});
+  CHECK(rig.left.topic == "/camera/infra1/image_rect_raw");
+  CHECK(rig.right.topic == "/camera/infra2/image_rect_raw");
+  CHECK(rig.imu.topic.empty());
+  CHECK(rig.imu.gyro_topic == "/camera/gyro/sample");
+  CHECK(rig.imu.accel_topic == "/camera/accel/sample");
+
+  rig = propose_rig({topic("/camera/rgb/image_color", image, 30.0, "rgb8"),
+                     topic("/camera/depth/image", image, 30.0, "32FC1"), topic("/imu", imu, 100)});
+  CHECK(rig.left.topic == "/camera/rgb/image_color");
+  CHECK(rig.right.topic.empty());
+  CHECK(rig.depth.topic == "/camera/depth/image");
+}
+
+TEST_CASE("A rig file is written for a recording, once", "[robot]") {
+  const auto bag = shared_data("ros_recordings/rosbag2/s3e_playground_2");
+  if (!bag) return;
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "rig.yaml";
+  CHECK_THAT(inspect_recording(*bag, file), Catch::Contains("written: " + file.string()));
+  const std::string text = read_input_file(file);
+  CHECK_THAT(text, Catch::Contains("topic: \"/Alpha/left_camera/compressed\"") &&
+                       Catch::Contains("topic: \"/Alpha/right_camera/compressed\"") &&
+                       Catch::Contains("topic: \"/Alpha/imu/data\""));
+  CHECK_THROWS_WITH(inspect_recording(*bag, file),
+                    file.string() + ": is there already: name another file");
+  // What is left to complete is named by its line.
+  CHECK_THROWS_WITH(read_rig_file(file),
+                    Catch::Contains(file.string()) && Catch::Contains("calibration"));
+}
+
+}  // namespace km
