@@ -13,7 +13,7 @@
 //   modules/core        Eigen, nlohmann-json and the standard library
 //   modules/<m>         core, its own folder, and the modules listed below
 //   runtime             core, security
-//   modules/<m>/*_node, *_codec   its own module, core, runtime
+//   modules/<m>/*_node, *_codec, modules/ros_dds   their own module, core, runtime
 //   apps, test          everything
 // Everywhere: what takes seconds to compile, JSON, is no header's to include.
 
@@ -29,6 +29,7 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"vio", {"images"}},
     {"pose_graph", {"outlier_rejection"}},
     {"relay", {"security"}},
+    {"ros_dds", {"recordings"}},
     {"sensors", {"recordings"}},
     {"pgo_study", {"pose_graph", "outlier_rejection"}},
     {"evaluation", {"images", "mesh"}},
@@ -59,6 +60,7 @@ std::string module_of(const std::string& path) {
 }
 
 bool joins_runtime(const fs::path& file) {
+  if (module_of(file.generic_string()) == "ros_dds") return true;
   const std::string stem = file.stem().string();
   return stem.ends_with("_node") || stem.ends_with("_codec");
 }

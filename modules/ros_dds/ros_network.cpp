@@ -1,0 +1,102 @@
+#include "modules/ros_dds/ros_network.hpp"
+
+#include <ros2.h>
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+#include <utility>
+
+#include "modules/core/text_rows.hpp"
+#include "modules/core/xml_text.hpp"
+#include "runtime/dds/participant.hpp"
+
+namespace km {
+namespace {
+
+struct KnownType {
+  const char* package;
+  const char* name;
+  const dds_topic_descriptor_t* descriptor;
+};
+
+constexpr std::array<KnownType, 8> kTypes = {{
+    {"sensor_msgs", "Image", &sensor_msgs_msg_dds__Image__desc},
+    {"sensor_msgs", "CompressedImage", &sensor_msgs_msg_dds__CompressedImage__desc},
+    {"sensor_msgs", "Imu", &sensor_msgs_msg_dds__Imu__desc},
+    {"sensor_msgs", "CameraInfo", &sensor_msgs_msg_dds__CameraInfo__desc},
+    {"geometry_msgs", "PoseStamped", &geometry_msgs_msg_dds__PoseStamped__desc},
+    {"nav_msgs", "Odometry", &nav_msgs_msg_dds__Odometry__desc},
+    {"nav_msgs", "Path", &nav_msgs_msg_dds__Path__desc},
+    {"tf2_msgs", "TFMessage", &tf2_msgs_msg_dds__TFMessage__desc},
+}};
+
+// DDS has one configuration per domain number and process. That of ROS gets a number of its own
+// here, beyond those on the network, and its true one there.
+constexpr dds_domainid_t kOwnNumbers = 1000;
+
+std::string cyclone_xml(const RosConfig& config, const NetworkInterface& interface) {
+  std::string peers;
+  for (const std::string& peer : config.peers)
+    peers += "<Peer address='" + xml_escaped(peer) + "'/>";
+  if (!peers.empty()) peers = "<Peers>" + peers + "</Peers>";
+  return "<CycloneDDS><Domain id='any'><General><Interfaces><NetworkInterface name='" +
+         xml_escaped(interface.name) + '\'' + (interface.loopback ? " multicast='true'" : "") +
+         "/></Interfaces></General><Discovery><ExternalDomainId>" + std::to_string(config.domain) +
+         "</ExternalDomainId><ParticipantIndex>" + (peers.empty() ? "none" : "auto") +
+         "</ParticipantIndex>" + peers + "</Discovery><Internal><SocketReceiveBufferSize max='" +
+         std::to_string(config.receive_buffer_bytes) + "B'/></Internal></Domain></CycloneDDS>";
+}
+
+}  // namespace
+
+RosNetwork::RosNetwork(const RosConfig& config) {
+  check_hosts(checked(config).peers);
+  const NetworkInterface interface =
+      select_interface(network_interfaces(), config.interface);
+  interface_ = interface.name;
+  const auto number = kOwnNumbers + static_cast<dds_domainid_t>(config.domain);
+  domain_ = DdsEntity(dds_create_domain(number, cyclone_xml(config, interface).c_str()),
+                      "domain " + std::to_string(config.domain) + " of ROS on interface " +
+                          interface_);
+  participant_ =
+      DdsEntity(dds_create_participant(number, nullptr, nullptr), "participant among those of ROS");
+}
+
+const dds_topic_descriptor_t& RosNetwork::descriptor_of(std::string_view type) {
+  const auto known = std::ranges::find_if(kTypes, [type](const KnownType& candidate) {
+    const std::string package(candidate.package), name(candidate.name);
+    return type == package + '/' + name || type == package + "/msg/" + name;
+  });
+  if (known == kTypes.end())
+    throw std::invalid_argument("messages of " + readable(std::string(type), 80) +
+                                " are of no type that is known");
+  return *known->descriptor;
+}
+
+DdsEntity RosNetwork::create_topic(std::string_view topic, std::string_view type) const {
+  const std::string name = "rt/" + std::string(topic.substr(topic.starts_with('/') ? 1 : 0));
+  return {dds_create_topic(participant(), &descriptor_of(type), name.c_str(), nullptr, nullptr),
+          "topic " + name};
+}
+
+std::vector<std::string> known_ros_types() {
+  std::vector<std::string> names;
+  for (const KnownType& type : kTypes)
+    names.push_back(std::string(type.package) + "/msg/" + type.name);
+  return names;
+}
+
+DdsQos ros_qos(RosQos kind, int depth) {
+  DdsQos qos = make_dds_qos();
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
+  const bool is_reliable = kind != RosQos::kSensorData;
+  dds_qset_reliability(qos.get(),
+                       is_reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
+                       DDS_MSECS(100));
+  dds_qset_durability(qos.get(), kind == RosQos::kLatched ? DDS_DURABILITY_TRANSIENT_LOCAL
+                                                          : DDS_DURABILITY_VOLATILE);
+  return qos;
+}
+
+}  // namespace km

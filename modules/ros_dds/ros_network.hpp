@@ -1,0 +1,69 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "modules/core/config.hpp"
+#include "runtime/dds/entity.hpp"
+
+namespace km {
+
+/// Where ROS 2 is.
+struct RosConfig {
+  static constexpr const char* kSection = "ros";
+
+  int domain = 0;
+  std::string interface;
+  std::vector<std::string> peers = {};
+  int receive_buffer_bytes = 33554432;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("domain", domain, {0, 230}, "ROS_DOMAIN_ID of drivers and viewers");
+    visitor.field("interface", interface,
+                  "network interface of theirs; empty: chosen; lo with ROS_LOCALHOST_ONLY=1");
+    visitor.field("peers", peers, "addresses of their hosts, where multicast does not pass");
+    visitor.field("receive_buffer_bytes", receive_buffer_bytes, {65536, 1 << 28},
+                  "[B] for images that come faster than they are taken; the kernel may grant less: "
+                  "net.core.rmem_max");
+  }
+};
+
+/// Kinds of quality of service that ROS has for its topics.
+enum class RosQos {
+  kSensorData,  ///< Best effort: what is lost is not sent again.
+  kReliable,
+  kLatched,  ///< Reliable, and the last is kept for those who come later.
+};
+
+/// A participant among those of ROS 2: as rmw_cyclonedds_cpp and rmw_fastrtps_cpp it names topics
+/// "rt/..." and types "sensor_msgs::msg::dds_::Imu_". It shares nothing with the domain of the
+/// team, which may have the same number.
+class RosNetwork {
+ public:
+  /// Throws ConfigError for an unusable `config`, DdsError if DDS refuses it.
+  explicit RosNetwork(const RosConfig& config);
+
+  [[nodiscard]] dds_entity_t participant() const { return participant_.handle(); }
+  [[nodiscard]] const std::string& interface() const { return interface_; }
+
+  /// A type of messages, as DDS has it, by ROS 1's or ROS 2's name of it: "sensor_msgs/Image",
+  /// "sensor_msgs/msg/Image". Throws std::invalid_argument for others than known_ros_types().
+  [[nodiscard]] static const dds_topic_descriptor_t& descriptor_of(std::string_view type);
+
+  /// A DDS topic for ROS' `topic`. Throws likewise.
+  [[nodiscard]] DdsEntity create_topic(std::string_view topic, std::string_view type) const;
+
+ private:
+  std::string interface_;
+  DdsEntity domain_;
+  DdsEntity participant_;
+};
+
+/// The types of messages that a RosNetwork knows: "sensor_msgs/msg/Image", ...
+[[nodiscard]] std::vector<std::string> known_ros_types();
+
+/// `depth`: messages kept until they are taken.
+[[nodiscard]] DdsQos ros_qos(RosQos kind, int depth);
+
+}  // namespace km

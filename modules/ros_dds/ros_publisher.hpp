@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "modules/ros_dds/ros_network.hpp"
+
+struct ddsi_serdata;
+
+namespace km {
+
+struct SerializedDeleter {
+  void operator()(ddsi_serdata* serialized) const;
+};
+
+/// Publishes messages that are written already (see encode_ros()) on one topic of ROS 2.
+/// Thread-safe.
+class RosPublisher {
+ public:
+  /// `depth`: with RosQos::kLatched, messages kept for those who come later.
+  RosPublisher(std::shared_ptr<const RosNetwork> network, const std::string& topic,
+               std::string_view type, RosQos qos, int depth);
+
+  /// Little-endian CDR with its encapsulation header. Throws DdsError for what is none.
+  void publish(std::span<const std::uint8_t> bytes) const;
+
+  /// Readers that are there.
+  [[nodiscard]] std::size_t reader_count() const;
+
+ private:
+  std::shared_ptr<const RosNetwork> network_;  // outlives what follows
+  std::string name_;
+  DdsEntity topic_, writer_;
+  std::unique_ptr<ddsi_serdata, SerializedDeleter> blank_;  // has the type by which DDS takes bytes
+};
+
+}  // namespace km

@@ -1,0 +1,90 @@
+#include "modules/ros_dds/ros_subscription.hpp"
+
+#include <dds/ddsi/ddsi_serdata.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <utility>
+
+namespace km {
+namespace {
+
+Stamp wall_now() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace
+
+RosSubscription::RosSubscription(std::shared_ptr<const RosNetwork> network,
+                                 std::vector<RosTopic> topics)
+    : network_(std::move(network)),
+      waitset_(dds_create_waitset(network_->participant()), "waitset"),
+      guard_(dds_create_guardcondition(network_->participant()), "guard condition") {
+  check_dds(dds_waitset_attach(waitset_.handle(), guard_.handle(), -1), "cannot wait for a stop");
+  for (const RosTopic& wanted : topics) {
+    channels_.push_back({wanted.topic, wanted.type, "cdr", 0});
+    topics_.push_back(network_->create_topic(wanted.topic, wanted.type));
+    const DdsQos qos = ros_qos(wanted.qos, wanted.depth);
+    readers_.emplace_back(dds_create_reader(network_->participant(), topics_.back().handle(),
+                                            qos.get(), nullptr),
+                          "reader of " + wanted.topic);
+    const dds_entity_t reader = readers_.back().handle();
+    check_dds(dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS), "cannot wait for data");
+    check_dds(dds_waitset_attach(waitset_.handle(), reader,
+                                 static_cast<dds_attach_t>(readers_.size() - 1)),
+              "cannot wait for " + wanted.topic);
+  }
+}
+
+void RosSubscription::take_from(std::size_t channel) {
+  constexpr std::size_t kAtOnce = 16;
+  std::array<ddsi_serdata*, kAtOnce> samples{};
+  std::array<dds_sample_info_t, kAtOnce> infos{};
+  const dds_return_t count = check_dds(
+      dds_takecdr(readers_[channel].handle(), samples.data(), kAtOnce, infos.data(), DDS_ANY_STATE),
+      "cannot take messages");
+  const Stamp now = wall_now();
+  for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
+    if (infos[k].valid_data) {
+      BagMessage message{channel, now, std::vector<std::uint8_t>(ddsi_serdata_size(samples[k]))};
+      ddsi_serdata_to_ser(samples[k], 0, message.bytes.size(), message.bytes.data());
+      taken_.push_back(std::move(message));
+    }
+    ddsi_serdata_unref(samples[k]);
+  }
+}
+
+std::optional<BagMessage> RosSubscription::next() {
+  while (taken_.empty() && !stopped_) {
+    std::array<dds_attach_t, 16> ready{};
+    const dds_return_t count = check_dds(
+        dds_waitset_wait(waitset_.handle(), ready.data(), ready.size(), DDS_SECS(1)),
+        "cannot wait for messages");
+    for (std::size_t k = 0; k < std::min<std::size_t>(ready.size(), static_cast<std::size_t>(count)); ++k)
+      if (ready[k] >= 0) take_from(static_cast<std::size_t>(ready[k]));
+  }
+  if (stopped_) return std::nullopt;
+  BagMessage message = std::move(taken_.front());
+  taken_.pop_front();
+  return message;
+}
+
+void RosSubscription::stop() noexcept {
+  stopped_ = true;
+  dds_set_guardcondition(guard_.handle(), true);
+}
+
+std::size_t RosSubscription::lost() const {
+  std::size_t total = 0;
+  for (const DdsEntity& reader : readers_) {
+    dds_sample_lost_status_t status{};
+    if (dds_get_sample_lost_status(reader.handle(), &status) == DDS_RETCODE_OK)
+      total += status.total_count;
+  }
+  return total;
+}
+
+}  // namespace km

@@ -1,0 +1,134 @@
+#include <catch2/catch.hpp>
+
+#include <chrono>
+#include <random>
+#include <thread>
+
+#include "modules/recordings/ros_messages.hpp"
+#include "modules/ros_dds/ros_publisher.hpp"
+#include "modules/ros_dds/ros_subscription.hpp"
+#include "test/support/patience.hpp"
+
+namespace km {
+namespace {
+
+int random_domain() {
+  std::random_device random;
+  return static_cast<int>(random() % 100);
+}
+
+std::shared_ptr<const RosNetwork> network() {
+  static const auto shared =
+      std::make_shared<const RosNetwork>(RosConfig{.domain = random_domain(), .interface = "lo"});
+  return shared;
+}
+
+RosImage image(Stamp stamp) {
+  return {.header = {stamp, "left"},
+          .height = 480,
+          .width = 752,
+          .encoding = "mono8",
+          .is_bigendian = false,
+          .step = 752,
+          .data = std::vector<std::uint8_t>(752 * 480, 7)};
+}
+
+RosImu imu(Stamp stamp) {
+  RosImu message;
+  message.header.stamp = stamp;
+  message.angular_velocity.x() = 0.25;
+  return message;
+}
+
+void wait_for_reader(const RosPublisher& publisher) {
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (publisher.reader_count() == 0 && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  REQUIRE(publisher.reader_count() > 0);
+}
+
+TEST_CASE("What is published on a topic of ROS is what is received", "[ros_dds]") {
+  RosSubscription subscription(
+      network(), {{"/a/imu", "sensor_msgs/msg/Imu", RosQos::kSensorData, 100},
+                  {"a/image", "sensor_msgs/Image", RosQos::kSensorData, 10}});
+  const RosPublisher images(network(), "/a/image", "sensor_msgs/msg/Image", RosQos::kSensorData, 10);
+  const RosPublisher imus(network(), "/a/imu", "sensor_msgs/Imu", RosQos::kReliable, 10);
+  wait_for_reader(images);
+  wait_for_reader(imus);
+  const auto sent_imu = encode_ros(imu(17)), sent_image = encode_ros(image(18));
+  imus.publish(sent_imu);
+  images.publish(sent_image);
+  for (int k = 0; k < 2; ++k) {
+    const auto received = subscription.next();
+    REQUIRE(received);
+    const auto& sent = received->channel == 0 ? sent_imu : sent_image;
+    REQUIRE(received->bytes.size() == (sent.size() + 3) / 4 * 4);
+    CHECK(std::equal(sent.begin() + 4, sent.end(), received->bytes.begin() + 4));
+    CHECK(received->bytes[1] == 1);
+    CHECK(received->log_time > 0);
+  }
+  CHECK(subscription.lost() == 0);
+}
+
+TEST_CASE("Every known type crosses", "[ros_dds]") {
+  const auto crosses = []<typename Message>(Message message) {
+    CAPTURE(Message::kType);
+    const std::string type(Message::kType);
+    RosSubscription subscription(network(), {{"/" + type, type, RosQos::kReliable, 10}});
+    const RosPublisher publisher(network(), "/" + type, type, RosQos::kReliable, 10);
+    wait_for_reader(publisher);
+    publisher.publish(encode_ros(message));
+    const auto received = subscription.next();
+    REQUIRE(received);
+    const auto decoded = decode_ros<Message>("cdr", received->bytes);
+    CAPTURE(decoded.refusal);
+    REQUIRE(decoded.value);
+    CHECK(encode_ros(*decoded.value) == encode_ros(message));
+  };
+  crosses(image(3));
+  crosses(RosCompressedImage{{4, "left"}, "jpeg", {1, 2, 3}});
+  crosses(imu(5));
+  RosCameraInfo camera;
+  camera.distortion_model = "plumb_bob";
+  camera.D = {1, 2, 3, 4, 5};
+  crosses(camera);
+  crosses(RosPoseStamped{{6, "map"}, {}});
+  RosOdometry odometry;
+  odometry.child_frame = "body";
+  crosses(odometry);
+  crosses(RosTransforms{{{{7, "map"}, "odom", {}}, {{8, "odom"}, "body", {}}}});
+}
+
+TEST_CASE("What is latched reaches those who come later", "[ros_dds]") {
+  const RosPublisher publisher(network(), "/tf_static", "tf2_msgs/msg/TFMessage", RosQos::kLatched,
+                               1);
+  publisher.publish(encode_ros(RosTransforms{{{{7, "map"}, "odom", {}}}}));
+  RosSubscription late(network(), {{"/tf_static", "tf2_msgs/msg/TFMessage", RosQos::kLatched, 10}});
+  const auto received = late.next();
+  REQUIRE(received);
+  CHECK(decode_ros<RosTransforms>("cdr", received->bytes).value->transforms[0].child_frame ==
+        "odom");
+}
+
+TEST_CASE("Waiting for messages ends with a stop", "[ros_dds]") {
+  RosSubscription subscription(network(), {{"/never", "sensor_msgs/msg/Imu"}});
+  std::jthread stopper([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    subscription.stop();
+  });
+  CHECK(!subscription.next());
+  CHECK(!subscription.next());
+}
+
+TEST_CASE("Bytes that are no message of the topic are not published", "[ros_dds]") {
+  const RosPublisher publisher(network(), "/b/imu", "sensor_msgs/msg/Imu", RosQos::kReliable, 10);
+  auto bytes = encode_ros(imu(1));
+  bytes.resize(bytes.size() - 100);
+  CHECK_THROWS_AS(publisher.publish(bytes), DdsError);
+  CHECK_THROWS_AS(RosPublisher(network(), "/b/scan", "sensor_msgs/msg/LaserScan",
+                               RosQos::kReliable, 10),
+                  std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace km
