@@ -37,6 +37,8 @@ Examples
   What is in a recording, and how regular its stamps are; and a robot on it, its topics as rig.yaml says:
     kimera_multi_robot --inspect recording.bag rig.yaml
     kimera_multi_robot --robot 0 --dataset recording.bag --rig rig.yaml --output results/a
+  On the sensors of this robot, whose drivers run on ROS 2:
+    kimera_multi_robot --robot 0 --live rig.yaml --output results/a
   The back-end alone, on a recorded pose graph:
     kimera_multi_robot --config config/datasets/tunnels.yaml --robot 3 --graph robot3.csv --rate max --output results/3
 
@@ -82,6 +84,16 @@ void add_input(CLI::App& app, RobotOptions& options) {
                    "EuRoC/ASL folder: cam0, cam1 (or depth0), imu0, or mav0/; or with --rig a bag "
                    "of ROS 1 (.bag) or ROS 2 (folder, .db3, .mcap)")
       ->check(CLI::ExistingPath);
+  group
+      ->add_option_function<std::string>(
+          "--live",
+          [&options](const std::string& rig) {
+            options.rig = rig;
+            options.is_live = true;
+          },
+          "Rig file: its topics are those of drivers that run now, on ROS 2 (see ros: in "
+          "config/robot.yaml); until Ctrl-C")
+      ->check(CLI::ExistingFile);
   group->add_option("--graph", options.graph, "Recorded pose graph of one robot (.g2o or .csv)")
       ->check(CLI::ExistingFile);
   group

@@ -12,32 +12,28 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path sensor_folder(const fs::path& dataset) {
-  return is_folder(dataset / "mav0") ? dataset / "mav0" : dataset;
-}
-
-DepthFrom depth_source(DenseSource wanted, const fs::path& sensors) {
-  const bool recorded = is_folder(sensors / "depth0");
-  const bool stereo = is_folder(sensors / "cam1");
-  if (wanted == DenseSource::kRecorded && !recorded)
-    throw ConfigError("mapping.depth: recorded, but there is no depth0 in " + sensors.string() +
+DepthFrom depth_source(DenseSource wanted, const ImageSources& sources) {
+  if (wanted == DenseSource::kRecorded && !sources.depth)
+    throw ConfigError("mapping.depth: recorded, but there are no depth images in " + sources.place +
                       "; stereo computes it");
-  if (wanted == DenseSource::kComputed && !stereo)
-    throw ConfigError("mapping.depth: stereo, but there is no cam1 in " + sensors.string());
-  return recorded && wanted != DenseSource::kComputed ? DepthFrom::kImages : DepthFrom::kStereo;
+  if (wanted == DenseSource::kComputed && !sources.right)
+    throw ConfigError("mapping.depth: stereo, but there is no right camera in " + sources.place);
+  return sources.depth && wanted != DenseSource::kComputed ? DepthFrom::kImages
+                                                           : DepthFrom::kStereo;
 }
 
-LabelsFrom label_source(DenseSource wanted, bool has_network, const fs::path& sensors) {
-  const bool recorded = is_folder(sensors / "label0");
-  if (wanted == DenseSource::kRecorded && !recorded)
-    throw ConfigError("mapping.labels: recorded, but there is no label0 in " + sensors.string());
+LabelsFrom label_source(DenseSource wanted, bool has_network, const ImageSources& sources) {
+  if (wanted == DenseSource::kRecorded && !sources.labels)
+    throw ConfigError("mapping.labels: recorded, but there are no label images in " +
+                      sources.place);
   if (wanted == DenseSource::kComputed && !has_network)
     throw ConfigError("mapping.labels: network, but segmentation.network names no file");
-  if (!recorded && !has_network)
-    throw ConfigError("mapping.mode: semantic needs labels, but there is no label0 in " +
-                      sensors.string() +
+  if (!sources.labels && !has_network)
+    throw ConfigError("mapping.mode: semantic needs labels, but there are no label images in " +
+                      sources.place +
                       " and segmentation.network names no file; metric does without");
-  return recorded && wanted != DenseSource::kComputed ? LabelsFrom::kImages : LabelsFrom::kNetwork;
+  return sources.labels && wanted != DenseSource::kComputed ? LabelsFrom::kImages
+                                                            : LabelsFrom::kNetwork;
 }
 
 LabelPalette read_palette(const fs::path& file) {
@@ -54,25 +50,40 @@ LabelPalette read_palette(const fs::path& file) {
 
 }  // namespace
 
+ImageSources image_sources(const fs::path& dataset) {
+  const fs::path sensors = is_folder(dataset / "mav0") ? dataset / "mav0" : dataset;
+  return {.place = sensors.string() + " (cam1, depth0, label0)",
+          .right = is_folder(sensors / "cam1"),
+          .depth = is_folder(sensors / "depth0"),
+          .labels = is_folder(sensors / "label0"),
+          .palette = sensors / "label_palette.csv"};
+}
+
+ImageSources image_sources(const SensorTopicNames& topics, const fs::path& rig) {
+  return {.place = rig.string(),
+          .right = !topics.right.empty(),
+          .depth = !topics.depth.empty(),
+          .labels = false,
+          .palette = rig.parent_path() / "label_palette.csv"};
+}
+
 std::optional<MappingPlan> plan_mapping(const MappingConfig& config,
                                         const StereoDepthConfig& stereo,
                                         const SegmentationConfig& segmentation,
-                                        const fs::path& dataset) {
+                                        const std::optional<ImageSources>& sources) {
   if (config.mode == MappingMode::kOff) return std::nullopt;
-  if (dataset.empty())
+  if (!sources)
     throw ConfigError("mapping.mode needs images: a robot on --graph has none, set it to off");
-  const fs::path sensors = sensor_folder(dataset);
   MappingPlan plan;
-  plan.sensor = {.depth = depth_source(config.depth, sensors),
+  plan.sensor = {.depth = depth_source(config.depth, *sources),
                  .labels = LabelsFrom::kNone,
                  .stereo = stereo,
                  .segmentation = segmentation};
   if (config.mode == MappingMode::kMetric) return plan;
-  plan.sensor.labels = label_source(config.labels, !segmentation.network.empty(), sensors);
+  plan.sensor.labels = label_source(config.labels, !segmentation.network.empty(), *sources);
   const bool own_table =
       plan.sensor.labels == LabelsFrom::kNetwork && !segmentation.palette.empty();
-  plan.palette =
-      read_palette(own_table ? fs::path(segmentation.palette) : sensors / "label_palette.csv");
+  plan.palette = read_palette(own_table ? fs::path(segmentation.palette) : sources->palette);
   return plan;
 }
 

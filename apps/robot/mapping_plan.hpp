@@ -2,11 +2,13 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "apps/robot/mapping_config.hpp"
 #include "modules/core/camera.hpp"
 #include "modules/core/label_palette.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
+#include "modules/sensors/bag_dataset.hpp"
 
 namespace km {
 
@@ -19,12 +21,28 @@ struct MappingPlan {
   [[nodiscard]] bool reads_labels() const { return sensor.labels == LabelsFrom::kImages; }
 };
 
-/// What `config` asks for, with the sources that the recording `dataset` (empty: none) has; nullopt
-/// if mapping is off. Throws ConfigError if it cannot be had, with what can.
+/// What a map can be made of.
+struct ImageSources {
+  std::string place;  ///< Where they are, for messages: a folder, or a file of topics.
+  bool right = false;
+  bool depth = false;
+  bool labels = false;
+  std::filesystem::path palette;  ///< File of the labels' classes, also where labels are computed.
+};
+
+/// Those of a EuRoC folder, by what is in it.
+[[nodiscard]] ImageSources image_sources(const std::filesystem::path& dataset);
+
+/// Those of a bag or a live robot: no labels.
+[[nodiscard]] ImageSources image_sources(const SensorTopicNames& topics,
+                                         const std::filesystem::path& rig);
+
+/// What `config` asks for, with the sources that there are (nullopt: no images at all); nullopt if
+/// mapping is off. Throws ConfigError if it cannot be had, with what can.
 [[nodiscard]] std::optional<MappingPlan> plan_mapping(const MappingConfig& config,
                                                       const StereoDepthConfig& stereo,
                                                       const SegmentationConfig& segmentation,
-                                                      const std::filesystem::path& dataset);
+                                                      const std::optional<ImageSources>& sources);
 
 /// Distance at which the depth of `rig` is off by `max_error_m`, one standard deviation, if its
 /// disparities are by a quarter of a pixel: sqrt(max_error_m * f * baseline / 0.25 px). With an

@@ -19,6 +19,7 @@
 #include "modules/place_recognition/place_recognition_config.hpp"
 #include "modules/pose_graph/graph_playback_config.hpp"
 #include "modules/pose_graph/pose_graph_config.hpp"
+#include "modules/ros_dds/ros_config.hpp"
 #include "modules/semantic_mapping/semantic_mapping_config.hpp"
 #include "modules/sensors/sensors_config.hpp"
 #include "modules/vio/tracker_config.hpp"
@@ -37,6 +38,7 @@ struct RobotOptions {
 
   std::filesystem::path dataset;  ///< EuRoC/ASL folder, or a bag; exclusive with `graph`.
   std::filesystem::path rig;      ///< Of a bag: which topics are the sensors (see RigFile).
+  bool is_live = false;           ///< The topics of `rig` are those of drivers that run now.
   std::filesystem::path graph;    ///< Recorded pose graph, g2o or CSV.
   std::filesystem::path session;  ///< Results of a run of the past; exclusive with both.
   std::optional<double> from_s;   ///< Part of the recording [s since its first image].
@@ -61,6 +63,7 @@ struct RobotConfig {
   DdsConfig dds;
   BudgetConfig budget;
   SensorsConfig sensors;
+  RosConfig ros;
   TrackerConfig tracker;
   VioConfig vio;
   KeyframeFeaturesConfig keyframe_features;
@@ -81,7 +84,7 @@ struct RobotConfig {
   /// Calls visit(section) for every section, in the order of files.
   void visit_sections(const auto& visit) {
     const auto visit_all = [&](auto&... sections) { (visit(sections), ...); };
-    visit_all(run, dds, budget, sensors, tracker, vio, keyframe_features, place_recognition,
+    visit_all(run, dds, budget, sensors, ros, tracker, vio, keyframe_features, place_recognition,
               loop_closure, pcm, pose_graph, graph_playback, mapping, stereo_depth, segmentation,
               semantic_mapping, mesh_deformation, mesh_chunks);
   }

@@ -9,6 +9,8 @@
 #include "modules/core/input_file.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "modules/recordings/open_bag.hpp"
+#include "modules/recordings/ros_messages.hpp"
+#include "modules/ros_dds/ros_subscription.hpp"
 #include "modules/sensors/bag_dataset.hpp"
 #include "modules/sensors/euroc_reader.hpp"
 #include "modules/sensors/euroc_rig_codec.hpp"
@@ -39,7 +41,7 @@ std::optional<RestoredRun> restore(const RobotOptions& options, const std::strin
                                 std::to_string(options.robot) + " on " + input +
                                 ": give the options it was started with, or --output");
   if (run.keyframes.empty()) return std::nullopt;
-  if (!options.dataset.empty() && run.final_states() == 0)
+  if (options.graph.empty() && run.final_states() == 0)
     throw std::invalid_argument(file.string() + ": has keyframes but no odometry");
   return run;
 }
@@ -62,30 +64,52 @@ RestoredRun open_session(const RobotOptions& options) {
   return alone_as(options.robot, std::move(run));
 }
 
-std::unique_ptr<DatasetReader> open_bag_dataset(const RobotOptions& options,
-                                                const RobotConfig& config,
-                                                std::optional<Stamp> not_before) {
-  if (options.rig.empty())
-    throw std::invalid_argument(
-        options.dataset.string() +
-        ": --rig FILE must tell which of its topics are the sensors; --inspect " +
-        options.dataset.string() + " rig.yaml writes one to complete");
+// Sensors by DDS: of images only the newest few count, inertial samples are all needed.
+std::unique_ptr<BagReader> subscribe(const RosConfig& config, const SensorTopicNames& topics) {
+  constexpr int kImages = 10, kSamples = 4000;
+  std::vector<RosTopic> wanted;
+  for (const std::string& topic : {topics.left, topics.right, topics.depth}) {
+    const bool is_compressed =
+        topic.ends_with("/compressed") || topic.ends_with("/compressedDepth");
+    const auto type = is_compressed ? RosCompressedImage::kType : RosImage::kType;
+    if (!topic.empty()) wanted.push_back({topic, std::string(type), RosQos::kSensorData, kImages});
+  }
+  for (const std::string& topic : {topics.imu, topics.gyro, topics.accel})
+    if (!topic.empty())
+      wanted.push_back({topic, std::string(RosImu::kType), RosQos::kSensorData, kSamples});
+  return std::make_unique<RosSubscription>(std::make_shared<const RosNetwork>(config),
+                                           std::move(wanted));
+}
+
+std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const RobotConfig& config,
+                                             const std::optional<MappingPlan>& mapping, Rig rig,
+                                             std::optional<Stamp> not_before) {
+  const bool needs_depth =
+      rig.topics.right.empty() || config.sensors.depth || (mapping && mapping->reads_depth());
+  if (!needs_depth) rig.topics.depth.clear();
   const BagWindow window{.from_s = options.from_s.value_or(0.0),
                          .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
                          .not_before = not_before};
-  return std::make_unique<BagDataset>(options.dataset.string(), open_bag(options.dataset),
-                                      read_rig_file(options.rig), config.sensors.stereo_tolerance_s,
-                                      window);
+  auto messages = options.is_live ? subscribe(config.ros, rig.topics) : open_bag(options.dataset);
+  return std::make_unique<BagDataset>(options.is_live ? "live" : options.dataset.string(),
+                                      std::move(messages), std::move(rig),
+                                      config.sensors.stereo_tolerance_s, window);
 }
 
 std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const RobotConfig& config,
                                             const std::optional<MappingPlan>& mapping,
+                                            const std::optional<Rig>& rig,
                                             const std::optional<RestoredRun>& restored) {
   const auto not_before = restored ? std::optional(restored->odometry.back().stamp) : std::nullopt;
-  if (may_be_bag(options.dataset)) return open_bag_dataset(options, config, not_before);
-  if (!options.rig.empty())
-    throw std::invalid_argument("--rig " + options.rig.string() + " is for a bag, " +
-                                options.dataset.string() + " is none");
+  const std::string dataset = options.dataset.string();
+  const bool is_bag = options.is_live || may_be_bag(options.dataset);
+  if (is_bag && !rig)
+    throw std::invalid_argument(dataset + ": --rig FILE must tell which of its topics are the " +
+                                "sensors; --inspect " + dataset + " rig.yaml writes one");
+  if (is_bag) return open_messages(options, config, mapping, *rig, not_before);
+  if (rig)
+    throw std::invalid_argument("--rig " + options.rig.string() + " is for a bag, " + dataset +
+                                " is none");
   EurocOptions euroc{.from_s = options.from_s.value_or(0.0),
                      .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
                      .not_before = not_before,
@@ -111,14 +135,17 @@ RecordedGraph open_graph(const RobotOptions& options) {
 }  // namespace
 
 RobotInput open_robot_input(const RobotOptions& options, const RobotConfig& config,
-                            const std::optional<MappingPlan>& mapping) {
+                            const std::optional<MappingPlan>& mapping,
+                            const std::optional<Rig>& rig) {
   if (!options.session.empty()) return {PastRun(), {}, open_session(options)};
-  const bool is_dataset = !options.dataset.empty();
-  const fs::path& path = is_dataset ? options.dataset : options.graph;
+  const bool is_dataset = options.is_live || !options.dataset.empty();
+  const fs::path& path = options.is_live ? options.rig
+                         : is_dataset    ? options.dataset
+                                         : options.graph;
   const std::string name = (path / "").parent_path().filename();  // wherever it is mounted
   std::optional<RestoredRun> restored = restore(options, name);
   if (!is_dataset) return {open_graph(options), name, std::move(restored)};
-  auto reader = open_dataset(options, config, mapping, restored);
+  auto reader = open_dataset(options, config, mapping, rig, restored);
   auto map = restored && mapping ? restore_map(options, *restored) : std::nullopt;
   return {std::move(reader), name, std::move(restored), std::move(map)};
 }

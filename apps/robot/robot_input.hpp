@@ -27,9 +27,10 @@ struct RobotInput {
 };
 
 /// Opens what the options name, and with --resume the journal of the run to go on with. Throws
-/// DatasetError, InputFileError and std::invalid_argument with one line that names the file and
-/// what helps.
+/// DatasetError, DdsError, InputFileError and std::invalid_argument with one line that names the
+/// file and what helps.
 [[nodiscard]] RobotInput open_robot_input(const RobotOptions& options, const RobotConfig& config,
-                                          const std::optional<MappingPlan>& mapping);
+                                          const std::optional<MappingPlan>& mapping,
+                                          const std::optional<Rig>& rig);
 
 }  // namespace km

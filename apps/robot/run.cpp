@@ -425,14 +425,22 @@ int conclude(const RobotOptions& options, bool has_budget, Robot& robot,
   return verdict.exit_code;
 }
 
+std::optional<ImageSources> sources_of(const RobotOptions& options, const std::optional<Rig>& rig) {
+  if (rig) return image_sources(rig->topics, options.rig);
+  if (options.dataset.empty()) return std::nullopt;
+  return image_sources(options.dataset);
+}
+
 }  // namespace
 
 int run_robot(const RobotOptions& options, SignalWatch& signals,
               const std::function<void(Topics&)>& listen) {
   const RobotConfig config = load_robot_config(options);
-  const std::optional<MappingPlan> mapping =
-      plan_mapping(config.mapping, config.stereo_depth, config.segmentation, options.dataset);
-  RobotInput input = open_robot_input(options, config, mapping);
+  const std::optional<Rig> rig =
+      options.rig.empty() ? std::nullopt : std::optional(read_rig_file(options.rig));
+  const std::optional<MappingPlan> mapping = plan_mapping(
+      config.mapping, config.stereo_depth, config.segmentation, sources_of(options, rig));
+  RobotInput input = open_robot_input(options, config, mapping, rig);
   const bool goes_on = options.resume && input.restored;
   ResultWriter results;
   Robot robot(options, config, std::move(input), mapping, results, signals);

@@ -60,6 +60,12 @@ class BagReader {
 
   /// Faults met so far.
   [[nodiscard]] virtual BagReport report() const = 0;
+
+  /// True for what happens now and has no end: log times are those of arrival.
+  [[nodiscard]] virtual bool is_live() const { return false; }
+
+  /// Ends next(), now and later, where it waits. Thread-safe.
+  virtual void stop() noexcept {}
 };
 
 }  // namespace km

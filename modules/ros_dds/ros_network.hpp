@@ -4,30 +4,10 @@
 #include <string_view>
 #include <vector>
 
-#include "modules/core/config.hpp"
+#include "modules/ros_dds/ros_config.hpp"
 #include "runtime/dds/entity.hpp"
 
 namespace km {
-
-/// Where ROS 2 is.
-struct RosConfig {
-  static constexpr const char* kSection = "ros";
-
-  int domain = 0;
-  std::string interface;
-  std::vector<std::string> peers = {};
-  int receive_buffer_bytes = 33554432;
-
-  void visit_fields(auto& visitor) {
-    visitor.field("domain", domain, {0, 230}, "ROS_DOMAIN_ID of drivers and viewers");
-    visitor.field("interface", interface,
-                  "network interface of theirs; empty: chosen; lo with ROS_LOCALHOST_ONLY=1");
-    visitor.field("peers", peers, "addresses of their hosts, where multicast does not pass");
-    visitor.field("receive_buffer_bytes", receive_buffer_bytes, {65536, 1 << 28},
-                  "[B] for images that come faster than they are taken; the kernel may grant less: "
-                  "net.core.rmem_max");
-  }
-};
 
 /// Kinds of quality of service that ROS has for its topics.
 enum class RosQos {

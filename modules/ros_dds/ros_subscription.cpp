@@ -5,7 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
+#include <span>
 #include <utility>
+
+#include "runtime/clock.hpp"
+#include "runtime/heartbeat.hpp"
+#include "runtime/log.hpp"
 
 namespace km {
 namespace {
@@ -28,15 +34,17 @@ RosSubscription::RosSubscription(std::shared_ptr<const RosNetwork> network,
     channels_.push_back({wanted.topic, wanted.type, "cdr", 0});
     topics_.push_back(network_->create_topic(wanted.topic, wanted.type));
     const DdsQos qos = ros_qos(wanted.qos, wanted.depth);
-    readers_.emplace_back(dds_create_reader(network_->participant(), topics_.back().handle(),
-                                            qos.get(), nullptr),
-                          "reader of " + wanted.topic);
+    readers_.emplace_back(
+        dds_create_reader(network_->participant(), topics_.back().handle(), qos.get(), nullptr),
+        "reader of " + wanted.topic);
     const dds_entity_t reader = readers_.back().handle();
     check_dds(dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS), "cannot wait for data");
     check_dds(dds_waitset_attach(waitset_.handle(), reader,
                                  static_cast<dds_attach_t>(readers_.size() - 1)),
               "cannot wait for " + wanted.topic);
   }
+  told_s_ = steady_now_s();
+  heard_s_.assign(readers_.size(), told_s_);
 }
 
 void RosSubscription::take_from(std::size_t channel) {
@@ -52,19 +60,39 @@ void RosSubscription::take_from(std::size_t channel) {
       BagMessage message{channel, now, std::vector<std::uint8_t>(ddsi_serdata_size(samples[k]))};
       ddsi_serdata_to_ser(samples[k], 0, message.bytes.size(), message.bytes.data());
       taken_.push_back(std::move(message));
+      heard_s_[channel] = steady_now_s();
     }
     ddsi_serdata_unref(samples[k]);
   }
 }
 
+// A driver that died, or a topic by another name, is what people look for first.
+void RosSubscription::tell_silence() {
+  const double now_s = steady_now_s();
+  if (now_s - told_s_ < kSilence_s) return;
+  told_s_ = now_s;
+  for (std::size_t channel = 0; channel < readers_.size(); ++channel) {
+    if (now_s - heard_s_[channel] < kSilence_s) continue;
+    dds_subscription_matched_status_t status{};
+    dds_get_subscription_matched_status(readers_[channel].handle(), &status);
+    log::warn("ros") << "nothing on " << channels_[channel].topic << " (" << channels_[channel].type
+                     << ") for " << std::lround(now_s - heard_s_[channel]) << " s; "
+                     << status.current_count << " publish it";
+  }
+}
+
 std::optional<BagMessage> RosSubscription::next() {
   while (taken_.empty() && !stopped_) {
+    tell_silence();
     std::array<dds_attach_t, 16> ready{};
-    const dds_return_t count = check_dds(
-        dds_waitset_wait(waitset_.handle(), ready.data(), ready.size(), DDS_SECS(1)),
-        "cannot wait for messages");
-    for (std::size_t k = 0; k < std::min<std::size_t>(ready.size(), static_cast<std::size_t>(count)); ++k)
-      if (ready[k] >= 0) take_from(static_cast<std::size_t>(ready[k]));
+    const auto count = [&] {
+      const Heartbeat::Waiting waiting;
+      return check_dds(dds_waitset_wait(waitset_.handle(), ready.data(), ready.size(), DDS_SECS(1)),
+                       "cannot wait for messages");
+    }();
+    const auto ready_count = std::min(ready.size(), static_cast<std::size_t>(count));
+    for (const dds_attach_t channel : std::span(ready).first(ready_count))
+      if (channel >= 0) take_from(static_cast<std::size_t>(channel));
   }
   if (stopped_) return std::nullopt;
   BagMessage message = std::move(taken_.front());

@@ -19,10 +19,12 @@ struct RosTopic {
   int depth = 10;  ///< Messages kept until next() takes them; the oldest go.
 };
 
-/// Messages of ROS 2 as they come, logged at the time of their arrival: a recording that has no
-/// end. Not thread-safe but for stop() and lost().
+/// Messages of ROS 2 as they come. What is silent for kSilence_s is named in the log. Not
+/// thread-safe but for stop() and lost().
 class RosSubscription final : public BagReader {
  public:
+  static constexpr double kSilence_s = 5.0;
+
   RosSubscription(std::shared_ptr<const RosNetwork> network, std::vector<RosTopic> topics);
 
   [[nodiscard]] const std::vector<BagChannel>& channels() const override { return channels_; }
@@ -30,20 +32,23 @@ class RosSubscription final : public BagReader {
   [[nodiscard]] std::optional<BagMessage> next() override;
   [[nodiscard]] BagReport report() const override { return {}; }
 
-  /// Ends next(), now and later.
-  void stop() noexcept;
+  [[nodiscard]] bool is_live() const override { return true; }
+  void stop() noexcept override;
 
   /// Messages that came too fast for DDS or for next(). Thread-safe.
   [[nodiscard]] std::size_t lost() const;
 
  private:
   void take_from(std::size_t channel);
+  void tell_silence();
 
   std::shared_ptr<const RosNetwork> network_;  // outlives what follows
   std::vector<BagChannel> channels_;
   std::vector<DdsEntity> topics_, readers_;
   DdsEntity waitset_, guard_;
   std::deque<BagMessage> taken_;
+  std::vector<double> heard_s_;  // of each channel, when last; steady clock
+  double told_s_ = 0.0;          // when silence was looked for
   std::atomic<bool> stopped_ = false;
 };
 

@@ -53,6 +53,7 @@ BagDataset::BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig
       window_(window),
       joiner_(!rig_.topics.right.empty(), !rig_.topics.depth.empty(), stereo_tolerance_s) {
   find_topics();
+  if (is_live()) return;
   first_ = read_packet();
   if (first_) return;
   std::ostringstream message;

@@ -39,12 +39,12 @@ struct BagWindow {
 
 /// Reads sensor packets from the messages of a bag, as they come: sensor_msgs/Image and
 /// CompressedImage, and sensor_msgs/Imu, whose stamps are those of their headers. Bad messages are
-/// skipped and counted.
+/// skipped and counted. A bag may be live.
 class BagDataset final : public DatasetReader {
  public:
   /// `name` begins messages: the path of the bag. `stereo_tolerance_s`: see FrameJoiner. Reads up
-  /// to the first packet. Throws DatasetError for topics that the bag does not have or that are of
-  /// another type, naming those that it has, and where the window has no frame.
+  /// to the first packet, but of a live one. Throws DatasetError for topics that the bag does not
+  /// have or that are of another type, naming those that it has, and where the window has no frame.
   BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig,
              std::optional<double> stereo_tolerance_s, const BagWindow& window = {});
 
@@ -53,6 +53,8 @@ class BagDataset final : public DatasetReader {
   [[nodiscard]] ReaderReport report() const override;
   [[nodiscard]] std::size_t pair_count() const override { return pair_count_; }
   [[nodiscard]] std::vector<std::string> remarks() const override;
+  [[nodiscard]] bool is_live() const override { return bag_->is_live(); }
+  void stop() noexcept override { bag_->stop(); }
 
  private:
   enum class Role { kNone, kLeft, kRight, kDepth, kImu, kGyro, kAccel };

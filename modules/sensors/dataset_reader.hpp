@@ -66,7 +66,13 @@ class DatasetReader {
   /// What a user should know of how it is read, a line each; complete with the first packet.
   [[nodiscard]] virtual std::vector<std::string> remarks() const { return {}; }
 
-  /// Frames that next() can give at most.
+  /// True for sensors that measure now: next() waits for them, and there is no end.
+  [[nodiscard]] virtual bool is_live() const { return false; }
+
+  /// Ends next(), now and later, where it waits. Thread-safe.
+  virtual void stop() noexcept {}
+
+  /// Frames that next() can give at most; 0 if it is not known.
   [[nodiscard]] virtual std::size_t pair_count() const = 0;
 };
 

@@ -58,6 +58,7 @@ void SensorsNode::start() {
 
 void SensorsNode::stop() noexcept {
   stopped_ = true;
+  reader_->stop();
   clock_.stop();
   worker_.stop();  // refuses further posts, so that the decoder ends too
   if (decoder_.joinable()) decoder_.join();
@@ -85,20 +86,25 @@ void SensorsNode::decode() {
   }
 }
 
-bool SensorsNode::wait_until_due(Stamp stamp) {
+// Nullopt: stopped meanwhile.
+std::optional<double> SensorsNode::lag_when_due_s(Stamp stamp) {
+  if (reader_->is_live())
+    return stopped_ ? std::nullopt : std::optional(latency_.lag_s(stamp, steady_now_s()));
   const Heartbeat::Waiting waiting;
-  return clock_.wait_until(stamp);
+  return clock_.wait_until(stamp) ? std::optional(clock_.lag_s()) : std::nullopt;
 }
 
 void SensorsNode::step(const Packet& packet) {
-  if (!wait_until_due(packet->frame->stamp)) return;
-  if (const Packet due = filter_.take(packet, clock_.lag_s())) {
+  const auto lag_s = lag_when_due_s(packet->frame->stamp);
+  if (!lag_s) return;
+  if (const Packet due = filter_.take(packet, *lag_s)) {
     topics_.packets.publish(due);
     ++published_;
   } else {
     ++skipped_;
     log::limited(log::Level::kWarn, name(), "lag")
-        << "frame skipped, consumers lag behind: " << skipped_ << " of " << listed_;
+        << "frame skipped, consumers lag behind: " << skipped_ << " of "
+        << std::max(listed_, skipped_ + published_);
   }
 }
 

@@ -50,9 +50,10 @@ struct SensorsTopics {
   Out<SensorsEnd> end;
 };
 
-/// Plays a recording. One thread decodes ahead, another publishes each
-/// packet when it is due; a consumer whose queue is full (kBlock) holds publication up, and at a
-/// finite rate pairs that became later than max_lag_s are skipped, their inertial samples kept.
+/// Plays a recording, or hands on what sensors measure now. One thread decodes ahead, another
+/// publishes each packet when it is due, which is at once if it is live; a consumer whose queue is
+/// full (kBlock) holds publication up, and at a finite rate pairs that became later than max_lag_s
+/// are skipped, their inertial samples kept.
 class SensorsNode final : public Node {
  public:
   /// `rate`: dataset seconds per second; infinity: as fast as consumers take it. Throws ConfigError
@@ -84,7 +85,7 @@ class SensorsNode final : public Node {
   using Input = std::variant<Packet, EndOfData, std::exception_ptr>;
 
   void decode();
-  bool wait_until_due(Stamp stamp);
+  [[nodiscard]] std::optional<double> lag_when_due_s(Stamp stamp);
   void step(const Packet& packet);
   void step(const EndOfData& end);
   void step(const std::exception_ptr& failure) { std::rethrow_exception(failure); }
@@ -93,6 +94,7 @@ class SensorsNode final : public Node {
   const std::size_t listed_;
   LagFilter filter_;
   ReplayClock clock_;
+  LatencyMeter latency_;  // of what is live
   const SensorsTopics topics_;
   std::atomic<std::size_t> published_ = 0;
   std::atomic<std::size_t> skipped_ = 0;

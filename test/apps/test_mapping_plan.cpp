@@ -20,7 +20,7 @@ struct Recording {
   }
   [[nodiscard]] std::optional<MappingPlan> plan(const MappingConfig& config,
                                                 const SegmentationConfig& network = {}) const {
-    return plan_mapping(config, {}, network, folder.path());
+    return plan_mapping(config, {}, network, image_sources(folder.path()));
   }
 };
 
@@ -68,6 +68,20 @@ TEST_CASE("Depth is used as far as it is good enough", "[robot][mapping]") {
   CHECK(50.0 / (disparity_px - 0.25) - range_m == Approx(0.2).epsilon(0.05));
 }
 
+TEST_CASE("A bag has the images that its rig file names", "[robot][mapping]") {
+  const MappingConfig metric{.mode = MappingMode::kMetric};
+  const auto plan = [&](const SensorTopicNames& topics, const MappingConfig& config) {
+    return plan_mapping(config, {}, {}, image_sources(topics, "rig.yaml"));
+  };
+  SensorTopicNames topics;
+  topics.right = "/right";
+  CHECK(plan(topics, metric)->sensor.depth == DepthFrom::kStereo);
+  topics.depth = "/depth";
+  CHECK(plan(topics, metric)->reads_depth());
+  CHECK_THROWS_WITH(plan(topics, {.mode = MappingMode::kSemantic}),
+                    Catch::Contains("no label images in rig.yaml"));
+}
+
 TEST_CASE("A map that cannot be had is refused with what is missing", "[robot][mapping]") {
   const Recording stereo({"cam0", "cam1"});
   const Recording depth({"cam0", "depth0", "label0"});
@@ -77,10 +91,13 @@ TEST_CASE("A map that cannot be had is refused with what is missing", "[robot][m
     CHECK_THROWS_AS(recording.plan(config), ConfigError);
     CHECK_THROWS_WITH(recording.plan(config), Catch::Contains(words));
   };
-  refused(stereo, {.mode = MappingMode::kMetric, .depth = DenseSource::kRecorded}, "no depth0");
-  refused(depth, {.mode = MappingMode::kMetric, .depth = DenseSource::kComputed}, "no cam1");
+  refused(stereo, {.mode = MappingMode::kMetric, .depth = DenseSource::kRecorded},
+          "no depth images");
+  refused(depth, {.mode = MappingMode::kMetric, .depth = DenseSource::kComputed},
+          "no right camera");
   refused(stereo, {.mode = MappingMode::kSemantic}, "metric does without");
-  refused(stereo, {.mode = MappingMode::kSemantic, .labels = DenseSource::kRecorded}, "no label0");
+  refused(stereo, {.mode = MappingMode::kSemantic, .labels = DenseSource::kRecorded},
+          "no label images");
   refused(depth, {.mode = MappingMode::kSemantic, .labels = DenseSource::kComputed},
           "segmentation.network names no file");
   depth.folder.write("mav0/label_palette.csv", "what is this");

@@ -1,0 +1,97 @@
+#include "apps/publish/euroc_messages.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "modules/recordings/ros_messages.hpp"
+
+namespace km {
+namespace {
+
+constexpr const char* kLeft = "/cam0/image_raw";
+constexpr const char* kRight = "/cam1/image_raw";
+constexpr const char* kDepth = "/depth0/image_raw";
+constexpr const char* kImu = "/imu0";
+constexpr const char* kImageType = "sensor_msgs/msg/Image";
+
+RosImage message_of(Stamp stamp, const GrayImage& image, const char* frame) {
+  return {.header = {stamp, frame},
+          .height = static_cast<std::uint32_t>(image.height),
+          .width = static_cast<std::uint32_t>(image.width),
+          .encoding = "mono8",
+          .is_bigendian = false,
+          .step = static_cast<std::uint32_t>(image.width),
+          .data = image.pixels};
+}
+
+RosImage message_of(Stamp stamp, const DepthImage& image) {
+  RosImage message{.header = {stamp, "cam0"},
+                   .height = static_cast<std::uint32_t>(image.height),
+                   .width = static_cast<std::uint32_t>(image.width),
+                   .encoding = "16UC1",
+                   .is_bigendian = false,
+                   .step = static_cast<std::uint32_t>(2 * image.width),
+                   .data = {}};
+  for (const std::uint16_t value : image.millimetres) {
+    message.data.push_back(static_cast<std::uint8_t>(value));
+    message.data.push_back(static_cast<std::uint8_t>(value >> 8U));
+  }
+  return message;
+}
+
+RosImu message_of(const ImuSample& sample) {
+  RosImu message;
+  message.header = {sample.stamp, "imu0"};
+  message.orientation_covariance[0] = -1.0;  // none is measured
+  message.angular_velocity = sample.gyro;
+  message.linear_acceleration = sample.accel;
+  return message;
+}
+
+}  // namespace
+
+EurocMessages::EurocMessages(std::unique_ptr<DatasetReader> dataset)
+    : dataset_(std::move(dataset)) {
+  const SensorRig& rig = dataset_->rig();
+  channels_ = {{kImu, "sensor_msgs/msg/Imu", "cdr", 0}, {kLeft, kImageType, "cdr", 0}};
+  if (rig.stereo.depth_source == DepthSource::kRightImage)
+    channels_.push_back({kRight, kImageType, "cdr", 0});
+  if (rig.depth) channels_.push_back({kDepth, kImageType, "cdr", 0});
+}
+
+void EurocMessages::add(const char* topic, Stamp stamp, std::vector<std::uint8_t> bytes) {
+  const auto channel = std::ranges::find(channels_, topic, &BagChannel::topic);
+  messages_.push_back(
+      {static_cast<std::size_t>(channel - channels_.begin()), stamp, std::move(bytes)});
+}
+
+// The last sample of a packet is not before its frame.
+void EurocMessages::take(const SensorPacket& packet) {
+  const StereoFrame& frame = *packet.frame;
+  const auto add_frame = [&] {
+    add(kLeft, frame.stamp, encode_ros(message_of(frame.stamp, frame.left, "cam0")));
+    if (!frame.right.pixels.empty())
+      add(kRight, frame.stamp, encode_ros(message_of(frame.stamp, frame.right, "cam1")));
+    if (frame.depth) add(kDepth, frame.stamp, encode_ros(message_of(frame.stamp, *frame.depth)));
+  };
+  for (std::size_t k = 0; k < packet.imu.size(); ++k) {
+    const ImuSample& sample = packet.imu[k];
+    if (k + 1 == packet.imu.size()) add_frame();
+    if (last_sample_ && sample.stamp <= *last_sample_) continue;
+    last_sample_ = sample.stamp;
+    add(kImu, sample.stamp, encode_ros(message_of(sample)));
+  }
+}
+
+std::optional<BagMessage> EurocMessages::next() {
+  while (messages_.empty()) {
+    const auto packet = dataset_->next();
+    if (!packet) return std::nullopt;
+    take(*packet);
+  }
+  BagMessage message = std::move(messages_.front());
+  messages_.pop_front();
+  return message;
+}
+
+}  // namespace km

@@ -1,0 +1,140 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdlib>
+#include <exception>
+#include <iostream>
+#include <thread>
+
+#include "apps/publish/euroc_messages.hpp"
+#include "apps/publish/message_player.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/recordings/open_bag.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
+#include "runtime/log.hpp"
+#include "runtime/supervisor.hpp"
+
+namespace km {
+namespace {
+
+constexpr int kBadInput = 1, kBadCommandLine = 2;
+
+constexpr const char* kAbout =
+    "Plays a recording as live topics of ROS 2, without ROS: a stand-in for the drivers of a "
+    "robot.";
+
+constexpr const char* kFooter = R"(
+RECORDING is a bag of ROS 1 (.bag) or ROS 2 (folder, .db3, .mcap), whose topics keep their names, or a
+EuRoC/ASL folder: /cam0/image_raw, /cam1/image_raw (or /depth0/image_raw) and /imu0.
+
+Examples
+  A robot on live topics, on one host; the rig file names the topics:
+    kimera_multi_publish MH_01_easy --wait 1
+    kimera_multi_robot --robot 0 --live rig.yaml --output results/a
+  The same with a bad driver: up to 20 ms late, one message in ten lost:
+    kimera_multi_publish recording.bag --jitter 0.02 --drop 0.1
+
+Exit codes: 0 done, also after Ctrl-C; 1 bad input; 2 bad command line.)";
+
+struct Options {
+  std::filesystem::path recording;
+  RosConfig ros;
+  PlayOptions play;
+  std::size_t wait = 0;
+};
+
+Options parse_options(int argc, char** argv) {
+  Options options;
+  CLI::App app{kAbout};
+  app.footer(kFooter);
+  app.add_option("RECORDING", options.recording)->required()->check(CLI::ExistingPath);
+  app.add_option("--rate", options.play.rate, "Speed: 1 real time, 2 twice as fast")
+      ->check(CLI::Range(1e-3, 1e3))
+      ->capture_default_str();
+  app.add_option("--topics", options.play.topics, "Only these")->delimiter(',');
+  app.add_option("--wait", options.wait, "Begin when each topic has so many readers")
+      ->capture_default_str();
+  app.add_flag("--reliable", options.play.reliable,
+               "What is lost is sent again; else best effort, as drivers of sensors are");
+  app.add_option("--delay", options.play.delay_s, "Of every message [s]")
+      ->check(CLI::Range(0., 60.));
+  app.add_option("--jitter", options.play.jitter_s, "Beside it, at random from 0 to this [s]")
+      ->check(CLI::Range(0., 60.));
+  app.add_option("--drop", options.play.drop_share, "Share of messages that are lost, at random")
+      ->check(CLI::Range(0., 1.));
+  app.add_option("--seed", options.play.seed, "Of what is random")->capture_default_str();
+  const char* const domain = std::getenv("ROS_DOMAIN_ID");
+  options.ros.domain = domain != nullptr ? std::atoi(domain) : 0;
+  app.add_option("--domain", options.ros.domain,
+                 "ROS_DOMAIN_ID, by default that of the environment")
+      ->check(CLI::Range(0, 230))
+      ->capture_default_str();
+  app.add_option("--interface", options.ros.interface, "Network interface, e.g. lo");
+  app.add_option("--peers", options.ros.peers, "Addresses of other hosts, where multicast is off")
+      ->delimiter(',');
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    std::exit(app.exit(error) == 0 ? 0 : kBadCommandLine);
+  }
+  return options;
+}
+
+std::unique_ptr<BagReader> open(const std::filesystem::path& recording) {
+  if (may_be_bag(recording)) return open_bag(recording);
+  const std::filesystem::path mav0 = find_mav0(recording);
+  const bool has_depth = std::filesystem::is_directory(mav0 / "depth0");
+  return std::make_unique<EurocMessages>(
+      std::make_unique<EurocReader>(open_euroc(recording, {.depth = has_depth})));
+}
+
+std::string table(const std::vector<PlayedTopic>& topics) {
+  std::vector<std::vector<std::string>> rows = {
+      {"topic", "type", "published", "dropped", "not of the type"}};
+  for (const PlayedTopic& topic : topics)
+    rows.push_back({topic.topic, topic.type, std::to_string(topic.published),
+                    std::to_string(topic.dropped), std::to_string(topic.refused)});
+  return align_columns(rows);
+}
+
+// True once there are enough readers; false after a signal.
+bool wait_for_readers(const MessagePlayer& player, std::size_t wanted, SignalWatch& signals) {
+  while (player.least_readers() < wanted) {
+    log::limited(log::Level::kInfo, "publish", "readers")
+        << "waiting for readers: the fewest of a topic are " << player.least_readers() << " of "
+        << wanted;
+    if (signals.wait(0.05)) return false;
+  }
+  return true;
+}
+
+void play(const Options& options, SignalWatch& signals) {
+  MessagePlayer player(open(options.recording), std::make_shared<const RosNetwork>(options.ros),
+                       options.play);
+  for (const std::string& topic : player.left_out())
+    log::warn("publish") << "left out, its type is not known: " << topic;
+  if (player.topics().empty()) throw std::invalid_argument("there is no topic to play");
+  if (!wait_for_readers(player, options.wait, signals)) return;
+  std::atomic<bool> ended = false;
+  std::jthread stopper([&] {
+    while (!ended && !signals.wait(0.2)) {
+    }
+    player.stop();
+  });
+  while (player.step())
+    log::limited(log::Level::kInfo, "publish", "progress") << fixed(player.played_s(), 1) << " s";
+  ended = true;
+  std::cout << table(player.topics());
+}
+
+}  // namespace
+}  // namespace km
+
+int main(int argc, char** argv) try {
+  const km::Options options = km::parse_options(argc, argv);
+  km::SignalWatch signals;  // before any thread: they inherit the blocked signals
+  km::play(options, signals);
+  return 0;
+} catch (const std::exception& error) {
+  std::cerr << "kimera_multi_publish: " << error.what() << '\n';
+  return km::kBadInput;
+}

@@ -1,0 +1,127 @@
+#include "apps/publish/message_player.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include "modules/core/text_rows.hpp"
+#include "modules/recordings/ros_messages.hpp"
+
+namespace km {
+namespace {
+
+constexpr int kKeptMessages = 100;
+
+template <typename... Messages>
+std::optional<std::vector<std::uint8_t>> as_ros_2(const BagChannel& channel,
+                                                  const std::vector<std::uint8_t>& bytes) {
+  std::optional<std::vector<std::uint8_t>> written;
+  const auto rewrite = [&]<typename Message>(const Message*) {
+    if (!is_of_type(channel, Message::kType)) return;
+    const auto message = decode_ros<Message>(channel.encoding, bytes);
+    if (message.value) written = encode_ros(*message.value);
+  };
+  (rewrite(static_cast<const Messages*>(nullptr)), ...);
+  return written;
+}
+
+// Little-endian CDR; nothing if it is not a message of its type.
+std::optional<std::vector<std::uint8_t>> as_published(const BagChannel& channel,
+                                                      std::vector<std::uint8_t> bytes) {
+  constexpr std::uint8_t kLittleEndian = 1;
+  if (channel.encoding == "cdr" && bytes.size() > 4 && bytes[1] == kLittleEndian) return bytes;
+  return as_ros_2<RosImage, RosCompressedImage, RosImu, RosCameraInfo, RosPoseStamped, RosOdometry,
+                  RosTransforms>(channel, bytes);
+}
+
+bool is_known(const BagChannel& channel) {
+  const auto types = known_ros_types();
+  return (channel.encoding == "cdr" || channel.encoding == "ros1") &&
+         std::ranges::any_of(types, [&](std::string type) {
+           type.erase(type.find("/msg"), 4);
+           return is_of_type(channel, type);
+         });
+}
+
+}  // namespace
+
+MessagePlayer::MessagePlayer(std::unique_ptr<BagReader> recording,
+                             std::shared_ptr<const RosNetwork> network, const PlayOptions& options)
+    : recording_(std::move(recording)),
+      options_(options),
+      random_(options.seed),
+      clock_(options.rate) {
+  for (const BagChannel& channel : recording_->channels()) {
+    const bool is_wanted = options.topics.empty() ||
+                           std::ranges::find(options.topics, channel.topic) != options.topics.end();
+    topic_of_.emplace_back();
+    if (!is_wanted) continue;
+    if (!is_known(channel)) {
+      left_out_.push_back(channel.topic + " (" + channel.type + ")");
+      continue;
+    }
+    const auto known = std::ranges::find(topics_, channel.topic, &PlayedTopic::topic);
+    topic_of_.back() = static_cast<std::size_t>(known - topics_.begin());
+    if (known != topics_.end()) continue;
+    topics_.push_back({channel.topic, channel.type});
+    const RosQos qos = channel.topic == "/tf_static" ? RosQos::kLatched
+                       : options.reliable            ? RosQos::kReliable
+                                                     : RosQos::kSensorData;
+    const std::string type = is_of_type(channel, RosTransforms::kType)
+                                 ? std::string(RosTransforms::kType)
+                                 : channel.type;
+    publishers_.push_back(
+        std::make_unique<RosPublisher>(network, channel.topic, type, qos, kKeptMessages));
+  }
+  for (const std::string& topic : options.topics)
+    if (std::ranges::find(recording_->channels(), topic, &BagChannel::topic) ==
+        recording_->channels().end())
+      throw std::invalid_argument("the recording has no topic " + readable(topic, 80));
+}
+
+std::size_t MessagePlayer::least_readers() const {
+  std::size_t least = std::numeric_limits<std::size_t>::max();
+  for (const auto& publisher : publishers_) least = std::min(least, publisher->reader_count());
+  return publishers_.empty() ? 0 : least;
+}
+
+void MessagePlayer::schedule(BagMessage message) {
+  newest_ = std::max(newest_.value_or(message.log_time), message.log_time);
+  if (message.channel >= topic_of_.size() || !topic_of_[message.channel]) return;
+  const std::size_t topic = *topic_of_[message.channel];
+  std::uniform_real_distribution<double> uniform;
+  if (uniform(random_) < options_.drop_share) {
+    ++topics_[topic].dropped;
+    return;
+  }
+  auto bytes = as_published(recording_->channels()[message.channel], std::move(message.bytes));
+  if (!bytes) {
+    ++topics_[topic].refused;
+    return;
+  }
+  // Of the recording's time, as the clock is.
+  const double late_s = options_.rate * (options_.delay_s + options_.jitter_s * uniform(random_));
+  due_.push({message.log_time + nanoseconds(late_s), number_++, topic, std::move(*bytes)});
+}
+
+bool MessagePlayer::step() {
+  while (!ended_ && (due_.empty() || *newest_ <= due_.top().stamp)) {
+    auto message = recording_->next();
+    ended_ = !message;
+    if (!message) break;
+    if (!first_)
+      static_cast<void>(clock_.due(first_.emplace(message->log_time),
+                                   ReplayClock::TimePoint::clock::now()));
+    schedule(std::move(*message));
+  }
+  if (due_.empty() || !clock_.wait_until(due_.top().stamp)) return false;
+  const Due& due = due_.top();
+  publishers_[due.topic]->publish(due.bytes);
+  ++topics_[due.topic].published;
+  played_s_ = seconds_between(*first_, due.stamp);
+  due_.pop();
+  return true;
+}
+
+}  // namespace km

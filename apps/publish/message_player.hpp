@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <queue>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "modules/recordings/bag_reader.hpp"
+#include "modules/ros_dds/ros_publisher.hpp"
+#include "runtime/clock.hpp"
+
+namespace km {
+
+/// How a recording is played, and what goes wrong on the way.
+struct PlayOptions {
+  double rate = 1.0;        ///< Times real time.
+  double delay_s = 0.0;     ///< Of every message.
+  double jitter_s = 0.0;    ///< Beside it, uniform from 0 to this.
+  double drop_share = 0.0;  ///< Of the messages.
+  bool reliable = false;    ///< Else best effort, as drivers of sensors are.
+  unsigned seed = 0;
+  std::vector<std::string> topics;  ///< Those to play; all without any.
+};
+
+/// What became of one topic.
+struct PlayedTopic {
+  std::string topic, type;
+  std::size_t published = 0;
+  std::size_t dropped = 0;
+  std::size_t refused = 0;  ///< Not messages of their type.
+};
+
+/// The messages of a recording as live topics of ROS 2, as they were recorded or worse. Messages of
+/// ROS 1 are written anew as those of ROS 2.
+class MessagePlayer {
+ public:
+  /// Topics of types that a RosNetwork does not know are left out: `left_out()`. Throws
+  /// std::invalid_argument for topics to play that the recording does not have.
+  MessagePlayer(std::unique_ptr<BagReader> recording, std::shared_ptr<const RosNetwork> network,
+                const PlayOptions& options);
+
+  /// Readers of the topic that the fewest have.
+  [[nodiscard]] std::size_t least_readers() const;
+
+  /// Publishes the next message when it is due; false after the last one, and after stop().
+  bool step();
+
+  /// Ends step(). Thread-safe.
+  void stop() { clock_.stop(); }
+
+  [[nodiscard]] const std::vector<PlayedTopic>& topics() const { return topics_; }
+  [[nodiscard]] const std::vector<std::string>& left_out() const { return left_out_; }
+  /// Of what was published last, in the recording's time.
+  [[nodiscard]] double played_s() const { return played_s_; }
+
+ private:
+  struct Due {
+    Stamp stamp = 0;
+    std::uint64_t number = 0;  // in the order of the recording
+    std::size_t topic = 0;
+    std::vector<std::uint8_t> bytes;
+    bool operator>(const Due& other) const {
+      return std::pair(stamp, number) > std::pair(other.stamp, other.number);
+    }
+  };
+
+  void schedule(BagMessage message);
+
+  std::unique_ptr<BagReader> recording_;
+  PlayOptions options_;
+  std::mt19937 random_;
+  ReplayClock clock_;
+  std::vector<PlayedTopic> topics_;
+  std::vector<std::unique_ptr<RosPublisher>> publishers_;
+  std::vector<std::optional<std::size_t>> topic_of_;  // by channel
+  std::vector<std::string> left_out_;
+  std::priority_queue<Due, std::vector<Due>, std::greater<>> due_;
+  std::optional<Stamp> first_, newest_;
+  bool ended_ = false;
+  std::uint64_t number_ = 0;
+  double played_s_ = 0.0;
+};
+
+}  // namespace km
