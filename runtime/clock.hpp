@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -18,26 +17,6 @@ namespace km {
 
 /// Seconds as a duration of the steady clock, for waits.
 [[nodiscard]] std::chrono::steady_clock::duration steady_duration(double s);
-
-/// How far data that come as they happen are behind: their latency less the smallest there was,
-/// since their clock may have any origin. As it may also go slower than ours, the smallest is
-/// forgotten by a millisecond a second.
-class LatencyMeter {
- public:
-  /// `now_s`: by any clock.
-  [[nodiscard]] double lag_s(Stamp stamp, double now_s) {
-    constexpr double kForgotten = 1e-3;
-    const double latency_s = now_s - 1e-9 * static_cast<double>(stamp);
-    if (last_s_) least_s_ += kForgotten * (now_s - *last_s_);
-    least_s_ = last_s_ ? std::min(least_s_, latency_s) : latency_s;
-    last_s_ = now_s;
-    return latency_s - least_s_;
-  }
-
- private:
-  std::optional<double> last_s_;
-  double least_s_ = 0.0;
-};
 
 /// Paces the playing of a recording: sensor time passes `rate` times as fast as real time, from
 /// the first stamp asked for. Thread-safe.

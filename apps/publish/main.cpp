@@ -1,5 +1,5 @@
 #include <CLI/CLI.hpp>
-#include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <exception>
 #include <iostream>
@@ -10,6 +10,7 @@
 #include "modules/core/text_table.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/sensors/euroc_rig_codec.hpp"
+#include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 #include "runtime/supervisor.hpp"
 
@@ -98,14 +99,26 @@ std::string table(const std::vector<PlayedTopic>& topics) {
 
 // True once there are enough readers; false after a signal.
 bool wait_for_readers(const MessagePlayer& player, std::size_t wanted, SignalWatch& signals) {
-  while (player.least_readers() < wanted) {
-    log::limited(log::Level::kInfo, "publish", "readers")
-        << "waiting for readers: the fewest of a topic are " << player.least_readers() << " of "
-        << wanted;
+  if (player.least_readers() < wanted)
+    log::info("publish") << "waiting until each topic has readers: " << wanted;
+  while (player.least_readers() < wanted)
     if (signals.wait(0.05)) return false;
-  }
   return true;
 }
+
+// Says how far it is, every few seconds.
+class Progress {
+ public:
+  void tell(double played_s) {
+    constexpr double kInterval_s = 5.0;
+    if (steady_now_s() - told_s_ < kInterval_s) return;
+    told_s_ = steady_now_s();
+    log::info("publish") << fixed(played_s, 1) << " s played";
+  }
+
+ private:
+  double told_s_ = steady_now_s();
+};
 
 void play(const Options& options, SignalWatch& signals) {
   MessagePlayer player(open(options.recording), std::make_shared<const RosNetwork>(options.ros),
@@ -120,8 +133,8 @@ void play(const Options& options, SignalWatch& signals) {
     }
     player.stop();
   });
-  while (player.step())
-    log::limited(log::Level::kInfo, "publish", "progress") << fixed(player.played_s(), 1) << " s";
+  Progress progress;
+  while (player.step()) progress.tell(player.played_s());
   ended = true;
   std::cout << table(player.topics());
 }

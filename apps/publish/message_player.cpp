@@ -111,8 +111,8 @@ bool MessagePlayer::step() {
     ended_ = !message;
     if (!message) break;
     if (!first_)
-      static_cast<void>(clock_.due(first_.emplace(message->log_time),
-                                   ReplayClock::TimePoint::clock::now()));
+      static_cast<void>(
+          clock_.due(first_.emplace(message->log_time), ReplayClock::TimePoint::clock::now()));
     schedule(std::move(*message));
   }
   if (due_.empty() || !clock_.wait_until(due_.top().stamp)) return false;

@@ -18,6 +18,8 @@ const char* to_string(BagFault fault) {
       return "messages of unknown channels";
     case BagFault::kUnordered:
       return "messages earlier than the index says";
+    case BagFault::kLost:
+      return "lost messages";
   }
   return "unknown faults";
 }

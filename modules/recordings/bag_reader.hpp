@@ -35,6 +35,7 @@ enum class BagFault {
   kCompression,     ///< Of an unknown kind, or that cannot be undone.
   kUnknownChannel,  ///< A message whose channel is described nowhere before it.
   kUnordered,       ///< A message earlier than its chunk says: later ones were given already.
+  kLost,            ///< A live message that came faster than it was taken, or only in part.
 };
 
 /// A short plural for tables and log lines: "malformed records".

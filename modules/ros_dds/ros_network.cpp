@@ -52,13 +52,12 @@ std::string cyclone_xml(const RosConfig& config, const NetworkInterface& interfa
 
 RosNetwork::RosNetwork(const RosConfig& config) {
   check_hosts(checked(config).peers);
-  const NetworkInterface interface =
-      select_interface(network_interfaces(), config.interface);
+  const NetworkInterface interface = select_interface(network_interfaces(), config.interface);
   interface_ = interface.name;
   const auto number = kOwnNumbers + static_cast<dds_domainid_t>(config.domain);
-  domain_ = DdsEntity(dds_create_domain(number, cyclone_xml(config, interface).c_str()),
-                      "domain " + std::to_string(config.domain) + " of ROS on interface " +
-                          interface_);
+  domain_ =
+      DdsEntity(dds_create_domain(number, cyclone_xml(config, interface).c_str()),
+                "domain " + std::to_string(config.domain) + " of ROS on interface " + interface_);
   participant_ =
       DdsEntity(dds_create_participant(number, nullptr, nullptr), "participant among those of ROS");
 }

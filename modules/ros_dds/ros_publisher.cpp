@@ -10,8 +10,8 @@
 namespace km {
 namespace {
 
-// DDS does not hand out the type that it makes of a descriptor but with a message that was received:
-// one without content goes over a topic that nobody else looks at.
+// DDS does not hand out the type that it makes of a descriptor but with a message that was
+// received: one without content goes over a topic that nobody else looks at.
 ddsi_serdata* receive_blank(const RosNetwork& network, std::string_view type) {
   const dds_topic_descriptor_t& descriptor = RosNetwork::descriptor_of(type);
   std::string name = "kimera_multi/type/" + std::string(descriptor.m_typename);
@@ -44,8 +44,8 @@ RosPublisher::RosPublisher(std::shared_ptr<const RosNetwork> network, const std:
     : network_(std::move(network)),
       name_(topic),
       topic_(network_->create_topic(topic, type)),
-      writer_(dds_create_writer(network_->participant(), topic_.handle(),
-                                ros_qos(qos, depth).get(), nullptr),
+      writer_(dds_create_writer(network_->participant(), topic_.handle(), ros_qos(qos, depth).get(),
+                                nullptr),
               "writer of " + topic),
       blank_(receive_blank(*network_, type)) {}
 
@@ -54,7 +54,8 @@ void RosPublisher::publish(std::span<const std::uint8_t> bytes) const {
   padded.resize((padded.size() + 3) / 4 * 4);  // as DDS has it on the wire
   ddsrt_iovec_t vector{.iov_base = padded.data(),
                        .iov_len = static_cast<ddsrt_iov_len_t>(padded.size())};
-  ddsi_serdata* const sample = ddsi_serdata_from_ser_iov(blank_->type, SDK_DATA, 1, &vector, padded.size());
+  ddsi_serdata* const sample =
+      ddsi_serdata_from_ser_iov(blank_->type, SDK_DATA, 1, &vector, padded.size());
   if (sample == nullptr) throw DdsError("not a message of the type of " + name_);
   check_dds(dds_writecdr(writer_.handle(), sample), "cannot publish on " + name_);
 }

@@ -105,14 +105,16 @@ void RosSubscription::stop() noexcept {
   dds_set_guardcondition(guard_.handle(), true);
 }
 
-std::size_t RosSubscription::lost() const {
-  std::size_t total = 0;
-  for (const DdsEntity& reader : readers_) {
+BagReport RosSubscription::report() const {
+  BagReport report;
+  for (std::size_t channel = 0; channel < readers_.size(); ++channel) {
     dds_sample_lost_status_t status{};
-    if (dds_get_sample_lost_status(reader.handle(), &status) == DDS_RETCODE_OK)
-      total += status.total_count;
+    check_dds(dds_get_sample_lost_status(readers_[channel].handle(), &status),
+              "cannot count lost messages");
+    if (status.total_count > 0)
+      report.add(BagFault::kLost, channels_[channel].topic, status.total_count);
   }
-  return total;
+  return report;
 }
 
 }  // namespace km

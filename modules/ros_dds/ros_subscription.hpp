@@ -20,7 +20,7 @@ struct RosTopic {
 };
 
 /// Messages of ROS 2 as they come. What is silent for kSilence_s is named in the log. Not
-/// thread-safe but for stop() and lost().
+/// thread-safe but for stop().
 class RosSubscription final : public BagReader {
  public:
   static constexpr double kSilence_s = 5.0;
@@ -30,13 +30,11 @@ class RosSubscription final : public BagReader {
   [[nodiscard]] const std::vector<BagChannel>& channels() const override { return channels_; }
   /// Waits for a message. Nullopt after stop().
   [[nodiscard]] std::optional<BagMessage> next() override;
-  [[nodiscard]] BagReport report() const override { return {}; }
+  /// Messages that came too fast for DDS or for next().
+  [[nodiscard]] BagReport report() const override;
 
   [[nodiscard]] bool is_live() const override { return true; }
   void stop() noexcept override;
-
-  /// Messages that came too fast for DDS or for next(). Thread-safe.
-  [[nodiscard]] std::size_t lost() const;
 
  private:
   void take_from(std::size_t channel);

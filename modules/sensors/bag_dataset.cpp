@@ -1,6 +1,7 @@
 #include "modules/sensors/bag_dataset.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 #include <utility>
 
@@ -78,7 +79,8 @@ void BagDataset::find_topics() {
       if (role_of_[k] == role) messages += bag_->channels()[k].message_count;
     return messages;
   };
-  pair_count_ = count(Role::kLeft);
+  const bool is_whole = window_.from_s <= 0.0 && std::isinf(window_.to_s) && !window_.not_before;
+  if (is_whole) pair_count_ = count(Role::kLeft);
   if (!topics.right.empty()) pair_count_ = std::min(pair_count_, count(Role::kRight));
 }
 
@@ -220,6 +222,7 @@ std::optional<SensorPacket> BagDataset::read_packet() {
     if (!frame) continue;
     auto samples = imu_.until(joined->stamp);
     count_gaps(samples);
+    arrival_ = newest_log_time_;  // it may have waited for others: that is no consumer's fault
     return SensorPacket{std::make_shared<const StereoFrame>(std::move(*frame)), std::move(samples)};
   }
   return std::nullopt;
@@ -244,8 +247,8 @@ ReaderReport BagDataset::report() const {
     all.add(ReaderFault::kNoAcceleration, name_ + ": " + rig_.topics.gyro, imu_joiner_.lost());
   const BagReport damage = bag_->report();
   for (const auto& [fault, entry] : damage.entries())
-    all.add(ReaderFault::kDamagedBag, std::string(to_string(fault)) + ": " + entry.first,
-            entry.count);
+    all.add(fault == BagFault::kLost ? ReaderFault::kLostMessage : ReaderFault::kDamagedBag,
+            std::string(to_string(fault)) + ": " + entry.first, entry.count);
   return all;
 }
 

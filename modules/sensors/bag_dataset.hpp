@@ -54,6 +54,7 @@ class BagDataset final : public DatasetReader {
   [[nodiscard]] std::size_t pair_count() const override { return pair_count_; }
   [[nodiscard]] std::vector<std::string> remarks() const override;
   [[nodiscard]] bool is_live() const override { return bag_->is_live(); }
+  [[nodiscard]] Stamp arrival() const override { return is_live() ? arrival_ : 0; }
   void stop() noexcept override { bag_->stop(); }
 
  private:
@@ -85,6 +86,7 @@ class BagDataset final : public DatasetReader {
   std::size_t pair_count_ = 0;
   std::optional<Stamp> start_;  // of the recording: its first frame
   Stamp newest_log_time_ = 0;
+  Stamp arrival_ = 0;                  // of the last packet
   bool ended_ = false;                 // the bag
   bool is_over_ = false;               // the window
   std::optional<SensorPacket> first_;  // read ahead

@@ -35,6 +35,7 @@ enum class ReaderFault {
   kMalformedMessage,   ///< A message of a bag that is not of its type.
   kNoAcceleration,     ///< A sample of a gyroscope with none of the accelerometer around it.
   kDamagedBag,         ///< A piece of a bag that cannot be read (see BagFault).
+  kLostMessage,        ///< Of a live topic: it came faster than it was taken.
 };
 
 /// A short plural for tables and log lines: "malformed rows".
@@ -68,6 +69,10 @@ class DatasetReader {
 
   /// True for sensors that measure now: next() waits for them, and there is no end.
   [[nodiscard]] virtual bool is_live() const { return false; }
+
+  /// When the last packet was complete [ns since 1970]; 0 for a recording. Its stamps do not tell:
+  /// they may be of any clock, also of one that is slower, a simulator's.
+  [[nodiscard]] virtual Stamp arrival() const { return 0; }
 
   /// Ends next(), now and later, where it waits. Thread-safe.
   virtual void stop() noexcept {}

@@ -16,6 +16,11 @@ void append(std::vector<ImuSample>& samples, const std::vector<ImuSample>& next)
   samples.insert(samples.end(), next.begin() + (repeats ? 1 : 0), next.end());
 }
 
+void log_lines(const std::string& text, std::string_view name) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) log::warn(name) << line;
+}
+
 }  // namespace
 
 LagFilter::LagFilter(double max_lag_s) : max_lag_s_(max_lag_s) {
@@ -75,43 +80,56 @@ void SensorsNode::decode() {
       }();
       if (!std::exchange(has_remarked, true))
         for (const std::string& remark : reader_->remarks()) log::info(name()) << remark;
+      if (reader_->is_live()) tell_faults();
       if (!packet) {
         worker_.post(EndOfData{reader_->report()});
         return;
       }
-      if (!worker_.post(std::make_shared<const SensorPacket>(std::move(*packet)))) return;
+      auto data = std::make_shared<const SensorPacket>(std::move(*packet));
+      if (!worker_.post(Packet{std::move(data), reader_->arrival()})) return;
     }
   } catch (...) {
     worker_.post(std::current_exception());  // the worker ends with it, as any node does
   }
 }
 
+// What is live has no end at which to tell it.
+void SensorsNode::tell_faults() {
+  constexpr double kInterval_s = 5.0;
+  const double now_s = steady_now_s();
+  if (now_s - told_s_ < kInterval_s) return;
+  told_s_ = now_s;
+  const std::string faults = to_string(reader_->report());
+  if (faults != told_faults_) log_lines(faults, name());
+  told_faults_ = faults;
+}
+
 // Nullopt: stopped meanwhile.
-std::optional<double> SensorsNode::lag_when_due_s(Stamp stamp) {
-  if (reader_->is_live())
-    return stopped_ ? std::nullopt : std::optional(latency_.lag_s(stamp, steady_now_s()));
+std::optional<double> SensorsNode::lag_when_due_s(const Packet& packet) {
+  if (packet.arrival != 0)
+    return stopped_ ? std::nullopt
+                    : std::optional(wall_now_s() - 1e-9 * static_cast<double>(packet.arrival));
   const Heartbeat::Waiting waiting;
-  return clock_.wait_until(stamp) ? std::optional(clock_.lag_s()) : std::nullopt;
+  return clock_.wait_until(packet.data->frame->stamp) ? std::optional(clock_.lag_s())
+                                                      : std::nullopt;
 }
 
 void SensorsNode::step(const Packet& packet) {
-  const auto lag_s = lag_when_due_s(packet->frame->stamp);
+  const auto lag_s = lag_when_due_s(packet);
   if (!lag_s) return;
-  if (const Packet due = filter_.take(packet, *lag_s)) {
+  if (const auto due = filter_.take(packet.data, *lag_s)) {
     topics_.packets.publish(due);
     ++published_;
   } else {
     ++skipped_;
     log::limited(log::Level::kWarn, name(), "lag")
-        << "frame skipped, consumers lag behind: " << skipped_ << " of "
-        << std::max(listed_, skipped_ + published_);
+        << "frame skipped, consumers lag behind: " << skipped_ << " of " << listed();
   }
 }
 
 void SensorsNode::step(const EndOfData& data) {
   if (stopped_) return;
-  std::istringstream faults(to_string(data.faults));
-  for (std::string line; std::getline(faults, line);) log::warn(name()) << line;
+  log_lines(to_string(data.faults), name());
   log::info(name()) << "end of data: " << published_ << " frames, " << skipped_ << " skipped";
   topics_.end.publish(SensorsEnd{published_, skipped_, data.faults});
 }

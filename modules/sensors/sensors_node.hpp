@@ -1,9 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <exception>
 #include <memory>
+#include <string>
 #include <string_view>
 #include <thread>
 #include <variant>
@@ -74,18 +76,22 @@ class SensorsNode final : public Node {
   /// Packets published and pairs skipped so far. Thread-safe.
   std::size_t published() const { return published_; }
   std::size_t skipped() const { return skipped_; }
-  /// Pairs of the recording. Thread-safe.
-  std::size_t listed() const { return listed_; }
+  /// Pairs of the recording, or so far, where that is more. Thread-safe.
+  std::size_t listed() const { return std::max<std::size_t>(listed_, published_ + skipped_); }
 
  private:
   struct EndOfData {
     ReaderReport faults;
   };
-  using Packet = std::shared_ptr<const SensorPacket>;
+  struct Packet {
+    std::shared_ptr<const SensorPacket> data;
+    Stamp arrival = 0;  // see DatasetReader
+  };
   using Input = std::variant<Packet, EndOfData, std::exception_ptr>;
 
   void decode();
-  [[nodiscard]] std::optional<double> lag_when_due_s(Stamp stamp);
+  void tell_faults();
+  [[nodiscard]] std::optional<double> lag_when_due_s(const Packet& packet);
   void step(const Packet& packet);
   void step(const EndOfData& end);
   void step(const std::exception_ptr& failure) { std::rethrow_exception(failure); }
@@ -94,11 +100,12 @@ class SensorsNode final : public Node {
   const std::size_t listed_;
   LagFilter filter_;
   ReplayClock clock_;
-  LatencyMeter latency_;  // of what is live
   const SensorsTopics topics_;
   std::atomic<std::size_t> published_ = 0;
   std::atomic<std::size_t> skipped_ = 0;
   std::atomic<bool> stopped_ = false;
+  std::string told_faults_;  // of a live source
+  double told_s_ = 0.0;
   Timing reading_;
   Heartbeat decoding_;  // a step reads one packet
   std::thread decoder_;

@@ -6,6 +6,7 @@
 
 #include <catch2/catch.hpp>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -35,6 +36,12 @@ inline int random_domain() {
     if (lock < 0 || flock(lock, LOCK_EX | LOCK_NB) == 0) return domain;  // kept to the end
     close(lock);
   }
+}
+
+/// Lines of a file; 0 if there is none.
+inline std::size_t line_count(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  return static_cast<std::size_t>(std::count(std::istreambuf_iterator<char>(in), {}, '\n'));
 }
 
 /// "robot3".

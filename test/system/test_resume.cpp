@@ -93,11 +93,6 @@ bool is_there_within(const fs::path& file, std::chrono::seconds patience) {
   return fs::exists(file);
 }
 
-std::size_t line_count(const fs::path& file) {
-  std::ifstream in(file);
-  return static_cast<std::size_t>(std::count(std::istreambuf_iterator<char>(in), {}, '\n'));
-}
-
 // Position error after alignment, of all estimates in one frame [m].
 double error_m(const fs::path& dataset, const std::vector<fs::path>& estimates,
                const TemporaryFolder& folder) {
