@@ -256,7 +256,8 @@ void RelayStore::deliver(const RelayMessagePtr& message) {
   if (message->content.size() <= tail_bytes()) return;
   if (!keys_) return output_.delivered.push_back(message);
   RelayMessage plain = *message;
-  plain.content.resize(plain.content.size() - tail_bytes());
+  plain.content.erase(plain.content.end() - static_cast<std::ptrdiff_t>(tail_bytes()),
+                      plain.content.end());
   output_.delivered.push_back(std::make_shared<const RelayMessage>(std::move(plain)));
 }
 

@@ -48,10 +48,11 @@ void wait_for_reader(const RosPublisher& publisher) {
 }
 
 TEST_CASE("What is published on a topic of ROS is what is received", "[ros_dds]") {
-  RosSubscription subscription(
-      network(), {{"/a/imu", "sensor_msgs/msg/Imu", RosQos::kSensorData, 100},
-                  {"a/image", "sensor_msgs/Image", RosQos::kSensorData, 10}});
-  const RosPublisher images(network(), "/a/image", "sensor_msgs/msg/Image", RosQos::kSensorData, 10);
+  RosSubscription subscription(network(),
+                               {{"/a/imu", "sensor_msgs/msg/Imu", RosQos::kSensorData, 100},
+                                {"a/image", "sensor_msgs/Image", RosQos::kSensorData, 10}});
+  const RosPublisher images(network(), "/a/image", "sensor_msgs/msg/Image", RosQos::kSensorData,
+                            10);
   const RosPublisher imus(network(), "/a/imu", "sensor_msgs/Imu", RosQos::kReliable, 10);
   wait_for_reader(images);
   wait_for_reader(imus);
@@ -125,9 +126,9 @@ TEST_CASE("Bytes that are no message of the topic are not published", "[ros_dds]
   auto bytes = encode_ros(imu(1));
   bytes.resize(bytes.size() - 100);
   CHECK_THROWS_AS(publisher.publish(bytes), DdsError);
-  CHECK_THROWS_AS(RosPublisher(network(), "/b/scan", "sensor_msgs/msg/LaserScan",
-                               RosQos::kReliable, 10),
-                  std::invalid_argument);
+  CHECK_THROWS_AS(
+      RosPublisher(network(), "/b/scan", "sensor_msgs/msg/LaserScan", RosQos::kReliable, 10),
+      std::invalid_argument);
 }
 
 }  // namespace
