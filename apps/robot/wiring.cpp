@@ -171,7 +171,7 @@ void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig&
   map.max_range_m =
       std::min(map.max_range_m, usable_range_m(rig, config.mapping.max_depth_error_m));
   DenseSensor sensor(rig, plan.sensor);
-  const PinholeCamera camera = sensor.camera();
+  const Camera camera = sensor.camera();
   add<DenseSensingNode>(true, std::move(sensor), plan.sensor.labels, config.mapping.rate_hz,
                         overflow,
                         DenseSensingTopics{.located = topics_.located_frames,

@@ -18,7 +18,7 @@ double path_length_m(const std::vector<TrueState>& states) {
 }
 
 void describe_rig(std::ostream& text, const SimulationOptions& options, const SensorRig& rig) {
-  const PinholeCamera& left = rig.stereo.cameras[0];
+  const Camera& left = rig.stereo.cameras[0];
   text << "## Sensors\n\n| sensor | figures |\n|---|---|\n"
        << "| cam0" << (options.cameras == CameraKind::kStereo ? ", cam1 | grey, " : " | grey, ")
        << left.width << 'x' << left.height << " px at " << number_text(options.rate_hz)

@@ -367,7 +367,7 @@ class Simulation {
   void write_calibration(std::size_t r) const {
     const RecordingLayout& layout = cameras_[r]->layout();
     const SensorRig& rig = robots_[r].rig;
-    const PinholeCamera& left = rig.stereo.cameras[0];
+    const Camera& left = rig.stereo.cameras[0];
     const std::string comment = std::string("simulated, world ") + world_->name;
     const auto write = [&](ImageChannel channel, const std::string& text) {
       if (!cameras_[r]->stamps(channel).empty())

@@ -69,7 +69,7 @@ void note_uncorrected(const Meshes& before, const Meshes& after, std::vector<std
 }
 
 // The left camera of the team: that of the first robot that has one.
-std::optional<PinholeCamera> camera_of(const TeamPlan& plan) {
+std::optional<Camera> camera_of(const TeamPlan& plan) {
   for (const RobotPlan& robot : plan.robots)
     if (!robot.dataset.empty()) return open_euroc(robot.dataset).rig().stereo.cameras[0];
   return std::nullopt;

@@ -4,23 +4,28 @@
 #include <optional>
 
 #include "modules/core/geometry.hpp"
+#include "modules/core/lens.hpp"
 
 namespace km {
 
-/// Pinhole camera with radial-tangential distortion (Brown-Conrady, as OpenCV's first four
-/// coefficients). A bearing is a point on the plane z = 1 of the camera frame, undistorted.
-struct PinholeCamera {
-  int width = 0;                                    ///< [px]
-  int height = 0;                                   ///< [px]
-  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;    ///< [px]
-  std::array<double, 4> distortion = {0, 0, 0, 0};  ///< k1, k2, p1, p2
+/// A central camera: a lens before an image plane. A bearing is a point on the plane z = 1 of the
+/// camera frame, undistorted; only what lies within the lens's disc has one (see Lens).
+struct Camera {
+  int width = 0;                                  ///< [px]
+  int height = 0;                                 ///< [px]
+  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;  ///< [px]; focal lengths on the axis
+  Lens lens = {};
   SE3 T_body_cam = SE3::Identity();
 
-  /// Distorted pixel of a bearing [px]; it may lie outside the image.
-  [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector2d& bearing) const;
+  /// Distorted pixel of a bearing [px]; it may lie outside the image. nullopt if the lens has no
+  /// such bearing.
+  [[nodiscard]] std::optional<Eigen::Vector2d> project(const Eigen::Vector2d& bearing) const;
 
-  /// Bearing of a distorted pixel [px]: project() inverted by Newton's method. nullopt where the
-  /// distortion has no inverse (far outside the image).
+  /// Where what lies along `ray`, of any length, in the camera frame comes to [px]. nullopt, too,
+  /// if it is not in front of the camera.
+  [[nodiscard]] std::optional<Eigen::Vector2d> project_ray(const Eigen::Vector3d& ray) const;
+
+  /// Bearing of a distorted pixel [px]; nullopt if the lens has none that comes there.
   [[nodiscard]] std::optional<Eigen::Vector2d> unproject(const Eigen::Vector2d& pixel) const;
 };
 
@@ -37,7 +42,7 @@ enum class DepthSource {
 /// an error of one pixel stands for one of z^2 / (f * baseline) in depth (as in Mur-Artal and
 /// Tardos, "ORB-SLAM2: an open-source SLAM system for monocular, stereo and RGB-D cameras", 2017).
 struct StereoRig {
-  std::array<PinholeCamera, 2> cameras;
+  std::array<Camera, 2> cameras;
   DepthSource depth_source = DepthSource::kRightImage;
 
   [[nodiscard]] SE3 T_left_right() const {
@@ -50,7 +55,7 @@ struct StereoRig {
 /// the baseline, the more the depth is trusted; that of a sensor that measures depth by stereo or
 /// structured light, or any b for which depth errors are about z^2 * 1 px / (f * b). Throws
 /// std::invalid_argument unless the baseline is positive and finite.
-[[nodiscard]] StereoRig rgbd_rig(const PinholeCamera& camera, double baseline_m);
+[[nodiscard]] StereoRig rgbd_rig(const Camera& camera, double baseline_m);
 
 /// Distances along the optical axis that a depth sensor measures [m]; others are none in its
 /// images.

@@ -9,7 +9,7 @@ namespace {
 constexpr double kMillimetresPerMetre = 1e3;
 constexpr double kEdge_px = 1.5;
 
-bool has_size(int width, int height, std::size_t pixels, const PinholeCamera& camera) {
+bool has_size(int width, int height, std::size_t pixels, const Camera& camera) {
   return width == camera.width && height == camera.height &&
          pixels == static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
 }
@@ -48,11 +48,11 @@ double depth_edge(const StereoRig& rig) {
   return kEdge_px / (rig.cameras[0].fx * rig.baseline_m());
 }
 
-bool fits(const GrayImage& image, const PinholeCamera& camera) {
+bool fits(const GrayImage& image, const Camera& camera) {
   return has_size(image.width, image.height, image.pixels.size(), camera);
 }
 
-bool fits(const DepthImage& image, const PinholeCamera& camera) {
+bool fits(const DepthImage& image, const Camera& camera) {
   return has_size(image.width, image.height, image.millimetres.size(), camera);
 }
 

@@ -20,8 +20,8 @@ namespace km {
 [[nodiscard]] double depth_edge(const StereoRig& rig);
 
 /// True if `image` has the camera's size and as many pixels as that.
-[[nodiscard]] bool fits(const GrayImage& image, const PinholeCamera& camera);
-[[nodiscard]] bool fits(const DepthImage& image, const PinholeCamera& camera);
+[[nodiscard]] bool fits(const GrayImage& image, const Camera& camera);
+[[nodiscard]] bool fits(const DepthImage& image, const Camera& camera);
 
 /// True if the frame has the images that the rig takes, of the right size: left and right, or left
 /// and, if any, depth.

@@ -7,7 +7,7 @@
 namespace km {
 namespace {
 
-bool fits(const LabelImage& labels, const PinholeCamera& camera) {
+bool fits(const LabelImage& labels, const Camera& camera) {
   return labels.width == camera.width && labels.height == camera.height &&
          labels.ids.size() ==
              static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);

@@ -56,7 +56,7 @@ class DenseSensor {
   DenseSensor(const StereoRig& rig, const DenseSensorConfig& config);
 
   /// The left camera, or, with stereo matching, an ideal one in its place.
-  [[nodiscard]] const PinholeCamera& camera() const { return stereo_ ? stereo_->camera() : left_; }
+  [[nodiscard]] const Camera& camera() const { return stereo_ ? stereo_->camera() : left_; }
 
   DenseImages sense(const StereoFrame& frame);
 
@@ -64,7 +64,7 @@ class DenseSensor {
   void add_depth(const StereoFrame& frame, DenseImages& images);
   void add_labels(const StereoFrame& frame, DenseImages& images);
 
-  PinholeCamera left_, right_;
+  Camera left_, right_;
   LabelsFrom labels_;
   std::optional<StereoDepth> stereo_;
   std::optional<SegmentationNetwork> network_;

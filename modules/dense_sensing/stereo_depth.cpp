@@ -14,7 +14,7 @@
 namespace km {
 namespace {
 
-PinholeCamera shrunk(PinholeCamera camera, int factor) {
+Camera shrunk(Camera camera, int factor) {
   camera.width /= factor;
   camera.height /= factor;
   camera.fx /= factor;

@@ -21,7 +21,7 @@ class StereoRectification {
   StereoRectification(const StereoRig& rig, int downscale);
 
   /// The virtual left camera.
-  [[nodiscard]] const PinholeCamera& camera() const { return camera_; }
+  [[nodiscard]] const Camera& camera() const { return camera_; }
   [[nodiscard]] double baseline_m() const { return baseline_m_; }
 
   /// What the virtual camera on `side` (0: left) saw of `image`; 0 where the real one saw nothing.
@@ -39,7 +39,7 @@ class StereoRectification {
   static constexpr std::int32_t kOutside = -1;
 
   Rectification full_;
-  PinholeCamera camera_;
+  Camera camera_;
   double baseline_m_;
   cv::Size label_size_;
   cv::Mat seen_;
@@ -60,7 +60,7 @@ class StereoDepth {
   StereoDepth(const StereoRig& rig, const StereoDepthConfig& config);
 
   /// The camera of the depth images: without distortion, in the place of the left one.
-  [[nodiscard]] const PinholeCamera& camera() const { return rectification_.camera(); }
+  [[nodiscard]] const Camera& camera() const { return rectification_.camera(); }
   [[nodiscard]] const StereoRectification& rectification() const { return rectification_; }
 
   /// Disparities that are searched, from 0 on [px].

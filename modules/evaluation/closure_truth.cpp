@@ -40,8 +40,8 @@ void check(const ClosureTruthOptions& options) {
     throw std::invalid_argument("score_closures: default_depth_m is not positive");
 }
 
-// The grid of an image as bearings on z = 1; those that the distortion leaves without one are out.
-std::vector<Eigen::Vector3d> grid_of(const PinholeCamera& camera) {
+// The grid of an image as bearings on z = 1; pixels that the lens leaves without one are out.
+std::vector<Eigen::Vector3d> grid_of(const Camera& camera) {
   std::vector<Eigen::Vector3d> bearings;
   for (int row = 0; row < kGridRows; ++row)
     for (int column = 0; column < kGridColumns; ++column) {
@@ -52,15 +52,16 @@ std::vector<Eigen::Vector3d> grid_of(const PinholeCamera& camera) {
   return bearings;
 }
 
-double overlap(const PinholeCamera& camera, const std::vector<Eigen::Vector3d>& grid,
-               const SE3& T_a_b, double depth_m) {
+double overlap(const Camera& camera, const std::vector<Eigen::Vector3d>& grid, const SE3& T_a_b,
+               double depth_m) {
   const SE3 T_b_a = T_a_b.inverse();
   std::size_t seen = 0;
   for (const Eigen::Vector3d& bearing : grid) {
     const Eigen::Vector3d p_b = T_b_a * (depth_m * bearing);
     if (p_b.z() * kMaxDepthRatio < depth_m || p_b.z() > kMaxDepthRatio * depth_m) continue;
-    const Eigen::Vector2d px = camera.project(p_b.hnormalized());
-    if (px.x() >= 0.0 && px.y() >= 0.0 && px.x() < camera.width && px.y() < camera.height) ++seen;
+    const auto px = camera.project_ray(p_b);
+    if (px && px->x() >= 0.0 && px->y() >= 0.0 && px->x() < camera.width && px->y() < camera.height)
+      ++seen;
   }
   return grid.empty() ? 0.0 : share(seen, grid.size());
 }
@@ -68,7 +69,7 @@ double overlap(const PinholeCamera& camera, const std::vector<Eigen::Vector3d>& 
 // Keyframes with their true poses, and which of them see the same place.
 class Places {
  public:
-  Places(std::span<const TrueKeyframe> keyframes, const PinholeCamera& camera,
+  Places(std::span<const TrueKeyframe> keyframes, const Camera& camera,
          const ClosureTruthOptions& options)
       : camera_(camera), options_(options), grid_(grid_of(camera)) {
     for (const TrueKeyframe& keyframe : keyframes)
@@ -104,7 +105,7 @@ class Places {
     return keyframe.scene_depth_m > 0.0 ? keyframe.scene_depth_m : options_.default_depth_m;
   }
 
-  const PinholeCamera& camera_;
+  const Camera& camera_;
   const ClosureTruthOptions& options_;
   std::vector<Eigen::Vector3d> grid_;
   std::map<KeyframeId, const TrueKeyframe*> keyframes_;
@@ -147,7 +148,7 @@ class StageCounter {
 
 }  // namespace
 
-double view_overlap(const PinholeCamera& camera, const SE3& T_a_b, double depth_m) {
+double view_overlap(const Camera& camera, const SE3& T_a_b, double depth_m) {
   return overlap(camera, grid_of(camera), T_a_b, depth_m);
 }
 
@@ -164,7 +165,7 @@ double ClosureScores::frame_recall(const StageScore& stage) const {
 }
 
 ClosureScores score_closures(std::span<const TrueKeyframe> keyframes,
-                             std::span<const ClosureRecord> closures, const PinholeCamera& camera,
+                             std::span<const ClosureRecord> closures, const Camera& camera,
                              const ClosureTruthOptions& options) {
   check(options);
   const Places places(keyframes, camera, options);

@@ -55,7 +55,7 @@ struct ClosureTruthOptions {
 /// `depth_m` before `a` (z in its frame): a grid of 8x6 pixels, lifted to that depth, counts where
 /// it projects into the other's image with between half and twice that depth. T_a_b: of the
 /// cameras.
-[[nodiscard]] double view_overlap(const PinholeCamera& camera, const SE3& T_a_b, double depth_m);
+[[nodiscard]] double view_overlap(const Camera& camera, const SE3& T_a_b, double depth_m);
 
 /// How many closures of one stage are true. Each direction of a pair is a closure of its own.
 struct StageScore {
@@ -98,7 +98,7 @@ struct ClosureScores {
 /// keyframes.
 [[nodiscard]] ClosureScores score_closures(std::span<const TrueKeyframe> keyframes,
                                            std::span<const ClosureRecord> closures,
-                                           const PinholeCamera& camera,
+                                           const Camera& camera,
                                            const ClosureTruthOptions& options = {});
 
 /// A robot's file about its closures that cannot be used. what() is one line that names file and

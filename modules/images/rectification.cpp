@@ -13,7 +13,7 @@ namespace {
 void require_usable(const StereoRig& rig) {
   if (rig.depth_source != DepthSource::kRightImage)
     throw std::invalid_argument("rectification: the rig has no right camera");
-  for (const PinholeCamera& camera : rig.cameras)
+  for (const Camera& camera : rig.cameras)
     if (camera.width <= 0 || camera.height <= 0 || !(camera.fx > 0.0) || !(camera.fy > 0.0))
       throw std::invalid_argument("rectification: a camera without pixels or focal length");
 }
@@ -34,9 +34,9 @@ Eigen::Matrix3d rectified_axes(const StereoRig& rig) {
   return R_left_rect;
 }
 
-PinholeCamera virtual_camera(const PinholeCamera& left, const Eigen::Matrix3d& R_left_rect,
-                             Rectification::Centre centre) {
-  PinholeCamera camera;
+Camera virtual_camera(const Camera& left, const Eigen::Matrix3d& R_left_rect,
+                      Rectification::Centre centre) {
+  Camera camera;
   camera.width = left.width;
   camera.height = left.height;
   camera.fx = camera.fy = 0.5 * (left.fx + left.fy);
@@ -54,16 +54,11 @@ PinholeCamera virtual_camera(const PinholeCamera& left, const Eigen::Matrix3d& R
 
 }  // namespace
 
-std::optional<Eigen::Vector2d> seen_pixel(const PinholeCamera& camera, const Eigen::Vector3d& ray) {
-  if (ray.z() <= 0.0) return std::nullopt;
-  const Eigen::Vector2d bearing = ray.hnormalized();
-  const Eigen::Vector2d pixel = camera.project(bearing);
-  if (!(pixel.x() >= 0.0 && pixel.x() <= camera.width - 1.0 && pixel.y() >= 0.0 &&
-        pixel.y() <= camera.height - 1.0))
+std::optional<Eigen::Vector2d> seen_pixel(const Camera& camera, const Eigen::Vector3d& ray) {
+  const auto pixel = camera.project_ray(ray);
+  if (!pixel || !(pixel->x() >= 0.0 && pixel->x() <= camera.width - 1.0 && pixel->y() >= 0.0 &&
+                  pixel->y() <= camera.height - 1.0))
     return std::nullopt;
-  // Beyond a fold of the distortion's polynomial the pixel is that of a bearing nearer the axis.
-  const auto back = camera.unproject(pixel);
-  if (!back || (*back - bearing).norm() > 1e-6) return std::nullopt;
   return pixel;
 }
 
@@ -89,7 +84,7 @@ Rectification::Rectification(const StereoRig& rig, Centre centre) : real_(rig.ca
 }
 
 cv::Mat Rectification::rectified(const GrayImage& image, std::size_t side) const {
-  const PinholeCamera& real = real_.at(side);
+  const Camera& real = real_.at(side);
   if (!fits(image, real))
     throw std::invalid_argument("rectification: image of " + std::to_string(image.width) + 'x' +
                                 std::to_string(image.height) + ", expected " +

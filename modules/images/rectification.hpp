@@ -9,18 +9,18 @@
 
 namespace km {
 
-/// Where `camera` shows what lies along `ray`, of any length, in its frame [px]; nullopt if its
-/// image does not. Behind a fold of the distortion nothing is seen, although project() gives a
-/// pixel there.
-[[nodiscard]] std::optional<Eigen::Vector2d> seen_pixel(const PinholeCamera& camera,
+/// Where the image of `camera` shows what lies along `ray`, of any length, in its frame [px];
+/// nullopt if it does not.
+[[nodiscard]] std::optional<Eigen::Vector2d> seen_pixel(const Camera& camera,
                                                         const Eigen::Vector3d& ray);
 
 /// Two virtual cameras without distortion, in the places of a rig's, whose rows are the same planes
 /// of space: a point at depth z lies focal length * baseline / z further left in the right image.
 ///
 /// The virtual optical axes are midway between the real ones, as far as the baseline's direction
-/// leaves them free; the focal length is that of the left camera, so that nothing is magnified
-/// where its lens distorts least. The images are as large as the left camera's.
+/// leaves them free; the focal length is that of the left camera on its axis, so that nothing is
+/// magnified where its lens distorts least. The images are as large as the left camera's: of a
+/// fisheye lens of 190 degrees they hold the middle 120 degrees or so, of others nearly all.
 class Rectification {
  public:
   /// The principal point of the virtual cameras.
@@ -35,7 +35,7 @@ class Rectification {
   Rectification(const StereoRig& rig, Centre centre);
 
   /// The virtual left camera.
-  [[nodiscard]] const PinholeCamera& camera() const { return camera_; }
+  [[nodiscard]] const Camera& camera() const { return camera_; }
   /// Turns vectors of it into the left camera's.
   [[nodiscard]] const Eigen::Matrix3d& R_left_rect() const { return R_left_rect_; }
 
@@ -44,9 +44,9 @@ class Rectification {
   [[nodiscard]] cv::Mat rectified(const GrayImage& image, std::size_t side) const;
 
  private:
-  std::array<PinholeCamera, 2> real_;
+  std::array<Camera, 2> real_;
   Eigen::Matrix3d R_left_rect_;
-  PinholeCamera camera_;
+  Camera camera_;
   // Where each virtual pixel lies in the real image, in cv::remap()'s compact form.
   std::array<cv::Mat, 2> maps_, map_fractions_;
 };

@@ -190,12 +190,14 @@ float EpipolarMatcher::disparity(const Rectified& images, const Eigen::Vector2d&
 std::vector<float> EpipolarMatcher::inverse_depths(
     const StereoFrame& frame, std::span<const Eigen::Vector2f> bearings) const {
   const Rectified images = rectify(frame);
-  const PinholeCamera& camera = rectification_.camera();
+  const Camera& camera = rectification_.camera();
   const Eigen::Matrix3d R_rect_left = rectification_.R_left_rect().transpose();
   std::vector<float> result(bearings.size(), 0.0F);
   for (std::size_t i = 0; i < bearings.size(); ++i) {
     const Eigen::Vector3d ray = R_rect_left * bearings[i].cast<double>().homogeneous();
-    const float d = disparity(images, camera.project(ray.hnormalized()));
+    const auto pixel = camera.project_ray(ray);
+    if (!pixel) continue;
+    const float d = disparity(images, *pixel);
     // Depth along the rectified axis is f * baseline / d; the ray scales it to the left camera's.
     const double inverse_depth = d * ray.z() / focal_baseline_;
     if (inverse_depth >= 1.0 / config_.max_depth_m && inverse_depth <= 1.0 / config_.min_depth_m)

@@ -17,17 +17,12 @@ constexpr std::uint32_t kLabelBits = 0xFF0000U;
 constexpr std::uint32_t kNoDepth = 65535;  // beside 0, by some sensors
 constexpr double kMaxGrowth = 2.0;         // of the ideal image against the real one
 
-bool distorted(const PinholeCamera& camera) {
-  return std::any_of(camera.distortion.begin(), camera.distortion.end(),
-                     [](double k) { return k != 0.0; });
-}
-
-// Extent of the bearings along the image's border.
+// Extent of the bearings of an image.
 struct BearingBounds {
   Eigen::Vector2d low = Eigen::Vector2d::Zero();
   Eigen::Vector2d high = Eigen::Vector2d::Zero();
 
-  void add(const PinholeCamera& camera, int u, int v) {
+  void add(const Camera& camera, int u, int v) {
     const auto bearing = camera.unproject(Eigen::Vector2d(u, v));
     if (!bearing) return;
     low = low.cwiseMin(*bearing);
@@ -35,34 +30,27 @@ struct BearingBounds {
   }
 };
 
-BearingBounds border_of(const PinholeCamera& camera) {
+// Not of the border alone: the corners of a fisheye image have none.
+BearingBounds bounds_of(const Camera& camera) {
   BearingBounds bounds;
-  for (int u = 0; u < camera.width; ++u) {
-    bounds.add(camera, u, 0);
-    bounds.add(camera, u, camera.height - 1);
-  }
-  for (int v = 0; v < camera.height; ++v) {
-    bounds.add(camera, 0, v);
-    bounds.add(camera, camera.width - 1, v);
-  }
+  for (int v = 0; v < camera.height; ++v)
+    for (int u = 0; u < camera.width; ++u) bounds.add(camera, u, v);
   return bounds;
 }
 
-// The pixel of the distorted image that shows `bearing`. Beyond where the distortion folds back,
-// project() lands in the image again: the way back tells.
-std::uint32_t source_of(const PinholeCamera& camera, const Eigen::Vector2d& bearing) {
-  const Eigen::Vector2d px = camera.project(bearing);
-  const double u = std::floor(px.x() + 0.5), v = std::floor(px.y() + 0.5);
+// The pixel of the distorted image that shows `bearing`.
+std::uint32_t source_of(const Camera& camera, const Eigen::Vector2d& bearing) {
+  const auto px = camera.project(bearing);
+  if (!px) return kNoSource;
+  const double u = std::floor(px->x() + 0.5), v = std::floor(px->y() + 0.5);
   if (!(u >= 0.0 && v >= 0.0 && u < camera.width && v < camera.height)) return kNoSource;
-  const auto back = camera.unproject(px);
-  if (!back || (*back - bearing).norm() > 1e-3) return kNoSource;
   return static_cast<std::uint32_t>(v) * static_cast<std::uint32_t>(camera.width) +
          static_cast<std::uint32_t>(u);
 }
 
 }  // namespace
 
-DepthViewMaker::DepthViewMaker(const PinholeCamera& camera, double min_range_m, double max_range_m,
+DepthViewMaker::DepthViewMaker(const Camera& camera, double min_range_m, double max_range_m,
                                const LabelPalette& palette) {
   if (camera.width <= 0 || camera.height <= 0 || !(camera.fx > 0.0) || !(camera.fy > 0.0))
     throw std::invalid_argument("mapping: a camera of " + std::to_string(camera.width) + " x " +
@@ -82,7 +70,7 @@ DepthViewMaker::DepthViewMaker(const PinholeCamera& camera, double min_range_m, 
   view_.fy = static_cast<float>(camera.fy);
   view_.cx = static_cast<float>(camera.cx);
   view_.cy = static_cast<float>(camera.cy);
-  if (distorted(camera)) plan_rectification(camera);
+  if (!camera.lens.is_ideal()) plan_rectification(camera);
   view_.pixels.assign(
       static_cast<std::size_t>(view_.width) * static_cast<std::size_t>(view_.height) + 1, 0);
   view_.tile_columns = (view_.width + DepthView::kTileSide - 1) / DepthView::kTileSide;
@@ -94,8 +82,8 @@ DepthViewMaker::DepthViewMaker(const PinholeCamera& camera, double min_range_m, 
   strips_.resize(static_cast<std::size_t>(view_.tile_rows));
 }
 
-void DepthViewMaker::plan_rectification(const PinholeCamera& camera) {
-  const BearingBounds bounds = border_of(camera);
+void DepthViewMaker::plan_rectification(const Camera& camera) {
+  const BearingBounds bounds = bounds_of(camera);
   const Eigen::Vector2d focal(camera.fx, camera.fy);
   const Eigen::Vector2d largest(kMaxGrowth * camera.width, kMaxGrowth * camera.height);
   // Pixels from the principal point to the borders, scaled down where both together are too many.

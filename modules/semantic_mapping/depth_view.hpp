@@ -44,7 +44,7 @@ struct DepthView {
 class DepthViewMaker {
  public:
   /// Throws std::invalid_argument for a camera without pixels or focal length.
-  DepthViewMaker(const PinholeCamera& camera, double min_range_m, double max_range_m,
+  DepthViewMaker(const Camera& camera, double min_range_m, double max_range_m,
                  const LabelPalette& palette);
 
   /// The view of these images, valid until the next call. Precondition: both have the camera's
@@ -57,7 +57,7 @@ class DepthViewMaker {
     std::size_t with_depth = 0, labels_outside = 0;
   };
 
-  void plan_rectification(const PinholeCamera& camera);
+  void plan_rectification(const Camera& camera);
   StripSums make_strip(int row, const DepthImage& depth, const LabelImage* labels);
   std::size_t fill(std::size_t begin, std::size_t end, const DepthImage& depth,
                    const LabelImage* labels);

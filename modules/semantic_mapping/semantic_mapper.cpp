@@ -32,7 +32,7 @@ bool usable(const SE3& T) {
 }
 
 template <typename Image, typename Pixels>
-bool fits(const Image& image, const Pixels& pixels, const PinholeCamera& camera) {
+bool fits(const Image& image, const Pixels& pixels, const Camera& camera) {
   return image.width == camera.width && image.height == camera.height &&
          pixels.size() ==
              static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
@@ -60,7 +60,7 @@ struct SemanticMapper::State {
     bool free = false;  // all of it is looked through
   };
 
-  State(const SemanticMappingConfig& settings, const PinholeCamera& its_camera,
+  State(const SemanticMappingConfig& settings, const Camera& its_camera,
         const LabelPalette& palette)
       : config(checked(settings)),
         camera(its_camera),
@@ -79,7 +79,7 @@ struct SemanticMapper::State {
   MeshUpdateReport update_mesh();
 
   SemanticMappingConfig config;
-  PinholeCamera camera;
+  Camera camera;
   DepthViewMaker views;
   BlockMap map;
   IncrementalMesh mesh;
@@ -183,7 +183,7 @@ MeshUpdateReport SemanticMapper::State::update_mesh() {
   return report;
 }
 
-SemanticMapper::SemanticMapper(const SemanticMappingConfig& config, const PinholeCamera& camera,
+SemanticMapper::SemanticMapper(const SemanticMappingConfig& config, const Camera& camera,
                                const LabelPalette& palette)
     : state_(std::make_unique<State>(config, camera, palette)) {}
 SemanticMapper::~SemanticMapper() = default;

@@ -73,9 +73,8 @@ class SemanticMapper {
  public:
   /// `camera` takes the depth and label images; its T_body_cam is not used. Labels that `palette`
   /// lacks count as unknown. Throws ConfigError if `config` is out of bounds and
-  /// std::invalid_argument for a camera without pixels or focal length, or whose distortion has no
-  /// inverse inside the image.
-  SemanticMapper(const SemanticMappingConfig& config, const PinholeCamera& camera,
+  /// std::invalid_argument for a camera without pixels or focal length.
+  SemanticMapper(const SemanticMappingConfig& config, const Camera& camera,
                  const LabelPalette& palette = {});
   ~SemanticMapper();
   SemanticMapper(SemanticMapper&&) noexcept;

@@ -12,10 +12,9 @@ constexpr std::size_t kQueuedFrames = 2;
 
 }  // namespace
 
-SemanticMappingNode::SemanticMappingNode(const SemanticMappingConfig& config,
-                                         const PinholeCamera& camera, const LabelPalette& palette,
-                                         double mesh_interval_s, Overflow overflow,
-                                         const SemanticMappingTopics& topics)
+SemanticMappingNode::SemanticMappingNode(const SemanticMappingConfig& config, const Camera& camera,
+                                         const LabelPalette& palette, double mesh_interval_s,
+                                         Overflow overflow, const SemanticMappingTopics& topics)
     : mapper_(config, camera, palette),
       palette_(palette),
       mesh_interval_s_(mesh_interval_s),

@@ -30,7 +30,7 @@ class SemanticMappingNode final : public Node {
  public:
   /// `camera` takes the frames. A mesh every `mesh_interval_s`, by stamps. `overflow`: whether a
   /// full queue holds the frames up or drops the oldest. Throws as SemanticMapper does.
-  SemanticMappingNode(const SemanticMappingConfig& config, const PinholeCamera& camera,
+  SemanticMappingNode(const SemanticMappingConfig& config, const Camera& camera,
                       const LabelPalette& palette, double mesh_interval_s, Overflow overflow,
                       const SemanticMappingTopics& topics);
   ~SemanticMappingNode() override { stop(); }

@@ -168,7 +168,7 @@ void require_model(const SensorYaml& yaml, const char* key, const std::string& m
     yaml.fail(key, std::string(key) + " '" + found + "' is not supported, only " + model);
 }
 
-void read_resolution(const SensorYaml& yaml, PinholeCamera& camera) {
+void read_resolution(const SensorYaml& yaml, Camera& camera) {
   const auto resolution = yaml.numbers("resolution", 2, "width and height");
   for (const double side : resolution)
     if (side < 1.0 || side > kMaxSide_px || side != std::floor(side))
@@ -179,7 +179,7 @@ void read_resolution(const SensorYaml& yaml, PinholeCamera& camera) {
   camera.height = static_cast<int>(resolution[1]);
 }
 
-void read_intrinsics(const SensorYaml& yaml, PinholeCamera& camera) {
+void read_intrinsics(const SensorYaml& yaml, Camera& camera) {
   const auto K = yaml.numbers("intrinsics", 4, "fu, fv, cu, cv");
   for (const std::size_t i : {0U, 1U})
     if (!kFocal_px.contains(K[i]))
@@ -192,21 +192,21 @@ void read_intrinsics(const SensorYaml& yaml, PinholeCamera& camera) {
   camera.fx = K[0], camera.fy = K[1], camera.cx = K[2], camera.cy = K[3];
 }
 
-void read_distortion(const SensorYaml& yaml, PinholeCamera& camera) {
+void read_distortion(const SensorYaml& yaml, Camera& camera) {
   const auto distortion = yaml.numbers("distortion_coefficients", 4, "k1, k2, p1, p2");
   for (const double coefficient : distortion)
     if (!kDistortion.contains(coefficient))
       yaml.fail("distortion_coefficients",
                 "distortion_coefficients: " + shortest_text(coefficient) + " is outside " +
                     kDistortion.text());
-  std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
+  camera.lens = Lens(LensModel::kRadialTangential, distortion);
 }
 
-PinholeCamera read_camera(const std::filesystem::path& file) {
+Camera read_camera(const std::filesystem::path& file) {
   const SensorYaml yaml(file);
   require_model(yaml, "camera_model", "pinhole", "pinhole");
   require_model(yaml, "distortion_model", "radial-tangential", "radtan");
-  PinholeCamera camera;
+  Camera camera;
   read_resolution(yaml, camera);
   read_intrinsics(yaml, camera);
   read_distortion(yaml, camera);
@@ -223,8 +223,8 @@ ImuNoise read_imu_noise(const SensorYaml& yaml) {
 }
 
 // Throws unless a depth pixel is the left pixel of the same place.
-void check_alignment(const SensorYaml& yaml, const PinholeCamera& left) {
-  PinholeCamera depth = left;
+void check_alignment(const SensorYaml& yaml, const Camera& left) {
+  Camera depth = left;
   read_resolution(yaml, depth);
   if (depth.width != left.width || depth.height != left.height)
     yaml.fail("resolution", "resolution: not that of cam0, " + std::to_string(left.width) + " x " +
@@ -235,7 +235,7 @@ void check_alignment(const SensorYaml& yaml, const PinholeCamera& left) {
   if (off.cwiseAbs().maxCoeff() > kMaxMisalignment_px)
     yaml.fail("intrinsics", "intrinsics: not those of cam0, with which depth must align");
   if (yaml.has("distortion_coefficients")) read_distortion(yaml, depth);
-  if (depth.distortion != left.distortion)
+  if (depth.lens != left.lens)
     yaml.fail("distortion_coefficients",
               "distortion_coefficients: not those of cam0, with which depth must align");
   const SE3 T = left.T_body_cam.inverse() * yaml.extrinsics();
@@ -255,7 +255,7 @@ DepthRange read_depth_range(const SensorYaml& yaml) {
   return range;
 }
 
-StereoRig read_stereo(const std::filesystem::path& mav0, const PinholeCamera& left) {
+StereoRig read_stereo(const std::filesystem::path& mav0, const Camera& left) {
   const std::filesystem::path file = mav0 / "cam1" / "sensor.yaml";
   if (!is_there(mav0 / "cam1"))
     throw DatasetError(file.string() + ": no such file (nor depth0, which RGB-D has instead)");
@@ -271,7 +271,7 @@ SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth) {
   SensorRig rig;
   const SensorYaml imu(mav0 / "imu0" / "sensor.yaml");
   rig.imu = read_imu_noise(imu);
-  const PinholeCamera left = read_camera(mav0 / "cam0" / "sensor.yaml");
+  const Camera left = read_camera(mav0 / "cam0" / "sensor.yaml");
   const bool rgbd = !is_there(mav0 / "cam1") && is_there(mav0 / "depth0");
   if (!rgbd) rig.stereo = read_stereo(mav0, left);
   if (rgbd || with_depth) {
@@ -283,8 +283,7 @@ SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth) {
           rgbd_rig(left, depth.number("baseline_m", kDepthBaseline_m, kDefaultDepthBaseline_m));
   }
   const SE3 T_imu_body = imu.extrinsics().inverse();  // `body` here: the one the files refer to
-  for (PinholeCamera& camera : rig.stereo.cameras)
-    camera.T_body_cam = T_imu_body * camera.T_body_cam;
+  for (Camera& camera : rig.stereo.cameras) camera.T_body_cam = T_imu_body * camera.T_body_cam;
   return rig;
 }
 

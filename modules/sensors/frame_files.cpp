@@ -127,7 +127,7 @@ StereoPairResult load_stereo_pair(const StereoPairFile& files, const StereoRig& 
       {files.left, result.frame.left}, {files.right, result.frame.right}};
   const std::size_t count = rig.depth_source == DepthSource::kRightImage ? 2 : 1;
   for (std::size_t i = 0; i < count; ++i) {
-    const PinholeCamera& camera = rig.cameras[i];
+    const Camera& camera = rig.cameras[i];
     ImageResult loaded = load_gray_image(images[i].first, camera.width, camera.height);
     if (loaded.status != ImageStatus::kOk) return {loaded.status, std::move(loaded.problem), {}};
     images[i].second = std::move(loaded.image);

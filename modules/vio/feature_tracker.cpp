@@ -63,7 +63,7 @@ KltResult track_klt(const ImagePyramid& from, const ImagePyramid& to,
 }
 
 void check_rig(const StereoRig& rig) {
-  for (const PinholeCamera& camera : rig.cameras) {
+  for (const Camera& camera : rig.cameras) {
     if (camera.width > 0 && camera.height > 0 && camera.fx > 0.0 && camera.fy > 0.0) continue;
     throw std::invalid_argument("FeatureTracker: a camera of " + std::to_string(camera.width) +
                                 " x " + std::to_string(camera.height) + " px with focal lengths " +
@@ -72,7 +72,7 @@ void check_rig(const StereoRig& rig) {
 }
 
 template <typename Image>
-void check_image(const Image& image, const PinholeCamera& camera, const char* side) {
+void check_image(const Image& image, const Camera& camera, const char* side) {
   if (fits(image, camera)) return;
   throw std::invalid_argument("FeatureTracker::track: the " + std::string(side) + " image is " +
                               std::to_string(image.width) + " x " + std::to_string(image.height) +
@@ -163,7 +163,8 @@ Eigen::Vector2f FeatureTracker::predicted_px(const Track& track, double inverse_
   const Eigen::Vector3d X = transfer({track.left, inverse_depth, track.left}, T_previous_current);
   constexpr double kMinDepthRatio = 0.1;  // Nearly behind the camera: no prediction.
   if (X.z() < kMinDepthRatio) return track.px;
-  return rig_.cameras[0].project(X.hnormalized()).cast<float>();
+  const auto px = rig_.cameras[0].project_ray(X);
+  return px ? px->cast<float>() : track.px;
 }
 
 std::vector<FeatureTracker::Step> FeatureTracker::follow(const ImagePyramid& left,

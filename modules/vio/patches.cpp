@@ -144,9 +144,8 @@ float PatchTemplate::correlation(const cv::Mat& image, int x, int y) const {
   return covariance / (norm_ * std::sqrt(variance));
 }
 
-Eigen::Matrix2f local_warp(const PinholeCamera& a, const PinholeCamera& b,
-                           const Eigen::Vector2d& bearing_a, double inverse_depth,
-                           const SE3& T_b_a) {
+Eigen::Matrix2f local_warp(const Camera& a, const Camera& b, const Eigen::Vector2d& bearing_a,
+                           double inverse_depth, const SE3& T_b_a) {
   const auto in_b = [&](const Eigen::Vector2d& bearing) {
     return Eigen::Vector3d(T_b_a.linear() * bearing.homogeneous() +
                            inverse_depth * T_b_a.translation());
@@ -159,8 +158,11 @@ Eigen::Matrix2f local_warp(const PinholeCamera& a, const PinholeCamera& b,
     const Eigen::Vector2d step = kStep * Eigen::Vector2d::Unit(axis);
     const Eigen::Vector2d plus = bearing_a + step;
     const Eigen::Vector2d minus = bearing_a - step;
-    J_a.col(axis) = a.project(plus) - a.project(minus);
-    J_b.col(axis) = b.project(in_b(plus).hnormalized()) - b.project(in_b(minus).hnormalized());
+    const auto a_plus = a.project(plus), a_minus = a.project(minus);
+    const auto b_plus = b.project_ray(in_b(plus)), b_minus = b.project_ray(in_b(minus));
+    if (!a_plus || !a_minus || !b_plus || !b_minus) return Eigen::Matrix2f::Identity();
+    J_a.col(axis) = *a_plus - *a_minus;
+    J_b.col(axis) = *b_plus - *b_minus;
   }
   return (J_b * J_a.inverse()).cast<float>();
 }

@@ -7,7 +7,7 @@
 
 namespace km {
 
-ViewModel view_model(const PinholeCamera& camera, double noise_px) {
+ViewModel view_model(const Camera& camera, double noise_px) {
   const SE3 T_cam_body = camera.T_body_cam.inverse();
   return {T_cam_body.linear(), T_cam_body.translation(),
           std::sqrt(camera.fx * camera.fy) / noise_px};

@@ -16,7 +16,7 @@ struct ViewModel {
   double weight = 1.0;  ///< Focal length over pixel noise: bearing errors to standard deviations.
 };
 
-[[nodiscard]] ViewModel view_model(const PinholeCamera& camera, double noise_px);
+[[nodiscard]] ViewModel view_model(const Camera& camera, double noise_px);
 
 /// A linearised reprojection error in standard deviations. The pose's tangent is [rotation;
 /// translation], see retract().

@@ -21,10 +21,13 @@ constexpr double kMinDisparityPx = -1.0;  // Noise of a point at infinity.
 StereoMatcher::StereoMatcher(const StereoRig& rig, const TrackerConfig& config)
     : rig_(rig), config_(config), T_right_left_(rig.T_left_right().inverse()) {}
 
+Eigen::Vector3d StereoMatcher::right_ray(const Eigen::Vector2d& left, double inverse_depth) const {
+  return T_right_left_.linear() * left.homogeneous() + inverse_depth * T_right_left_.translation();
+}
+
 Eigen::Vector2d StereoMatcher::right_bearing(const Eigen::Vector2d& left,
                                              double inverse_depth) const {
-  return (T_right_left_.linear() * left.homogeneous() + inverse_depth * T_right_left_.translation())
-      .hnormalized();
+  return right_ray(left, inverse_depth).hnormalized();
 }
 
 std::optional<StereoMatcher::Start> StereoMatcher::search(const ImagePyramid& left,
@@ -45,8 +48,9 @@ std::optional<StereoMatcher::Start> StereoMatcher::search(const ImagePyramid& le
   std::size_t best = 0;
   for (std::size_t i = 0; i < scores.size(); ++i) {
     const double inverse_depth = nearest * static_cast<double>(i) / steps;
-    const Eigen::Vector2d px =
-        0.5 * rig_.cameras[1].project(right_bearing(query.left, inverse_depth));
+    const auto full = rig_.cameras[1].project_ray(right_ray(query.left, inverse_depth));
+    if (!full) continue;
+    const Eigen::Vector2d px = 0.5 * *full;
     const bool inside =
         px.x() >= 0.0 && px.y() >= 0.0 && px.x() < image.cols && px.y() < image.rows;
     if (!inside) continue;
@@ -69,8 +73,9 @@ std::optional<StereoMatcher::Start> StereoMatcher::start_of(const ImagePyramid& 
                                                             const ImagePyramid& right,
                                                             const StereoQuery& query) const {
   if (!query.inverse_depth) return search(left, right, query);
-  const Eigen::Vector2d expected = right_bearing(query.left, *query.inverse_depth);
-  return Start{rig_.cameras[1].project(expected).cast<float>(), *query.inverse_depth};
+  const auto expected = rig_.cameras[1].project_ray(right_ray(query.left, *query.inverse_depth));
+  if (!expected) return std::nullopt;
+  return Start{expected->cast<float>(), *query.inverse_depth};
 }
 
 std::optional<StereoMatch> StereoMatcher::triangulate(const StereoQuery& query,

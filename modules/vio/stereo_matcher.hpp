@@ -57,6 +57,9 @@ class StereoMatcher {
   [[nodiscard]] const StereoStatistics& statistics() const { return statistics_; }
 
  private:
+  // Along which the right camera sees it, of any length.
+  [[nodiscard]] Eigen::Vector3d right_ray(const Eigen::Vector2d& left, double inverse_depth) const;
+
   struct Start {
     Eigen::Vector2f right_px;
     double inverse_depth;

@@ -58,7 +58,7 @@ TEST_CASE("Recorded depth and labels are preferred, others computed", "[robot][m
 }
 
 TEST_CASE("Depth is used as far as it is good enough", "[robot][mapping]") {
-  PinholeCamera camera;
+  Camera camera;
   camera.fx = 500.0;
   const StereoRig rig = rgbd_rig(camera, 0.1);
   const double range_m = usable_range_m(rig, 0.2);

@@ -65,9 +65,9 @@ std::optional<StereoStatistics::StereoMatch> StereoStatistics::judge(
 cv::Point2f StereoStatistics::at_infinity(const cv::Point2f& left) const {
   const auto bearing = rig_.cameras[0].unproject(vector_of(left));
   if (!bearing) return left;
-  const Eigen::Vector2d px =
-      rig_.cameras[1].project((T_right_left_.linear() * bearing->homogeneous()).hnormalized());
-  return {static_cast<float>(px.x()), static_cast<float>(px.y())};
+  const auto px = rig_.cameras[1].project_ray(T_right_left_.linear() * bearing->homogeneous());
+  if (!px) return left;
+  return {static_cast<float>(px->x()), static_cast<float>(px->y())};
 }
 
 void StereoStatistics::add(Stamp stamp, const KltImage& left, const KltImage& right,

@@ -30,15 +30,15 @@ std::string extrinsics(const SE3& T_body_sensor) {
   return text.str();
 }
 
-std::string optics(const PinholeCamera& camera, double rate_hz) {
+std::string optics(const Camera& camera, double rate_hz) {
   std::ostringstream text;
   text << "rate_hz: " << number_text(rate_hz) << "\nresolution: [" << camera.width << ", "
        << camera.height << "]\ncamera_model: pinhole\nintrinsics: [" << number_text(camera.fx)
        << ", " << number_text(camera.fy) << ", " << number_text(camera.cx) << ", "
        << number_text(camera.cy) << "]  # fu, fv, cu, cv [px]\n"
        << "distortion_model: radial-tangential\ndistortion_coefficients: [";
-  for (std::size_t i = 0; i < camera.distortion.size(); ++i)
-    text << (i == 0 ? "" : ", ") << number_text(camera.distortion[i]);
+  const std::span<const double> k = camera.lens.coefficients();
+  for (std::size_t i = 0; i < k.size(); ++i) text << (i == 0 ? "" : ", ") << number_text(k[i]);
   text << "]  # k1, k2, p1, p2\n";
   return text.str();
 }
@@ -97,11 +97,11 @@ std::string image_csv(const std::vector<Stamp>& stamps, const std::string& exten
   return text;
 }
 
-std::string camera_yaml(const PinholeCamera& camera, double rate_hz, const std::string& comment) {
+std::string camera_yaml(const Camera& camera, double rate_hz, const std::string& comment) {
   return heading("camera", comment) + extrinsics(camera.T_body_cam) + optics(camera, rate_hz);
 }
 
-std::string depth_yaml(const PinholeCamera& camera, const DepthCameraFigures& figures,
+std::string depth_yaml(const Camera& camera, const DepthCameraFigures& figures,
                        const std::string& comment) {
   return heading("depth", comment) + extrinsics(camera.T_body_cam) +
          optics(camera, figures.rate_hz) +

@@ -31,7 +31,7 @@ struct TrueState {
 
 /// Texts of sensor.yaml in the EuRoC/ASL format. Numbers keep the digits that tell doubles apart:
 /// the calibration a reader gets is the one that was rendered.
-[[nodiscard]] std::string camera_yaml(const PinholeCamera& camera, double rate_hz,
+[[nodiscard]] std::string camera_yaml(const Camera& camera, double rate_hz,
                                       const std::string& comment);
 
 /// What a depth camera is told apart by from the camera in whose place it is.
@@ -43,7 +43,7 @@ struct DepthCameraFigures {
 };
 
 /// A depth camera in the place of `camera`, pixel for pixel, with images in mm.
-[[nodiscard]] std::string depth_yaml(const PinholeCamera& camera, const DepthCameraFigures& figures,
+[[nodiscard]] std::string depth_yaml(const Camera& camera, const DepthCameraFigures& figures,
                                      const std::string& comment);
 
 /// The inertial sensor, which is the body frame.

@@ -18,11 +18,13 @@ SE3 pose_of_rows(const Eigen::Matrix<double, 3, 4>& rows) {
 }
 
 StereoRig euroc_stereo() {
-  PinholeCamera left, right;
+  Camera left, right;
   left.fx = 458.654, left.fy = 457.296, left.cx = 367.215, left.cy = 248.375;
-  left.distortion = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05};
+  left.lens =
+      Lens(LensModel::kRadialTangential, {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05});
   right.fx = 457.587, right.fy = 456.134, right.cx = 379.999, right.cy = 255.238;
-  right.distortion = {-0.28368365, 0.07451284, -0.00010473, -3.55590700e-05};
+  right.lens =
+      Lens(LensModel::kRadialTangential, {-0.28368365, 0.07451284, -0.00010473, -3.55590700e-05});
   Eigen::Matrix<double, 3, 4> T_left, T_right;
   T_left << 0.0148655429818, -0.999880929698, 0.00414029679422, -0.0216401454975,  //
       0.999557249008, 0.0149672133247, 0.025715529948, -0.064676986768,            //
@@ -38,7 +40,7 @@ StereoRig euroc_stereo() {
 }
 
 // Scaled by the widths about the image's centre; pixel centres have whole coordinates.
-void resize(PinholeCamera& camera, int width, int height) {
+void resize(Camera& camera, int width, int height) {
   const double scale = width / kWidth_px;
   camera.cx = (camera.cx + 0.5 - 0.5 * kWidth_px) * scale + 0.5 * width - 0.5;
   camera.cy = (camera.cy + 0.5 - 0.5 * kHeight_px) * scale + 0.5 * height - 0.5;
@@ -69,7 +71,7 @@ SensorRig default_rig(RigKind kind, int width, int height) {
                                   std::to_string(height) + " is outside 16x16 to 8192x8192");
   SensorRig rig;
   rig.stereo = euroc_stereo();
-  for (PinholeCamera& camera : rig.stereo.cameras) resize(camera, width, height);
+  for (Camera& camera : rig.stereo.cameras) resize(camera, width, height);
   if (kind == RigKind::kVehicle) mount_on_vehicle(rig.stereo);
   return rig;
 }

@@ -93,7 +93,7 @@ class ViewPass {
     if (request.radiance) gray_.resize(n);
     if (request.rgb) color_.resize(n);
     if (request.radiance) view_.radiance.resize(n);
-    if (request.rgb) view_.rgb.resize(n);
+    if (request.rgb) view_.rgb.assign(n, Eigen::Vector3f::Zero());
     if (request.depth) view_.depth_m.resize(n);
     if (request.labels) view_.labels.resize(n);
   }
@@ -208,7 +208,9 @@ class ViewPass {
     Aim aim;
     for (int y = y0; y < std::min(y0 + kBlock, height_); ++y)
       for (int x = x0; x < std::min(x0 + kBlock, width_); ++x)
-        aim.set(static_cast<std::size_t>((y - y0) * kBlock + x - x0), x, y, {0.0F, 0.0F});
+        if (rays_.is_lit(index(x, y)))
+          aim.set(static_cast<std::size_t>((y - y0) * kBlock + x - x0), x, y, {0.0F, 0.0F});
+    if (aim.active == 0) return;
     SurfaceHits hits;
     trace(aim, hits);
     SurfacePoints points;
@@ -288,6 +290,7 @@ class ViewPass {
 
   // Edges towards each other of two neighbouring pixels.
   void compare(std::size_t a, Edge towards_b, std::size_t b, Edge towards_a) {
+    if (!rays_.is_lit(a) || !rays_.is_lit(b)) return;
     const bool one_triangle = pixels_[a].triangle == pixels_[b].triangle;
     const bool one_light = pixels_[a].dark == pixels_[b].dark;
     if ((one_triangle && one_light) || !contrast(a, b)) return;
@@ -320,6 +323,7 @@ class ViewPass {
       const int x = x0 + 2 * (static_cast<int>(lane) % 4) + row % 2;
       const int y = y0 + row;
       if (x >= width_ || y >= height_ || edge_[index(x, y)] != kNoEdge) continue;
+      if (!rays_.is_lit(index(x, y))) continue;
       const float depth_m = pixels_[index(x, y)].depth_m;
       if (depth_m > 0.0F && depth_m < nearest_m) continue;
       aim.set(lane, x, y, sample_offset((5 * lane + 3) % kLanes, kLanes));
@@ -374,7 +378,7 @@ class ViewPass {
     const auto n = static_cast<std::size_t>(samples_);
     const auto refine_pixel = [&](int x, int y) {
       const std::uint8_t edge = edge_[index(x, y)];
-      if (edge == kNoEdge) return;
+      if (edge == kNoEdge || !rays_.is_lit(index(x, y))) return;
       for (std::size_t i = 0; i < n; ++i) {
         const Eigen::Vector2f offset = sample_offset(i, n);
         if (!beyond_edge(edge, offset)) continue;
@@ -418,7 +422,7 @@ class ViewPass {
     const std::size_t nearer = across ? index(side_x, sample.y) : index(sample.x, side_y);
     const std::size_t farther = across ? index(sample.x, side_y) : index(side_x, sample.y);
     for (const std::size_t other : {nearer, farther, index(side_x, side_y)})
-      if (pixels_[other].triangle == triangle) return other;
+      if (pixels_[other].triangle == triangle && rays_.is_lit(other)) return other;
     if (triangle == kNoTriangle) return std::nullopt;
     const SurfaceRecord& surface = scene_.surfaces.record(triangle);
     for (const std::size_t other : {nearer, farther, pixel})
@@ -518,28 +522,36 @@ class ViewPass {
 
 }  // namespace
 
-PixelRays::PixelRays(const PinholeCamera& camera) : camera_(camera) {
+PixelRays::PixelRays(const Camera& camera) : camera_(camera) {
   if (camera.width < 1 || camera.height < 1)
     throw std::invalid_argument("camera: an image of " + std::to_string(camera.width) + " x " +
                                 std::to_string(camera.height) + " pixels");
   if (!(camera.fx > 0.0 && camera.fy > 0.0))
     throw std::invalid_argument("camera: focal lengths " + std::to_string(camera.fx) + ", " +
                                 std::to_string(camera.fy) + " are not both positive");
-  bearings_.reserve(static_cast<std::size_t>(camera.width + 1) *
-                    static_cast<std::size_t>(camera.height + 1));
+  const auto columns = static_cast<std::size_t>(stride());
+  const std::size_t size = columns * static_cast<std::size_t>(camera.height + 1);
+  bearings_.reserve(size);
+  std::vector<std::uint8_t> has_bearing;
+  has_bearing.reserve(size);
   for (int y = 0; y <= camera.height; ++y) {
     for (int x = 0; x <= camera.width; ++x) {
-      const Eigen::Vector2d pixel(x, y);
-      const Eigen::Vector2d pinhole((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy);
-      bearings_.push_back(camera.unproject(pixel).value_or(pinhole).cast<float>());
+      const auto bearing = camera.unproject(Eigen::Vector2d(x, y));
+      bearings_.push_back(bearing.value_or(Eigen::Vector2d::Zero()).cast<float>());
+      has_bearing.push_back(bearing ? 1 : 0);
     }
   }
+  lit_.reserve(size);
+  for (std::size_t i = 0; i + columns < size; ++i)
+    if ((i + 1) % columns != 0)
+      lit_.push_back(static_cast<std::uint8_t>(has_bearing[i] & has_bearing[i + 1] &
+                                               has_bearing[i + columns]));
 }
 
-PinholeCamera shrunk(const PinholeCamera& camera, int factor) {
+Camera shrunk(const Camera& camera, int factor) {
   if (factor < 1)
     throw std::invalid_argument("shrunk: a factor of " + std::to_string(factor) + " is below 1");
-  PinholeCamera small = camera;
+  Camera small = camera;
   small.width = (camera.width + factor - 1) / factor;
   small.height = (camera.height + factor - 1) / factor;
   small.fx /= factor;
@@ -565,7 +577,7 @@ RenderedView Renderer::render(const PixelRays& rays, const SE3& T_world_body,
   return ViewPass(impl_->scene, impl_->options, rays, T_world_body, request).run();
 }
 
-RenderedView Renderer::render(const PinholeCamera& camera, const SE3& T_world_body,
+RenderedView Renderer::render(const Camera& camera, const SE3& T_world_body,
                               const RenderRequest& request) const {
   return render(PixelRays(camera), T_world_body, request);
 }

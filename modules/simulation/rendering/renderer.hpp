@@ -17,24 +17,29 @@ namespace km {
 class PixelRays {
  public:
   /// Throws std::invalid_argument for an empty image or a focal length that is not positive.
-  explicit PixelRays(const PinholeCamera& camera);
+  explicit PixelRays(const Camera& camera);
 
-  [[nodiscard]] const PinholeCamera& camera() const { return camera_; }
+  [[nodiscard]] const Camera& camera() const { return camera_; }
 
   /// Bearings of the pixels' centres on the plane z = 1 of the camera frame, row-major, with one
-  /// column and one row more than the image, so that differences give each pixel's extent. Where
-  /// the distortion has no inverse, the bearing continues the undistorted pinhole.
+  /// column and one row more than the image, so that differences give each pixel's extent. 0 where
+  /// the lens has no bearing.
   [[nodiscard]] const std::vector<Eigen::Vector2f>& bearings() const { return bearings_; }
   [[nodiscard]] int stride() const { return camera_.width + 1; }
 
+  /// False for a pixel, of width * height row by row, for which the lens has no bearing, or none
+  /// for that to its right or below: it stays black.
+  [[nodiscard]] bool is_lit(std::size_t pixel) const { return lit_[pixel] != 0; }
+
  private:
-  PinholeCamera camera_;
+  Camera camera_;
   std::vector<Eigen::Vector2f> bearings_;
+  std::vector<std::uint8_t> lit_;
 };
 
 /// The camera with its image shrunk by `factor` (at least 1): the same field of view, fewer pixels.
 /// For metering, previews and tests. Sizes round up.
-[[nodiscard]] PinholeCamera shrunk(const PinholeCamera& camera, int factor);
+[[nodiscard]] Camera shrunk(const Camera& camera, int factor);
 
 /// What the lens throws on the sensor, before exposure, noise and quantisation; row-major,
 /// width * height each. Vectors not asked for are empty.
@@ -44,7 +49,8 @@ struct RenderedView {
   std::vector<float> radiance;       ///< Linear grey, anti-aliased; a white wall in the sun is 1.
   std::vector<Eigen::Vector3f> rgb;  ///< Linear colour, anti-aliased.
   std::vector<float> depth_m;        ///< z in the camera frame at the pixel's centre [m]; 0: sky.
-  std::vector<LabelId> labels;       ///< At the pixel's centre; sky is SurfaceClass::kSky.
+  std::vector<LabelId> labels;       ///< At the pixel's centre; sky is SurfaceClass::kSky, and
+                                     ///< what the lens does not see SurfaceClass::kUnknown.
 };
 
 struct RenderRequest {
@@ -73,7 +79,7 @@ class Renderer {
   [[nodiscard]] RenderedView render(const PixelRays& rays, const SE3& T_world_body,
                                     const RenderRequest& request) const;
   /// The same for a single view: computes the camera's rays first.
-  [[nodiscard]] RenderedView render(const PinholeCamera& camera, const SE3& T_world_body,
+  [[nodiscard]] RenderedView render(const Camera& camera, const SE3& T_world_body,
                                     const RenderRequest& request) const;
 
  private:

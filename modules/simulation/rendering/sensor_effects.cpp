@@ -222,7 +222,7 @@ template std::vector<Eigen::Vector3f> lens_blurred(const std::vector<Eigen::Vect
 
 std::vector<Eigen::Vector2f> image_motion(const PixelRays& rays, const std::vector<float>& depth_m,
                                           const Vector6& body_velocity, double time_s) {
-  const PinholeCamera& camera = rays.camera();
+  const Camera& camera = rays.camera();
   const auto [omega, v] = camera_velocity(camera.T_body_cam, body_velocity);
   const auto time = static_cast<float>(time_s);
   std::vector<Eigen::Vector2f> motion(depth_m.size());
@@ -231,6 +231,8 @@ std::vector<Eigen::Vector2f> image_motion(const PixelRays& rays, const std::vect
     const Eigen::Vector2f* bearing =
         rays.bearings().data() + static_cast<std::ptrdiff_t>(y) * rays.stride();
     for (int x = 0; x < camera.width; ++x, ++i, ++bearing) {
+      motion[i].setZero();
+      if (!rays.is_lit(i)) continue;
       const Eigen::Vector2f& b = *bearing;
       const float inverse_depth = depth_m[i] > 0.0F ? 1.0F / depth_m[i] : 0.0F;
       // Motion of the point at unit depth, then of its bearing.
@@ -288,7 +290,7 @@ SensorEffects::SensorEffects(const PixelRays& rays, const SensorEffectsConfig& c
     : config_(checked(config)),
       rays_(rays),
       noise_tile_(make_noise_tile(config.noise_correlation_px)) {
-  const PinholeCamera& camera = rays.camera();
+  const Camera& camera = rays.camera();
   // The light falls as the fourth power of a cosine does: 1 / (1 + k r^2)^2.
   const Eigen::Vector2d half(0.5 * (camera.width - 1), 0.5 * (camera.height - 1));
   const double k =
@@ -316,7 +318,7 @@ RenderRequest SensorEffects::request(bool color) const {
 }
 
 void SensorEffects::require_complete(const RenderedView& view, std::size_t values) const {
-  const PinholeCamera& camera = rays_.camera();
+  const Camera& camera = rays_.camera();
   if (view.width != camera.width || view.height != camera.height)
     throw std::invalid_argument("SensorEffects: a view of " + std::to_string(view.width) + " x " +
                                 std::to_string(view.height) + " for a camera of " +

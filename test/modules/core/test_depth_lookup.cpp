@@ -8,13 +8,12 @@
 namespace km {
 namespace {
 
-PinholeCamera small_camera() {
+Camera small_camera() {
   return {.width = 64, .height = 48, .fx = 50.0, .fy = 50.0, .cx = 31.5, .cy = 23.5};
 }
 
 // Depth of the plane normal . p = distance.
-DepthImage plane_depth(const PinholeCamera& camera, const Eigen::Vector3d& normal,
-                       double distance_m) {
+DepthImage plane_depth(const Camera& camera, const Eigen::Vector3d& normal, double distance_m) {
   DepthImage image{camera.width, camera.height, {}};
   for (int y = 0; y < camera.height; ++y)
     for (int x = 0; x < camera.width; ++x) {
@@ -28,7 +27,7 @@ DepthImage plane_depth(const PinholeCamera& camera, const Eigen::Vector3d& norma
 constexpr double kNoEdge = 1e9;
 
 TEST_CASE("The depth of a slanted plane is exact between pixels", "[core]") {
-  const PinholeCamera camera = small_camera();
+  const Camera camera = small_camera();
   const Eigen::Vector3d normal(0.3, -0.5, 0.9);
   const double distance_m = 4.0;
   const DepthImage image = plane_depth(camera, normal, distance_m);
@@ -77,22 +76,22 @@ TEST_CASE("Outside the image there is no depth", "[core]") {
 }
 
 TEST_CASE("An RGB-D rig sees a disparity of f * baseline / z", "[core]") {
-  PinholeCamera camera = small_camera();
+  Camera camera = small_camera();
   camera.T_body_cam.linear() = Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitY()).matrix();
   const StereoRig rig = rgbd_rig(camera, 0.08);
   CHECK(rig.depth_source == DepthSource::kDepthImage);
   CHECK(rig.baseline_m() == Approx(0.08));
   const Eigen::Vector3d p_left(0.5, -0.2, 2.0);
   const Eigen::Vector3d p_right = rig.T_left_right().inverse() * p_left;
-  const Eigen::Vector2d left = camera.project(p_left.hnormalized());
-  const Eigen::Vector2d right = rig.cameras[1].project(p_right.hnormalized());
+  const Eigen::Vector2d left = camera.project(p_left.hnormalized()).value();
+  const Eigen::Vector2d right = rig.cameras[1].project(p_right.hnormalized()).value();
   CHECK((left - right - Eigen::Vector2d(50.0 * 0.08 / 2.0, 0.0)).norm() < 1e-9);
   for (const double baseline_m : {0.0, -0.1, std::nan("")})
     CHECK_THROWS_AS(rgbd_rig(camera, baseline_m), std::invalid_argument);
 }
 
 TEST_CASE("A frame fits a rig if it has the images that the rig takes", "[core]") {
-  const PinholeCamera camera = small_camera();
+  const Camera camera = small_camera();
   const GrayImage image{64, 48, std::vector<std::uint8_t>(64 * 48)};
   const StereoRig rgbd = rgbd_rig(camera, 0.1);
   const StereoRig stereo{{camera, camera}};

@@ -61,12 +61,12 @@ struct DepthDifferences {
 inline void add_differences(const DepthImage& depth, const StereoDepth& stereo,
                             const StereoRig& rig, const std::vector<TriangulatedCorner>& corners,
                             DepthDifferences& differences) {
-  const PinholeCamera& camera = stereo.camera();
+  const Camera& camera = stereo.camera();
   const SE3 T_cam_left = camera.T_body_cam.inverse() * rig.cameras[0].T_body_cam;
   const double focal_baseline = camera.fx * stereo.rectification().baseline_m();
   for (const TriangulatedCorner& corner : corners) {
     const Eigen::Vector3d p = T_cam_left * corner.p_left;
-    const Eigen::Vector2d px = camera.project(p.hnormalized());
+    const Eigen::Vector2d px = camera.project(p.hnormalized()).value();
     const long x = std::lround(px.x()), y = std::lround(px.y());
     if (x < stereo.disparities() || y < 0 || x >= depth.width || y >= depth.height) continue;
     ++differences.corners;

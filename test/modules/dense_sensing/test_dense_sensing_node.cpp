@@ -23,7 +23,7 @@ struct Bench {
   std::unique_ptr<DenseSensingNode> node;
 
   explicit Bench(Overflow overflow = Overflow::kBlock) {
-    PinholeCamera camera = test_rig().cameras[0];
+    Camera camera = test_rig().cameras[0];
     camera.T_body_cam.translation().z() = 0.5;
     rig = rgbd_rig(camera, 0.1);
     seen = TexturedPlane{}.render_rgbd(rig, SE3::Identity(), 0);

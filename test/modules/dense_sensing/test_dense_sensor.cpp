@@ -11,7 +11,7 @@ namespace km {
 namespace {
 
 // Left of the optical axis 1, right of it 2.
-std::shared_ptr<const LabelImage> halves(const PinholeCamera& camera) {
+std::shared_ptr<const LabelImage> halves(const Camera& camera) {
   auto labels = std::make_shared<LabelImage>(LabelImage{camera.width, camera.height, {}});
   for (int y = 0; y < camera.height; ++y)
     for (int x = 0; x < camera.width; ++x) {
@@ -24,7 +24,7 @@ std::shared_ptr<const LabelImage> halves(const PinholeCamera& camera) {
 TEST_CASE("Recorded depth and labels are handed on as they are", "[dense_sensor]") {
   const StereoRig rig = rgbd_rig(test_rig().cameras[0], 0.1);
   DenseSensor sensor(rig, {.labels = LabelsFrom::kImages});
-  CHECK(sensor.camera().distortion == rig.cameras[0].distortion);
+  CHECK(sensor.camera().lens == rig.cameras[0].lens);
   StereoFrame frame = TexturedPlane{}.render_rgbd(rig, SE3::Identity(), 5);
   frame.labels = halves(rig.cameras[0]);
   const DenseImages images = sensor.sense(frame);
@@ -45,7 +45,7 @@ TEST_CASE("Labels follow the pixels of rectified depth", "[dense_sensor]") {
   const DenseImages images = sensor.sense(frame);
   REQUIRE(images.problem == DenseProblem::kNone);
   REQUIRE(images.labels != nullptr);
-  const PinholeCamera& camera = sensor.camera();
+  const Camera& camera = sensor.camera();
   REQUIRE(images.labels->width == camera.width);
   CHECK(images.depth->width == camera.width);
   const double margin = 1.0 / camera.fx;  // half a pixel there, half one in the real image

@@ -22,7 +22,7 @@ struct DepthError {
 // Against the true distance of `plane` along the axis of the depth camera.
 DepthError compare(const DepthImage& depth, const StereoDepth& stereo, const TexturedPlane& plane,
                    const SE3& T_world_body) {
-  const PinholeCamera& camera = stereo.camera();
+  const Camera& camera = stereo.camera();
   const SE3 T_world_cam = T_world_body * camera.T_body_cam;
   const double focal_baseline = camera.fx * stereo.rectification().baseline_m();
   std::vector<double> errors_px;
@@ -67,6 +67,42 @@ TEST_CASE("Planes at any distance and slant come out where they are", "[stereo_d
   CHECK(error.share > kMinShare);
 }
 
+TEST_CASE("Any lens comes out as a plane of the right depth", "[stereo_depth]") {
+  struct Case {
+    double focal_px;
+    Lens lens;
+  };
+  // Fisheye lenses of 144, 136 and 144 degrees across.
+  const Case c = GENERATE(Case{150.0, Lens(LensModel::kEquidistant, {0.003, 7e-4, -2e-3, 2e-4})},
+                          Case{190.0, Lens(LensModel::kOmnidirectional, {0.8, -0.1, 0, 1e-4, 0})},
+                          Case{150.0, Lens(LensModel::kDoubleSphere, {-0.17, 0.59})});
+  CAPTURE(to_string(c.lens.model()));
+  StereoRig rig = test_rig();
+  for (Camera& camera : rig.cameras) {
+    camera.fx = camera.fy = c.focal_px;
+    camera.lens = c.lens;
+  }
+  rig.cameras[1].T_body_cam =
+      make_pose(so3_exp(Eigen::Vector3d(0.02, -0.03, 0.025)), {0.11, 0.004, -0.003});
+  const DepthError error = error_on(rig, {}, TexturedPlane{2.0, 0.1, 1}, SE3::Identity());
+  CHECK(error.median_px < kMaxMedian_px);
+  CHECK(error.share > kMinShare);
+}
+
+TEST_CASE("A fisheye lens of 190 degrees is rectified to a view of some 120", "[stereo_depth]") {
+  StereoRig rig = test_rig();
+  for (Camera& camera : rig.cameras) {
+    camera.fx = camera.fy = 0.5 * camera.width / (95.0 * M_PI / 180.0);
+    camera.lens = Lens(LensModel::kEquidistant, {0.0, 0.0, 0.0, 0.0});
+  }
+  const StereoRectification rectification(rig, 1);
+  const Camera& camera = rectification.camera();
+  const double left = camera.unproject({0.0, camera.cy}).value().x();
+  const double right = camera.unproject({camera.width - 1.0, camera.cy}).value().x();
+  CHECK((std::atan(right) - std::atan(left)) * 180.0 / M_PI == Approx(118.0).margin(2.0));
+  CHECK(cv::countNonZero(rectification.seen()) == camera.width * camera.height);
+}
+
 TEST_CASE("Cameras that are turned and unlike each other are rectified", "[stereo_depth]") {
   StereoRig rig = test_rig();
   rig.cameras[1].T_body_cam =
@@ -74,7 +110,7 @@ TEST_CASE("Cameras that are turned and unlike each other are rectified", "[stere
   rig.cameras[1].cx += 9.0;
   rig.cameras[1].cy -= 6.0;
   rig.cameras[1].fx *= 1.03;
-  rig.cameras[1].distortion = {-0.25, 0.05, -3e-4, 2e-4};
+  rig.cameras[1].lens = Lens(LensModel::kRadialTangential, {-0.25, 0.05, -3e-4, 2e-4});
   const DepthError error = error_on(rig, {}, TexturedPlane{}, SE3::Identity());
   CHECK(error.median_px < kMaxMedian_px);
   CHECK(error.share > kMinShare);

@@ -14,8 +14,8 @@ namespace {
 constexpr double kRadians = std::numbers::pi / 180.0;
 
 // 90 by 73.7 degrees; it looks along the body's x axis, as a car's would.
-PinholeCamera camera() {
-  PinholeCamera camera;
+Camera camera() {
+  Camera camera;
   camera.width = 640;
   camera.height = 480;
   camera.fx = camera.fy = 320.0;

@@ -10,18 +10,18 @@
 namespace km {
 namespace {
 
-PinholeCamera test_camera() {
+Camera test_camera() {
   return {.width = 320,
           .height = 240,
           .fx = 200.0,
           .fy = 202.0,
           .cx = 161.0,
           .cy = 118.0,
-          .distortion = {-0.28, 0.07, 2e-4, 1e-5}};
+          .lens = Lens(LensModel::kRadialTangential, {-0.28, 0.07, 2e-4, 1e-5})};
 }
 
 // Squares of random grey levels: corners everywhere.
-GrayImage checkered(const PinholeCamera& camera) {
+GrayImage checkered(const Camera& camera) {
   std::mt19937 rng(5);
   std::vector<std::uint8_t> levels(32 * 24);
   for (std::uint8_t& level : levels) level = static_cast<std::uint8_t>(rng() & 0xFFU);
@@ -36,7 +36,7 @@ const Eigen::Vector3d kNormal(0.2, -0.4, 0.9);
 constexpr double kDistance_m = 3.0;
 
 // The plane kNormal . p = kDistance_m, none of it in the left third.
-std::shared_ptr<const DepthImage> plane_depth(const PinholeCamera& camera) {
+std::shared_ptr<const DepthImage> plane_depth(const Camera& camera) {
   DepthImage image{camera.width, camera.height, {}};
   for (int y = 0; y < camera.height; ++y)
     for (int x = 0; x < camera.width; ++x) {
@@ -61,7 +61,7 @@ TEST_CASE("keypoints of an RGB-D frame have the depth of their pixel", "[loop_cl
   int holes = 0;
   for (const Keypoint& keypoint : features.keypoints) {
     const Eigen::Vector2d bearing = keypoint.bearing.cast<double>();
-    const double x = rig.cameras[0].project(bearing).x();
+    const double x = rig.cameras[0].project(bearing).value().x();
     CAPTURE(x);
     if (x < 106 - 1) {  // a third, less the reach of a neighbour
       ++holes;
@@ -146,16 +146,16 @@ StereoRig folding_rig() {
                     .fy = 200.0,
                     .cx = 319.5,
                     .cy = 239.5,
-                    .distortion = {-0.3, 0.0, 0.0, 0.0}};
+                    .lens = Lens(LensModel::kRadialTangential, {-0.3, 0.0, 0.0, 0.0})};
   rig.cameras[1] = rig.cameras[0];
   rig.cameras[1].T_body_cam.translation().x() = kRigBaseline_m;
   return rig;
 }
 
 // A round dot, which looks the same in a mirror, on a grey wall.
-GrayImage dot_at(const Eigen::Vector2d& bearing, const PinholeCamera& camera) {
+GrayImage dot_at(const Eigen::Vector2d& bearing, const Camera& camera) {
   constexpr double kRadius_px = 1.5;
-  const Eigen::Vector2d centre = camera.project(bearing);
+  const Eigen::Vector2d centre = camera.project(bearing).value();
   GrayImage image{camera.width, camera.height, {}};
   for (int y = 0; y < camera.height; ++y)
     for (int x = 0; x < camera.width; ++x) {

@@ -7,8 +7,7 @@ namespace km {
 namespace {
 
 StereoRig small_rig() {
-  PinholeCamera camera{
-      .width = 320, .height = 240, .fx = 200.0, .fy = 200.0, .cx = 160.0, .cy = 120.0};
+  Camera camera{.width = 320, .height = 240, .fx = 200.0, .fy = 200.0, .cx = 160.0, .cy = 120.0};
   return rgbd_rig(camera, 0.1);
 }
 

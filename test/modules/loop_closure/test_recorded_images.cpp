@@ -69,7 +69,7 @@ TEST_CASE("keypoints cover a recorded image and most have a plausible depth", "[
   int covered = 0;  // cells of an 8 x 5 raster over the image that hold a keypoint
   for (int cell = 0; cell < 40; ++cell)
     covered += std::any_of(keypoints.begin(), keypoints.end(), [&](const Keypoint& k) {
-      const Eigen::Vector2d px = rig.stereo.cameras[0].project(k.bearing.cast<double>());
+      const Eigen::Vector2d px = rig.stereo.cameras[0].project(k.bearing.cast<double>()).value();
       return static_cast<int>(px.x() / 94) == cell % 8 && static_cast<int>(px.y() / 96) == cell / 8;
     });
   CHECK(covered >= 28);  // the detector leaves a margin of 31 px, and walls are blank

@@ -68,8 +68,7 @@ struct Run {
 // Mapper and corrector in turns.
 class Mapping {
  public:
-  Mapping(const Task& task, const Run& run, const PinholeCamera& camera,
-          const LabelPalette& palette)
+  Mapping(const Task& task, const Run& run, const Camera& camera, const LabelPalette& palette)
       : run_(run), camera_(camera), mapper_(config(task), camera, palette), corrector_(lmo(task)) {
     std::printf("time_s,resident_mb,blocks,vertices,faces,dropped_faces,nodes,correction_cpu_s\n");
   }
@@ -123,7 +122,7 @@ class Mapping {
   }
 
   const Run& run_;
-  PinholeCamera camera_;
+  Camera camera_;
   SemanticMapper mapper_;
   MeshCorrector corrector_;
   std::uint64_t version_ = 0;

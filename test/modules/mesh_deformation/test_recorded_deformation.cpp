@@ -82,7 +82,7 @@ TEST_CASE("A recorded kitchen mapped with drift is corrected to agree with the f
   RecordedKitchen kitchen(*folder);
   SemanticMappingConfig mapping;
   mapping.voxel_size_m = 0.05;
-  const PinholeCamera& camera = kitchen.rig().cameras[0];
+  const Camera& camera = kitchen.rig().cameras[0];
   Robot first{SemanticMapper(mapping, camera)};
   Robot given{SemanticMapper(mapping, camera)};
   Robot drifted{SemanticMapper(mapping, camera)};

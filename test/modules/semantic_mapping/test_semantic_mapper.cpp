@@ -6,6 +6,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "modules/semantic_mapping/depth_view.hpp"
 #include "test/modules/semantic_mapping/mesh_checks.hpp"
 #include "test/modules/semantic_mapping/wall_scene.hpp"
 
@@ -14,10 +15,12 @@ namespace {
 
 TEST_CASE("A room is mapped where it is, with its labels", "[semantic_mapping]") {
   const double voxel_m = GENERATE(0.05, 0.1);
-  const bool distorted = GENERATE(false, true);
-  CAPTURE(voxel_m, distorted);
-  PinholeCamera camera = small_camera();
-  if (distorted) camera.distortion = {-0.28, 0.07, 2e-4, -1e-4};  // as of EuRoC's cameras
+  const Lens lens = GENERATE(
+      Lens(), Lens(LensModel::kRadialTangential, {-0.28, 0.07, 2e-4, -1e-4}),  // as of EuRoC's
+      Lens(LensModel::kEquidistant, {0.0034, 0.0007, -0.002, 0.0002}));        // as of TUM-VI's
+  CAPTURE(voxel_m, to_string(lens.model()));
+  Camera camera = small_camera();
+  camera.lens = lens;
   SemanticMapper mapper(settings(voxel_m), camera, BoxRoom::palette());
   // Shifted and turned against the grid.
   const SE3 T_odom_room = make_pose(
@@ -44,6 +47,28 @@ TEST_CASE("A room is mapped where it is, with its labels", "[semantic_mapping]")
   // means over many frames are far below that.
   CHECK(error_m / count < 0.003);
   CHECK(static_cast<double>(right) / count > 0.97);  // not where walls meet
+}
+
+TEST_CASE("Of a fisheye image all is viewed that has bearings", "[semantic_mapping]") {
+  Camera camera = small_camera();
+  camera.fx = camera.fy = 40.0;  // the borders are more than 80 degrees off the axis
+  camera.lens = Lens(LensModel::kEquidistant, {0.0, 0.0, 0.0, 0.0});
+  DepthViewMaker maker(camera, 0.1, 10.0, {});
+  DepthImage depth{camera.width, camera.height, {}};
+  for (int v = 0; v < camera.height; ++v)
+    for (int u = 0; u < camera.width; ++u)
+      depth.millimetres.push_back(static_cast<std::uint16_t>(1000 + u));
+  const DepthView& view = maker.make(depth, nullptr);
+  CHECK(view.width <= 2 * camera.width + 2);
+  CHECK(view.with_depth == static_cast<std::size_t>(view.width * view.height));
+  for (const double x : {-1.5, -0.5, 0.0, 0.7, 1.9}) {  // tangents, up to 62 degrees
+    const int u = static_cast<int>(std::lround(static_cast<double>(view.cx) + 40.0 * x));
+    const int v = static_cast<int>(std::lround(static_cast<double>(view.cy)));
+    const double source = camera.cx + 40.0 * std::atan((u - static_cast<double>(view.cx)) / 40.0);
+    CAPTURE(x, u, v);
+    CHECK(DepthView::depth_m(view.pixels[static_cast<std::size_t>(v * view.width + u)]) ==
+          Approx(1.0 + 1e-3 * std::round(source)).margin(1.1e-3));
+  }
 }
 
 TEST_CASE("Two depths are averaged by their weights", "[semantic_mapping]") {
@@ -246,7 +271,7 @@ TEST_CASE("Unusable settings and cameras are refused", "[semantic_mapping]") {
   SemanticMappingConfig config = settings();
   config.voxel_size_m = 0.0;
   CHECK_THROWS_AS(SemanticMapper(config, small_camera()), ConfigError);
-  CHECK_THROWS_AS(SemanticMapper(settings(), PinholeCamera{}), std::invalid_argument);
+  CHECK_THROWS_AS(SemanticMapper(settings(), Camera{}), std::invalid_argument);
 }
 
 TEST_CASE("A frame seen again keeps every vertex and its first keyframe", "[semantic_mapping]") {

@@ -31,9 +31,8 @@ struct BoxRoom {
                          {6, "ceiling", {200, 200, 200}}});
   }
 
-  static PinholeCamera camera() {
-    PinholeCamera camera{
-        .width = 640, .height = 480, .fx = 525.0, .fy = 525.0, .cx = 319.5, .cy = 239.5};
+  static Camera camera() {
+    Camera camera{.width = 640, .height = 480, .fx = 525.0, .fy = 525.0, .cx = 319.5, .cy = 239.5};
     return camera;
   }
 
@@ -79,7 +78,7 @@ struct DepthAndLabels {
 /// length along `direction` to the first surface, or infinity, and sets its label. Directions have
 /// length 1 along the optical axis, so that lengths are depths.
 template <typename Cast>
-DepthAndLabels render(const PinholeCamera& camera, const SE3& T_world_cam, const Cast& cast) {
+DepthAndLabels render(const Camera& camera, const SE3& T_world_cam, const Cast& cast) {
   DepthAndLabels images;
   images.depth = {camera.width, camera.height, {}};
   images.labels = {camera.width, camera.height, {}};
@@ -116,8 +115,8 @@ inline double cast_room(const Eigen::Vector3d& origin, const Eigen::Vector3d& di
 }
 
 /// A quarter of the benchmark's camera: 160 x 120.
-inline PinholeCamera small_camera() {
-  PinholeCamera camera = BoxRoom::camera();
+inline Camera small_camera() {
+  Camera camera = BoxRoom::camera();
   camera.width /= 4;
   camera.height /= 4;
   camera.fx = camera.fy = camera.fx / 4.0;

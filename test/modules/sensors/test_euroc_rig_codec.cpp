@@ -11,14 +11,14 @@ namespace km {
 TEST_CASE("The rig has the numbers of the sensor files", "[sensors]") {
   const EurocFolder folder;
   const SensorRig rig = read_euroc_rig(folder.mav0());
-  const PinholeCamera& left = rig.stereo.cameras[0];
+  const Camera& left = rig.stereo.cameras[0];
   CHECK(left.width == 32);
   CHECK(left.height == 24);
   CHECK(left.fx == 30.0);
   CHECK(left.fy == 31.0);
   CHECK(left.cx == 16.0);
   CHECK(left.cy == 12.0);
-  CHECK(left.distortion == std::array<double, 4>{-0.2, 0.05, 0.001, 0.002});
+  CHECK(left.lens == Lens(LensModel::kRadialTangential, {-0.2, 0.05, 0.001, 0.002}));
   CHECK(left.T_body_cam.linear() * Eigen::Vector3d::UnitX() == Eigen::Vector3d::UnitY());
   CHECK(left.T_body_cam.translation() == Eigen::Vector3d(0.0, 0.2, 0.3));
   CHECK(rig.stereo.baseline_m() == Approx(0.1));

@@ -34,7 +34,7 @@ constexpr const char* kPalette =
     "tree,0,200,10,255,7\n";
 
 // Median distance [m] of the depths of frame a, carried into b, from those that b has there.
-double depth_disagreement(const PosedFrame& a, const PosedFrame& b, const PinholeCamera& camera) {
+double depth_disagreement(const PosedFrame& a, const PosedFrame& b, const Camera& camera) {
   const SE3 T_b_a = b.T_world_cam.inverse() * a.T_world_cam;
   std::vector<double> errors;
   for (int y = 4; y < camera.height; y += 8)
@@ -44,7 +44,9 @@ double depth_disagreement(const PosedFrame& a, const PosedFrame& b, const Pinhol
       if (!rho_a) continue;
       const Eigen::Vector3d p_b = T_b_a * (camera.unproject(px)->homogeneous() / *rho_a);
       if (p_b.z() < 0.1) continue;
-      const auto rho_b = inverse_depth_at(*b.frame->depth, camera.project(p_b.hnormalized()), 0.05);
+      const auto px_b = camera.project_ray(p_b);
+      if (!px_b) continue;
+      const auto rho_b = inverse_depth_at(*b.frame->depth, *px_b, 0.05);
       if (rho_b) errors.push_back(std::abs(1.0 / *rho_b - p_b.z()));
     }
   REQUIRE(errors.size() > 500);

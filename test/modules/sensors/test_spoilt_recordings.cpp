@@ -29,7 +29,7 @@ std::string png_of(std::uint32_t width, std::uint32_t height) {
 }
 
 void check_rig(const SensorRig& rig) {
-  for (const PinholeCamera& camera : rig.stereo.cameras) {
+  for (const Camera& camera : rig.stereo.cameras) {
     CHECK(camera.T_body_cam.matrix().allFinite());
     CHECK(std::isfinite(camera.fx * camera.fy * camera.cx * camera.cy));
     CHECK(camera.width * camera.height > 0);

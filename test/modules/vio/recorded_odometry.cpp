@@ -30,8 +30,7 @@ struct SeenRay {
 };
 
 // Of every pixel of the left camera; nullopt where its lens has no bearing.
-std::vector<std::optional<SeenRay>> seen_rays(const PinholeCamera& rectified,
-                                              const PinholeCamera& left) {
+std::vector<std::optional<SeenRay>> seen_rays(const Camera& rectified, const Camera& left) {
   const SE3 T_rect_left = rectified.T_body_cam.inverse() * left.T_body_cam;
   std::vector<std::optional<SeenRay>> rays;
   for (int y = 0; y < left.height; ++y)
@@ -40,7 +39,7 @@ std::vector<std::optional<SeenRay>> seen_rays(const PinholeCamera& rectified,
       auto& seen = rays.emplace_back();
       if (!bearing) continue;
       const Eigen::Vector3d ray = T_rect_left.linear() * bearing->homogeneous();
-      seen = SeenRay{rectified.project(ray.hnormalized()), ray.z()};
+      if (const auto px = rectified.project_ray(ray)) seen = SeenRay{*px, ray.z()};
     }
   return rays;
 }

@@ -74,8 +74,7 @@ struct SyntheticMotion {
 
 /// Two cameras that look along the body's x axis, the image's x axis being -y of the body.
 inline SensorRig synthetic_rig() {
-  PinholeCamera camera{
-      .width = 752, .height = 480, .fx = 458.0, .fy = 458.0, .cx = 376.0, .cy = 240.0};
+  Camera camera{.width = 752, .height = 480, .fx = 458.0, .fy = 458.0, .cx = 376.0, .cy = 240.0};
   Eigen::Matrix3d R_body_cam;
   R_body_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   camera.T_body_cam = make_pose(R_body_cam, {0.05, 0.055, 0.0});
@@ -140,7 +139,7 @@ class SyntheticWorld {
  private:
   std::optional<Eigen::Vector2d> see(std::size_t c, const SE3& T_odom_body,
                                      const Eigen::Vector3d& p_odom, double noise_px) {
-    const PinholeCamera& camera = rig_.stereo.cameras[c];
+    const Camera& camera = rig_.stereo.cameras[c];
     const Eigen::Vector3d p = (T_odom_body * camera.T_body_cam).inverse() * p_odom;
     if (p.z() < 0.3) return std::nullopt;
     const Eigen::Vector2d bearing = p.head<2>() / p.z();

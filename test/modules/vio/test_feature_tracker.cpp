@@ -79,6 +79,47 @@ TEST_CASE("Features of a moving camera stay on their landmarks to a tenth of a p
   CHECK(quantile(errors_px, 0.95) < 0.2);
 }
 
+TEST_CASE("Through a fisheye lens features stay on their landmarks, and pairs have depth",
+          "[vio]") {
+  const StereoRig rig = fisheye_rig();
+  const Camera& left = rig.cameras[0];
+  const TexturedPlane plane{2.0, 0.25, 1};  // cells of 19 px in the middle, 3 px at 65 degrees
+  FeatureTracker tracker(rig, small_image_config());
+  const Vector6 motion = twist(0.01, -0.02, 0.01, 0.01, 0, 0.03);
+  std::map<std::uint64_t, Eigen::Vector3d> landmarks;
+  std::vector<double> errors_px, wide_errors_px, depth_errors_px;
+  for (int i = 0; i < 8; ++i) {
+    const SE3 T_world_body = camera_pose(i, motion);
+    const TrackedFrame frame =
+        tracker.track(plane.render(rig, T_world_body, i * kFrameNs), so3_exp(motion.head<3>()));
+    for (const TrackedFeature& feature : frame.features) {
+      const Eigen::Vector2d px = left.project(feature.left).value();
+      const Eigen::Vector3d seen = T_world_body.inverse() * plane.meet(T_world_body, feature.left);
+      if (feature.right)
+        depth_errors_px.push_back(
+            (rig.cameras[1].project(*feature.right).value() -
+             rig.cameras[1].project_ray(seen - Eigen::Vector3d(0.11, 0, 0)).value())
+                .norm());
+      const auto [landmark, is_new] =
+          landmarks.try_emplace(feature.id, plane.meet(T_world_body, feature.left));
+      if (is_new) continue;
+      const auto expected = left.project_ray(T_world_body.inverse() * landmark->second);
+      REQUIRE(expected.has_value());
+      const bool wide = feature.left.norm() > std::tan(50.0 * M_PI / 180.0);
+      (wide ? wide_errors_px : errors_px).push_back((*expected - px).norm());
+    }
+  }
+  REQUIRE(errors_px.size() > 100);
+  CHECK(quantile(errors_px, 0.5) < 0.05);
+  CHECK(quantile(errors_px, 0.95) < 0.2);
+  REQUIRE(wide_errors_px.size() > 200);  // there the texture is too fine for the pixels
+  CHECK(quantile(wide_errors_px, 0.5) < 0.1);
+  CHECK(quantile(wide_errors_px, 0.95) < 1.0);
+  REQUIRE(depth_errors_px.size() > 4 * 50);
+  CHECK(quantile(depth_errors_px, 0.5) < 0.05);
+  CHECK(quantile(depth_errors_px, 0.95) < 0.2);
+}
+
 TEST_CASE("Stereo matches of a plane have its depth", "[vio]") {
   // 63 px of disparity (126 in an image of twice the size), 13 px, 2.5 px.
   const double depth_m = GENERATE(0.4, 2.0, 10.0);
@@ -94,7 +135,7 @@ TEST_CASE("Stereo matches of a plane have its depth", "[vio]") {
   int visible = 0;  // To the right camera.
   for (const TrackedFeature& feature : frame.features) {
     const Eigen::Vector2d expected = feature.left - Eigen::Vector2d(0.11 / depth_m, 0.0);
-    visible += rig.cameras[1].project(expected).x() > 16.0 ? 1 : 0;
+    visible += rig.cameras[1].project(expected).value().x() > 16.0 ? 1 : 0;
     if (!feature.right) continue;
     errors_px.push_back(rig.cameras[0].fx * (*feature.right - expected).norm());
   }
@@ -123,7 +164,7 @@ TEST_CASE("Features that move by themselves are dropped", "[vio]") {
   };
   const Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   const auto on_sticker = [&](const TrackedFeature& feature, int top) {
-    const Eigen::Vector2d px = rig.cameras[0].project(feature.left);
+    const Eigen::Vector2d px = rig.cameras[0].project(feature.left).value();
     return px.x() > 108 && px.x() < 182 && px.y() > top + 8 && px.y() < top + 82;
   };
   const TrackedFrame first = tracker.track(frame_with_sticker(0, 80), R);
@@ -307,7 +348,7 @@ TEST_CASE("Holes and edges of the depth image give no right observation", "[vio]
   const TrackedFrame result = tracker.track(frame, Eigen::Matrix3d::Identity());
   int in_hole = 0, beyond = 0;
   for (const TrackedFeature& feature : result.features) {
-    const double x = rig.cameras[0].project(feature.left).x();
+    const double x = rig.cameras[0].project(feature.left).value().x();
     CAPTURE(x);
     if (x < hole_end - 1) {
       ++in_hole;

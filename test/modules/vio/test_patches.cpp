@@ -68,8 +68,10 @@ TEST_CASE("An edge is no patch: it can slide", "[vio]") {
 }
 
 TEST_CASE("The local warp is the derivative of the image of a facing surface", "[vio]") {
-  const StereoRig rig = test_rig();
-  const PinholeCamera& camera = rig.cameras[0];
+  const bool fisheye = GENERATE(false, true);
+  CAPTURE(fisheye);
+  const StereoRig rig = fisheye ? fisheye_rig() : test_rig();
+  const Camera& camera = rig.cameras[0];
   Vector6 xi;
   xi << 0.02, -0.05, 0.2, 0.05, 0.02, 0.2;
   const SE3 T_b_a = se3_exp(xi);
@@ -77,7 +79,7 @@ TEST_CASE("The local warp is the derivative of the image of a facing surface", "
   const Eigen::Vector2d bearing = camera.unproject(px_a).value();
   const auto in_b = [&](const Eigen::Vector2d& px) {
     const Eigen::Vector3d p = 1.5 * camera.unproject(px).value().homogeneous();
-    return camera.project((T_b_a * p).hnormalized());
+    return camera.project((T_b_a * p).hnormalized()).value();
   };
   const Eigen::Matrix2f A = local_warp(camera, camera, bearing, 1.0 / 1.5, T_b_a);
   const Eigen::Vector2d offset(1.5, -1.0);
@@ -85,6 +87,9 @@ TEST_CASE("The local warp is the derivative of the image of a facing surface", "
   CHECK((A.cast<double>() * offset - expected).norm() < 0.02);  // Second order.
   const SE3 behind = make_pose(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0, 0, -2.0));
   CHECK(local_warp(camera, camera, bearing, 1.0 / 1.5, behind).isIdentity());
+  // Next to a bearing that the lens has not.
+  const Eigen::Vector2d rim(camera.lens.max_bearing() - 1e-4, 0.0);
+  CHECK(local_warp(camera, camera, rim, 0.0, SE3::Identity()).isIdentity());
 }
 
 TEST_CASE("Patch correlation is blind to gain and offset and nothing else", "[vio]") {

@@ -53,7 +53,7 @@ TEST_CASE("Reprojection Jacobians agree with differences", "[vio]") {
 }
 
 TEST_CASE("A reprojection error is in standard deviations of the image point", "[vio]") {
-  const PinholeCamera camera = synthetic_rig().stereo.cameras[0];
+  const Camera camera = synthetic_rig().stereo.cameras[0];
   const ViewModel view = view_model(camera, 0.5);
   const SE3 T = SE3::Identity();
   const Eigen::Vector3d p = camera.T_body_cam * Eigen::Vector3d(0.2, -0.1, 2.0);

@@ -36,22 +36,32 @@ inline double smooth_noise(double x, double y, std::uint32_t seed) {
 
 /// Two equal cameras side by side, x right, with the distortion of a wide lens.
 inline StereoRig test_rig(double baseline_m = 0.11) {
-  PinholeCamera camera{
-      .width = 376, .height = 240, .fx = 230.0, .fy = 230.0, .cx = 185.0, .cy = 121.0};
-  camera.distortion = {-0.28, 0.07, 2e-4, 1e-5};
+  Camera camera{.width = 376, .height = 240, .fx = 230.0, .fy = 230.0, .cx = 185.0, .cy = 121.0};
+  camera.lens = Lens(LensModel::kRadialTangential, {-0.28, 0.07, 2e-4, 1e-5});
   StereoRig rig;
   rig.cameras = {camera, camera};
   rig.cameras[1].T_body_cam.translation().x() = baseline_m;
   return rig;
 }
 
+/// The same cameras with the lens of TUM-VI's: 143 degrees across, and corners without bearings.
+inline StereoRig fisheye_rig() {
+  StereoRig rig = test_rig();
+  for (Camera& camera : rig.cameras) {
+    camera.fx = camera.fy = 150.0;
+    camera.lens = Lens(LensModel::kEquidistant, {0.0034823894022493434, 0.0007150348452162257,
+                                                 -0.0020532361418706202, 0.00020293673591811182});
+  }
+  return rig;
+}
+
 /// Of every pixel, row by row. Kept for the next image of the same lens: undistortion takes most of
 /// the time of an image.
-inline const std::vector<std::optional<Eigen::Vector2d>>& bearings_of(const PinholeCamera& camera) {
+inline const std::vector<std::optional<Eigen::Vector2d>>& bearings_of(const Camera& camera) {
   static std::vector<std::optional<Eigen::Vector2d>> bearings;
-  static PinholeCamera last;
-  const auto lens = [](const PinholeCamera& c) {
-    return std::tie(c.width, c.height, c.fx, c.fy, c.cx, c.cy, c.distortion);
+  static Camera last;
+  const auto lens = [](const Camera& c) {
+    return std::tie(c.width, c.height, c.fx, c.fy, c.cx, c.cy, c.lens);
   };
   if (lens(camera) == lens(last)) return bearings;
   last = camera;
@@ -69,7 +79,7 @@ struct TexturedPlane {
   double cell_m = 0.06;
   std::uint32_t seed = 1;
 
-  [[nodiscard]] GrayImage render(const PinholeCamera& camera, const SE3& T_world_body) const {
+  [[nodiscard]] GrayImage render(const Camera& camera, const SE3& T_world_body) const {
     GrayImage image{camera.width, camera.height, {}};
     const SE3 T_world_cam = T_world_body * camera.T_body_cam;
     for (const auto& bearing : bearings_of(camera))
@@ -85,7 +95,7 @@ struct TexturedPlane {
   /// What an RGB-D camera sees: `rig` as rgbd_rig() makes it.
   [[nodiscard]] StereoFrame render_rgbd(const StereoRig& rig, const SE3& T_world_body,
                                         Stamp stamp) const {
-    const PinholeCamera& camera = rig.cameras[0];
+    const Camera& camera = rig.cameras[0];
     const SE3 T_world_cam = T_world_body * camera.T_body_cam;
     DepthImage depth{camera.width, camera.height, {}};
     for (const auto& bearing : bearings_of(camera)) {
@@ -114,7 +124,7 @@ struct TexturedPlane {
 };
 
 /// An image of one grey level.
-inline GrayImage flat_image(const PinholeCamera& camera, std::uint8_t level) {
+inline GrayImage flat_image(const Camera& camera, std::uint8_t level) {
   const auto pixels =
       static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   return {camera.width, camera.height, std::vector<std::uint8_t>(pixels, level)};

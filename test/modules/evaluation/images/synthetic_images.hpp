@@ -47,7 +47,7 @@ inline cv::Mat noisy_wall(int width, int height, double grey, double sigma, std:
 
 /// Two cameras side by side that see the same of what is infinitely far.
 inline StereoRig aligned_rig(int width, int height, double focal_px) {
-  PinholeCamera camera;
+  Camera camera;
   camera.width = width;
   camera.height = height;
   camera.fx = camera.fy = focal_px;

@@ -105,20 +105,21 @@ TEST_CASE("Images of the wrong size are refused", "[simulation][dataset]") {
                   std::invalid_argument);
 }
 
-PinholeCamera some_camera(double shift_m) {
-  PinholeCamera camera;
+Camera some_camera(double shift_m) {
+  Camera camera;
   camera.width = 376;
   camera.height = 240;
   camera.fx = 229.327;
   camera.fy = 228.648;
   camera.cx = 183.6075;
   camera.cy = 124.1875;
-  camera.distortion = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05};
+  camera.lens =
+      Lens(LensModel::kRadialTangential, {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05});
   camera.T_body_cam = make_pose(so3_exp(Eigen::Vector3d(0.1, -1.2, 0.7)), {shift_m, -0.06, 1e-9});
   return camera;
 }
 
-void check_equal(const PinholeCamera& a, const PinholeCamera& b) {
+void check_equal(const Camera& a, const Camera& b) {
   constexpr double kRounding = 1e-14;  // of the reader's nearest rotation
   CHECK(a.width == b.width);
   CHECK(a.height == b.height);
@@ -126,15 +127,15 @@ void check_equal(const PinholeCamera& a, const PinholeCamera& b) {
   CHECK(a.fy == b.fy);
   CHECK(a.cx == b.cx);
   CHECK(a.cy == b.cy);
-  CHECK(a.distortion == b.distortion);
+  CHECK(a.lens == b.lens);
   CHECK((a.T_body_cam.matrix() - b.T_body_cam.matrix()).norm() < kRounding);
 }
 
 TEST_CASE("The reader gets the calibration that was written", "[simulation][dataset]") {
   const TemporaryFolder folder;
   const RecordingLayout layout(folder.path(), ImageFormat::kJpeg);
-  const PinholeCamera left = some_camera(0.0);
-  const PinholeCamera right = some_camera(0.11);
+  const Camera left = some_camera(0.0);
+  const Camera right = some_camera(0.11);
   ImuNoise noise;
   noise.gyro_noise_density = 1.6968e-04;
   noise.accel_random_walk = 0.1 + 0.2;  // needs all digits
@@ -155,7 +156,7 @@ TEST_CASE("The reader gets the calibration that was written", "[simulation][data
 TEST_CASE("The reader gets the depth camera that was written", "[simulation][dataset]") {
   const TemporaryFolder folder;
   const RecordingLayout layout(folder.path(), ImageFormat::kJpeg);
-  const PinholeCamera camera = some_camera(0.0);
+  const Camera camera = some_camera(0.0);
   const DepthCameraFigures figures{5.0, 0.4, 20.0, 0.27};
   write_whole_file(layout.calibration(ImageChannel::kLeft), camera_yaml(camera, 20.0, "left"));
   write_whole_file(layout.calibration(ImageChannel::kDepth), depth_yaml(camera, figures, "depth"));

@@ -51,18 +51,18 @@ Shot driving_shot() {
   return shot;
 }
 
-struct Camera {
+struct RenderingCamera {
   PixelRays rays;
   SensorEffects effects;
 
-  explicit Camera(const PinholeCamera& camera) : rays(camera), effects(rays, {}) {}
+  explicit RenderingCamera(const Camera& camera) : rays(camera), effects(rays, {}) {}
 };
 
-std::size_t develop_pair(const Renderer& renderer, const std::array<Camera, 2>& cameras,
+std::size_t develop_pair(const Renderer& renderer, const std::array<RenderingCamera, 2>& cameras,
                          const SE3& T_world_body) {
   const Shot shot = driving_shot();
   std::size_t bytes = 0;
-  for (const Camera& camera : cameras) {
+  for (const RenderingCamera& camera : cameras) {
     const RenderedView view =
         renderer.render(camera.rays, T_world_body, camera.effects.request(false));
     bytes += camera.effects.gray(view, shot).pixels.size();
@@ -71,7 +71,7 @@ std::size_t develop_pair(const Renderer& renderer, const std::array<Camera, 2>& 
 }
 
 // Threads take the poses in turns.
-double pairs_per_second(const Renderer& renderer, const std::array<Camera, 2>& cameras,
+double pairs_per_second(const Renderer& renderer, const std::array<RenderingCamera, 2>& cameras,
                         const std::vector<SE3>& poses, std::size_t threads) {
   const Clock::time_point start = Clock::now();
   std::vector<std::thread> workers;
@@ -91,7 +91,7 @@ double mean_ms(const std::vector<SE3>& poses, const Function& function) {
   return 1e3 * seconds_since(start) / static_cast<double>(poses.size());
 }
 
-void print_stages(const World& world, const Renderer& renderer, const Camera& camera,
+void print_stages(const World& world, const Renderer& renderer, const RenderingCamera& camera,
                   const std::vector<SE3>& poses) {
   const Renderer unshadowed(world, {1, false});
   const Renderer coarse(world, {1, true});
@@ -119,7 +119,8 @@ void run(const World& world) {
               world.mesh.triangles.size(), seconds_since(start));
   for (const int shrink : {1, 2}) {
     const StereoRig rig = default_rig(RigKind::kVehicle, 752 / shrink, 480 / shrink).stereo;
-    const std::array<Camera, 2> cameras = {Camera(rig.cameras[0]), Camera(rig.cameras[1])};
+    const std::array<RenderingCamera, 2> cameras = {RenderingCamera(rig.cameras[0]),
+                                                    RenderingCamera(rig.cameras[1])};
     const std::vector<SE3> poses = poses_in(world, 12);
     std::vector<double> rates;
     for (int i = 0; i < 5; ++i) rates.push_back(pairs_per_second(renderer, cameras, poses, 2));

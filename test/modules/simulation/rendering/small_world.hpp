@@ -62,8 +62,8 @@ inline float at(const RenderedView& view, int x, int y) {
 }
 
 /// Camera that looks along the body's +x with its image upright (body: x forward, z up).
-inline PinholeCamera forward_camera(int width, int height, double focal_px) {
-  PinholeCamera camera;
+inline Camera forward_camera(int width, int height, double focal_px) {
+  Camera camera;
   camera.width = width;
   camera.height = height;
   camera.fx = focal_px;
@@ -77,9 +77,10 @@ inline PinholeCamera forward_camera(int width, int height, double focal_px) {
 }
 
 /// EuRoC's left lens on that camera.
-inline PinholeCamera distorted_camera(int width, int height, double focal_px) {
-  PinholeCamera camera = forward_camera(width, height, focal_px);
-  camera.distortion = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05};
+inline Camera distorted_camera(int width, int height, double focal_px) {
+  Camera camera = forward_camera(width, height, focal_px);
+  camera.lens =
+      Lens(LensModel::kRadialTangential, {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05});
   return camera;
 }
 

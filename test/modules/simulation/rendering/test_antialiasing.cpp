@@ -29,7 +29,7 @@ TEST_CASE("The grey of an edge is the share of the pixel that is covered",
           "[simulation][rendering]") {
   const double slope = GENERATE(0.0, 0.13, -0.4, 0.9);
   CAPTURE(slope);
-  const PinholeCamera camera = forward_camera(48, 48, 48.0);
+  const Camera camera = forward_camera(48, 48, 48.0);
   Builder builder;
   const MaterialId white = builder.material(SurfaceClass::kWall, 1.0F);
   const MaterialId black = builder.material(SurfaceClass::kObject, 0.0F);
@@ -70,7 +70,7 @@ TEST_CASE("The grey of an edge is the share of the pixel that is covered",
 TEST_CASE("A wire thinner than a pixel neither breaks nor vanishes", "[simulation][rendering]") {
   const double shift_px = GENERATE(0.0, 0.25, 0.5, 0.75);
   CAPTURE(shift_px);
-  const PinholeCamera camera = forward_camera(64, 64, 64.0);
+  const Camera camera = forward_camera(64, 64, 64.0);
   Builder builder;
   const MaterialId black = builder.material(SurfaceClass::kPole, 0.0F);
   const MaterialId white = builder.material(SurfaceClass::kWall, 1.0F);
@@ -198,7 +198,7 @@ double share_that_flickers(const RenderedView& a, const RenderedView& b,
 }
 
 // How the pixels move when the body does, by `step` (forwards, to the left, up).
-std::vector<Eigen::Vector2d> motion_of(const RenderedView& view, const PinholeCamera& camera,
+std::vector<Eigen::Vector2d> motion_of(const RenderedView& view, const Camera& camera,
                                        const Eigen::Vector3d& step) {
   std::vector<Eigen::Vector2d> motion;
   for (int y = 0; y < view.height; ++y) {
@@ -208,14 +208,15 @@ std::vector<Eigen::Vector2d> motion_of(const RenderedView& view, const PinholeCa
       const Eigen::Vector2d bearing((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy);
       const Eigen::Vector3d moved(depth * bearing.x() + step.y(), depth * bearing.y() + step.z(),
                                   depth - step.x());
-      motion.emplace_back(camera.project(moved.hnormalized()) - Eigen::Vector2d(x, y));
+      const auto to = camera.project_ray(moved);  // none in the sky
+      motion.push_back(to ? *to - Eigen::Vector2d(x, y) : Eigen::Vector2d(0, 0));
     }
   }
   return motion;
 }
 
 // The floor as a renderer without filters would show it: the texture at the pixel's centre.
-RenderedView unfiltered(const World& world, const RenderedView& view, const PinholeCamera& camera,
+RenderedView unfiltered(const World& world, const RenderedView& view, const Camera& camera,
                         const Eigen::Vector3d& eye) {
   RenderedView result = view;
   for (int y = 0; y < view.height; ++y) {
@@ -233,7 +234,7 @@ RenderedView unfiltered(const World& world, const RenderedView& view, const Pinh
 TEST_CASE("Nothing flickers under a motion of a fraction of a pixel", "[simulation][rendering]") {
   const World world = textured_floor();
   const Renderer renderer(world);
-  const PinholeCamera camera = forward_camera(320, 240, 200.0);
+  const Camera camera = forward_camera(320, 240, 200.0);
   const Eigen::Vector3d eye(0.3, 0.2, 1.5);
   const RenderRequest request = {true, false, true, false};
   const RenderedView a = renderer.render(camera, above_floor(eye.x(), eye.y()), request);

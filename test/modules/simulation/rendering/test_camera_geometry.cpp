@@ -29,8 +29,7 @@ SE3 tilted_pose() {
 TEST_CASE("Depth of a plane is the analytic one in every pixel", "[simulation][rendering]") {
   const bool distorted = GENERATE(false, true);
   CAPTURE(distorted);
-  const PinholeCamera camera =
-      distorted ? distorted_camera(78, 58, 48.0) : forward_camera(78, 58, 48.0);
+  const Camera camera = distorted ? distorted_camera(78, 58, 48.0) : forward_camera(78, 58, 48.0);
   Builder builder;
   builder.wall(2.0F, 6.0F, builder.material(SurfaceClass::kWall, 0.5F));
   const World world = builder.build();
@@ -51,8 +50,46 @@ TEST_CASE("Depth of a plane is the analytic one in every pixel", "[simulation][r
   }
 }
 
+TEST_CASE("A fisheye sees a plane as far as its lens goes, and black beyond",
+          "[simulation][rendering]") {
+  const Lens lens = GENERATE(Lens(LensModel::kEquidistant, {0.003, 7e-4, -2e-3, 2e-4}),
+                             Lens(LensModel::kOmnidirectional, {1.2, 0.0, 0.0, 0.0, 0.0}),
+                             Lens(LensModel::kDoubleSphere, {-0.17, 0.59}));
+  CAPTURE(to_string(lens.model()));
+  Camera camera = forward_camera(97, 93, 30.0);
+  camera.lens = lens;
+  Builder builder;
+  builder.wall(2.0F, 16.0F, builder.material(SurfaceClass::kWall, 0.5F));
+  const World world = builder.build();
+  const PixelRays rays(camera);
+  const RenderedView view = Renderer(world).render(rays, SE3::Identity(), kEverything);
+  int lit = 0;
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const std::size_t at = pixel(view, x, y);
+      CAPTURE(x, y);
+      const auto bearing = camera.unproject({x, y});
+      const bool seen = bearing && camera.unproject({x + 1, y}) && camera.unproject({x, y + 1});
+      REQUIRE(rays.is_lit(at) == seen);
+      if (seen) {
+        ++lit;
+        REQUIRE(view.depth_m[at] == Approx(2.0).epsilon(2e-5));
+        REQUIRE(view.labels[at] == static_cast<LabelId>(SurfaceClass::kWall));
+        REQUIRE(view.radiance[at] > 0.01F);
+      } else {
+        REQUIRE(view.depth_m[at] == 0.0F);
+        REQUIRE(view.labels[at] == static_cast<LabelId>(SurfaceClass::kUnknown));
+        REQUIRE(view.radiance[at] == 0.0F);
+        REQUIRE(view.rgb[at].isZero());
+      }
+    }
+  }
+  CHECK(lit > 0.5 * 97 * 93);
+  CHECK(lit < 0.95 * 97 * 93);
+}
+
 TEST_CASE("A box hides what is behind it, and only that", "[simulation][rendering]") {
-  const PinholeCamera camera = distorted_camera(62, 46, 40.0);
+  const Camera camera = distorted_camera(62, 46, 40.0);
   Builder builder;
   builder.wall(8.0F, 3.0F, builder.material(SurfaceClass::kWall, 0.5F));
   builder.scene.box({4.0F, -0.5F, -0.25F}, {5.0F, 0.5F, 0.75F},
@@ -83,7 +120,7 @@ TEST_CASE("A known point is seen where the camera model projects it", "[simulati
   CAPTURE(seed);
   std::mt19937 random(static_cast<std::mt19937::result_type>(seed));
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  const PinholeCamera camera = distorted_camera(376, 240, 230.0);
+  const Camera camera = distorted_camera(376, 240, 230.0);
   const double y = 1.5 * uniform(random);
   const double z = 0.8 * uniform(random);
   const Eigen::Vector3d point(3.0, y, z);
@@ -111,14 +148,14 @@ TEST_CASE("A known point is seen where the camera model projects it", "[simulati
   }
   REQUIRE(mass > 1.0);
   const Eigen::Vector3d in_camera = (T_world_body * camera.T_body_cam).inverse() * point;
-  const Eigen::Vector2d expected = camera.project(in_camera.hnormalized());
+  const Eigen::Vector2d expected = camera.project(in_camera.hnormalized()).value();
   constexpr double kTolerance_px = 0.1;
   CHECK((centroid / mass - expected).norm() < kTolerance_px);
 }
 
 TEST_CASE("An empty world is sky to the rim", "[simulation][rendering]") {
   const World world = Builder().build();
-  const PinholeCamera camera = forward_camera(33, 21, 30.0);  // no multiple of a packet
+  const Camera camera = forward_camera(33, 21, 30.0);  // no multiple of a packet
   const RenderedView view = Renderer(world).render(camera, SE3::Identity(), kEverything);
   REQUIRE(view.radiance.size() == 33U * 21U);
   for (std::size_t i = 0; i < view.radiance.size(); ++i) {
@@ -144,7 +181,7 @@ TEST_CASE("A camera inside a solid sees its inner sides", "[simulation][renderin
 
 TEST_CASE("Only what is asked for is rendered", "[simulation][rendering]") {
   const World world = Builder().build();
-  const PinholeCamera camera = forward_camera(16, 16, 16.0);
+  const Camera camera = forward_camera(16, 16, 16.0);
   const RenderedView view =
       Renderer(world).render(camera, SE3::Identity(), {false, false, true, false});
   CHECK(view.radiance.empty());
@@ -154,7 +191,7 @@ TEST_CASE("Only what is asked for is rendered", "[simulation][rendering]") {
 }
 
 TEST_CASE("Cameras and worlds that cannot be rendered are refused", "[simulation][rendering]") {
-  PinholeCamera camera = forward_camera(16, 16, 16.0);
+  Camera camera = forward_camera(16, 16, 16.0);
   camera.width = 0;
   CHECK_THROWS_AS(PixelRays(camera), std::invalid_argument);
   camera = forward_camera(16, 16, 0.0);
@@ -169,8 +206,8 @@ TEST_CASE("Cameras and worlds that cannot be rendered are refused", "[simulation
 }
 
 TEST_CASE("A shrunk camera sees the same field of view", "[simulation][rendering]") {
-  const PinholeCamera camera = distorted_camera(752, 480, 458.0);
-  const PinholeCamera small = shrunk(camera, 8);
+  const Camera camera = distorted_camera(752, 480, 458.0);
+  const Camera small = shrunk(camera, 8);
   CHECK(small.width == 94);
   CHECK(small.height == 60);
   const Eigen::Vector2d corner = camera.unproject({-0.5, -0.5}).value();

@@ -44,7 +44,7 @@ TEST_CASE("A plane in the sun has the radiance of its albedo and light",
 
 TEST_CASE("A slab takes the sun away below it", "[simulation][rendering]") {
   const World world = sunny_floor(true);
-  const PinholeCamera camera = forward_camera(64, 48, 60.0);
+  const Camera camera = forward_camera(64, 48, 60.0);
   const RenderedView lit = Renderer(world, {4, false}).render(camera, looking_down(3.0), {});
   const RenderedView dark = Renderer(world, {4, true}).render(camera, looking_down(3.0), {});
   // The upper half of the image is x > 0.

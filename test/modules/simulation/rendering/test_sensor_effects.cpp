@@ -12,7 +12,7 @@ namespace {
 using small_world::distorted_camera;
 using small_world::forward_camera;
 
-RenderedView flat_view(const PinholeCamera& camera, float radiance) {
+RenderedView flat_view(const Camera& camera, float radiance) {
   RenderedView view;
   view.width = camera.width;
   view.height = camera.height;
@@ -107,7 +107,7 @@ TEST_CASE("Grey levels are the response to the exposed light", "[simulation][sen
   CAPTURE(gamma, signal);
   SensorEffectsConfig config = clean();
   config.gamma = gamma;
-  const PinholeCamera camera = forward_camera(4, 4, 4.0);
+  const Camera camera = forward_camera(4, 4, 4.0);
   const SensorEffects effects(PixelRays(camera), config);
   const GrayImage image =
       effects.gray(flat_view(camera, static_cast<float>(signal / 2.0)), shot(2.0));
@@ -118,7 +118,7 @@ TEST_CASE("Grey levels are the response to the exposed light", "[simulation][sen
 TEST_CASE("The corners lose the light that vignetting says", "[simulation][sensor]") {
   SensorEffectsConfig config = clean();
   config.vignetting = 0.3;
-  const PinholeCamera camera = forward_camera(101, 75, 60.0);
+  const Camera camera = forward_camera(101, 75, 60.0);
   const SensorEffects effects(PixelRays(camera), config);
   const GrayImage image = effects.gray(flat_view(camera, 0.8F), shot(1.0));
   CHECK(image.pixels[37 * 101 + 50] == std::lround(255 * 0.8));
@@ -155,7 +155,7 @@ TEST_CASE("Noise has the strength and the correlation that are configured",
   config.read_noise = 3.0;
   config.photon_noise = 4.0;
   config.noise_correlation_px = correlation_px;
-  const PinholeCamera camera = forward_camera(320, 240, 200.0);
+  const Camera camera = forward_camera(320, 240, 200.0);
   const SensorEffects effects(PixelRays(camera), config);
   const Statistics s =
       statistics_of(effects.gray(flat_view(camera, static_cast<float>(level)), shot(1.0, 7)));
@@ -170,7 +170,7 @@ TEST_CASE("Noise has the strength and the correlation that are configured",
 }
 
 TEST_CASE("Noise is a function of the seed", "[simulation][sensor]") {
-  const PinholeCamera camera = forward_camera(64, 48, 60.0);
+  const Camera camera = forward_camera(64, 48, 60.0);
   const SensorEffects effects(PixelRays(camera), {});
   const RenderedView view = flat_view(camera, 0.5F);
   CHECK(effects.gray(view, shot(1.0, 1)).pixels == effects.gray(view, shot(1.0, 1)).pixels);
@@ -181,7 +181,7 @@ TEST_CASE("Amplification raises the noise where the shutter cannot open longer",
           "[simulation][sensor]") {
   SensorEffectsConfig config = clean();
   config.read_noise = 2.0;
-  const PinholeCamera camera = forward_camera(160, 120, 100.0);
+  const Camera camera = forward_camera(160, 120, 100.0);
   const SensorEffects effects(PixelRays(camera), config);
   Shot amplified = shot(3.0);
   amplified.exposure.time_s = config.unit_exposure_s;  // three times too short
@@ -190,7 +190,7 @@ TEST_CASE("Amplification raises the noise where the shutter cannot open longer",
 }
 
 TEST_CASE("Colour is developed channel by channel", "[simulation][sensor]") {
-  const PinholeCamera camera = forward_camera(4, 4, 4.0);
+  const Camera camera = forward_camera(4, 4, 4.0);
   const SensorEffects effects(PixelRays(camera), clean());
   const ColorImage image = effects.color(flat_view(camera, 0.8F), shot(1.0));
   REQUIRE(image.pixels.size() == 48);
@@ -243,7 +243,7 @@ TEST_CASE("The lens spreads a point as it is configured and keeps its light",
 }
 
 TEST_CASE("Image motion is that of projected points", "[simulation][sensor]") {
-  const PinholeCamera camera = distorted_camera(188, 120, 115.0);
+  const Camera camera = distorted_camera(188, 120, 115.0);
   const PixelRays rays(camera);
   Vector6 velocity;
   velocity << 0.4, -0.9, 0.6, 1.5, -0.7, 0.3;
@@ -257,7 +257,7 @@ TEST_CASE("Image motion is that of projected points", "[simulation][sensor]") {
     const auto seen_at = [&](double t) {
       const SE3 T_start_body = se3_exp(t * velocity);
       const SE3 T_cam_start = (T_start_body * camera.T_body_cam).inverse() * camera.T_body_cam;
-      return camera.project((T_cam_start * point).hnormalized());
+      return camera.project((T_cam_start * point).hnormalized()).value();
     };
     const Eigen::Vector2d expected = seen_at(0.005) - seen_at(-0.005);
     const std::size_t i = static_cast<std::size_t>(pixel.y() * 188 + pixel.x());
@@ -286,7 +286,7 @@ TEST_CASE("A bright point is smeared along its motion, its light kept", "[simula
 }
 
 TEST_CASE("Views that lack what an effect needs are refused", "[simulation][sensor]") {
-  const PinholeCamera camera = forward_camera(8, 8, 8.0);
+  const Camera camera = forward_camera(8, 8, 8.0);
   const SensorEffects effects(PixelRays(camera), {});
   RenderedView view = flat_view(camera, 0.5F);
   view.depth_m.clear();
