@@ -23,7 +23,7 @@ Rig small_rig() {
   Rig rig;
   rig.topics = {
       .left = "/left", .right = "/right", .depth = {}, .imu = "/imu", .gyro = {}, .accel = {}};
-  for (PinholeCamera& camera : rig.sensors.stereo.cameras)
+  for (Camera& camera : rig.sensors.stereo.cameras)
     camera = {.width = kWidth, .height = kHeight, .fx = 5, .fy = 5, .cx = 3, .cy = 2};
   rig.sensors.stereo.cameras[1].T_body_cam.translation().x() = 0.1;
   return rig;
