@@ -5,6 +5,7 @@
 #include <iostream>
 #include <thread>
 
+#include "apps/publish/answers.hpp"
 #include "apps/publish/euroc_messages.hpp"
 #include "apps/publish/message_player.hpp"
 #include "modules/core/text_table.hpp"
@@ -41,6 +42,7 @@ struct Options {
   RosConfig ros;
   PlayOptions play;
   std::size_t wait = 0;
+  std::string answers;
 };
 
 Options parse_options(int argc, char** argv) {
@@ -54,6 +56,9 @@ Options parse_options(int argc, char** argv) {
   app.add_option("--topics", options.play.topics, "Only these")->delimiter(',');
   app.add_option("--wait", options.wait, "Begin when each topic has so many readers")
       ->capture_default_str();
+  app.add_option("--answers", options.answers,
+                 "Topic of a robot's nav_msgs/Odometry (/robot0/odometry): how long after an image "
+                 "its pose comes");
   app.add_flag("--reliable", options.play.reliable,
                "What is lost is sent again; else best effort, as drivers of sensors are");
   app.add_option("--delay", options.play.delay_s, "Of every message [s]")
@@ -121,8 +126,13 @@ class Progress {
 };
 
 void play(const Options& options, SignalWatch& signals) {
-  MessagePlayer player(open(options.recording), std::make_shared<const RosNetwork>(options.ros),
-                       options.play);
+  const auto network = std::make_shared<const RosNetwork>(options.ros);
+  MessagePlayer player(open(options.recording), network, options.play);
+  std::optional<Answers> answers;
+  if (!options.answers.empty()) {
+    answers.emplace(network, options.answers);
+    player.on_image([&answers](Stamp stamp) { answers->sent(stamp); });
+  }
   for (const std::string& topic : player.left_out())
     log::warn("publish") << "left out, its type is not known: " << topic;
   if (player.topics().empty()) throw std::invalid_argument("there is no topic to play");
@@ -137,6 +147,9 @@ void play(const Options& options, SignalWatch& signals) {
   while (player.step()) progress.tell(player.played_s());
   ended = true;
   std::cout << table(player.topics());
+  if (!answers) return;
+  static_cast<void>(signals.wait(1.0));  // the last ones are on their way
+  std::cout << answers->text() << '\n';
 }
 
 }  // namespace

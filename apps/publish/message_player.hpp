@@ -50,6 +50,9 @@ class MessagePlayer {
   /// Publishes the next message when it is due; false after the last one, and after stop().
   bool step();
 
+  /// Tells the stamp of each image of the first topic with images before it is published.
+  void on_image(std::function<void(Stamp)> tell) { tell_image_ = std::move(tell); }
+
   /// Ends step(). Thread-safe.
   void stop() { clock_.stop(); }
 
@@ -70,6 +73,7 @@ class MessagePlayer {
   };
 
   void schedule(BagMessage message);
+  void tell_image(const Due& due) const;
 
   std::unique_ptr<BagReader> recording_;
   PlayOptions options_;
@@ -84,6 +88,7 @@ class MessagePlayer {
   bool ended_ = false;
   std::uint64_t number_ = 0;
   double played_s_ = 0.0;
+  std::function<void(Stamp)> tell_image_;
 };
 
 }  // namespace km

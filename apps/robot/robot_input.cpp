@@ -65,7 +65,8 @@ RestoredRun open_session(const RobotOptions& options) {
 }
 
 // Sensors by DDS: of images only the newest few count, inertial samples are all needed.
-std::unique_ptr<BagReader> subscribe(const RosConfig& config, const SensorTopicNames& topics) {
+std::unique_ptr<BagReader> subscribe(std::shared_ptr<const RosNetwork> network,
+                                     const SensorTopicNames& topics) {
   constexpr int kImages = 10, kSamples = 4000;
   std::vector<RosTopic> wanted;
   for (const std::string& topic : {topics.left, topics.right, topics.depth}) {
@@ -77,12 +78,12 @@ std::unique_ptr<BagReader> subscribe(const RosConfig& config, const SensorTopicN
   for (const std::string& topic : {topics.imu, topics.gyro, topics.accel})
     if (!topic.empty())
       wanted.push_back({topic, std::string(RosImu::kType), RosQos::kSensorData, kSamples});
-  return std::make_unique<RosSubscription>(std::make_shared<const RosNetwork>(config),
-                                           std::move(wanted));
+  return std::make_unique<RosSubscription>(std::move(network), std::move(wanted));
 }
 
 std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const RobotConfig& config,
                                              const std::optional<MappingPlan>& mapping, Rig rig,
+                                             std::shared_ptr<const RosNetwork> ros,
                                              std::optional<Stamp> not_before) {
   const bool needs_depth =
       rig.topics.right.empty() || config.sensors.depth || (mapping && mapping->reads_depth());
@@ -90,7 +91,8 @@ std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const 
   const BagWindow window{.from_s = options.from_s.value_or(0.0),
                          .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
                          .not_before = not_before};
-  auto messages = options.is_live ? subscribe(config.ros, rig.topics) : open_bag(options.dataset);
+  auto messages =
+      options.is_live ? subscribe(std::move(ros), rig.topics) : open_bag(options.dataset);
   return std::make_unique<BagDataset>(options.is_live ? "live" : options.dataset.string(),
                                       std::move(messages), std::move(rig),
                                       config.sensors.stereo_tolerance_s, window);
@@ -99,6 +101,7 @@ std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const 
 std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const RobotConfig& config,
                                             const std::optional<MappingPlan>& mapping,
                                             const std::optional<Rig>& rig,
+                                            std::shared_ptr<const RosNetwork> ros,
                                             const std::optional<RestoredRun>& restored) {
   const auto not_before = restored ? std::optional(restored->odometry.back().stamp) : std::nullopt;
   const std::string dataset = options.dataset.string();
@@ -106,7 +109,7 @@ std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const R
   if (is_bag && !rig)
     throw std::invalid_argument(dataset + ": --rig FILE must tell which of its topics are the " +
                                 "sensors; --inspect " + dataset + " rig.yaml writes one");
-  if (is_bag) return open_messages(options, config, mapping, *rig, not_before);
+  if (is_bag) return open_messages(options, config, mapping, *rig, std::move(ros), not_before);
   if (rig)
     throw std::invalid_argument("--rig " + options.rig.string() + " is for a bag, " + dataset +
                                 " is none");
@@ -144,10 +147,14 @@ RobotInput open_robot_input(const RobotOptions& options, const RobotConfig& conf
                                          : options.graph;
   const std::string name = (path / "").parent_path().filename();  // wherever it is mounted
   std::optional<RestoredRun> restored = restore(options, name);
-  if (!is_dataset) return {open_graph(options), name, std::move(restored)};
-  auto reader = open_dataset(options, config, mapping, rig, restored);
+  std::shared_ptr<const RosNetwork> ros;
+  if (options.is_live || config.ros.publish.value_or(false))
+    ros = std::make_shared<const RosNetwork>(config.ros);
+  if (!is_dataset)
+    return {open_graph(options), name, std::move(restored), std::nullopt, std::move(ros)};
+  auto reader = open_dataset(options, config, mapping, rig, ros, restored);
   auto map = restored && mapping ? restore_map(options, *restored) : std::nullopt;
-  return {std::move(reader), name, std::move(restored), std::move(map)};
+  return {std::move(reader), name, std::move(restored), std::move(map), std::move(ros)};
 }
 
 }  // namespace km

@@ -10,6 +10,7 @@
 #include "modules/journal/restored_run.hpp"
 #include "modules/mesh/continued_map.hpp"
 #include "modules/pose_graph/recorded_graph.hpp"
+#include "modules/ros_dds/ros_network.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 
 namespace km {
@@ -24,6 +25,7 @@ struct RobotInput {
   std::string name;  ///< For the journal.
   std::optional<RestoredRun> restored = {};
   std::optional<ContinuedMap> map = {};  ///< Of the restored run, where there is mapping.
+  std::shared_ptr<const RosNetwork> ros = nullptr;  ///< Null unless it hears or tells something.
 };
 
 /// Opens what the options name, and with --resume the journal of the run to go on with. Throws

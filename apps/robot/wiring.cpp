@@ -18,6 +18,7 @@
 #include "modules/place_recognition/place_recognition_node.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
 #include "modules/pose_graph/team_node.hpp"
+#include "modules/ros_dds/ros_output_node.hpp"
 #include "modules/semantic_mapping/semantic_mapping_node.hpp"
 #include "modules/vio/vio_node.hpp"
 #include "runtime/dds/robot_status.hpp"
@@ -73,6 +74,11 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   if (mapping) add_mesh_correction(config, options.output, results);
   add_network(share_meshes(config.mesh_chunks));
   add_records();
+  if (input.ros != nullptr && config.ros.publish.value_or(true))
+    add<RosOutputNode>(false, std::move(input.ros), options.name,
+                       RosOutputTopics{.odometry = topics_.odometry,
+                                       .keyframes = topics_.keyframe_odometry,
+                                       .trajectory = topics_.trajectory});
   if (seal_ != nullptr)
     add<TeamKeysNode>(false, options.security, *seal_, [this] { bridge_->tell_keys(); });
   nodes_.push_back(bridge_);

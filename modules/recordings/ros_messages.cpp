@@ -82,6 +82,13 @@ void fields(auto& wire, Is<RosPoseStamped> auto& pose) {
   fields(wire, pose.pose);
 }
 
+void fields(auto& wire, Is<RosPath> auto& path) {
+  constexpr std::size_t kLeast_bytes = 7 * sizeof(double);
+  fields(wire, path.header);
+  wire.resize(path.poses, kLeast_bytes);
+  for (auto& pose : path.poses) fields(wire, pose);
+}
+
 void fields(auto& wire, Is<RosOdometry> auto& odometry) {
   fields(wire, odometry.header);
   wire.text(odometry.child_frame);
@@ -152,6 +159,8 @@ template Decoded<RosCameraInfo> decode_ros(std::string_view, std::span<const std
 template std::vector<std::uint8_t> encode_ros(const RosCameraInfo&);
 template Decoded<RosPoseStamped> decode_ros(std::string_view, std::span<const std::uint8_t>);
 template std::vector<std::uint8_t> encode_ros(const RosPoseStamped&);
+template Decoded<RosPath> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosPath&);
 template Decoded<RosOdometry> decode_ros(std::string_view, std::span<const std::uint8_t>);
 template std::vector<std::uint8_t> encode_ros(const RosOdometry&);
 template Decoded<RosTransforms> decode_ros(std::string_view, std::span<const std::uint8_t>);

@@ -79,6 +79,12 @@ struct RosPoseStamped {
   RosPose pose;
 };
 
+struct RosPath {
+  static constexpr std::string_view kType = "nav_msgs/Path";
+  RosHeader header;
+  std::vector<RosPoseStamped> poses;
+};
+
 struct RosOdometry {
   static constexpr std::string_view kType = "nav_msgs/Odometry";
   RosHeader header;

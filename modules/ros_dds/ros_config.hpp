@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@ struct RosConfig {
   int domain = 0;
   std::string interface;
   std::vector<std::string> peers = {};
+  std::optional<bool> publish = {};
   int receive_buffer_bytes = 33554432;
 
   void visit_fields(auto& visitor) {
@@ -21,6 +23,8 @@ struct RosConfig {
     visitor.field("interface", interface,
                   "network interface of theirs; empty: chosen; lo with ROS_LOCALHOST_ONLY=1");
     visitor.field("peers", peers, "addresses of their hosts, where multicast does not pass");
+    visitor.field("publish", publish,
+                  "tell viewers where the robot is: odometry, pose, tf, path; none: with --live");
     visitor.field("receive_buffer_bytes", receive_buffer_bytes, {65536, 1 << 28},
                   "[B] for images that come faster than they are taken; the kernel may grant less: "
                   "net.core.rmem_max");

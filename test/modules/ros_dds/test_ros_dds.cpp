@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "modules/recordings/ros_messages.hpp"
+#include "modules/ros_dds/ros_output_node.hpp"
 #include "modules/ros_dds/ros_publisher.hpp"
 #include "modules/ros_dds/ros_subscription.hpp"
 #include "test/support/patience.hpp"
@@ -97,7 +98,62 @@ TEST_CASE("Every known type crosses", "[ros_dds]") {
   RosOdometry odometry;
   odometry.child_frame = "body";
   crosses(odometry);
+  crosses(RosPath{{7, "map"}, {{{8, "map"}, {}}, {{9, "map"}, {}}}});
   crosses(RosTransforms{{{{7, "map"}, "odom", {}}, {{8, "odom"}, "body", {}}}});
+}
+
+TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
+  Topic<OdometryState> odometry;
+  Topic<KeyframeOdometry> keyframes;
+  Topic<Trajectory> trajectories;
+  RosOutputNode node(network(), "robot 3", {odometry, keyframes, trajectories});
+  RosSubscription viewer(network(), {{"/robot_3/odometry", "nav_msgs/Odometry", RosQos::kReliable},
+                                     {"/robot_3/pose", "geometry_msgs/PoseStamped"},
+                                     {"/tf", "tf2_msgs/TFMessage", RosQos::kReliable},
+                                     {"/robot_3/path", "nav_msgs/Path", RosQos::kLatched}});
+  OdometryState state;
+  state.stamp = 5;
+  state.T_odom_body.translation() = Eigen::Vector3d(1, 2, 3);
+  state.v_odom = {0.5, 0, 0};
+  KeyframeOdometry keyframe;
+  keyframe.stamp = 5;
+  SE3 T_map_body = SE3::Identity();
+  T_map_body.translation() = Eigen::Vector3d(10, 2, 3);
+  node.start();
+  odometry.publish(state);
+  keyframes.publish(keyframe);
+  trajectories.publish(Trajectory{0, 0, {T_map_body}});
+  std::optional<RosPath> path;
+  std::optional<RosPoseStamped> pose;
+  std::optional<RosOdometry> told;
+  std::optional<RosTransforms> transforms;
+  // States go on until the viewer has all: it may have come later.
+  while (!(path && pose && told && transforms)) {
+    const auto message = [&] {
+      state.stamp += 10;
+      odometry.publish(state);
+      return viewer.next();
+    }();
+    REQUIRE(message);
+    const auto& bytes = message->bytes;
+    if (message->channel == 0) told = decode_ros<RosOdometry>("cdr", bytes).value;
+    if (message->channel == 1) pose = decode_ros<RosPoseStamped>("cdr", bytes).value;
+    if (message->channel == 2) transforms = decode_ros<RosTransforms>("cdr", bytes).value;
+    if (message->channel == 3) path = decode_ros<RosPath>("cdr", bytes).value;
+    if (pose && pose->pose.position.x() != 10.0) pose.reset();  // before the correction
+    if (transforms && transforms->transforms[0].pose.position.x() != 9.0) transforms.reset();
+  }
+  node.stop();
+  CHECK(told->header.frame == "robot_3/odom");
+  CHECK(told->child_frame == "robot_3/base_link");
+  CHECK(told->pose.position == Eigen::Vector3d(1, 2, 3));
+  CHECK(told->linear_velocity.x() == 0.5);
+  CHECK(pose->header.frame == "map");
+  CHECK(transforms->transforms[0].child_frame == "robot_3/odom");
+  CHECK(transforms->transforms[1].child_frame == "robot_3/base_link");
+  REQUIRE(path->poses.size() == 1);
+  CHECK(path->poses[0].header.stamp == 5);
+  CHECK(path->poses[0].pose.position == Eigen::Vector3d(10, 2, 3));
 }
 
 TEST_CASE("What is latched reaches those who come later", "[ros_dds]") {

@@ -1,0 +1,58 @@
+#include "apps/publish/answers.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "modules/core/text_table.hpp"
+#include "modules/recordings/ros_messages.hpp"
+#include "runtime/clock.hpp"
+
+namespace km {
+namespace {
+
+double quantile(std::vector<double> values, double share) {
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::ranges::nth_element(values, at);
+  return *at;
+}
+
+}  // namespace
+
+Answers::Answers(std::shared_ptr<const RosNetwork> network, const std::string& topic)
+    : topic_(topic),
+      subscription_(std::move(network),
+                    {{topic, std::string(RosOdometry::kType), RosQos::kReliable, 1000}}),
+      listener_([this] { listen(); }) {}
+
+Answers::~Answers() {
+  subscription_.stop();
+}
+
+void Answers::sent(Stamp stamp) {
+  const std::lock_guard lock(mutex_);
+  sent_s_.emplace(stamp, steady_now_s());
+  ++sent_;
+}
+
+void Answers::listen() {
+  while (const auto message = subscription_.next()) {
+    const auto header = decode_ros<RosHeader>("cdr", message->bytes);
+    const std::lock_guard lock(mutex_);
+    const auto sent = header.value ? sent_s_.find(header.value->stamp) : sent_s_.end();
+    if (sent == sent_s_.end()) continue;
+    latencies_s_.push_back(steady_now_s() - sent->second);
+    sent_s_.erase(sent);
+  }
+}
+
+std::string Answers::text() const {
+  const std::lock_guard lock(mutex_);
+  std::string text = topic_ + ": " + std::to_string(latencies_s_.size()) + " of " +
+                     std::to_string(sent_) + " images answered";
+  if (latencies_s_.empty()) return text;
+  return text + ", after " + fixed(1e3 * quantile(latencies_s_, 0.5), 1) + " ms (median), " +
+         fixed(1e3 * quantile(latencies_s_, 0.95), 1) + " ms (95 %)";
+}
+
+}  // namespace km

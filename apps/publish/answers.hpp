@@ -1,0 +1,40 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "modules/core/stamp.hpp"
+#include "modules/ros_dds/ros_subscription.hpp"
+
+namespace km {
+
+/// How long a robot takes from an image to the pose it tells with the image's stamp: a
+/// nav_msgs/Odometry. Thread-safe.
+class Answers {
+ public:
+  Answers(std::shared_ptr<const RosNetwork> network, const std::string& topic);
+  ~Answers();
+
+  /// An image with this stamp is about to be published.
+  void sent(Stamp stamp);
+
+  /// "/robot0/odometry: 318 of 333 images answered, after 12.3 ms (median), 20.1 ms (95 %)".
+  [[nodiscard]] std::string text() const;
+
+ private:
+  void listen();
+
+  std::string topic_;
+  RosSubscription subscription_;
+  mutable std::mutex mutex_;        // guards what follows
+  std::map<Stamp, double> sent_s_;  // steady clock; without an answer so far
+  std::vector<double> latencies_s_;
+  std::size_t sent_ = 0;
+  std::jthread listener_;  // last member: ends first
+};
+
+}  // namespace km

@@ -1,0 +1,39 @@
+#include "modules/ros_dds/live_frames.hpp"
+
+#include <algorithm>
+
+#include "modules/core/lie.hpp"
+
+namespace km {
+
+void LiveFrames::add(const OdometryState& state) {
+  constexpr std::size_t kRecent = 200;  // a start hands on the states of its first images at once
+  if (!recent_.empty()) {
+    const OdometryState& before = recent_.back();
+    const double dt = seconds_between(before.stamp, state.stamp);
+    if (dt > 0.0)
+      angular_rate_ =
+          so3_log(before.T_odom_body.linear().transpose() * state.T_odom_body.linear()) / dt;
+  }
+  recent_.push_back(state);
+  if (recent_.size() > kRecent) recent_.pop_front();
+}
+
+void LiveFrames::add(const KeyframeOdometry& keyframe) {
+  const auto index = static_cast<std::size_t>(keyframe.id.index);
+  stamps_.resize(std::max(stamps_.size(), index + 1));
+  T_odom_kf_.resize(stamps_.size());
+  stamps_[index] = keyframe.stamp;
+  const auto state = std::ranges::find(recent_, keyframe.stamp, &OdometryState::stamp);
+  if (state != recent_.end()) T_odom_kf_[index] = state->T_odom_body;
+}
+
+void LiveFrames::add(const Trajectory& trajectory) {
+  for (std::size_t k = std::min(T_odom_kf_.size(), trajectory.T_world_kf.size()); k-- > 0;) {
+    if (!T_odom_kf_[k]) continue;
+    T_map_odom_ = trajectory.T_world_kf[k] * T_odom_kf_[k]->inverse();
+    return;
+  }
+}
+
+}  // namespace km

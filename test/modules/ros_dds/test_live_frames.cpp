@@ -1,0 +1,54 @@
+#include <catch2/catch.hpp>
+
+#include "modules/core/lie.hpp"
+#include "modules/ros_dds/live_frames.hpp"
+
+namespace km {
+namespace {
+
+constexpr Stamp kPeriod = 50'000'000;
+
+OdometryState state_at(int k) {
+  OdometryState state;
+  state.stamp = 1'000'000'000 + k * kPeriod;
+  state.T_odom_body =
+      make_pose(so3_exp(Eigen::Vector3d(0, 0, 0.02 * k)), Eigen::Vector3d(0.1 * k, 0, 1));
+  return state;
+}
+
+KeyframeOdometry keyframe_at(int k, KeyframeIndex index) {
+  KeyframeOdometry keyframe;
+  keyframe.id = {3, index};
+  keyframe.stamp = state_at(k).stamp;
+  return keyframe;
+}
+
+TEST_CASE("The newest keyframe is where the pose graph has it", "[ros_dds]") {
+  LiveFrames frames;
+  CHECK(frames.T_map_odom().isApprox(SE3::Identity()));
+  for (int k = 0; k <= 20; ++k) {
+    frames.add(state_at(k));
+    if (k % 10 == 0) frames.add(keyframe_at(k, static_cast<KeyframeIndex>(k / 10)));
+  }
+  const SE3 T = make_pose(so3_exp(Eigen::Vector3d(0.1, 0.2, 0.3)), Eigen::Vector3d(4, 5, 6));
+  // The third keyframe is not optimised yet.
+  frames.add(Trajectory{3, 3, {SE3::Identity(), T}});
+  CHECK((frames.T_map_odom() * state_at(10).T_odom_body).isApprox(T, 1e-12));
+  frames.add(Trajectory{3, 3, {SE3::Identity(), SE3::Identity(), T}});
+  CHECK((frames.T_map_odom() * state_at(20).T_odom_body).isApprox(T, 1e-12));
+  CHECK(frames.keyframe_stamps() ==
+        std::vector{state_at(0).stamp, state_at(10).stamp, state_at(20).stamp});
+  CHECK(frames.angular_rate().isApprox(Eigen::Vector3d(0, 0, 0.4), 1e-9));  // 0.02 rad in 50 ms
+}
+
+TEST_CASE("Keyframes of a former life do not correct odometry", "[ros_dds]") {
+  LiveFrames frames;
+  frames.add(state_at(0));
+  frames.add(keyframe_at(0, 7));
+  frames.add(Trajectory{3, 3, std::vector<SE3>(7, SE3::Identity())});
+  CHECK(frames.T_map_odom().isApprox(SE3::Identity()));
+  CHECK(frames.keyframe_stamps().size() == 8);
+}
+
+}  // namespace
+}  // namespace km
