@@ -33,4 +33,14 @@ bool is_covariance(const Matrix6& Sigma) {
   return eigen.eigenvalues().minCoeff() >= -1e-9 * scale;
 }
 
+bool is_usable(const StateCovariance& Sigma) {
+  if (!Sigma.allFinite() || Sigma != Sigma.transpose() || Sigma.diagonal().minCoeff() < 1e-16 ||
+      Sigma.diagonal().maxCoeff() > 1e6)
+    return false;
+  const Eigen::Matrix<double, 11, 1> scale = Sigma.diagonal().cwiseSqrt().cwiseInverse();
+  const StateCovariance correlations = scale.asDiagonal() * Sigma * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<StateCovariance> eigen(correlations, Eigen::EigenvaluesOnly);
+  return eigen.eigenvalues().minCoeff() >= 1e-9;
+}
+
 }  // namespace km

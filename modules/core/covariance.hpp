@@ -1,6 +1,7 @@
 #pragma once
 
 #include "modules/core/geometry.hpp"
+#include "modules/core/odometry.hpp"
 
 namespace km {
 
@@ -31,5 +32,9 @@ struct UncertainPose {
 /// True if every element is finite, the matrix symmetric to 1e-6 of its largest element, and no
 /// eigenvalue below -1e-9 of the largest. For matrices that come from outside.
 [[nodiscard]] bool is_covariance(const Matrix6& Sigma);
+
+/// True if odometry can go on from a state with this covariance: symmetric, variances from 1e-16 to
+/// 1e6, and no eigenvalue of the correlations below 1e-9. For matrices that come from outside.
+[[nodiscard]] bool is_usable(const StateCovariance& Sigma);
 
 }  // namespace km

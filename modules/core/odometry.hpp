@@ -18,6 +18,11 @@ struct OdometryState {
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< [m/s^2]
 };
 
+/// Of an OdometryState without heading and position, which only say where `odom` is: tilt about x
+/// and y of odom [rad], velocity in odom, its direction seen from the heading [m/s], gyro bias
+/// [rad/s], accelerometer bias [m/s^2].
+using StateCovariance = Eigen::Matrix<double, 11, 11>;
+
 /// Which way is up, as inertial sensing knows it.
 struct Vertical {
   Eigen::Vector3d up_body = Eigen::Vector3d::UnitZ();  ///< Unit, against gravity.
@@ -35,6 +40,8 @@ struct KeyframeOdometry {
   SE3 T_previous_kf = SE3::Identity();    ///< Pose in the keyframe before; odom for the first.
   Matrix6 covariance = Matrix6::Zero();   ///< Of T_previous_kf; zero for the first.
   std::optional<Vertical> vertical = {};  ///< Here; none where there is no inertial sensing.
+  /// Of the OdometryState here, for a later process to go on from it; none where it is not known.
+  std::optional<StateCovariance> state_covariance = {};
 };
 
 /// An image and where its camera was, relative to the keyframes: what is built from such images

@@ -5,12 +5,16 @@
 #include <utility>
 
 #include "modules/core/bytes.hpp"
+#include "modules/core/covariance.hpp"
 
 namespace km {
 namespace {
 
 constexpr std::size_t kMaxText_bytes = 65536;
 constexpr std::size_t kMaxKeypoints = 65536;
+// What follows a keyframe's step.
+constexpr unsigned kHasVertical = 1;
+constexpr unsigned kHasStateCovariance = 2;
 
 class EntryWriter {
  public:
@@ -44,10 +48,13 @@ class EntryWriter {
     put(keyframe.T_odom_kf);
     put(keyframe.T_previous_kf);
     put(keyframe.covariance);
-    out_.u8(keyframe.vertical ? 1 : 0);
-    if (!keyframe.vertical) return;
-    put(keyframe.vertical->up_body);
-    out_.f64(keyframe.vertical->sigma_rad);
+    out_.u8(static_cast<std::uint8_t>((keyframe.vertical ? kHasVertical : 0U) |
+                                      (keyframe.state_covariance ? kHasStateCovariance : 0U)));
+    if (keyframe.vertical) {
+      put(keyframe.vertical->up_body);
+      out_.f64(keyframe.vertical->sigma_rad);
+    }
+    if (keyframe.state_covariance) put(*keyframe.state_covariance);
   }
   void put(const Keyframe& keyframe) {
     put(keyframe.odometry);
@@ -98,9 +105,10 @@ class EntryWriter {
   void put(const Eigen::Vector3d& v) {
     for (const double value : v) out_.f64(value);
   }
-  void put(const Matrix6& covariance) {  // symmetric
-    for (int row = 0; row < 6; ++row)
-      for (int column = row; column < 6; ++column) out_.f64(covariance(row, column));
+  template <int kSize>
+  void put(const Eigen::Matrix<double, kSize, kSize>& covariance) {  // symmetric
+    for (int row = 0; row < kSize; ++row)
+      for (int column = row; column < kSize; ++column) out_.f64(covariance(row, column));
   }
   void put(const std::string& text) {
     const std::size_t size = std::min(text.size(), kMaxText_bytes);
@@ -157,10 +165,16 @@ class EntryReader {
     get(keyframe.T_odom_kf);
     get(keyframe.T_previous_kf);
     get(keyframe.covariance);
-    if (in_.u8() == 0) return;
-    Vertical& vertical = keyframe.vertical.emplace();
-    get(vertical.up_body);
-    get(vertical.sigma_rad);
+    const unsigned has = in_.u8();
+    if ((has & ~(kHasVertical | kHasStateCovariance)) != 0) in_.fail();
+    if ((has & kHasVertical) != 0) {
+      Vertical& vertical = keyframe.vertical.emplace();
+      get(vertical.up_body);
+      get(vertical.sigma_rad);
+    }
+    if ((has & kHasStateCovariance) == 0) return;
+    get(keyframe.state_covariance.emplace());
+    if (finite_ && !is_usable(*keyframe.state_covariance)) in_.fail();
   }
   void get(Keyframe& keyframe) {
     get(keyframe.odometry);
@@ -227,9 +241,10 @@ class EntryReader {
   void get(Eigen::Vector3d& v) {
     for (double& value : v) get(value);
   }
-  void get(Matrix6& covariance) {
-    for (int row = 0; row < 6; ++row)
-      for (int column = row; column < 6; ++column) {
+  template <int kSize>
+  void get(Eigen::Matrix<double, kSize, kSize>& covariance) {
+    for (int row = 0; row < kSize; ++row)
+      for (int column = row; column < kSize; ++column) {
         get(covariance(row, column));
         covariance(column, row) = covariance(row, column);
       }

@@ -39,7 +39,8 @@ inline constexpr std::size_t kMaxJournalEntry_bytes = std::size_t{1} << 22U;
 /// numbers come back to the last bit.
 [[nodiscard]] std::vector<std::uint8_t> encode_journal_entry(const JournalEntry& entry);
 
-/// Refuses what encode_journal_entry() never writes, and numbers that are not finite.
+/// Refuses what encode_journal_entry() never writes, numbers that are not finite, and covariances
+/// of states that odometry cannot go on from (is_usable()).
 [[nodiscard]] Decoded<JournalEntry> decode_journal_entry(std::span<const std::uint8_t> bytes);
 
 }  // namespace km

@@ -29,6 +29,25 @@ constexpr double kHeldPosition_m = 1e-3;  // of the first state: fixes the gauge
 constexpr double kHeldHeading_rad = 1e-3;
 constexpr double kGyroBiasSigma = 0.02;  // around the guess of the start [rad/s]
 
+// Rows that hold heading, the rotation about the vertical as seen from the body, and position.
+Eigen::MatrixXd held_gauge(const OdometryState& state) {
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(4, 15);
+  J.block<1, 3>(0, 0) = state.T_odom_body.linear().row(2) / kHeldHeading_rad;
+  J.block<3, 3>(1, 3).diagonal().setConstant(1.0 / kHeldPosition_m);
+  return J;
+}
+
+// What StateCovariance is about, by the 15 variables of a state. A velocity that only turns with
+// the heading is no error.
+Eigen::Matrix<double, 11, 15> without_gauge(const OdometryState& state) {
+  const Eigen::Matrix3d R = state.T_odom_body.linear();
+  Eigen::Matrix<double, 11, 15> J = Eigen::Matrix<double, 11, 15>::Zero();
+  J.topLeftCorner<2, 3>() = R.topRows<2>();
+  J.block<3, 3>(2, 0) = -Eigen::Vector3d::UnitZ().cross(state.v_odom) * R.row(2);
+  J.bottomRightCorner<9, 9>().setIdentity();
+  return J;
+}
+
 }  // namespace
 
 FixedLagSmoother::FixedLagSmoother(const SensorRig& rig, const VioConfig& config)
@@ -45,9 +64,7 @@ FixedLagSmoother::FixedLagSmoother(const SensorRig& rig, const VioConfig& config
 
 std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
     std::span<const InertialFrame> frames, std::span<const OdometryState> guess) {
-  window_.frames.clear();
-  window_.landmarks.clear();
-  window_.prior = {};
+  clear();
   Stamp last_keyframe = 0;
   for (std::size_t k = 0; k < frames.size(); ++k) {
     if (!append(frames[k], guess[k])) return std::nullopt;
@@ -68,6 +85,26 @@ std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
   std::vector<OdometryState> states;
   for (const WindowFrame& frame : window_.frames) states.push_back(frame.state);
   return states;
+}
+
+void FixedLagSmoother::start(const InertialFrame& frame, const OdometryState& state,
+                             const StateCovariance& covariance) {
+  clear();
+  (void)append(frame, state);  // the first needs no inertial factor
+  observe(window_, frame.tracked);
+  window_.frames.back().keyframe = true;
+  StatePrior& prior = window_.prior;
+  prior.frames = {window_.frames.back().id};
+  prior.linearization = {window_.frames.back().state};
+  prior.J.resize(15, 15);
+  prior.J << held_gauge(state), covariance.llt().matrixL().solve(without_gauge(state));
+  prior.r = Eigen::VectorXd::Zero(15);
+}
+
+void FixedLagSmoother::clear() {
+  window_.frames.clear();
+  window_.landmarks.clear();
+  window_.prior = {};
 }
 
 SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame) {
@@ -200,21 +237,40 @@ std::optional<UncertainPose> FixedLagSmoother::relative_pose(Stamp from, Stamp t
   const WindowFrame* a = frame_at(from);
   const WindowFrame* b = frame_at(to);
   if (a == nullptr || b == nullptr) return std::nullopt;
+  UncertainPose result;
+  result.T = a->state.T_odom_body.inverse() * b->state.T_odom_body;
+  // xi = -Ad(T_to_from) xi_from + xi_to
+  Eigen::MatrixXd D_T =
+      Eigen::MatrixXd::Zero(15 * static_cast<Eigen::Index>(window_.frames.size()), 6);
+  D_T.middleRows<6>(15 * (a - window_.frames.data())) = -adjoint(result.T.inverse()).transpose();
+  D_T.middleRows<6>(15 * (b - window_.frames.data())) += Matrix6::Identity();
+  const auto Sigma = covariance_of(std::move(D_T));
+  if (!Sigma) return std::nullopt;
+  result.Sigma = *Sigma;
+  return result;
+}
+
+std::optional<StateCovariance> FixedLagSmoother::state_covariance(Stamp stamp) const {
+  const WindowFrame* frame = frame_at(stamp);
+  if (frame == nullptr) return std::nullopt;
+  Eigen::MatrixXd D_T =
+      Eigen::MatrixXd::Zero(15 * static_cast<Eigen::Index>(window_.frames.size()), 11);
+  D_T.middleRows<15>(15 * (frame - window_.frames.data())) =
+      without_gauge(frame->state).transpose();
+  const auto Sigma = covariance_of(std::move(D_T));
+  if (!Sigma) return std::nullopt;
+  return StateCovariance(Sigma->selfadjointView<Eigen::Upper>());  // rounding leaves none exact
+}
+
+// Sigma = D H^-1 D^T = |L^-1 D^T|^2.
+std::optional<Eigen::MatrixXd> FixedLagSmoother::covariance_of(Eigen::MatrixXd D_T) const {
   WindowEquations equations(window_, 0.0);
   equations.add_all();
   Eigen::MatrixXd H = equations.H();
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(H);
   if (llt.info() != Eigen::Success) return std::nullopt;
-
-  UncertainPose result;
-  result.T = a->state.T_odom_body.inverse() * b->state.T_odom_body;
-  // xi = -Ad(T_to_from) xi_from + xi_to; Sigma = D H^-1 D^T = |L^-1 D^T|^2.
-  Eigen::MatrixXd D_T = Eigen::MatrixXd::Zero(H.rows(), 6);
-  D_T.middleRows<6>(15 * (a - window_.frames.data())) = -adjoint(result.T.inverse()).transpose();
-  D_T.middleRows<6>(15 * (b - window_.frames.data())) += Matrix6::Identity();
   llt.matrixL().solveInPlace(D_T);
-  result.Sigma = D_T.transpose() * D_T;
-  return result;
+  return D_T.transpose() * D_T;
 }
 
 void FixedLagSmoother::hold_first() {
@@ -224,9 +280,7 @@ void FixedLagSmoother::hold_first() {
   prior.linearization = {first};
   prior.J = Eigen::MatrixXd::Zero(10, 15);
   prior.r = Eigen::VectorXd::Zero(10);
-  // Heading: the rotation about the vertical, seen from the body.
-  prior.J.block<1, 3>(0, 0) = first.T_odom_body.linear().row(2) / kHeldHeading_rad;
-  prior.J.block<3, 3>(1, 3).diagonal().setConstant(1.0 / kHeldPosition_m);
+  prior.J.topRows<4>() = held_gauge(first);
   prior.J.block<3, 3>(4, 9).diagonal().setConstant(1.0 / kGyroBiasSigma);
   prior.J.block<3, 3>(7, 12).diagonal().setConstant(1.0 / config_.accel_bias_sigma);
 }

@@ -51,6 +51,11 @@ class FixedLagSmoother {
   [[nodiscard]] std::optional<std::vector<OdometryState>> start(
       std::span<const InertialFrame> frames, std::span<const OdometryState> guess);
 
+  /// Starts on one image, from its state as estimated earlier: heading and position are held, the
+  /// rest is kept as well as `covariance`, positive definite, says. What was before is forgotten.
+  void start(const InertialFrame& frame, const OdometryState& state,
+             const StateCovariance& covariance);
+
   /// Adds the next image. Precondition: start() succeeded. Where frame.samples do not cover the
   /// time since the image before or make no inertial factor, the solution is not usable, and only
   /// start() may follow.
@@ -66,6 +71,9 @@ class FixedLagSmoother {
   /// covariance; nullopt if one has left or the information is singular.
   [[nodiscard]] std::optional<UncertainPose> relative_pose(Stamp from, Stamp to) const;
 
+  /// Of the state at an image in the window; nullopt if it has left or the information is singular.
+  [[nodiscard]] std::optional<StateCovariance> state_covariance(Stamp stamp) const;
+
   /// True if the image at `stamp` will not be in the window any more after the next add().
   [[nodiscard]] bool leaving(Stamp stamp) const;
 
@@ -79,7 +87,10 @@ class FixedLagSmoother {
   void decide_keyframe();
   int reject_outliers();
   void locate_landmarks();
+  void clear();
   void hold_first();
+  // Of D times the error of all frames, from its transpose.
+  [[nodiscard]] std::optional<Eigen::MatrixXd> covariance_of(Eigen::MatrixXd D_T) const;
   [[nodiscard]] std::size_t keyframes() const;
 
   VioConfig config_;

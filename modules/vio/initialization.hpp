@@ -11,13 +11,15 @@ namespace km {
 enum class StartStatus {
   kAtRest,          ///< Images and inertial data agree that the body stands still.
   kInMotion,        ///< Motion from stereo, aligned with the inertial data.
+  kGoesOn,          ///< From the state where an earlier process left off; guess_start() never.
   kTooFewImages,    ///< Fewer than kMinStartImages.
   kTooFewFeatures,  ///< Not enough features with depth, or tracked, to follow the motion by stereo.
   kInconsistent,    ///< Stereo and inertial data do not fit together.
 };
 
 [[nodiscard]] constexpr bool started(StartStatus status) {
-  return status == StartStatus::kAtRest || status == StartStatus::kInMotion;
+  return status == StartStatus::kAtRest || status == StartStatus::kInMotion ||
+         status == StartStatus::kGoesOn;
 }
 
 /// A guess of the states of the first images, for FixedLagSmoother::start(), or why there is none.

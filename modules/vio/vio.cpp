@@ -57,6 +57,7 @@ Vio::Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, cons
 void Vio::continue_from(const VioCheckpoint& checkpoint) {
   last_ = checkpoint.state;
   last_keyframe_ = checkpoint.keyframe;
+  T_chain_odom_ = checkpoint.keyframe.T_odom_kf * checkpoint.state.T_odom_body.inverse();
 }
 
 VioResult Vio::process(const SensorPacket& packet) {
@@ -85,6 +86,8 @@ VioResult Vio::process(const SensorPacket& packet) {
     ++statistics_.gaps;
     result.problem = VioProblem::kInertialGap;
     restart(std::move(held));
+  } else if (first && goes_on_at(held)) {
+    go_on(held, result);
   } else if (running_) {
     advance(held, result);
   } else {
@@ -133,6 +136,22 @@ Eigen::Matrix3d Vio::turn(const std::vector<ImuSample>& samples, Stamp from, Sta
   ImuPreintegration imu(rig_.imu, last_ ? last_->gyro_bias : Eigen::Vector3d::Zero(),
                         Eigen::Vector3d::Zero());
   return imu.add(samples, from, to) ? imu.motion().dR : Eigen::Matrix3d::Identity();
+}
+
+bool Vio::goes_on_at(const Held& held) const {
+  const Stamp stamp = held.frame->stamp;
+  return last_keyframe_ && last_keyframe_->state_covariance && last_keyframe_->stamp == stamp &&
+         last_->stamp == stamp;
+}
+
+// The state of this image has been given out, and its keyframe handed on.
+void Vio::go_on(const Held& held, VioResult& result) {
+  smoother_.start(held.data, *last_, *last_keyframe_->state_covariance);
+  ++statistics_.start_attempts;
+  ++statistics_.starts;
+  result.start = StartStatus::kGoesOn;
+  running_ = true;
+  locate(*last_, held.frame, result);
 }
 
 void Vio::try_start(VioResult& result) {
@@ -264,6 +283,11 @@ std::optional<Vertical> Vio::vertical_at(const OdometryState& state) const {
   return Vertical{state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ(), sigma_rad};
 }
 
+std::optional<StateCovariance> Vio::state_covariance_at(const OdometryState& state) const {
+  const auto covariance = smoother_.state_covariance(state.stamp);
+  return covariance && is_usable(*covariance) ? covariance : std::nullopt;
+}
+
 // Where the first image is the last keyframe's, that one was handed on already.
 void Vio::take_up_or_hand_on_first(VioResult& result) {
   const OdometryState& first = result.states.front();
@@ -282,6 +306,7 @@ void Vio::hand_on_first(const OdometryState& state, VioResult& result) {
     keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * keyframe.T_odom_kf;
     keyframe.covariance = restart_covariance();
   }
+  keyframe.state_covariance = state_covariance_at(state);
   last_keyframe_ = keyframe;
   result.keyframes.push_back(keyframe);
 }
@@ -305,6 +330,7 @@ void Vio::hand_on(const OdometryState& state, VioResult& result) {
     keyframe.covariance.diagonal() += (drift.array() + kLeastVariance).matrix();
   }
   keyframe.T_odom_kf = last_keyframe_->T_odom_kf * keyframe.T_previous_kf;
+  keyframe.state_covariance = state_covariance_at(state);
   last_keyframe_ = keyframe;
   result.keyframes.push_back(keyframe);
 }

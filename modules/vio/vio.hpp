@@ -67,7 +67,9 @@ class Vio {
   Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, const VioConfig& config);
 
   /// Goes on from there: the next keyframe follows that one, measured from it like any other where
-  /// odometry starts on its image. Call before the first process().
+  /// odometry starts on its image. Where that comes first and the covariance of the state is
+  /// known, odometry starts on it at once, from that state; else like any start, with the images
+  /// of VioConfig::start_s. Call before the first process().
   void continue_from(const VioCheckpoint& checkpoint);
 
   [[nodiscard]] VioResult process(const SensorPacket& packet);
@@ -85,6 +87,8 @@ class Vio {
   [[nodiscard]] std::optional<std::vector<ImuSample>> samples_since(Stamp last, Stamp now) const;
   [[nodiscard]] Eigen::Matrix3d turn(const std::vector<ImuSample>& samples, Stamp from,
                                      Stamp to) const;
+  [[nodiscard]] bool goes_on_at(const Held& held) const;
+  void go_on(const Held& held, VioResult& result);
   void try_start(VioResult& result);
   void advance(const Held& held, VioResult& result);
   void restart(Held held);
@@ -93,6 +97,8 @@ class Vio {
   void take_up_or_hand_on_first(VioResult& result);
   void hand_on_first(const OdometryState& state, VioResult& result);
   void hand_on(const OdometryState& state, VioResult& result);
+  [[nodiscard]] std::optional<StateCovariance> state_covariance_at(
+      const OdometryState& state) const;
   [[nodiscard]] std::optional<Vertical> vertical_at(const OdometryState& state) const;
   void locate(const OdometryState& state, const Frame& frame, VioResult& result);
   [[nodiscard]] bool locates_points(const StereoFrame& frame) const;

@@ -33,6 +33,8 @@ const char* text(StartStatus status) {
       return "started at rest";
     case StartStatus::kInMotion:
       return "started in motion";
+    case StartStatus::kGoesOn:
+      return "goes on from the last keyframe";
     case StartStatus::kTooFewImages:
       return "too few images to start";
     case StartStatus::kTooFewFeatures:
@@ -79,7 +81,9 @@ void VioNode::report(const VioResult& result, Stamp stamp) const {
     log::limited(log::Level::kWarn, name(), text(result.problem))
         << "at " << stamp << " ns: " << text(result.problem);
   if (!result.start) return;
-  if (started(*result.start))
+  if (*result.start == StartStatus::kGoesOn)
+    log::info(name()) << text(*result.start);
+  else if (started(*result.start))
     log::info(name()) << text(*result.start) << " with " << result.states.size() << " images";
   else
     log::limited(log::Level::kWarn, name(), text(*result.start))

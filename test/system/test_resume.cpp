@@ -107,7 +107,7 @@ double error_m(const fs::path& dataset, const std::vector<fs::path>& estimates,
   return read_json(folder.path() / "error.json")["joint"]["position_m"]["rmse"].get<double>();
 }
 
-TEST_CASE("A robot that is killed again and again loses a second at most", "[system][resume]") {
+TEST_CASE("A robot that is killed again and again loses no image", "[system][resume]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -132,13 +132,10 @@ TEST_CASE("A robot that is killed again and again loses a second at most", "[sys
     }
     Process last(with(command, "--resume", output));
     REQUIRE(last.wait() == 0);
-    // Odometry does not start on what is left behind the last keyframe where that is too little.
-    constexpr std::size_t kImagesInASecond = 20;
-    CHECK(line_count(output / "odometry.tum") + kImagesInASecond >=
-          line_count(folder.path() / "whole/odometry.tum"));
+    CHECK(line_count(output / "odometry.tum") == line_count(folder.path() / "whole/odometry.tum"));
     const double killed_m = error_m(*dataset, {output / "optimized.tum"}, folder);
     CAPTURE(whole_m, killed_m);
-    // Each start knows the biases of the sensors anew: a millimetre here.
+    // Other keyframes close other loops: some tenths of a millimetre here.
     CHECK(killed_m < whole_m + 2e-3);
   }
 }

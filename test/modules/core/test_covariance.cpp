@@ -57,5 +57,20 @@ TEST_CASE("Matrices that are no covariance are told apart", "[core]") {
   CHECK_FALSE(is_covariance(bad));
 }
 
+TEST_CASE("Covariances of states are usable from the least to the most, and where invertible",
+          "[core]") {
+  for (const double variance : {1e-16, 1.0, 1e6})
+    CHECK(is_usable(variance * StateCovariance::Identity()));
+  for (const double variance : {-1.0, 0.0, 1e-17, 1e7, std::nan(""), HUGE_VAL})
+    CHECK_FALSE(is_usable(variance * StateCovariance::Identity()));
+  StateCovariance covariance = StateCovariance::Identity();
+  covariance(1, 9) = 1e-3;
+  CHECK_FALSE(is_usable(covariance));  // not symmetric
+  covariance(9, 1) = covariance(1, 9);
+  CHECK(is_usable(covariance));
+  covariance(9, 1) = covariance(1, 9) = 1.0;
+  CHECK_FALSE(is_usable(covariance));  // fully correlated
+}
+
 }  // namespace
 }  // namespace km

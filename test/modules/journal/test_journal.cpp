@@ -33,6 +33,10 @@ KeyframeOdometry step(KeyframeIndex index, std::mt19937& rng) {
   keyframe.T_previous_kf = random_pose(rng);
   keyframe.covariance = random_covariance(rng, 0.1);
   if (index % 2 == 0) keyframe.vertical = Vertical{random_vector<3>(rng).normalized(), 0.01};
+  if (index % 4 > 1) return keyframe;
+  StateCovariance& covariance = keyframe.state_covariance.emplace();
+  for (int c = 0; c < covariance.cols(); ++c) covariance.col(c) = random_vector<11>(rng);
+  covariance = StateCovariance(covariance * covariance.transpose());
   return keyframe;
 }
 
@@ -122,6 +126,10 @@ TEST_CASE("Every entry comes back to the last bit", "[journal]") {
   CHECK(back.covariance == back.covariance.transpose());
   REQUIRE(back.vertical);
   CHECK(back.vertical->up_body == keyframe.vertical->up_body);
+  REQUIRE(back.state_covariance);
+  CHECK(back.state_covariance->triangularView<Eigen::Upper>().toDenseMatrix() ==
+        keyframe.state_covariance->triangularView<Eigen::Upper>().toDenseMatrix());
+  CHECK(*back.state_covariance == back.state_covariance->transpose());
 
   for (const JournalEntry& entry : some_run()) {
     const auto bytes = encode_journal_entry(entry);
@@ -143,6 +151,46 @@ TEST_CASE("What is no entry is refused", "[journal]") {
   nowhere.v_odom.x() = std::numeric_limits<double>::quiet_NaN();
   CHECK_FALSE(decode_journal_entry(encode_journal_entry(nowhere)).value);
   CHECK_FALSE(decode_journal_entry(std::vector<std::uint8_t>{200}).value);
+  bytes = encode_journal_entry(KeyframeOdometry{});
+  REQUIRE(bytes.back() == 0);  // nothing follows the step
+  bytes.back() = 4;
+  CHECK_FALSE(decode_journal_entry(bytes).value);
+}
+
+TEST_CASE("Covariances of states that odometry cannot go on from are refused", "[journal]") {
+  KeyframeOdometry keyframe;
+  const auto taken = [&](const StateCovariance& covariance) {
+    keyframe.state_covariance = covariance;
+    return decode_journal_entry(encode_journal_entry(keyframe)).value.has_value();
+  };
+  CHECK(taken(1e-4 * StateCovariance::Identity()));
+  CHECK_FALSE(taken(StateCovariance::Zero()));
+  CHECK_FALSE(taken(-StateCovariance::Identity()));
+  CHECK_FALSE(taken(StateCovariance::Ones()));  // of rank one
+  CHECK_FALSE(taken(1e300 * StateCovariance::Identity()));
+  StateCovariance covariance = StateCovariance::Identity();
+  covariance(3, 7) = std::numeric_limits<double>::quiet_NaN();
+  CHECK_FALSE(taken(covariance));
+  covariance(3, 7) = 1.5;  // more than fully correlated
+  CHECK_FALSE(taken(covariance));
+}
+
+TEST_CASE("A journal from before states had covariances is read, without them", "[journal]") {
+  // A step then ended in whether it has a vertical: 0 or 1.
+  std::mt19937 rng(11);
+  for (const KeyframeIndex index : {2U, 3U}) {  // with a vertical, and without
+    const KeyframeOdometry keyframe = step(index, rng);
+    REQUIRE_FALSE(keyframe.state_covariance);
+    std::vector<std::uint8_t> bytes = encode_journal_entry(keyframe);
+    constexpr std::size_t kVertical_bytes = 32;
+    CHECK(bytes.at(bytes.size() - 1 - (keyframe.vertical ? kVertical_bytes : 0)) ==
+          (keyframe.vertical ? 1 : 0));
+    const auto decoded = decode_journal_entry(bytes);
+    REQUIRE(decoded.value);
+    const auto& back = std::get<KeyframeOdometry>(*decoded.value);
+    CHECK(back.vertical.has_value() == keyframe.vertical.has_value());
+    CHECK_FALSE(back.state_covariance);
+  }
 }
 
 TEST_CASE("A journal cut anywhere is whole up to its last full entry", "[journal]") {

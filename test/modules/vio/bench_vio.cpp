@@ -1,11 +1,15 @@
 // Odometry on EuRoC MH_01_easy as in the table of results: three pieces and 21 starts.
-//   bench_vio DATASET [rgbd] [starts] [black] [KEY=VALUE ...]   keys of the sections vio and
-//   tracker
+//   bench_vio DATASET [rgbd] [starts] [black] [resume=SECONDS] [KEY=VALUE ...]   keys of the
+//   sections vio and tracker
 // "rgbd" replaces the right images by depth made from both, "starts" adds the 21 starts, "black"
-// runs with one second of black images at each of 12 places.
+// runs with one second of black images at each of 12 places, "resume" kills odometry
+// within the first seconds at every keyframe, once or at every n-th, and takes it up there, from
+// its state and anew.
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <iostream>
 #include <map>
@@ -131,12 +135,74 @@ void run_black(const Recording& recording, const TrackerConfig& tracker, const V
   }
 }
 
+// Of odometry that is killed at the `keyframes`-th new keyframe of each of its first `kills` lives,
+// the first of which is `whole` up to there, and taken up there.
+OdometryErrors killed_errors(const Recording& recording, const OdometryRun& whole,
+                             std::size_t keyframes, std::size_t kills, bool from_state,
+                             const TrackerConfig& tracker, const VioConfig& config) {
+  OdometryRun joined, run = whole;
+  std::size_t first = 0;
+  for (std::size_t life = 0;; ++life) {
+    const bool killed = life < kills && run.keyframes.size() > keyframes;
+    for (std::size_t k = 0; k < run.states.size(); ++k) {
+      if (killed && run.states[k].stamp > run.keyframes[keyframes - 1].stamp) break;
+      joined.states.push_back(run.states[k]);
+      joined.truth.push_back(run.truth[k]);
+    }
+    if (!killed) return errors_since(joined, 0.0);
+    VioCheckpoint checkpoint{joined.states.back(), run.keyframes[keyframes - 1]};
+    if (!from_state) checkpoint.keyframe.state_covariance.reset();
+    while (recording.packets[first].frame->stamp < checkpoint.keyframe.stamp) ++first;
+    run = run_odometry(recording, first, recording.packets.size(), tracker, config, checkpoint);
+  }
+}
+
+void run_resume(const Recording& recording, const TrackerConfig& tracker, const VioConfig& config) {
+  const OdometryRun whole = run_odometry(recording, 0, recording.packets.size(), tracker, config);
+  const double whole_mm = 1e3 * errors_since(whole, 0.0).ate_m;
+  std::printf("never killed: ATE %.2f mm, %zu keyframes\n", whole_mm, whole.keyframes.size());
+  std::array<std::vector<double>, 2> all;
+  const auto compare = [&](std::size_t keyframes, std::size_t kills) {
+    std::array<double, 2> ate_mm;
+    for (const std::size_t from_state : {0U, 1U})
+      ate_mm[from_state] =
+          1e3 *
+          killed_errors(recording, whole, keyframes, kills, from_state == 1, tracker, config).ate_m;
+    return ate_mm;
+  };
+  for (std::size_t k = 1; k < whole.keyframes.size(); ++k) {
+    const auto [anew, on] = compare(k, 1);
+    all[0].push_back(anew);
+    all[1].push_back(on);
+    const Stamp stamp = whole.keyframes[k - 1].stamp;
+    std::printf("killed at %5.2f s: ATE %6.2f mm anew, %6.2f mm from its state\n",
+                seconds_between(whole.states.front().stamp, stamp), anew, on);
+  }
+  for (const std::size_t from_state : {0U, 1U}) {
+    const std::vector<double>& mm = all[from_state];
+    std::printf("%s: ATE median %.2f p90 %.2f max %.2f mm, more than 5 %% worse %zu of %zu\n",
+                from_state == 1 ? "from its state" : "anew", quantile(mm, 0.5), quantile(mm, 0.9),
+                quantile(mm, 1.0),
+                static_cast<std::size_t>(
+                    std::ranges::count_if(mm, [&](double v) { return v > 1.05 * whole_mm; })),
+                mm.size());
+  }
+  for (const std::size_t keyframes : {2U, 3U, 5U, 8U}) {
+    const auto [anew, on] = compare(keyframes, whole.keyframes.size());
+    std::printf("killed at every %zu keyframes: ATE %6.2f mm anew, %6.2f mm from its state\n",
+                keyframes, anew, on);
+  }
+}
+
 int run(int argc, char** argv) {
   bool starts = false, black = false, rgbd = false;
+  double resume_s = 0.0;
   Overrides overrides;
   for (int a = 2; a < argc; ++a) {
     const char* equals = std::strchr(argv[a], '=');
-    if (equals != nullptr)
+    if (std::strncmp(argv[a], "resume=", 7) == 0)
+      resume_s = std::atof(argv[a] + 7);
+    else if (equals != nullptr)
       overrides.values[std::string(argv[a], static_cast<std::size_t>(equals - argv[a]))] =
           equals + 1;
     else if (std::strcmp(argv[a], "rgbd") == 0)
@@ -151,6 +217,10 @@ int run(int argc, char** argv) {
   for (const auto& [name, value] : overrides.values)
     if (!overrides.used[name]) throw std::invalid_argument("unknown key " + name);
 
+  if (resume_s > 0.0) {
+    run_resume(read_recording(argv[1], 0.0, resume_s), tracker, config);
+    return 0;
+  }
   Recording recording = read_recording(argv[1], 0.0, 16.0);
   if (rgbd) recording = as_rgbd(recording);
   const struct {
@@ -200,7 +270,8 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) try {
   if (argc < 2) {
-    std::cerr << "usage: bench_vio DATASET [rgbd] [starts] [black] [KEY=VALUE ...]\n";
+    std::cerr
+        << "usage: bench_vio DATASET [rgbd] [starts] [black] [resume=SECONDS] [KEY=VALUE ...]\n";
     return 2;
   }
   return km::run(argc, argv);

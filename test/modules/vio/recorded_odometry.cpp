@@ -47,8 +47,10 @@ std::vector<std::optional<SeenRay>> seen_rays(const Camera& rectified, const Cam
 }  // namespace
 
 OdometryRun run_odometry(const Recording& recording, std::size_t first, std::size_t last,
-                         const TrackerConfig& tracker, const VioConfig& config) {
+                         const TrackerConfig& tracker, const VioConfig& config,
+                         const std::optional<VioCheckpoint>& checkpoint) {
   Vio vio(0, recording.rig, tracker, config);
+  if (checkpoint) vio.continue_from(*checkpoint);
   OdometryRun run;
   std::map<Stamp, const SE3*> truth;
   for (std::size_t k = first; k < last; ++k) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -21,9 +22,11 @@ struct OdometryRun {
   VioStatistics statistics;
 };
 
-/// Runs a fresh Vio over packets `first` to `last` (not included) of `recording`.
+/// Runs a fresh Vio over packets `first` to `last` (not included) of `recording`, which goes on
+/// from `checkpoint` if there is one.
 OdometryRun run_odometry(const Recording& recording, std::size_t first, std::size_t last,
-                         const TrackerConfig& tracker, const VioConfig& config);
+                         const TrackerConfig& tracker, const VioConfig& config,
+                         const std::optional<VioCheckpoint>& checkpoint = {});
 
 /// Errors of a trajectory against the true poses of the same instants.
 struct OdometryErrors {

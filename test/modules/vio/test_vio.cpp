@@ -191,6 +191,52 @@ TEST_CASE("A gap in the inertial samples leads to a new start from the last pose
   CHECK(after.keyframes.front().covariance(5, 5) > 0.1);
 }
 
+TEST_CASE("From a keyframe that an earlier process left odometry goes on at once", "[vio]") {
+  const Bench bench;
+  Vio former = bench.vio();
+  const VioResult before = feed(former, bench, 0, 60);
+  const KeyframeOdometry& last = before.keyframes.back();
+  const auto image = static_cast<int>(last.stamp / Bench::kFrameStep);
+  const OdometryState& state = before.states.at(static_cast<std::size_t>(image));
+  REQUIRE(state.stamp == last.stamp);
+
+  Vio vio = bench.vio();
+  vio.continue_from({state, last});
+  const VioResult first = feed(vio, bench, image, image + 1);
+  CHECK(first.start == StartStatus::kGoesOn);
+  CHECK(first.states.empty());  // that one stands
+  REQUIRE(first.frames.size() == 1);
+  CHECK((first.frames[0].T_odom_body.matrix() - last.T_odom_kf.matrix()).norm() < 1e-9);
+  const VioResult after = feed(vio, bench, image + 1, image + 60);
+  REQUIRE(after.states.size() == 59);
+  for (const OdometryState& next : after.states) {
+    CHECK((state.T_odom_body.inverse() * next.T_odom_body).translation().norm() < 1e-3);
+    CHECK((next.gyro_bias - state.gyro_bias).norm() < 1e-4);
+  }
+  REQUIRE_FALSE(after.keyframes.empty());
+  CHECK(after.keyframes.front().id.index == last.id.index + 1);
+  CHECK(after.keyframes.front().covariance(5, 5) < 1e-3);
+}
+
+TEST_CASE("Where the keyframe's image does not come again odometry starts as ever", "[vio]") {
+  const Bench bench;
+  Vio former = bench.vio();
+  const VioResult before = feed(former, bench, 0, 60);
+  KeyframeOdometry last = before.keyframes.back();
+  const auto image = static_cast<int>(last.stamp / Bench::kFrameStep);
+  last.T_odom_kf.translation().x() += 1.0;  // the chain has moved away from live odometry
+  Vio vio = bench.vio();
+  vio.continue_from({before.states.at(static_cast<std::size_t>(image)), last});
+  const VioResult after = feed(vio, bench, image + 20, image + 20 + Bench::kStartImages);
+  CHECK(after.start == StartStatus::kAtRest);
+  REQUIRE(after.states.size() == Bench::kStartImages);
+  REQUIRE_FALSE(after.keyframes.empty());
+  const KeyframeOdometry& next = after.keyframes.front();
+  CHECK(next.id.index == last.id.index + 1);
+  CHECK(next.T_previous_kf.translation().norm() < 5e-3);
+  CHECK(next.covariance(5, 5) > 0.1);
+}
+
 TEST_CASE("Inertial samples that end before an image hold over it, and over no more", "[vio]") {
   const Bench bench;
   Vio vio = bench.vio();
