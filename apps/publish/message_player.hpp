@@ -24,7 +24,7 @@ struct PlayOptions {
   double drop_share = 0.0;  ///< Of the messages.
   bool reliable = false;    ///< Else best effort, as drivers of sensors are.
   unsigned seed = 0;
-  std::vector<std::string> topics;  ///< Those to play; all without any.
+  std::vector<std::string> topics = {};  ///< Those to play; all without any.
 };
 
 /// What became of one topic.

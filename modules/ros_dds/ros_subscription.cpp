@@ -47,23 +47,28 @@ RosSubscription::RosSubscription(std::shared_ptr<const RosNetwork> network,
   heard_s_.assign(readers_.size(), told_s_);
 }
 
+// All there are: DDS tells of those that come, not of those that are left.
 void RosSubscription::take_from(std::size_t channel) {
   constexpr std::size_t kAtOnce = 16;
   std::array<ddsi_serdata*, kAtOnce> samples{};
   std::array<dds_sample_info_t, kAtOnce> infos{};
-  const dds_return_t count = check_dds(
-      dds_takecdr(readers_[channel].handle(), samples.data(), kAtOnce, infos.data(), DDS_ANY_STATE),
-      "cannot take messages");
-  const Stamp now = wall_now();
-  for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
-    if (infos[k].valid_data) {
-      BagMessage message{channel, now, std::vector<std::uint8_t>(ddsi_serdata_size(samples[k]))};
-      ddsi_serdata_to_ser(samples[k], 0, message.bytes.size(), message.bytes.data());
-      taken_.push_back(std::move(message));
-      heard_s_[channel] = steady_now_s();
+  for (std::size_t count = kAtOnce; count == kAtOnce;) {
+    count =
+        static_cast<std::size_t>(check_dds(dds_takecdr(readers_[channel].handle(), samples.data(),
+                                                       kAtOnce, infos.data(), DDS_ANY_STATE),
+                                           "cannot take messages"));
+    for (std::size_t k = 0; k < count; ++k) {
+      if (infos[k].valid_data) add(channel, *samples[k]);
+      ddsi_serdata_unref(samples[k]);
     }
-    ddsi_serdata_unref(samples[k]);
   }
+}
+
+void RosSubscription::add(std::size_t channel, const ddsi_serdata& sample) {
+  BagMessage message{channel, wall_now(), std::vector<std::uint8_t>(ddsi_serdata_size(&sample))};
+  ddsi_serdata_to_ser(&sample, 0, message.bytes.size(), message.bytes.data());
+  taken_.push_back(std::move(message));
+  heard_s_[channel] = steady_now_s();
 }
 
 // A driver that died, or a topic by another name, is what people look for first.

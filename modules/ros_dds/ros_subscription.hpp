@@ -9,6 +9,8 @@
 #include "modules/recordings/bag_reader.hpp"
 #include "modules/ros_dds/ros_network.hpp"
 
+struct ddsi_serdata;
+
 namespace km {
 
 /// A topic to listen to.
@@ -38,6 +40,7 @@ class RosSubscription final : public BagReader {
 
  private:
   void take_from(std::size_t channel);
+  void add(std::size_t channel, const ddsi_serdata& sample);
   void tell_silence();
 
   std::shared_ptr<const RosNetwork> network_;  // outlives what follows

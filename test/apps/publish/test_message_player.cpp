@@ -1,0 +1,110 @@
+#include <catch2/catch.hpp>
+
+#include <map>
+#include <random>
+#include <thread>
+
+#include "apps/publish/euroc_messages.hpp"
+#include "apps/publish/message_player.hpp"
+#include "modules/recordings/ros_messages.hpp"
+#include "modules/ros_dds/ros_subscription.hpp"
+#include "test/modules/sensors/euroc_folder.hpp"
+#include "test/modules/sensors/listed_bag.hpp"
+
+namespace km {
+namespace {
+
+constexpr int kMessages = 200;
+constexpr Stamp kFirst = 5'000'000'000, kPeriod = 1'000'000;
+
+std::shared_ptr<const RosNetwork> network() {
+  static const auto shared = std::make_shared<const RosNetwork>(
+      RosConfig{.domain = static_cast<int>(std::random_device()() % 100), .interface = "lo"});
+  return shared;
+}
+
+std::unique_ptr<ListedBag> samples(const std::string& topic = "/imu") {
+  auto bag = std::make_unique<ListedBag>();
+  for (int k = 0; k < kMessages; ++k) {
+    RosImu message;
+    message.header.stamp = kFirst + k * kPeriod;
+    bag->add(topic, message);
+  }
+  return bag;
+}
+
+// The stamps that a reader gets of what is played.
+std::vector<Stamp> played(std::unique_ptr<BagReader> bag, const std::string& topic,
+                          PlayOptions options, PlayedTopic& played) {
+  options.reliable = true;
+  MessagePlayer player(std::move(bag), network(), options);
+  RosSubscription reader(network(), {{topic, "sensor_msgs/Imu", RosQos::kReliable, kMessages}});
+  while (player.least_readers() == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  while (player.step()) {
+  }
+  played = player.topics().at(0);
+  std::vector<Stamp> stamps;
+  while (stamps.size() < played.published) {
+    const auto message = reader.next();
+    stamps.push_back(decode_ros<RosHeader>("cdr", message->bytes).value->stamp);
+  }
+  return stamps;
+}
+
+TEST_CASE("A recording is played in its order and pace", "[publish]") {
+  PlayedTopic topic;
+  const auto begin = std::chrono::steady_clock::now();
+  const auto stamps = played(samples("/a"), "/a", {.rate = 2.0}, topic);
+  CHECK(std::chrono::steady_clock::now() - begin >= std::chrono::milliseconds(99));  // 0.199 s
+  CHECK(topic.published == kMessages);
+  CHECK(topic.dropped == 0);
+  REQUIRE(stamps.size() == kMessages);
+  CHECK(stamps.front() == kFirst);
+  CHECK(std::ranges::is_sorted(stamps));
+}
+
+TEST_CASE("A bad driver loses and delays messages, the same ones for a seed", "[publish]") {
+  const PlayOptions bad{.rate = 10.0, .jitter_s = 0.002, .drop_share = 0.3, .seed = 7};
+  PlayedTopic topic;
+  const auto stamps = played(samples("/b"), "/b", bad, topic);
+  CHECK(topic.published + topic.dropped == kMessages);
+  CHECK(topic.dropped > 30);
+  CHECK(topic.dropped < 90);
+  CHECK_FALSE(std::ranges::is_sorted(stamps));  // by up to 20 ms of the recording's time
+  for (std::size_t k = 1; k < stamps.size(); ++k) CHECK(stamps[k] > stamps[k - 1] - 20'000'000);
+  CHECK(played(samples("/b"), "/b", bad, topic) == stamps);
+}
+
+TEST_CASE("What is not known is left out, what is broken counted", "[publish]") {
+  auto bag = samples("/c");
+  bag->add_bytes("/scan", "sensor_msgs/LaserScan", kFirst, {0, 1, 0, 0});
+  bag->add_bytes("/c", RosImu::kType, kFirst, {0, 0, 0, 0, 1});  // big-endian, and cut
+  MessagePlayer player(std::move(bag), network(), {.rate = 100.0});
+  CHECK(player.left_out() == std::vector<std::string>{"/scan (sensor_msgs/LaserScan)"});
+  while (player.step()) {
+  }
+  REQUIRE(player.topics().size() == 1);
+  CHECK(player.topics()[0].published == kMessages);
+  CHECK(player.topics()[0].refused == 1);
+  CHECK_THROWS_WITH(MessagePlayer(samples("/d"), network(), {.topics = {"/e"}}),
+                    "the recording has no topic /e");
+}
+
+TEST_CASE("A EuRoC folder becomes the messages of its drivers", "[publish]") {
+  const EurocFolder folder;
+  EurocMessages messages(std::make_unique<EurocReader>(open_euroc(folder.root())));
+  std::map<std::string, int> counts;
+  Stamp last = 0;
+  while (const auto message = messages.next()) {
+    ++counts[messages.channels()[message->channel].topic];
+    CHECK(message->log_time >= last);
+    last = message->log_time;
+    CHECK(decode_ros<RosHeader>("cdr", message->bytes).value->stamp == message->log_time);
+  }
+  CHECK(counts["/cam0/image_raw"] == EurocFolder::kPairs);
+  CHECK(counts["/cam1/image_raw"] == EurocFolder::kPairs);
+  CHECK(counts["/imu0"] == 271);  // from a second before the first image to the last one
+}
+
+}  // namespace
+}  // namespace km
