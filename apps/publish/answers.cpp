@@ -10,6 +10,8 @@
 namespace km {
 namespace {
 
+constexpr double kSoon_s = 0.05;  // at a start the first second of images waits: not these
+
 double quantile(std::vector<double> values, double share) {
   const auto at =
       values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
@@ -52,7 +54,9 @@ std::string Answers::text() const {
                      std::to_string(sent_) + " images answered";
   if (latencies_s_.empty()) return text;
   return text + ", after " + fixed(1e3 * quantile(latencies_s_, 0.5), 1) + " ms (median), " +
-         fixed(1e3 * quantile(latencies_s_, 0.95), 1) + " ms (95 %)";
+         fixed(1e3 * quantile(latencies_s_, 0.95), 1) + " ms (95 %), " +
+         std::to_string(std::ranges::count_if(latencies_s_, [](double s) { return s > kSoon_s; })) +
+         " of them after more than " + fixed(1e3 * kSoon_s, 0) + " ms";
 }
 
 }  // namespace km
