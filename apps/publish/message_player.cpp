@@ -47,7 +47,8 @@ bool is_known(const BagChannel& channel) {
 }  // namespace
 
 MessagePlayer::MessagePlayer(std::unique_ptr<BagReader> recording,
-                             std::shared_ptr<const RosNetwork> network, const PlayOptions& options)
+                             const std::shared_ptr<const RosNetwork>& network,
+                             const PlayOptions& options)
     : recording_(std::move(recording)),
       options_(options),
       random_(options.seed),

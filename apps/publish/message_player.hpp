@@ -41,8 +41,8 @@ class MessagePlayer {
  public:
   /// Topics of types that a RosNetwork does not know are left out: `left_out()`. Throws
   /// std::invalid_argument for topics to play that the recording does not have.
-  MessagePlayer(std::unique_ptr<BagReader> recording, std::shared_ptr<const RosNetwork> network,
-                const PlayOptions& options);
+  MessagePlayer(std::unique_ptr<BagReader> recording,
+                const std::shared_ptr<const RosNetwork>& network, const PlayOptions& options);
 
   /// Readers of the topic that the fewest have.
   [[nodiscard]] std::size_t least_readers() const;

@@ -42,15 +42,15 @@ void ProcessCsv::append(double time_s, const ProcessUsage& usage) {
   samples_.push_back({time_s, usage});
 }
 
-RunSummary::Process ProcessCsv::summary() const {
+ProcessSummary ProcessCsv::summary() const {
   constexpr double kLeastSpan_s = 60.0;
   if (samples_.empty()) return {};
   const Sample &first = samples_.front(), &last = samples_.back();
-  RunSummary::Process process{.cpu_s = last.usage.cpu_s,
-                              .peak_memory_bytes = last.usage.peak_bytes,
-                              .memory_at_start_bytes = first.usage.resident_bytes,
-                              .memory_at_end_bytes = last.usage.resident_bytes,
-                              .memory_growth_bytes_per_minute = std::nullopt};
+  ProcessSummary process{.cpu_s = last.usage.cpu_s,
+                         .peak_memory_bytes = last.usage.peak_bytes,
+                         .memory_at_start_bytes = first.usage.resident_bytes,
+                         .memory_at_end_bytes = last.usage.resident_bytes,
+                         .memory_growth_bytes_per_minute = std::nullopt};
   const double half_s = 0.5 * (first.time_s + last.time_s);
   if (last.time_s - half_s < kLeastSpan_s) return process;
   double n = 0.0, t = 0.0, y = 0.0, tt = 0.0, ty = 0.0;

@@ -33,7 +33,7 @@ class ProcessCsv {
   void append(double time_s, const ProcessUsage& usage);
 
   /// Of all samples of this process; those of time and of the peak are the last one's.
-  [[nodiscard]] RunSummary::Process summary() const;
+  [[nodiscard]] ProcessSummary summary() const;
 
  private:
   struct Sample {

@@ -81,7 +81,7 @@ G2oGraph graph_of(const RunRecord& record) {
   return graph;
 }
 
-RunSummary::Mapping map_counts(const RunRecord& record) {
+MappingSummary map_counts(const RunRecord& record) {
   const MappingProgress map = record.mapping().value_or(MappingProgress{});
   const DenseSensingProgress sensing = record.dense_sensing().value_or(DenseSensingProgress{});
   const RunRecord::MeshCorrections& corrections = record.mesh_corrections();

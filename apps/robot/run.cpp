@@ -203,7 +203,7 @@ class Watch {
     rounds_csv_.append(record.rounds());
     write(seconds(), robot_.bridge().traffic());
   }
-  [[nodiscard]] RunSummary::Process process() const { return process_csv_.summary(); }
+  [[nodiscard]] ProcessSummary process() const { return process_csv_.summary(); }
   [[nodiscard]] double seconds() const { return steady_now_s() - start_s_; }
   [[nodiscard]] const char* reason() const { return departure_.reason(); }
   [[nodiscard]] std::vector<MissedPeer> missed() const { return absentees_.missed(kHearsay_s); }
@@ -352,12 +352,12 @@ std::map<std::string, std::uint64_t> sent_bytes(Robot& robot) {
   return bytes;
 }
 
-RunSummary::HeldBack held_back(Robot& robot) {
-  RunSummary::HeldBack sums;
+HeldBackSums held_back(Robot& robot) {
+  HeldBackSums sums;
   for (const TopicTraffic& topic : robot.bridge().traffic().topics) {
     if (topic.direction == Direction::kIn) continue;
     const std::string category = to_string(topic.category);
-    const auto add = [&](RunSummary::Counts& sum, const TrafficCount& count) {
+    const auto add = [&](TrafficSums& sum, const TrafficCount& count) {
       sum.messages[category] += count.messages;
       sum.bytes[category] += count.bytes;
     };

@@ -26,105 +26,105 @@ struct ClosureCounts {
   bool operator==(const ClosureCounts&) const = default;
 };
 
+/// Of the team's optimiser, as this robot knows it.
+struct OptimizerSummary {
+  std::uint64_t rounds = 0;
+  double seconds = 0.0;  ///< Of this robot's work.
+  double cost = 0.0;
+  double gradient_norm = 0.0;
+  std::optional<RobotId> anchor;  ///< Robot whose frame the poses are in.
+  bool settled = false;
+  std::vector<RobotId> members;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("rounds", rounds);
+    visitor.field("seconds", seconds);
+    visitor.field("cost", cost);
+    visitor.field("gradient_norm", gradient_norm);
+    visitor.field("anchor", anchor);
+    visitor.field("settled", settled);
+    visitor.field("members", members);
+  }
+  bool operator==(const OptimizerSummary&) const = default;
+};
+
+/// Frames that went into the map, why others did not, and the mesh in the end.
+struct MappingSummary {
+  std::uint64_t frames = 0, skipped_wrong_size = 0, skipped_bad_pose = 0, skipped_too_late = 0;
+  std::uint64_t without_labels = 0, label_pixels_outside_palette = 0;
+  std::uint64_t blocks_refused = 0;  ///< For want of semantic_mapping.max_blocks.
+  std::uint64_t blocks = 0, vertices = 0, faces = 0, superseded_faces_dropped = 0;
+  std::uint64_t corrections = 0, moves_as_a_whole = 0;
+  double correction_seconds = 0.0;
+  std::uint64_t unbound_vertices = 0;  ///< In the last correction.
+
+  void visit_fields(auto& visitor) {
+    visitor.field("frames", frames);
+    visitor.field("skipped_wrong_size", skipped_wrong_size);
+    visitor.field("skipped_bad_pose", skipped_bad_pose);
+    visitor.field("skipped_too_late", skipped_too_late);
+    visitor.field("without_labels", without_labels);
+    visitor.field("label_pixels_outside_palette", label_pixels_outside_palette);
+    visitor.field("blocks_refused", blocks_refused);
+    visitor.field("blocks", blocks);
+    visitor.field("vertices", vertices);
+    visitor.field("faces", faces);
+    visitor.field("superseded_faces_dropped", superseded_faces_dropped);
+    visitor.field("corrections", corrections);
+    visitor.field("moves_as_a_whole", moves_as_a_whole);
+    visitor.field("correction_seconds", correction_seconds);
+    visitor.field("unbound_vertices", unbound_vertices);
+  }
+  bool operator==(const MappingSummary&) const = default;
+};
+
+/// By category of the traffic.
+struct TrafficSums {
+  std::map<std::string, std::uint64_t> messages, bytes;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("messages", messages);
+    visitor.field("bytes", bytes);
+  }
+  bool operator==(const TrafficSums&) const = default;
+};
+
+/// What the budget has held back, once per message: see HeldBack of the runtime.
+struct HeldBackSums {
+  TrafficSums delayed, superseded, dropped;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("delayed", delayed);
+    visitor.field("superseded", superseded);
+    visitor.field("dropped", dropped);
+  }
+  bool operator==(const HeldBackSums&) const = default;
+};
+
+/// What the process took of the machine.
+struct ProcessSummary {
+  double cpu_s = 0.0;
+  std::uint64_t peak_memory_bytes = 0;
+  std::uint64_t memory_at_start_bytes = 0;
+  std::uint64_t memory_at_end_bytes = 0;
+  /// Slope of the line of least squares through the second half of the time; absent if that is
+  /// less than a minute: what is taken at the start is no growth.
+  std::optional<double> memory_growth_bytes_per_minute;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("cpu_s", cpu_s);
+    visitor.field("peak_memory_bytes", peak_memory_bytes);
+    visitor.field("memory_at_start_bytes", memory_at_start_bytes);
+    visitor.field("memory_at_end_bytes", memory_at_end_bytes);
+    visitor.field("memory_growth_bytes_per_minute", memory_growth_bytes_per_minute);
+  }
+  bool operator==(const ProcessSummary&) const = default;
+};
+
 /// What a robot's run came to: summary.json, and the robot's part of a team's --json. The names in
 /// visit_fields are the keys; they are written and read in this order. An absent optional has no
 /// key; NaN is written as null.
 struct RunSummary {
-  /// Of the team's optimiser, as this robot knows it.
-  struct Optimizer {
-    std::uint64_t rounds = 0;
-    double seconds = 0.0;  ///< Of this robot's work.
-    double cost = 0.0;
-    double gradient_norm = 0.0;
-    std::optional<RobotId> anchor;  ///< Robot whose frame the poses are in.
-    bool settled = false;
-    std::vector<RobotId> members;
-
-    void visit_fields(auto& visitor) {
-      visitor.field("rounds", rounds);
-      visitor.field("seconds", seconds);
-      visitor.field("cost", cost);
-      visitor.field("gradient_norm", gradient_norm);
-      visitor.field("anchor", anchor);
-      visitor.field("settled", settled);
-      visitor.field("members", members);
-    }
-    bool operator==(const Optimizer&) const = default;
-  };
-
-  /// Frames that went into the map, why others did not, and the mesh in the end.
-  struct Mapping {
-    std::uint64_t frames = 0, skipped_wrong_size = 0, skipped_bad_pose = 0, skipped_too_late = 0;
-    std::uint64_t without_labels = 0, label_pixels_outside_palette = 0;
-    std::uint64_t blocks_refused = 0;  ///< For want of semantic_mapping.max_blocks.
-    std::uint64_t blocks = 0, vertices = 0, faces = 0, superseded_faces_dropped = 0;
-    std::uint64_t corrections = 0, moves_as_a_whole = 0;
-    double correction_seconds = 0.0;
-    std::uint64_t unbound_vertices = 0;  ///< In the last correction.
-
-    void visit_fields(auto& visitor) {
-      visitor.field("frames", frames);
-      visitor.field("skipped_wrong_size", skipped_wrong_size);
-      visitor.field("skipped_bad_pose", skipped_bad_pose);
-      visitor.field("skipped_too_late", skipped_too_late);
-      visitor.field("without_labels", without_labels);
-      visitor.field("label_pixels_outside_palette", label_pixels_outside_palette);
-      visitor.field("blocks_refused", blocks_refused);
-      visitor.field("blocks", blocks);
-      visitor.field("vertices", vertices);
-      visitor.field("faces", faces);
-      visitor.field("superseded_faces_dropped", superseded_faces_dropped);
-      visitor.field("corrections", corrections);
-      visitor.field("moves_as_a_whole", moves_as_a_whole);
-      visitor.field("correction_seconds", correction_seconds);
-      visitor.field("unbound_vertices", unbound_vertices);
-    }
-    bool operator==(const Mapping&) const = default;
-  };
-
-  /// By category of the traffic.
-  struct Counts {
-    std::map<std::string, std::uint64_t> messages, bytes;
-
-    void visit_fields(auto& visitor) {
-      visitor.field("messages", messages);
-      visitor.field("bytes", bytes);
-    }
-    bool operator==(const Counts&) const = default;
-  };
-
-  /// What the budget has held back, once per message: see HeldBack of the runtime.
-  struct HeldBack {
-    Counts delayed, superseded, dropped;
-
-    void visit_fields(auto& visitor) {
-      visitor.field("delayed", delayed);
-      visitor.field("superseded", superseded);
-      visitor.field("dropped", dropped);
-    }
-    bool operator==(const HeldBack&) const = default;
-  };
-
-  /// What the process took of the machine.
-  struct Process {
-    double cpu_s = 0.0;
-    std::uint64_t peak_memory_bytes = 0;
-    std::uint64_t memory_at_start_bytes = 0;
-    std::uint64_t memory_at_end_bytes = 0;
-    /// Slope of the line of least squares through the second half of the time; absent if that is
-    /// less than a minute: what is taken at the start is no growth.
-    std::optional<double> memory_growth_bytes_per_minute;
-
-    void visit_fields(auto& visitor) {
-      visitor.field("cpu_s", cpu_s);
-      visitor.field("peak_memory_bytes", peak_memory_bytes);
-      visitor.field("memory_at_start_bytes", memory_at_start_bytes);
-      visitor.field("memory_at_end_bytes", memory_at_end_bytes);
-      visitor.field("memory_growth_bytes_per_minute", memory_growth_bytes_per_minute);
-    }
-    bool operator==(const Process&) const = default;
-  };
-
   RobotId robot = 0;
   std::string name;
   std::uint64_t keyframes = 0;
@@ -132,11 +132,11 @@ struct RunSummary {
   std::uint64_t frames = 0;          ///< Stereo pairs played.
   std::uint64_t frames_skipped = 0;  ///< Pairs that odometry was too slow for.
   ClosureCounts closures;            ///< That this robot found.
-  Optimizer pgo;
-  std::optional<Mapping> mapping;                ///< Absent where mapping is off.
+  OptimizerSummary pgo;
+  std::optional<MappingSummary> mapping;         ///< Absent where mapping is off.
   std::map<std::string, std::uint64_t> traffic;  ///< Bytes sent, by category.
-  std::optional<HeldBack> held_back;             ///< Absent without a budget.
-  Process process;
+  std::optional<HeldBackSums> held_back;         ///< Absent without a budget.
+  ProcessSummary process;
   double seconds = 0.0;  ///< Wall time of the run.
   /// Robots that went silent and did not come back, and for how long they had been silent [s].
   std::map<std::string, double> lost_peers;

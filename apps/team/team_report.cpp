@@ -107,7 +107,7 @@ std::string closure_table(const TeamResult& team) {
   RunSummary sum;
   for (const RobotResult& robot : team.robots) {
     const RunSummary summary = robot.summary.value_or(RunSummary{});
-    const RunSummary::Optimizer& pgo = summary.pgo;
+    const OptimizerSummary& pgo = summary.pgo;
     add(robot.plan.name, summary);
     append(rows.back(), {fixed(pgo.cost, 3), pgo.anchor ? std::to_string(*pgo.anchor) : "-",
                          std::to_string(pgo.members.size()) + " robots"});

@@ -142,7 +142,7 @@ std::optional<ClosureScores> judge_closures(const TeamPlan& plan,
 // its own.
 std::optional<RobotId> frame_of(const RobotResult& robot) {
   if (!robot.summary) return std::nullopt;
-  const RunSummary::Optimizer& pgo = robot.summary->pgo;
+  const OptimizerSummary& pgo = robot.summary->pgo;
   return pgo.members.size() > 1 ? pgo.anchor : robot.plan.id;
 }
 

@@ -18,7 +18,7 @@ bool rigid(const LiftedPoses& X) {
 
 }  // namespace
 
-CentralSolver::CentralSolver(std::vector<BlockEdge> edges, LiftedPoses start, int dimension,
+CentralSolver::CentralSolver(const std::vector<BlockEdge>& edges, LiftedPoses start, int dimension,
                              const StaircaseOptions& options, std::vector<VerticalPrior> verticals)
     : staircase_(edges, start, options, verticals) {
   if (!rigid(start)) return;

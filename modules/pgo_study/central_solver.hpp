@@ -18,7 +18,7 @@ class CentralSolver {
   /// `start`: r x 4n, z up if there are verticals; unless it holds rigid poses (r = 3) the
   /// staircase begins with it at once. `dimension` 2: poses and measurements are planar. Throws
   /// std::invalid_argument if `edges` or `verticals` are not usable, see QuadraticProblem.
-  CentralSolver(std::vector<BlockEdge> edges, LiftedPoses start, int dimension,
+  CentralSolver(const std::vector<BlockEdge>& edges, LiftedPoses start, int dimension,
                 const StaircaseOptions& options = {}, std::vector<VerticalPrior> verticals = {});
 
   /// One Newton step, or one verification. False: all is done.

@@ -200,6 +200,7 @@ std::vector<int> parallel_edges(const std::vector<BlockEdge>& edges) {
   std::map<std::pair<Index, Index>, int> count;
   for (const BlockEdge& e : edges) ++count[pair_of(e)];
   std::vector<int> others;
+  others.reserve(edges.size());
   for (const BlockEdge& e : edges) others.push_back(count[pair_of(e)] - 1);
   return others;
 }

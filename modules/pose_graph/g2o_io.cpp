@@ -95,7 +95,7 @@ template <int N>
 EdgeCovariance<N> read_covariance(TextFields& fields) {
   const Eigen::Matrix<double, N, N> information = read_information<N>(fields);
   const Eigen::LLT<Eigen::Matrix<double, N, N>> llt(information);
-  const EdgeCovariance<N> edge =
+  EdgeCovariance<N> edge =
       llt.info() != Eigen::Success
           ? covariance_of_blocks<N>(information, fields)
           : EdgeCovariance<N>{llt.solve(Eigen::Matrix<double, N, N>::Identity())};

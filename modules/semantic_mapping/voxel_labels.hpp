@@ -36,6 +36,7 @@ class VoxelLabels {
 
   /// Votes of an observation of weight in [0, 1]: rounded, at least one.
   [[nodiscard]] static unsigned votes_of(float weight) {
+    // NOLINTNEXTLINE(bugprone-incorrect-roundings): lround takes longer, and nothing is negative
     const auto votes = static_cast<unsigned>(weight * static_cast<float>(kVotesPerWeight) + 0.5F);
     return votes > 0 ? votes : 1;
   }

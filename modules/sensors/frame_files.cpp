@@ -35,6 +35,7 @@ std::vector<ListedImage> list_images(const std::filesystem::path& camera, Reader
 
 std::vector<Stamp> stamps_of(const std::vector<ListedImage>& images) {
   std::vector<Stamp> stamps;
+  stamps.reserve(images.size());
   for (const ListedImage& image : images) stamps.push_back(image.stamp);
   return stamps;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
@@ -143,7 +144,7 @@ DepthResult depth_image_of(const LoadedImage<cv::Mat>& decoded, const std::strin
   const double max_mm = std::min(1e3 * range.max_m, kMaxStored_mm);
   const auto stored = [&](double depth_mm) {
     const bool measured = depth_mm > 0.0 && depth_mm >= min_mm && depth_mm <= max_mm;  // not NaN
-    return measured ? static_cast<std::uint16_t>(depth_mm + 0.5) : std::uint16_t{0};
+    return measured ? static_cast<std::uint16_t>(std::lround(depth_mm)) : std::uint16_t{0};
   };
   DepthResult result;
   result.image = {image.cols, image.rows, std::vector<std::uint16_t>(image.total())};

@@ -14,7 +14,7 @@ constexpr const char* kPalette = "name,red,green,blue,alpha,id\nroad,1,2,3,255,1
 struct Recording {
   TemporaryFolder folder;
 
-  explicit Recording(std::initializer_list<const char*> sensors) {
+  Recording(std::initializer_list<const char*> sensors) {
     for (const char* sensor : sensors) fs::create_directories(folder.path() / "mav0" / sensor);
     folder.write("mav0/label_palette.csv", kPalette);
   }

@@ -32,7 +32,7 @@ TEST_CASE("The growth of memory is that of the second half of the time", "[robot
     csv.append(static_cast<double>(s),
                {.resident_bytes =
                     100 * kMega + (s < 60 ? 2 * kMega * s : 120 * kMega + per_s * (s - 60))});
-  const RunSummary::Process process = csv.summary();
+  const ProcessSummary process = csv.summary();
   CHECK(process.memory_at_start_bytes == 100 * kMega);
   CHECK(process.memory_at_end_bytes == 220 * kMega + 60 * per_s);
   REQUIRE(process.memory_growth_bytes_per_minute);

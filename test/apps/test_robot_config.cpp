@@ -15,7 +15,9 @@ namespace {
 // Converts to every member of an aggregate.
 struct Anything {
   template <typename T>
-  operator T() const;  // NOLINT(google-explicit-constructor)
+  operator T() const {  // NOLINT(google-explicit-constructor)
+    return T();
+  }
 };
 
 // How many members an aggregate has.

@@ -50,7 +50,7 @@ inline std::string robot_name(int robot) {
 }
 
 /// A finished run of kimera_multi_team: what it printed, and its --json.
-struct TeamRun {
+struct TeamRun {  // NOLINT(bugprone-exception-escape): JSON checks itself as it is moved
   CommandResult result;
   Json json;
 };
@@ -91,8 +91,8 @@ inline std::filesystem::path write_team(const SplitGraph& graph, const Temporary
   for (const auto& [robot, keyframes] : graph.keyframes) {
     write_part(graph, robot, folder.path());
     const std::string number = std::to_string(robot);
-    team += "  - {id: " + number + ", name: " + robot_name(robot) + ", graph: part" + number +
-            ".g2o}\n";
+    team.append("  - {id: ").append(number).append(", name: ").append(robot_name(robot));
+    team.append(", graph: part").append(number).append(".g2o}\n");
   }
   return folder.write("team.yaml", team);
 }
@@ -115,8 +115,8 @@ inline TeamResult read_team(const std::filesystem::path& folder, int robots) {
       team.poses.push_back(vertex.T_world_kf);
     }
   }
-  for (RobotId robot = 0; robot < robots; ++robot)
-    for (const RelativePose& edge : parts[robot].edges)
+  for (int robot = 0; robot < robots; ++robot)
+    for (const RelativePose& edge : parts[static_cast<std::size_t>(robot)].edges)
       if (edge.from.robot == robot)  // an edge between two robots is in the files of both
         team.graph.edges.push_back(block_edge(index_of.at(edge.from), index_of.at(edge.to), edge));
   return team;
