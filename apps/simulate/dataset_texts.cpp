@@ -22,8 +22,8 @@ void describe_rig(std::ostream& text, const SimulationOptions& options, const Se
   text << "## Sensors\n\n| sensor | figures |\n|---|---|\n"
        << "| cam0" << (options.cameras == CameraKind::kStereo ? ", cam1 | grey, " : " | grey, ")
        << left.width << 'x' << left.height << " px at " << number_text(options.rate_hz)
-       << " Hz, focal length " << std::setprecision(4) << left.fx
-       << " px, radial-tangential distortion";
+       << " Hz, focal length " << std::setprecision(4) << left.fx << " px, "
+       << to_string(left.lens.model()) << " distortion";
   if (options.cameras == CameraKind::kStereo)
     text << ", baseline " << std::setprecision(3) << rig.stereo.baseline_m() << " m";
   text << " |\n";

@@ -108,7 +108,8 @@ RobotScenario recorded_robot(const RecordedFlight& flight, const SimulationOptio
   RobotScenario scenario;
   scenario.name = options.names[robot];
   scenario.seed = derived_seed(options.seed, robot);
-  scenario.rig = default_rig(RigKind::kFlying, options.width, options.height);
+  scenario.rig =
+      options.rig ? *options.rig : default_rig(RigKind::kFlying, options.width, options.height);
   scenario.images = recorded_stamps(flight, options);
   if (scenario.images.empty())
     throw std::invalid_argument(

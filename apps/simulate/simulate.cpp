@@ -10,6 +10,7 @@
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <sstream>
 #include <vector>
 
 #include "apps/simulate/dataset_folder.hpp"
@@ -17,6 +18,7 @@
 #include "apps/simulate/frame_workers.hpp"
 #include "apps/simulate/recorded_flight.hpp"
 #include "apps/simulate/robot_scenario.hpp"
+#include "modules/core/bytes.hpp"
 #include "modules/simulation/dataset/recording_files.hpp"
 #include "modules/simulation/dataset/recording_texts.hpp"
 #include "modules/simulation/motion/default_rig.hpp"
@@ -53,6 +55,18 @@ double frame_bytes(const SimulationOptions& options) {
   if (options.labels) bytes += 0.05;
   if (options.color) bytes += 1.3 * gray;
   return bytes * pixels;
+}
+
+// Of all that is written of a rig.
+std::string fingerprint(const SensorRig& rig) {
+  const std::string text = camera_yaml(rig.stereo.cameras[0], 1.0, "left") +
+                           camera_yaml(rig.stereo.cameras[1], 1.0, "right") +
+                           imu_yaml(rig.imu, "imu");
+  std::uint64_t hash = kFnv1aBasis;
+  for (const char c : text) mix_fnv1a(hash, static_cast<std::uint64_t>(c));
+  std::ostringstream digits;
+  digits << "fnv1a " << std::hex << hash;
+  return digits.str();
 }
 
 DepthSensorOptions depth_sensor(const SensorRig& rig, bool ideal) {
@@ -436,6 +450,8 @@ SimulationOutcome simulate(const SimulationOptions& options, SignalWatch& signal
     flights.push_back(read_recorded_flight(options.truths[i], options.imus[i]));
     record.parameters.emplace_back("recording " + options.names[i], flights.back().fingerprint);
   }
+  if (options.rig)
+    record.parameters.emplace_back("recording calibration", fingerprint(*options.rig));
   DatasetFolder folder(options.output, record);
   if (folder.is_complete()) {
     const std::size_t missing = missing_files(options);

@@ -10,6 +10,7 @@
 #include <thread>
 #include <tuple>
 
+#include "modules/sensors/rig_calibration_codec.hpp"
 #include "modules/simulation/dataset/number_text.hpp"
 #include "runtime/yaml_config.hpp"
 
@@ -125,6 +126,16 @@ void complete_recorded(SimulationOptions& options) {
   options.robots = static_cast<int>(options.truths.size());
 }
 
+// With them the cameras' resolution is not for the options to say.
+void complete_rig(SimulationOptions& options) {
+  RigChoice choice;
+  if (options.cameras == CameraKind::kRgbd) choice.depth = DepthRange{};
+  options.rig = read_rig(options.calibrations, choice).rig;
+  const Camera& left = options.rig->stereo.cameras[0];
+  options.width = left.width;
+  options.height = left.height;
+}
+
 void complete_names(const SimulationOptions& options) {
   std::set<std::string> seen;
   for (const std::string& name : options.names) {
@@ -147,12 +158,14 @@ SimulationOptions completed(SimulationOptions options) {
   if (options.is_recorded()) {
     complete_recorded(options);
   } else {
-    if (!options.imus.empty() || !options.names.empty() || options.start_s > 0.0 ||
-        options.end_s > 0.0)
-      throw std::invalid_argument("--imu, --names, --start and --end need --trajectory");
+    if (!options.imus.empty() || !options.calibrations.empty() || !options.names.empty() ||
+        options.start_s > 0.0 || options.end_s > 0.0)
+      throw std::invalid_argument(
+          "--imu, --calibration, --names, --start and --end need --trajectory");
     for (int i = 0; i < options.robots; ++i) options.names.push_back("robot" + std::to_string(i));
   }
   complete_names(options);
+  if (!options.calibrations.empty()) complete_rig(options);
   if (options.cameras == CameraKind::kRgbd) options.depth = true;
   if (!options.depth && (options.depth_rate_hz > 0.0 || options.ideal_depth))
     throw std::invalid_argument("--depth-rate and --ideal-depth need --depth or --rig rgbd");
@@ -212,6 +225,7 @@ std::string command_line(const SimulationOptions& options) {
   const auto file_name = [](const std::filesystem::path& file) { return file.filename().string(); };
   add(" --trajectory", options.truths, file_name);
   add(" --imu", options.imus, file_name);
+  add(" --calibration", options.calibrations, file_name);
   if (options.is_recorded())
     add(" --names", options.names, [](const std::string& name) { return name; });
   return text + " --output DIR";

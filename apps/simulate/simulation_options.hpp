@@ -3,9 +3,11 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "modules/core/camera.hpp"
 #include "modules/core/config.hpp"
 #include "modules/simulation/dataset/dataset_record.hpp"
 #include "modules/simulation/dataset/image_encoding.hpp"
@@ -42,14 +44,16 @@ struct SimulationOptions {
   ImageFormat format = ImageFormat::kJpeg;
   std::vector<std::filesystem::path> truths;
   std::vector<std::filesystem::path> imus;
+  std::vector<std::filesystem::path> calibrations;
   std::vector<std::string> names;
   double start_s = 0.0;
   double end_s = 0.0;
   std::filesystem::path output;
   int threads = 0;
 
-  int width = 752;   ///< [px], as `resolution` says.
-  int height = 480;  ///< [px]
+  int width = 752;               ///< [px], as `resolution` says, or `rig`.
+  int height = 480;              ///< [px]
+  std::optional<SensorRig> rig;  ///< As `calibrations` say.
 
   [[nodiscard]] bool is_recorded() const { return !truths.empty(); }
 
@@ -76,6 +80,9 @@ struct SimulationOptions {
                   "Recorded motion: true poses of flights, one file per robot: EuRoC's state CSV "
                   "or TUM text, also gzipped; in the frame of the world");
     visitor.field("imu", imus, Input{}, "The recorded inertial data, one CSV per --trajectory");
+    visitor.field("calibration", calibrations, Input{},
+                  "The sensors of recorded motion: a folder of EuRoC, one or two files of Kalibr, "
+                  "or one of Basalt (default: EuRoC's, its cameras scaled to the resolution)");
     visitor.field("names", names, "Names of the robots of recorded motion (default: the files')");
     visitor.field("start", start_s, {0.0, kDay_s},
                   "Of recorded motion: first image [s since the first true pose]");
@@ -91,8 +98,9 @@ struct SimulationOptions {
 /// command line has the last word. What is wrong with either is refused together, by name and line.
 void define(CLI::App& app, SimulationOptions& options);
 
-/// What follows from what was given: names, the number of robots, the depth's rate. Throws
-/// std::invalid_argument for options that contradict each other.
+/// What follows from what was given: names, the number of robots, the depth's rate, the rig of the
+/// files of calibration. Throws std::invalid_argument for options that contradict each other, and
+/// DatasetError as read_rig() does.
 [[nodiscard]] SimulationOptions completed(SimulationOptions options);
 
 /// Everything the bytes of the recordings depend on; neither threads nor the output's place.

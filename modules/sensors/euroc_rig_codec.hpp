@@ -11,9 +11,8 @@ namespace km {
 /// Without a folder cam1 it is an RGB-D rig: depth0 in place of the right camera. The body frame is
 /// the IMU's: T_body_cam = T_BS(imu0)^-1 T_BS(cam). Rotations that are orthonormal to 1e-3 are
 /// replaced by the nearest rotation. Throws DatasetError, naming file and line, for a missing file
-/// or key, a T_BS that is not a rigid transform (with how far off it is), a camera or distortion
-/// model other than pinhole with four radial-tangential coefficients, and numbers that no sensor
-/// has (the limits are named in the .cpp: noise, rates, focal lengths, levers).
+/// or key, a T_BS that is not a rigid transform (with how far off it is), models that read_camera()
+/// refuses, and numbers that no sensor has (calibration_limits.hpp).
 ///
 /// depth0/sensor.yaml: T_BS, resolution, intrinsics and, where given, distortion are those of cam0,
 /// else it is refused, as depth must be aligned with the left image. Optional keys: `depth_scale`

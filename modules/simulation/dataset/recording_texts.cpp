@@ -2,7 +2,9 @@
 
 #include <array>
 #include <bit>
+#include <span>
 #include <sstream>
+#include <vector>
 
 #include "modules/simulation/dataset/number_text.hpp"
 
@@ -30,16 +32,59 @@ std::string extrinsics(const SE3& T_body_sensor) {
   return text.str();
 }
 
+std::string list_text(std::span<const double> values) {
+  std::string text = "[";
+  for (std::size_t i = 0; i < values.size(); ++i)
+    text += (i == 0 ? "" : ", ") + number_text(values[i]);
+  return text + ']';
+}
+
+// As Kalibr names a lens: camera_model with what stands before fu in its intrinsics, and
+// distortion_model with its coefficients.
+struct LensTexts {
+  const char* camera_model = "pinhole";
+  std::span<const double> first = {};
+  const char* first_names = "";
+  const char* distortion_model = "radial-tangential";
+  std::span<const double> coefficients = {};
+  const char* names = "k1, k2, p1, p2";
+};
+
+LensTexts texts_of(const Lens& lens) {
+  const std::span<const double> k = lens.coefficients();
+  switch (lens.model()) {
+    case LensModel::kRadialTangential:
+      return {.coefficients = k,
+              .names = k.size() == 4 ? "k1, k2, p1, p2" : "k1, k2, p1, p2, k3, ..."};
+    case LensModel::kEquidistant:
+      return {.distortion_model = "equidistant", .coefficients = k, .names = "k1, k2, k3, k4"};
+    case LensModel::kOmnidirectional:
+      return {.camera_model = "omni",
+              .first = k.first(1),
+              .first_names = "xi, ",
+              .coefficients = k.subspan(1)};
+    case LensModel::kDoubleSphere:
+      return {.camera_model = "ds",
+              .first = k,
+              .first_names = "xi, alpha, ",
+              .distortion_model = "none",
+              .names = "none"};
+  }
+  return {};
+}
+
 std::string optics(const Camera& camera, double rate_hz) {
+  const LensTexts lens = texts_of(camera.lens);
+  const double scale = lens.first.empty() ? 1.0 : 1.0 + lens.first[0];  // see Lens
+  std::vector<double> intrinsics(lens.first.begin(), lens.first.end());
+  intrinsics.insert(intrinsics.end(), {scale * camera.fx, scale * camera.fy, camera.cx, camera.cy});
   std::ostringstream text;
   text << "rate_hz: " << number_text(rate_hz) << "\nresolution: [" << camera.width << ", "
-       << camera.height << "]\ncamera_model: pinhole\nintrinsics: [" << number_text(camera.fx)
-       << ", " << number_text(camera.fy) << ", " << number_text(camera.cx) << ", "
-       << number_text(camera.cy) << "]  # fu, fv, cu, cv [px]\n"
-       << "distortion_model: radial-tangential\ndistortion_coefficients: [";
-  const std::span<const double> k = camera.lens.coefficients();
-  for (std::size_t i = 0; i < k.size(); ++i) text << (i == 0 ? "" : ", ") << number_text(k[i]);
-  text << "]  # k1, k2, p1, p2\n";
+       << camera.height << "]\ncamera_model: " << lens.camera_model
+       << "\nintrinsics: " << list_text(intrinsics) << "  # " << lens.first_names
+       << "fu, fv, cu, cv [px]\ndistortion_model: " << lens.distortion_model
+       << "\ndistortion_coefficients: " << list_text(lens.coefficients) << "  # " << lens.names
+       << '\n';
   return text.str();
 }
 

@@ -88,6 +88,36 @@ TEST_CASE("Recorded motion needs a pair of files for each robot", "[simulate]") 
   CHECK(options.robots == 2);
 }
 
+TEST_CASE("Recorded motion may be that of another rig", "[simulate]") {
+  const TemporaryFolder folder;
+  const std::string flight = folder.write("room1.csv", "").string();
+  std::string camera =
+      "  camera_model: pinhole\n  distortion_model: equidistant\n"
+      "  distortion_coeffs: [0.003, 0.0007, -0.002, 0.0002]\n"
+      "  intrinsics: [190.9, 190.9, 254.9, 256.9]\n  resolution: [512, 510]\n";
+  const std::string chain =
+      folder
+          .write("camchain.yaml",
+                 "cam0:\n  T_cam_imu: [[1,0,0,0], [0,1,0,0], [0,0,1,0], [0,0,0,1]]\n" + camera +
+                     "cam1:\n  T_cam_imu: [[1,0,0,-0.1], [0,1,0,0], [0,0,1,0], [0,0,0,1]]\n" +
+                     camera)
+          .string();
+  const std::vector<std::string> recorded = {"--world",      "vicon_room", "--output", "x",
+                                             "--trajectory", flight,       "--imu",    flight};
+  CHECK_FALSE(parse(recorded).rig.has_value());
+  std::vector<std::string> words = recorded;
+  words.insert(words.end(), {"--calibration", chain});
+  const auto options = parse(words);
+  REQUIRE(options.rig.has_value());
+  CHECK(options.rig->stereo.cameras[0].lens.model() == LensModel::kEquidistant);
+  CHECK(options.width == 512);
+  CHECK(options.height == 510);
+  CHECK_THAT(command_line(options), Catch::Contains(" --calibration camchain.yaml"));
+  CHECK_THAT(refusal({"--calibration", chain}), Catch::Contains("--calibration, --names"));
+  words.back() = flight;
+  CHECK_THROWS_WITH(parse(words), Catch::Contains("room1.csv"));
+}
+
 TEST_CASE("Options may come from a file, and the command line has the last word", "[simulate]") {
   const TemporaryFolder folder;
   const std::string file =

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <yaml-cpp/yaml.h>
+
+#include <cstddef>
+#include <filesystem>
+#include <initializer_list>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/config.hpp"
+
+namespace km {
+
+/// A map of keys in a calibration file, YAML or JSON (which is YAML), and the one way to say what
+/// is wrong with it: every getter throws DatasetError with file, line and key for what is missing
+/// or not what it should be.
+class CalibrationMap {
+ public:
+  /// Reads a whole file.
+  explicit CalibrationMap(const std::filesystem::path& file);
+
+  [[nodiscard]] const std::filesystem::path& file() const { return *file_; }
+  [[nodiscard]] bool has(const char* key) const;
+  [[nodiscard]] bool is_list(const char* key) const;
+  /// The first of `keys` that exists; nullptr if none does.
+  [[nodiscard]] const char* first_of(std::initializer_list<const char*> keys) const;
+
+  [[nodiscard]] CalibrationMap map(const char* key) const;
+  /// A list of maps.
+  [[nodiscard]] std::vector<CalibrationMap> maps(const char* key) const;
+
+  [[nodiscard]] std::string word(const char* key) const;
+  /// nullopt for what is not a number, infinite or not-a-number.
+  [[nodiscard]] std::optional<double> number(const char* key) const;
+  [[nodiscard]] double number(const char* key, const Bounds<double>& bounds) const;
+  /// The same, or `otherwise` without the key.
+  [[nodiscard]] double number(const char* key, const Bounds<double>& bounds,
+                              double otherwise) const;
+
+  /// All finite numbers of a list; of a list of lists, row after row.
+  [[nodiscard]] std::vector<double> numbers(const char* key) const;
+  /// `count` of them. `meaning` is said where there are not as many.
+  [[nodiscard]] std::vector<double> numbers(const char* key, std::size_t count,
+                                            const char* meaning) const;
+  /// A list of lists.
+  [[nodiscard]] std::vector<std::vector<double>> lists(const char* key) const;
+
+  /// A 4x4 matrix, row by row in one list or in four, its rotation made exact; see
+  /// transform_problem() for what is refused. `name` is what messages call it.
+  [[nodiscard]] SE3 transform(const char* key, const char* name) const;
+
+  /// Refuses the value of a key; of the map if there is no such key.
+  [[noreturn]] void fail(const char* key, const std::string& problem) const;
+  /// "FILE line N" of a key.
+  [[nodiscard]] std::string place_of(const char* key) const;
+
+ private:
+  CalibrationMap(std::shared_ptr<const std::filesystem::path> file, YAML::Node node)
+      : file_(std::move(file)), node_(std::move(node)) {}
+
+  [[nodiscard]] YAML::Node child(const char* key) const;
+  [[noreturn]] void fail(const YAML::Node& node, const std::string& problem) const;
+  [[nodiscard]] std::vector<double> numbers(const YAML::Node& node, const char* name) const;
+  void append(const YAML::Node& list, const char* name, std::vector<double>& values) const;
+
+  std::shared_ptr<const std::filesystem::path> file_;
+  YAML::Node node_;
+};
+
+}  // namespace km

@@ -1,0 +1,33 @@
+#pragma once
+
+#include "modules/core/camera.hpp"
+#include "modules/sensors/calibration_map_codec.hpp"
+
+namespace km {
+
+/// The camera, but for its place, that the keys `resolution`, `camera_model`, `intrinsics`,
+/// `distortion_model` and `coefficients_key` describe, which EuRoC's sensor.yaml and Kalibr's
+/// chains have in common:
+///
+///     pinhole  fu, fv, cu, cv             radtan: k1, k2, p1, p2[, k3[, k4, k5, k6]]
+///                                         equidistant: k1, k2, k3, k4
+///                                         none
+///     omni     xi, fu, fv, cu, cv         radtan: k1, k2, p1, p2; none
+///     ds       xi, alpha, fu, fv, cu, cv  none
+///
+/// EuRoC writes radial-tangential for radtan. Throws DatasetError, naming file, line, key and
+/// value, for other models and for what calibration_limits.hpp refuses.
+[[nodiscard]] Camera read_camera(const CalibrationMap& map, const char* coefficients_key);
+
+/// Reads `resolution` and the `intrinsics` of a pinhole into `camera`, whose lens stays as it is.
+/// Errors as above.
+void read_pinhole(const CalibrationMap& map, Camera& camera);
+
+/// The lens of a calibration; what Lens refuses is refused with the place of `key`.
+[[nodiscard]] Lens lens_of(const CalibrationMap& map, const char* key, LensModel model,
+                           const std::vector<double>& coefficients);
+
+/// Refuses focal lengths and principal points that no camera has, with the place of `key`.
+void check_intrinsics(const CalibrationMap& map, const char* key, const Camera& camera);
+
+}  // namespace km
