@@ -116,6 +116,25 @@ bool is_comma_separated(const Table& table) {
   return table.text.find(',') != std::string::npos;
 }
 
+std::vector<StampedPose> poses_of(const std::vector<TrueState>& truth) {
+  std::vector<StampedPose> poses;
+  poses.reserve(truth.size());
+  for (const TrueState& state : truth) poses.push_back({state.stamp, state.T_world_body});
+  return poses;
+}
+
+// What was done to gaps, in words; empty if there are none.
+std::string bridging(const BridgedPoses& motion) {
+  if (motion.gaps + motion.open_gaps == 0) return {};
+  std::array<char, 200> text{};
+  std::snprintf(text.data(), text.size(),
+                ", %zu gaps of the truth of up to %.2f s bridged by inertial data, which meets the "
+                "truth beside them to %.1f mm rms, %.1f mm at most; %zu gaps without such data",
+                motion.gaps, motion.longest_s, 1e3 * motion.rms_m, 1e3 * motion.max_m,
+                motion.open_gaps);
+  return text.data();
+}
+
 }  // namespace
 
 RecordedFlight read_recorded_flight(const fs::path& truth, const fs::path& imu) {
@@ -135,6 +154,8 @@ RecordedFlight read_recorded_flight(const fs::path& truth, const fs::path& imu) 
   if (flight.imu.back().stamp <= flight.truth.front().stamp ||
       flight.truth.back().stamp <= flight.imu.front().stamp)
     throw std::runtime_error(truth.string() + " and " + imu.string() + " do not overlap in time");
+  flight.motion = bridge_gaps(poses_of(flight.truth), flight.imu);
+  flight.fingerprint += bridging(flight.motion);
   return flight;
 }
 

@@ -6,6 +6,7 @@
 
 #include "modules/core/frame.hpp"
 #include "modules/simulation/dataset/recording_texts.hpp"
+#include "modules/simulation/motion/gap_bridge.hpp"
 
 namespace km {
 
@@ -13,7 +14,8 @@ namespace km {
 struct RecordedFlight {
   std::vector<TrueState> truth;  ///< Velocity and biases are zero where the file has none.
   std::vector<ImuSample> imu;
-  std::string fingerprint;  ///< Names and check sums of both files.
+  BridgedPoses motion;      ///< The true poses, and those in their gaps as bridge_gaps() has them.
+  std::string fingerprint;  ///< Names and check sums of both files, and what was bridged.
 };
 
 /// Reads true poses (EuRoC's state CSV, or TUM text with stamps in seconds) and inertial data

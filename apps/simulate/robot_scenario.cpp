@@ -116,8 +116,7 @@ RobotScenario recorded_robot(const RecordedFlight& flight, const SimulationOptio
         scenario.name + ": nothing was recorded between --start and --end; the flight lasts " +
         std::to_string(seconds_between(flight.truth.front().stamp, flight.truth.back().stamp)) +
         " s");
-  std::vector<StampedPose> poses;
-  for (const TrueState& state : flight.truth) poses.push_back({state.stamp, state.T_world_body});
+  const std::vector<StampedPose>& poses = flight.motion.poses;
   RecordedTrajectory fitted = fit_recording(poses, poses.front().stamp);
   scenario.epoch = fitted.epoch;
   scenario.trajectory = std::make_unique<SplineTrajectory>(std::move(fitted.trajectory));
