@@ -23,7 +23,7 @@ std::string heading(const char* type, const std::string& comment) {
 std::string extrinsics(const SE3& T_body_sensor) {
   std::ostringstream text;
   text << "T_BS:\n  cols: 4\n  rows: 4\n  data: [";
-  const Eigen::Matrix4d T = T_body_sensor.matrix();
+  const Eigen::Matrix4d& T = T_body_sensor.matrix();
   for (int row = 0; row < 4; ++row) {
     for (int column = 0; column < 4; ++column)
       text << number_text(T(row, column)) << (row == 3 && column == 3 ? "]\n\n" : ", ");

@@ -19,6 +19,7 @@ constexpr double kBlockTolerance_px = 0.5;  // by which something nearer must co
 
 // Half away from zero for positive values, which all are; std::round costs a call.
 double rounded(double positive) {
+  // NOLINTNEXTLINE(bugprone-incorrect-roundings)
   return static_cast<double>(static_cast<std::int64_t>(positive + 0.5));
 }
 

@@ -100,8 +100,8 @@ UniformSpline<3> gusts(const FlightOptions& options, double first_s) {
   GaussianRandom random(SeededRandom::stream(options.seed, 32));
   std::vector<Eigen::Vector3d> controls(5, Eigen::Vector3d::Zero());
   const double span_s = std::max(0.0, options.duration_s - first_s);
-  const double count = std::ceil(span_s / kGustInterval_s) + 6.0;
-  for (double k = 0.0; k < count; ++k)
+  const int count = static_cast<int>(std::ceil(span_s / kGustInterval_s)) + 6;
+  for (int k = 0; k < count; ++k)
     controls.push_back(options.gusts_m * random.draw3().cwiseMax(-kMaxGusts).cwiseMin(kMaxGusts));
   return {first_s, kGustInterval_s, std::move(controls)};
 }

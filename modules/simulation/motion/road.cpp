@@ -164,8 +164,8 @@ UniformSpline<1> random_walk(double begin_m, double end_m, double roughness, std
   GaussianRandom random{SeededRandom(seed)};
   std::vector<UniformSpline<1>::Vector> heights;
   UniformSpline<1>::Vector height(step / std::sqrt(1.0 - leak * leak) * random.draw());
-  const double intervals = std::ceil((end_m - begin_m) / kInterval_m);
-  for (double k = -5.0; k < intervals; ++k) {
+  const int intervals = static_cast<int>(std::ceil((end_m - begin_m) / kInterval_m));
+  for (int k = -5; k < intervals; ++k) {
     heights.push_back(height);
     height[0] = leak * height[0] + step * random.draw();
   }

@@ -168,8 +168,8 @@ constexpr double kQuinticShrink = 0.63;     // of white noise by the spline thro
 UniformSpline<1> wander(double begin_m, double end_m, std::uint64_t seed) {
   GaussianRandom random(SeededRandom::stream(seed, 21));
   std::vector<UniformSpline<1>::Vector> controls;
-  const double intervals = std::ceil((end_m - begin_m) / kWanderInterval_m);
-  for (double k = -5.0; k < intervals; ++k)
+  const int intervals = static_cast<int>(std::ceil((end_m - begin_m) / kWanderInterval_m));
+  for (int k = -5; k < intervals; ++k)
     controls.emplace_back(kWander_m / kQuinticShrink * std::clamp(random.draw(), -2.0, 2.0));
   return {begin_m, kWanderInterval_m, std::move(controls)};
 }

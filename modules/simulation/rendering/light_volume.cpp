@@ -125,7 +125,7 @@ class LightBake {
     RayPacket shadow;
     LaneMask facing = 0;
     for (int lane = 0; lane < kLanes; ++lane) {
-      if (!has_lane(hits, lane)) continue;
+      if (!has_lane(hits, static_cast<std::size_t>(lane))) continue;
       const SurfaceRecord& surface = surfaces_.record(rays.hit.primID[lane]);
       const Eigen::Vector3f d(rays.ray.dir_x[lane], rays.ray.dir_y[lane], rays.ray.dir_z[lane]);
       const Eigen::Vector3f o(rays.ray.org_x[lane], rays.ray.org_y[lane], rays.ray.org_z[lane]);
@@ -337,9 +337,10 @@ std::vector<std::uint8_t> LightVolume::mark(const SurfaceMesh& mesh, const Surfa
     const std::size_t first =
         static_cast<std::size_t>(index) * kBrickSamples +
         static_cast<std::size_t>((local.z() * kSide + local.y()) * kSide + local.x());
-    for (const std::size_t z : {0, kSide * kSide})
-      for (const std::size_t y : {0, kSide})
-        for (const std::size_t x : {0, 1}) wanted[first + z + y + x] = 1;
+    constexpr std::size_t kRow = kSide;
+    for (const std::size_t z : {std::size_t{0}, kRow * kRow})
+      for (const std::size_t y : {std::size_t{0}, kRow})
+        for (const std::size_t x : {0U, 1U}) wanted[first + z + y + x] = 1;
   };
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const SurfaceRecord& surface = surfaces.record(static_cast<std::uint32_t>(i));

@@ -60,7 +60,7 @@ void attach_mesh(RTCDevice device, RTCScene scene, const SurfaceMesh& mesh) {
   void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                           sizeof(mesh.triangles[0]), mesh.triangles.size());
   if (vertices != nullptr && indices != nullptr) {
-    std::memcpy(vertices, mesh.vertices.data(), kVertexBytes * mesh.vertices.size());
+    std::memcpy(vertices, mesh.vertices.front().data(), kVertexBytes * mesh.vertices.size());
     std::memcpy(indices, mesh.triangles.data(), sizeof(mesh.triangles[0]) * mesh.triangles.size());
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene, geometry);
