@@ -107,14 +107,15 @@ void FixedLagSmoother::clear() {
   window_.prior = {};
 }
 
-SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame) {
+SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
   SmootherUpdate update;
-  if (!slide() || !append(frame, window_.frames.back().state)) return update;
+  if (!slide(rests) || !append(frame, window_.frames.back().state)) return update;
   WindowFrame& newest = window_.frames.back();
   const OdometryState predicted = predict(window_.frames[window_.frames.size() - 2].state,
                                           newest.imu->imu(), config_.gravity_mps2);
   newest.state = predicted;
   newest.state.stamp = frame.tracked.stamp;
+  newest.rests = rests;
   observe(window_, frame.tracked);
   decide_keyframe();
   locate_landmarks();
@@ -153,9 +154,13 @@ std::size_t FixedLagSmoother::keyframes() const {
 
 void FixedLagSmoother::decide_keyframe() {
   const std::size_t now = window_.frames.size() - 1;
+  WindowFrame& newest = window_.frames[now];
+  if (newest.rests) {
+    newest.keyframe = !window_.frames[now - 1].rests;
+    return;
+  }
   std::size_t last = now - 1;
   while (last > 0 && !window_.frames[last].keyframe) --last;
-  WindowFrame& newest = window_.frames[now];
   const WindowFrame& keyframe = window_.frames[last];
   const double patience = locates_new(window_) ? 1.0 : kPatience;
   if (seconds_between(keyframe.state.stamp, newest.state.stamp) >=
@@ -285,11 +290,18 @@ void FixedLagSmoother::hold_first() {
   prior.J.block<3, 3>(7, 12).diagonal().setConstant(1.0 / config_.accel_bias_sigma);
 }
 
-bool FixedLagSmoother::slide() {
+bool FixedLagSmoother::slide(bool rests) {
   for (std::size_t k = window_.frames.size(); k-- > 1;) {
+    WindowFrame& frame = window_.frames[k];
     const bool recent =
         k + static_cast<std::size_t>(config_.window_recent) >= window_.frames.size();
-    if (!recent && !window_.frames[k].keyframe && !merge_out(k)) return false;
+    if (recent || frame.keyframe) continue;
+    if (rests && frame.rests && window_.frames[k - 1].rests)
+      rest_out(k);
+    else if (frame.samples.empty())
+      frame.keyframe = true;  // the last one at rest: what follows is measured from it
+    else if (!merge_out(k))
+      return false;
   }
   while (keyframes() > static_cast<std::size_t>(config_.window_keyframes))
     marginalize_oldest(window_);
@@ -308,6 +320,19 @@ bool FixedLagSmoother::merge_out(std::size_t frame) {
   later = std::move(samples);
   forget_frame(window_, frame);
   return set_imu(frame);
+}
+
+void FixedLagSmoother::rest_out(std::size_t frame) {
+  forget_frame(window_, frame);
+  const auto in_keyframe = [&](const WindowObservation& o) {
+    return window_.frames[o.frame].keyframe;
+  };
+  for (WindowLandmark& landmark : window_.landmarks)  // may have lost what told its distance
+    if (std::ranges::none_of(landmark.observations, in_keyframe)) landmark.located = false;
+  WindowFrame& later = window_.frames[frame];
+  later.samples.clear();
+  later.imu = ImuFactor::at_rest(
+      noise_, seconds_between(window_.frames[frame - 1].state.stamp, later.state.stamp));
 }
 
 }  // namespace km

@@ -34,6 +34,9 @@ struct SmootherUpdate {
 ///
 /// The window slides in two ways. An image that is not a keyframe and no longer recent is taken out
 /// with its observations, and the inertial factors on its two sides become one, integrated anew.
+/// While the body rests, only images are taken out: the first one at rest is a keyframe, that and
+/// the most recent ones are joined by ImuFactor::at_rest(), and the rest of the window waits. So
+/// however long it stands, the pose is measured from the same keyframes.
 /// The oldest keyframe is marginalised: its inertial factor, the prior, and the landmarks that it
 /// has seen are replaced by a prior on the rest (marginalize_oldest()). Derivatives by states in
 /// the prior are first estimates. To keep tracked landmarks, dropping only the oldest keyframe's
@@ -56,10 +59,10 @@ class FixedLagSmoother {
   void start(const InertialFrame& frame, const OdometryState& state,
              const StateCovariance& covariance);
 
-  /// Adds the next image. Precondition: start() succeeded. Where frame.samples do not cover the
-  /// time since the image before or make no inertial factor, the solution is not usable, and only
-  /// start() may follow.
-  [[nodiscard]] SmootherUpdate add(const InertialFrame& frame);
+  /// Adds the next image; `rests`: the body stands still. Precondition: start() succeeded. Where
+  /// frame.samples do not cover the time since the image before or make no inertial factor, the
+  /// solution is not usable, and only start() may follow.
+  [[nodiscard]] SmootherUpdate add(const InertialFrame& frame, bool rests = false);
 
   /// States now in the window, in order of time.
   [[nodiscard]] const Window& window() const { return window_; }
@@ -81,8 +84,9 @@ class FixedLagSmoother {
   // These are false where an inertial factor cannot be made. The state is taken by value: it may be
   // the window's.
   [[nodiscard]] bool append(const InertialFrame& frame, OdometryState state);
-  [[nodiscard]] bool slide();
+  [[nodiscard]] bool slide(bool rests);
   [[nodiscard]] bool merge_out(std::size_t frame);
+  void rest_out(std::size_t frame);
   [[nodiscard]] bool set_imu(std::size_t frame);
   void decide_keyframe();
   int reject_outliers();

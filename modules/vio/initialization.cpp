@@ -4,11 +4,11 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <optional>
 #include <stdexcept>
 
 #include "modules/core/lie.hpp"
+#include "modules/vio/rest_detector.hpp"
 #include "modules/vio/window.hpp"
 
 namespace km {
@@ -108,21 +108,6 @@ std::optional<Preintegrations> preintegrate(std::span<const InertialFrame> frame
       return std::nullopt;
   }
   return all;
-}
-
-// Median distance of the features seen in both images [px]; nullopt if they are too few to tell.
-std::optional<double> image_motion(const TrackedFrame& a, const TrackedFrame& b, double focal_px) {
-  constexpr std::size_t kMinFeatures = 15;
-  std::map<std::uint64_t, Eigen::Vector2d> first;
-  for (const TrackedFeature& feature : a.features) first.emplace(feature.id, feature.left);
-  std::vector<double> distances;
-  for (const TrackedFeature& feature : b.features)
-    if (const auto it = first.find(feature.id); it != first.end())
-      distances.push_back(focal_px * (feature.left - it->second).norm());
-  if (distances.size() < kMinFeatures) return std::nullopt;
-  const auto median = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), median, distances.end());
-  return *median;
 }
 
 // Means of the samples, and how far those of the first and the second half are apart: rotors that
@@ -259,7 +244,7 @@ StartGuess guess_start(std::span<const InertialFrame> frames, const SensorRig& r
   if (frames.size() < kMinStartImages) return guess;
   const InertialMean mean = inertial_mean(frames);
   const double focal_px = rig.stereo.cameras[0].fx;
-  const auto motion_px = image_motion(frames.front().tracked, frames.back().tracked, focal_px);
+  const auto motion_px = image_motion_px(frames.front().tracked, frames.back().tracked, focal_px);
   guess.image_motion_px = motion_px.value_or(0.0);
   const bool weighs = is_gravity(mean.accel.norm(), config.gravity_mps2);
   if (motion_px && weighs && *motion_px < config.rest_parallax_px &&

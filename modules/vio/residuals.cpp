@@ -6,6 +6,17 @@
 #include "modules/core/lie.hpp"
 
 namespace km {
+namespace {
+
+using Vector9 = Eigen::Matrix<double, 9, 1>;
+
+// Standard deviations of what may change at rest: a body that begins to move is noticed when the
+// image has moved by a pixel or two, 2 mrad each, of what is a few metres away.
+constexpr double kRestRotation_rad = 4e-3;
+constexpr double kRestSpeed_mps = 0.02;
+constexpr double kRestPosition_m = 0.01;
+
+}  // namespace
 
 ViewModel view_model(const Camera& camera, double noise_px) {
   const SE3 T_cam_body = camera.T_body_cam.inverse();
@@ -65,13 +76,23 @@ std::optional<ImuFactor> ImuFactor::of(const ImuPreintegration& imu, double grav
     return std::nullopt;
   const Matrix9 sqrt_information = llt.matrixL().solve(Matrix9::Identity());
   if (!sqrt_information.allFinite()) return std::nullopt;
-  return ImuFactor(imu, gravity_mps2, sqrt_information);
+  return ImuFactor(imu, gravity_mps2, sqrt_information, imu.dt_s());
+}
+
+ImuFactor ImuFactor::at_rest(const ImuNoise& noise, double dt_s) {
+  // No sample: Eq. (45) over no time compares the states themselves.
+  const ImuPreintegration none(noise, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+  Vector9 weight;
+  weight << Eigen::Vector3d::Constant(1.0 / kRestRotation_rad),
+      Eigen::Vector3d::Constant(1.0 / kRestSpeed_mps),
+      Eigen::Vector3d::Constant(1.0 / kRestPosition_m);
+  return {none, 0.0, weight.asDiagonal(), dt_s};
 }
 
 ImuFactor::ImuFactor(const ImuPreintegration& imu, double gravity_mps2,
-                     const Matrix9& sqrt_information)
+                     const Matrix9& sqrt_information, double walk_s)
     : imu_(imu), gravity_odom_(0.0, 0.0, -gravity_mps2), sqrt_information_(sqrt_information) {
-  const double sqrt_dt = std::sqrt(imu.dt_s());
+  const double sqrt_dt = std::sqrt(walk_s);
   gyro_walk_weight_ = 1.0 / (imu.noise().gyro_random_walk * sqrt_dt);
   accel_walk_weight_ = 1.0 / (imu.noise().accel_random_walk * sqrt_dt);
 }

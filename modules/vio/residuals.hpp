@@ -73,6 +73,11 @@ class ImuFactor {
   [[nodiscard]] static std::optional<ImuFactor> of(const ImuPreintegration& imu,
                                                    double gravity_mps2);
 
+  /// Between two instants `dt_s` of one rest apart, in place of samples: pose and velocity are
+  /// equal as far as RestDetector can tell, biases walk. imu() is empty. Precondition: they walk by
+  /// `noise`, dt_s > 0.
+  [[nodiscard]] static ImuFactor at_rest(const ImuNoise& noise, double dt_s);
+
   [[nodiscard]] const ImuPreintegration& imu() const { return imu_; }
 
   /// Whitened error.
@@ -84,7 +89,8 @@ class ImuFactor {
                                   const OdometryState& lin_i, const OdometryState& lin_j) const;
 
  private:
-  ImuFactor(const ImuPreintegration& imu, double gravity_mps2, const Matrix9& sqrt_information);
+  ImuFactor(const ImuPreintegration& imu, double gravity_mps2, const Matrix9& sqrt_information,
+            double walk_s);
 
   ImuPreintegration imu_;
   Eigen::Vector3d gravity_odom_;

@@ -52,7 +52,8 @@ Vio::Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, cons
       rig_(rig),
       config_(checked(config)),
       tracker_(rig.stereo, tracker),
-      smoother_(rig, config) {}
+      smoother_(rig, config),
+      rest_detector_(config, rig.stereo.cameras[0].fx) {}
 
 void Vio::continue_from(const VioCheckpoint& checkpoint) {
   last_ = checkpoint.state;
@@ -214,7 +215,11 @@ void Vio::continue_from_last_pose(std::vector<OdometryState>& states) const {
 }
 
 void Vio::advance(const Held& held, VioResult& result) {
-  result.smoother = smoother_.add(held.data);
+  const bool rested = smoother_.window().frames.back().rests;
+  const bool rests = rest_detector_.add(held.data, *last_);
+  statistics_.rests += rests && !rested;
+  if (rests) rested_s_ += seconds_between(last_->stamp, held.frame->stamp);
+  result.smoother = smoother_.add(held.data, rests);
   if (locates_points(*held.frame)) {
     const auto& seen = held.data.tracked.features;
     const auto locatable =
@@ -267,7 +272,7 @@ bool Vio::locates_points(const StereoFrame& frame) const {
 
 bool Vio::due(const OdometryState& state, const StereoFrame& frame) const {
   if (!locates_points(frame)) return false;  // no keyframe to close a loop with; a better one comes
-  const double dt = seconds_between(last_keyframe_->stamp, state.stamp);
+  const double dt = moved_s(state.stamp);
   if (dt < config_.output_interval_s - 1e-3) return false;
   if (dt >= config_.output_rest_interval_s) return true;
   const WindowFrame* previous = smoother_.frame_at(last_keyframe_->stamp);
@@ -275,6 +280,11 @@ bool Vio::due(const OdometryState& state, const StereoFrame& frame) const {
   const SE3 T = previous->state.T_odom_body.inverse() * state.T_odom_body;
   return T.translation().norm() >= config_.output_distance_m ||
          angle_of(T.linear()) >= config_.output_rotation_rad;
+}
+
+// Since the last keyframe, without rests.
+double Vio::moved_s(Stamp stamp) const {
+  return seconds_between(last_keyframe_->stamp, stamp) - rested_s_;
 }
 
 std::optional<Vertical> Vio::vertical_at(const OdometryState& state) const {
@@ -308,6 +318,7 @@ void Vio::hand_on_first(const OdometryState& state, VioResult& result) {
   }
   keyframe.state_covariance = state_covariance_at(state);
   last_keyframe_ = keyframe;
+  rested_s_ = 0.0;
   result.keyframes.push_back(keyframe);
 }
 
@@ -322,7 +333,7 @@ void Vio::hand_on(const OdometryState& state, VioResult& result) {
                : last_keyframe_->T_odom_kf.inverse() * T_chain_odom_ * state.T_odom_body;
   keyframe.covariance = restart_covariance();
   if (relative && is_usable(relative->Sigma)) {
-    const double dt = seconds_between(last_keyframe_->stamp, state.stamp);
+    const double dt = moved_s(state.stamp);
     Vector6 drift;  // variance
     drift.head<3>().setConstant(dt * config_.drift_rotation * config_.drift_rotation);
     drift.tail<3>().setConstant(dt * config_.drift_translation * config_.drift_translation);
@@ -332,6 +343,7 @@ void Vio::hand_on(const OdometryState& state, VioResult& result) {
   keyframe.T_odom_kf = last_keyframe_->T_odom_kf * keyframe.T_previous_kf;
   keyframe.state_covariance = state_covariance_at(state);
   last_keyframe_ = keyframe;
+  rested_s_ = 0.0;
   result.keyframes.push_back(keyframe);
 }
 

@@ -10,6 +10,7 @@
 #include "modules/vio/feature_tracker.hpp"
 #include "modules/vio/fixed_lag_smoother.hpp"
 #include "modules/vio/initialization.hpp"
+#include "modules/vio/rest_detector.hpp"
 #include "modules/vio/vio_config.hpp"
 
 namespace km {
@@ -35,6 +36,7 @@ struct VioStatistics {
   int divergences = 0;
   int starts = 0;
   int start_attempts = 0;
+  int rests = 0;                ///< Times that the body came to stand still.
   int images_without_pose = 0;  ///< Given up: no start was possible with them.
 };
 
@@ -59,8 +61,10 @@ struct VioCheckpoint {
 /// Stereo-inertial or RGB-D-inertial odometry: one call per image, a pose for every image.
 ///
 /// Images of the first VioConfig::start_s are held back; then all their poses come at once, and
-/// from there one pose per image. Bad input is refused and reported, an estimate that diverges
-/// starts anew from the last pose; neither throws. Deterministic; not thread-safe.
+/// from there one pose per image. No keyframes come of a body that stands still (RestDetector), and
+/// the next one is measured from the one before the rest. Bad input is refused and reported, an
+/// estimate that diverges starts anew from the last pose; neither throws. Deterministic; not
+/// thread-safe.
 class Vio {
  public:
   /// Throws ConfigError, and std::invalid_argument for an unusable rig.
@@ -95,6 +99,7 @@ class Vio {
   [[nodiscard]] bool plausible(const SmootherUpdate& update) const;
   void continue_from_last_pose(std::vector<OdometryState>& states) const;
   void take_up_or_hand_on_first(VioResult& result);
+  [[nodiscard]] double moved_s(Stamp stamp) const;
   void hand_on_first(const OdometryState& state, VioResult& result);
   void hand_on(const OdometryState& state, VioResult& result);
   [[nodiscard]] std::optional<StateCovariance> state_covariance_at(
@@ -109,6 +114,7 @@ class Vio {
   VioConfig config_;
   FeatureTracker tracker_;
   FixedLagSmoother smoother_;
+  RestDetector rest_detector_;
   VioStatistics statistics_;
   std::vector<ImuSample> samples_;  // From the last one not after the last image on.
   std::optional<Stamp> last_image_;
@@ -117,6 +123,7 @@ class Vio {
   int unlocated_images_ = 0;           // In a row: with many features and hardly a landmark.
   std::optional<OdometryState> last_;  // Last state that was given out.
   std::optional<KeyframeOdometry> last_keyframe_;
+  double rested_s_ = 0.0;               // Since then.
   SE3 T_chain_odom_ = SE3::Identity();  // From live odometry to the chain of keyframes.
 };
 

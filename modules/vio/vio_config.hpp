@@ -26,6 +26,7 @@ struct VioConfig {
   double rest_parallax_px = 1.0;
   double rest_accel_mps2 = 0.5;
   double rest_gyro_radps = 0.05;
+  double rest_s = 1.0;
   double output_interval_s = 0.3;
   double output_distance_m = 0.1;
   double output_rotation_rad = 0.1;
@@ -70,12 +71,16 @@ struct VioConfig {
     visitor.field("start_timeout_s", start_timeout_s, {0.5, 60.0},
                   "[s] still unable to start, odometry starts again with newer images");
     visitor.field("rest_parallax_px", rest_parallax_px, {0.0, 20.0},
-                  "[px] of image motion over the images held back: a start at rest needs less");
-    visitor.field(
-        "rest_accel_mps2", rest_accel_mps2, {0.0, 10.0},
-        "[m/s^2] and less change of the mean accelerometer from their first half to the second");
+                  "[px] of image motion over the images held back: a start at rest needs less, and "
+                  "later a rest over rest_s");
+    visitor.field("rest_accel_mps2", rest_accel_mps2, {0.0, 10.0},
+                  "[m/s^2] and less change of the mean accelerometer from their first half to the "
+                  "second, later from what the estimate explains");
     visitor.field("rest_gyro_radps", rest_gyro_radps, {0.0, 1.0},
                   "[rad/s] and of the mean gyroscope");
+    visitor.field("rest_s", rest_s, {0.1, 1e6},
+                  "[s] a body that has stood still for this long is at rest: no keyframes come "
+                  "of it until it moves");
     visitor.field("output_interval_s", output_interval_s, {0.0, 10.0},
                   "[s] a keyframe is handed on at least this long after the one before, and then");
     visitor.field("output_distance_m", output_distance_m, {0.0, 10.0},
@@ -83,7 +88,7 @@ struct VioConfig {
     visitor.field("output_rotation_rad", output_rotation_rad, {0.0, 3.2},
                   "[rad] or turned by this much");
     visitor.field("output_rest_interval_s", output_rest_interval_s, {0.1, 1e3},
-                  "[s] or, even at rest, after this long");
+                  "[s] or, even if it hardly moves, after this long; rests do not count");
     visitor.field(
         "drift_rotation", drift_rotation, {0.0, 0.1},
         "[rad/sqrt(s)] random walk per axis added to the covariance between keyframes: "

@@ -64,8 +64,9 @@ void VioNode::stop() noexcept {
   const VioStatistics& s = vio_.statistics();
   log::info(name()) << s.images << " images, " << s.images_without_pose << " without a pose, "
                     << s.starts << " starts in " << s.start_attempts << " attempts, "
-                    << s.divergences << " divergences, " << s.gaps << " inertial gaps; refused "
-                    << s.refused_images << " images, " << s.refused_samples << " samples";
+                    << s.divergences << " divergences, " << s.gaps << " inertial gaps, " << s.rests
+                    << " rests; refused " << s.refused_images << " images, " << s.refused_samples
+                    << " samples";
 }
 
 void VioNode::step(const SensorPacket& packet) {

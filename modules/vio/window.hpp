@@ -18,8 +18,10 @@ struct WindowFrame {
   std::uint64_t id = 0;  ///< Ascending along the window.
   OdometryState state;
   bool keyframe = false;
-  std::vector<ImuSample> samples;  ///< Cover the time since the frame before; empty for the first.
-  std::optional<ImuFactor> imu;    ///< From the frame before; none for the first.
+  bool rests = false;  ///< The body stands still here.
+  /// Cover the time since the frame before; empty for the first, and where it has been rest.
+  std::vector<ImuSample> samples;
+  std::optional<ImuFactor> imu;  ///< From the frame before; none for the first.
 };
 
 /// Bearings of one landmark in one frame of the window.

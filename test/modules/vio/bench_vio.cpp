@@ -1,10 +1,10 @@
 // Odometry on EuRoC MH_01_easy as in the table of results: three pieces and 21 starts.
-//   bench_vio DATASET [rgbd] [starts] [black] [resume=SECONDS] [KEY=VALUE ...]   keys of the
-//   sections vio and tracker
+//   bench_vio DATASET [rgbd] [starts] [black] [resume=SECONDS] [rest=SECONDS] [KEY=VALUE ...]
+// with keys of the sections vio and tracker.
 // "rgbd" replaces the right images by depth made from both, "starts" adds the 21 starts, "black"
 // runs with one second of black images at each of 12 places, "resume" kills odometry
 // within the first seconds at every keyframe, once or at every n-th, and takes it up there, from
-// its state and anew.
+// its state and anew. "rest" stands still for so long; DATASET is V1_01_easy then.
 
 #include <algorithm>
 #include <array>
@@ -13,6 +13,7 @@
 #include <cstring>
 #include <iostream>
 #include <map>
+#include <numbers>
 #include <sstream>
 #include <string>
 
@@ -194,14 +195,35 @@ void run_resume(const Recording& recording, const TrackerConfig& tracker, const 
   }
 }
 
+void run_rest(const Recording& standing, const TrackerConfig& tracker, const VioConfig& config) {
+  const OdometryRun run = run_odometry(standing, 0, standing.packets.size(), tracker, config);
+  const SE3 first = run.states.front().T_odom_body, last = run.states.back().T_odom_body;
+  double most_m = 0.0, most_rad = 0.0;
+  for (const OdometryState& state : run.states) {
+    const SE3 T = first.inverse() * state.T_odom_body;
+    most_m = std::max(most_m, T.translation().norm());
+    most_rad = std::max(most_rad, angle_of(T.linear()));
+  }
+  const SE3 drift = first.inverse() * last;
+  std::printf(
+      "%.0f s at rest: %zu keyframes, %d rests, moved by %.2f mm, %.3f deg in the end, at most "
+      "%.2f mm, %.3f deg; cpu %.2f ms\n",
+      seconds_between(run.states.front().stamp, run.states.back().stamp), run.keyframes.size(),
+      run.statistics.rests, 1e3 * drift.translation().norm(),
+      angle_of(drift.linear()) * 180.0 / std::numbers::pi, 1e3 * most_m,
+      most_rad * 180.0 / std::numbers::pi, quantile(run.cpu_ms, 0.5));
+}
+
 int run(int argc, char** argv) {
   bool starts = false, black = false, rgbd = false;
-  double resume_s = 0.0;
+  double resume_s = 0.0, rest_s = 0.0;
   Overrides overrides;
   for (int a = 2; a < argc; ++a) {
     const char* equals = std::strchr(argv[a], '=');
     if (std::strncmp(argv[a], "resume=", 7) == 0)
       resume_s = std::atof(argv[a] + 7);
+    else if (std::strncmp(argv[a], "rest=", 5) == 0)
+      rest_s = std::atof(argv[a] + 5);
     else if (equals != nullptr)
       overrides.values[std::string(argv[a], static_cast<std::size_t>(equals - argv[a]))] =
           equals + 1;
@@ -217,6 +239,10 @@ int run(int argc, char** argv) {
   for (const auto& [name, value] : overrides.values)
     if (!overrides.used[name]) throw std::invalid_argument("unknown key " + name);
 
+  if (rest_s > 0.0) {
+    run_rest(standing_recording(argv[1], rest_s), tracker, config);
+    return 0;
+  }
   if (resume_s > 0.0) {
     run_resume(read_recording(argv[1], 0.0, resume_s), tracker, config);
     return 0;
@@ -270,8 +296,8 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) try {
   if (argc < 2) {
-    std::cerr
-        << "usage: bench_vio DATASET [rgbd] [starts] [black] [resume=SECONDS] [KEY=VALUE ...]\n";
+    std::cerr << "usage: bench_vio DATASET [rgbd] [starts] [black] [resume=SECONDS] [rest=SECONDS] "
+                 "[KEY=VALUE ...]\n";
     return 2;
   }
   return km::run(argc, argv);

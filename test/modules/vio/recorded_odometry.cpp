@@ -3,15 +3,20 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <set>
+#include <string>
 #include <utility>
 
 #include "modules/core/depth_lookup.hpp"
 #include "modules/dense_sensing/stereo_depth.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
+#include "modules/sensors/euroc_rig_codec.hpp"
+#include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {
@@ -42,6 +47,45 @@ std::vector<std::optional<SeenRay>> seen_rays(const Camera& rectified, const Cam
       if (const auto px = rectified.project_ray(ray)) seen = SeenRay{*px, ray.z()};
     }
   return rays;
+}
+
+// Makes `folder` a EuRoC folder of links to the images, which lie apart from their calibration in
+// the data.
+void link_static_start(const std::filesystem::path& recording,
+                       const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder / "mav0");
+  const auto source = std::filesystem::absolute(recording);
+  std::filesystem::create_symlink(source / "mav0/imu0", folder / "mav0/imu0");
+  for (const std::string camera : {"cam0", "cam1"}) {
+    const auto target = folder / "mav0" / camera;
+    std::filesystem::create_directories(target);
+    std::filesystem::create_symlink(source / "mav0" / camera / "sensor.yaml",
+                                    target / "sensor.yaml");
+    std::filesystem::create_symlink(source / "static_start" / camera, target / "data");
+    std::set<std::string> names;
+    for (const auto& file : std::filesystem::directory_iterator(target / "data"))
+      names.insert(file.path().filename());
+    std::ofstream list(target / "data.csv");
+    for (const std::string& name : names) list << name.substr(0, 19) << ',' << name << '\n';
+  }
+}
+
+// Plays `packets` again and again until they are `count`. Samples that lead up to the second image
+// stand before the first, too.
+void repeat(std::vector<SensorPacket>& packets, std::size_t count) {
+  const std::size_t turn = packets.size();
+  const Stamp step = packets[1].frame->stamp - packets[0].frame->stamp;
+  const Stamp period = packets.back().frame->stamp - packets.front().frame->stamp + step;
+  while (packets.size() < count) {
+    const std::size_t k = packets.size();
+    const Stamp shift = period * static_cast<Stamp>(k / turn);
+    auto frame = std::make_shared<StereoFrame>(*packets[k % turn].frame);
+    frame->stamp += shift;
+    SensorPacket packet = packets[std::max<std::size_t>(k % turn, 1)];
+    for (ImuSample& sample : packet.imu) sample.stamp += shift - (k % turn == 0 ? step : 0);
+    packet.frame = std::move(frame);
+    packets.push_back(std::move(packet));
+  }
 }
 
 }  // namespace
@@ -91,6 +135,18 @@ OdometryErrors odometry_errors(std::span<const OdometryState> states, std::span<
       .rpe_deg = error.rpe_rotation_deg.rmse,
       .tilt_deg = 180.0 / std::numbers::pi * std::sqrt(tilt / static_cast<double>(states.size())),
       .scale = align(pairs, true).scale};
+}
+
+Recording standing_recording(const std::filesystem::path& folder, double duration_s) {
+  const TemporaryFolder links;
+  link_static_start(folder, links.path());
+  EurocReader reader = open_euroc(links.path());
+  Recording result;
+  result.rig = reader.rig();
+  while (auto packet = reader.next()) result.packets.push_back(std::move(*packet));
+  repeat(result.packets, static_cast<std::size_t>(std::lround(5.0 * duration_s)) + 1);
+  result.T_world_body.assign(result.packets.size(), SE3::Identity());
+  return result;
 }
 
 Recording as_rgbd(const Recording& recording, std::size_t every, std::size_t first) {

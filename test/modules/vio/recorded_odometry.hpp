@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <span>
 #include <vector>
@@ -27,6 +28,10 @@ struct OdometryRun {
 OdometryRun run_odometry(const Recording& recording, std::size_t first, std::size_t last,
                          const TrackerConfig& tracker, const VioConfig& config,
                          const std::optional<VioCheckpoint>& checkpoint = {});
+
+/// The start of V1_01_easy in `folder`, 4.6 s at rest with rotors idling and five images a second,
+/// again and again for `duration_s`.
+Recording standing_recording(const std::filesystem::path& folder, double duration_s);
 
 /// Errors of a trajectory against the true poses of the same instants.
 struct OdometryErrors {

@@ -502,6 +502,45 @@ TEST_CASE("A second without features is bridged by the inertial samples", "[vio]
   CHECK(position_error(run.states.back(), world) < 0.05);
 }
 
+TEST_CASE("However long a body rests, the window keeps its keyframes and grows by nothing",
+          "[vio][rest]") {
+  SyntheticMotion motion;
+  motion.amplitude_m.setZero();
+  motion.turn_amplitude.setZero();
+  SyntheticWorld world(motion, 12);
+  constexpr std::size_t kRest = kStartImages + 20, kFilled = kRest + 5, kImages = kRest + 200;
+  const auto frames = world.frames(kImages, 0.5);
+  Run run = run_smoother({frames.begin(), frames.begin() + kRest}, world, 0.0, gaussian_config());
+  const auto keyframes = [&] {
+    std::vector<Stamp> stamps;
+    for (const WindowFrame& frame : run.smoother.window().frames)
+      if (frame.keyframe) stamps.push_back(frame.state.stamp);
+    return stamps;
+  };
+  SmootherUpdate update = run.smoother.add(frames[kRest], true);
+  CHECK(update.keyframe);  // the first at rest
+  for (std::size_t k = kRest + 1; k < kFilled; ++k) update = run.smoother.add(frames[k], true);
+  const std::vector<Stamp> before = keyframes();
+  for (std::size_t k = kFilled; k < kImages; ++k) {
+    update = run.smoother.add(frames[k], true);
+    CHECK(update.solution.usable);
+    CHECK_FALSE(update.keyframe);
+    CHECK(position_error(update.state, world) < 5e-3);
+  }
+  CHECK(keyframes() == before);
+  std::size_t samples = 0;
+  for (std::size_t k = before.size(); k < run.smoother.window().frames.size(); ++k)
+    samples += run.smoother.window().frames[k].samples.size();
+  CHECK(run.smoother.window().frames.size() <= before.size() + 4);
+  CHECK(samples <= std::size_t{3 * 11});  // of 50 ms each, at 200 Hz
+  // Ten seconds between two images of one rest.
+  const auto T = run.smoother.relative_pose(frames[kRest].tracked.stamp, update.state.stamp);
+  REQUIRE(T);
+  CHECK(T->T.translation().norm() < 5e-3);
+  // A centimetre is what goes unnoticed at rest.
+  CHECK(T->Sigma.diagonal().maxCoeff() < 2e-4);
+}
+
 TEST_CASE("The same input gives the same output to the last bit", "[vio]") {
   const VioConfig config = gaussian_config();
   SyntheticWorld world(SyntheticMotion{}, 8);

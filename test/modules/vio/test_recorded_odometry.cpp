@@ -1,15 +1,13 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <filesystem>
-#include <fstream>
 #include <numeric>
 #include <set>
 
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/core/lie.hpp"
 #include "modules/vio/vio_node.hpp"
 #include "recorded_odometry.hpp"
 #include "test/support/shared_data.hpp"
-#include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {
@@ -148,49 +146,55 @@ TEST_CASE("MH_01_easy: what goes on from a keyframe is as good as what never sto
         1.05 * static_cast<double>(ratios.size()));
 }
 
-// Makes `folder` a EuRoC folder of links to the images, which lie apart from their calibration in
-// the data.
-void link_static_start(const std::filesystem::path& recording,
-                       const std::filesystem::path& folder) {
-  std::filesystem::create_directories(folder / "mav0");
-  const auto source = std::filesystem::absolute(recording);
-  std::filesystem::create_symlink(source / "mav0/imu0", folder / "mav0/imu0");
-  for (const std::string camera : {"cam0", "cam1"}) {
-    const auto target = folder / "mav0" / camera;
-    std::filesystem::create_directories(target);
-    std::filesystem::create_symlink(source / "mav0" / camera / "sensor.yaml",
-                                    target / "sensor.yaml");
-    std::filesystem::create_symlink(source / "static_start" / camera, target / "data");
-    std::set<std::string> names;
-    for (const auto& file : std::filesystem::directory_iterator(target / "data"))
-      names.insert(file.path().filename());
-    std::ofstream list(target / "data.csv");
-    for (const std::string& name : names) list << name.substr(0, 19) << ',' << name << '\n';
-  }
-}
+// Ground truth: at the start of V1_01_easy.
+const Eigen::Vector3d kStaticGyroBias(-0.00225, 0.02154, 0.07703);
 
 TEST_CASE("V1_01_easy: a start at rest, at five images a second", "[vio]") {
   const auto folder = shared_data("euroc/V1_01_easy");
   if (!folder) return;
-  const TemporaryFolder links;
-  link_static_start(*folder, links.path());
-  EurocReader reader = open_euroc(links.path());
-  Vio vio(0, reader.rig(), TrackerConfig{}, VioConfig{});
-  std::vector<OdometryState> states;
-  std::optional<StartStatus> start;
-  while (const auto packet = reader.next()) {
-    const VioResult result = vio.process(*packet);
-    if (result.start) start = result.start;
-    states.insert(states.end(), result.states.begin(), result.states.end());
-  }
-  CHECK(start == StartStatus::kAtRest);
-  REQUIRE(states.size() == 24);
-  for (const OdometryState& state : states) {  // it stands: what moves is the estimate
+  const Recording data = standing_recording(*folder, 4.6);
+  REQUIRE(data.packets.size() == 24);
+  const OdometryRun run = run_odometry(data, 0, 24, TrackerConfig{}, {});
+  CHECK(std::ranges::count_if(run.results, [](const VioResult& result) {
+          return result.start == StartStatus::kAtRest;
+        }) == 1);
+  REQUIRE(run.states.size() == 24);
+  for (const OdometryState& state : run.states) {  // it stands: what moves is the estimate
     CHECK(state.T_odom_body.translation().norm() < 5e-3);
     CHECK(state.v_odom.norm() < 0.02);
   }
-  // Ground truth: gyro bias (-0.00225, 0.02154, 0.07703) rad/s at the start of V1_01_easy.
-  CHECK((states.back().gyro_bias - Eigen::Vector3d(-0.00225, 0.02154, 0.07703)).norm() < 2e-3);
+  CHECK((run.states.back().gyro_bias - kStaticGyroBias).norm() < 2e-3);
+}
+
+TEST_CASE("V1_01_easy: two minutes at rest, rotors idling", "[vio][rest]") {
+  const auto folder = shared_data("euroc/V1_01_easy");
+  if (!folder) return;
+  const Recording data = standing_recording(*folder, 120.0);
+  REQUIRE(data.packets.size() == 601);
+  const OdometryRun run = run_odometry(data, 0, data.packets.size(), TrackerConfig{}, {});
+  CHECK(run.statistics.rests >= 1);
+  CHECK(run.keyframes.size() <= 2);  // one every two seconds if it were not known to rest
+  REQUIRE(run.states.size() == data.packets.size());
+  for (const OdometryState& state : run.states) {
+    CHECK(state.T_odom_body.translation().norm() < 5e-3);
+    CHECK(angle_of(state.T_odom_body.linear().transpose() *
+                   run.states.front().T_odom_body.linear()) < 5e-3);
+    CHECK(state.v_odom.norm() < 0.02);
+  }
+}
+
+TEST_CASE("MH_01_easy: a body set down stays there, whatever comes of images", "[vio][rest]") {
+  // It moves until 15.5 s. From 16 s on there is an image a second.
+  const auto folder = shared_data("euroc/MH_01_easy");
+  if (!folder) return;
+  const Recording data = read_recording(*folder, 12.0, 26.5);
+  const OdometryRun run = run_odometry(data, 0, data.packets.size(), TrackerConfig{}, {});
+  REQUIRE(run.states.size() == data.packets.size());
+  CHECK(run.statistics.rests == 1);
+  CHECK(run.keyframes.back().stamp < data.packets[81].frame->stamp);  // 17 s
+  const SE3 there = run.states.back().T_odom_body;
+  for (std::size_t k = 82; k < run.states.size(); ++k)
+    CHECK((there.inverse() * run.states[k].T_odom_body).translation().norm() < 1e-3);
 }
 
 TEST_CASE("The odometry node publishes what odometry gives, in order of time", "[vio][node]") {

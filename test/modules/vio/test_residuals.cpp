@@ -147,6 +147,26 @@ TEST_CASE("Noise too small for a double makes no factor", "[vio]") {
   CHECK_FALSE(ImuFactor::of(imu, kGravity_mps2));
 }
 
+TEST_CASE("At rest a factor holds the state as it is, whatever gravity and biases", "[vio][rest]") {
+  const unsigned seed = GENERATE(range(0U, 5U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  constexpr double kRest_s = 100.0;
+  const ImuFactor factor = ImuFactor::at_rest(ImuNoise{}, kRest_s);
+  const OdometryState i = perturbed({}, 1.0, rng), j = perturbed(i, 0.1, rng);
+  CHECK(factor.error(i, i).norm() < 1e-9);
+  const ImuTerm term = factor.linearize(i, j, i, j);
+  CHECK(term.r == factor.error(i, j));
+  check_derivative(term.J_i, numeric_jacobian<15>(
+                                 [&](const Vector15& d) { return factor.error(moved(i, d), j); }));
+  check_derivative(term.J_j, numeric_jacobian<15>(
+                                 [&](const Vector15& d) { return factor.error(i, moved(j, d)); }));
+  Vector15 walked = Vector15::Zero();  // by a standard deviation of each bias
+  walked.segment<3>(9).setConstant(std::sqrt(kRest_s) * ImuNoise{}.gyro_random_walk);
+  walked.segment<3>(12).setConstant(std::sqrt(kRest_s) * ImuNoise{}.accel_random_walk);
+  CHECK(factor.error(i, moved(i, walked)).squaredNorm() == Approx(6.0));
+}
+
 TEST_CASE("At its first estimates a prior's offset moves as its states do", "[vio]") {
   std::mt19937 rng(11);
   StatePrior prior;

@@ -31,11 +31,14 @@ class Bench {
     return packet;
   }
 
-  Vio vio() const {
+  Vio vio(double rest_s = VioConfig{}.rest_s) const {
     VioConfig config;
     config.gravity_mps2 = kGravity_mps2;
+    config.rest_s = rest_s;
     return Vio(3, rig_, TrackerConfig{}, config);
   }
+  // Goes on as if it moved: with a keyframe every 2 s.
+  Vio restless() const { return vio(1e6); }
   const SensorRig& rig() const { return rig_; }
 
   static constexpr Stamp kFrameStep = 50'000'000;
@@ -78,7 +81,7 @@ TEST_CASE("Every image has a pose, at rest the same", "[vio]") {
 
 TEST_CASE("Keyframes are numbered without gaps and chain by their relative poses", "[vio]") {
   const Bench bench;
-  Vio vio = bench.vio();
+  Vio vio = bench.restless();
   const VioResult result = feed(vio, bench, 0, 100);
   REQUIRE(result.keyframes.size() >= 3);  // 5 s at rest, one every 2 s
   SE3 T_odom_kf = SE3::Identity();
@@ -102,7 +105,7 @@ TEST_CASE("Keyframes are numbered without gaps and chain by their relative poses
 
 TEST_CASE("Every image is located by the last keyframe at or before it", "[vio]") {
   const Bench bench;
-  Vio vio = bench.vio();
+  Vio vio = bench.restless();
   const VioResult result = feed(vio, bench, 0, 100);
   REQUIRE(result.frames.size() == result.states.size());
   REQUIRE(result.keyframes.size() >= 3);
@@ -193,14 +196,14 @@ TEST_CASE("A gap in the inertial samples leads to a new start from the last pose
 
 TEST_CASE("From a keyframe that an earlier process left odometry goes on at once", "[vio]") {
   const Bench bench;
-  Vio former = bench.vio();
+  Vio former = bench.restless();
   const VioResult before = feed(former, bench, 0, 60);
   const KeyframeOdometry& last = before.keyframes.back();
   const auto image = static_cast<int>(last.stamp / Bench::kFrameStep);
   const OdometryState& state = before.states.at(static_cast<std::size_t>(image));
   REQUIRE(state.stamp == last.stamp);
 
-  Vio vio = bench.vio();
+  Vio vio = bench.restless();
   vio.continue_from({state, last});
   const VioResult first = feed(vio, bench, image, image + 1);
   CHECK(first.start == StartStatus::kGoesOn);
@@ -220,12 +223,12 @@ TEST_CASE("From a keyframe that an earlier process left odometry goes on at once
 
 TEST_CASE("Where the keyframe's image does not come again odometry starts as ever", "[vio]") {
   const Bench bench;
-  Vio former = bench.vio();
+  Vio former = bench.restless();
   const VioResult before = feed(former, bench, 0, 60);
   KeyframeOdometry last = before.keyframes.back();
   const auto image = static_cast<int>(last.stamp / Bench::kFrameStep);
   last.T_odom_kf.translation().x() += 1.0;  // the chain has moved away from live odometry
-  Vio vio = bench.vio();
+  Vio vio = bench.restless();
   vio.continue_from({before.states.at(static_cast<std::size_t>(image)), last});
   const VioResult after = feed(vio, bench, image + 20, image + 20 + Bench::kStartImages);
   CHECK(after.start == StartStatus::kAtRest);

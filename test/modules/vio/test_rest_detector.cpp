@@ -1,0 +1,139 @@
+#include <catch2/catch.hpp>
+#include <functional>
+
+#include "modules/vio/rest_detector.hpp"
+#include "synthetic_motion.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kNoisePx = 0.1;  // of tracks on one patch
+
+SyntheticMotion standing() {
+  SyntheticMotion motion;
+  motion.amplitude_m.setZero();
+  motion.turn_amplitude.setZero();
+  motion.gyro_bias = {0.02, -0.01, 0.03};
+  motion.accel_bias = {0.1, 0.05, -0.1};
+  return motion;
+}
+
+VioConfig rest_config() {
+  VioConfig config;
+  config.gravity_mps2 = kGravity_mps2;
+  return config;
+}
+
+// Number of images before the first at which the body has stood still; all if it never has.
+// `estimate`: what is known of the state, from the true one.
+std::size_t images_before_rest(
+    const std::vector<InertialFrame>& frames, const SyntheticMotion& motion,
+    const std::function<void(OdometryState&)>& estimate = [](OdometryState&) {}) {
+  RestDetector detector(rest_config(), synthetic_rig().stereo.cameras[0].fx);
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    OdometryState state = motion.state(frames[k].tracked.stamp);
+    estimate(state);
+    if (detector.add(frames[k], state)) return k;
+  }
+  return frames.size();
+}
+
+// Slow enough for a rest.
+void thought_slow(OdometryState& state) {
+  state.v_odom.setZero();
+}
+
+constexpr int kTenSeconds = 200;  // 10 s
+
+TEST_CASE("Who stands still for a second rests", "[vio][rest]") {
+  const unsigned seed = GENERATE(range(0U, 5U));
+  const SyntheticMotion motion = standing();
+  SyntheticWorld world(motion, seed);
+  CHECK(images_before_rest(world.frames(40, kNoisePx), motion) == 20);
+}
+
+TEST_CASE("Rotors that idle do not disturb a rest", "[vio][rest]") {
+  const SyntheticMotion motion = standing();
+  SyntheticWorld world(motion, 1);
+  auto frames = world.frames(40, kNoisePx);
+  for (InertialFrame& frame : frames)
+    for (ImuSample& sample : frame.samples) {  // at 35 Hz
+      const double phase = 220.0 * seconds_between(0, sample.stamp);
+      sample.gyro.x() += 0.1 * std::sin(phase);
+      sample.accel.y() += 1.5 * std::cos(phase);
+    }
+  CHECK(images_before_rest(frames, motion) == 20);
+}
+
+TEST_CASE("A slow ride is no rest although the samples look like it", "[vio][rest]") {
+  const double speed = GENERATE(0.05, 0.1);
+  const int axis = GENERATE(0, 1, 2);
+  CAPTURE(speed, axis);
+  SyntheticMotion motion = standing();
+  motion.velocity(axis) = speed;
+  SyntheticWorld world(motion, 2);
+  CHECK(images_before_rest(world.frames(kTenSeconds, kNoisePx), motion, thought_slow) ==
+        kTenSeconds);
+}
+
+TEST_CASE("A slow turn is no rest", "[vio][rest]") {
+  SyntheticMotion motion = standing();
+  motion.turn_amplitude(2) = 0.1;  // 0.01 rad/s at most, 0.005 at both ends
+  motion.turn_frequency(2) = 0.1;
+  SyntheticWorld world(motion, 3);
+  CHECK(images_before_rest(world.frames(kTenSeconds, kNoisePx), motion, thought_slow) ==
+        kTenSeconds);
+}
+
+TEST_CASE("Images that hang are no rest while the body turns or gains speed", "[vio][rest]") {
+  const SyntheticMotion motion = standing();
+  SyntheticWorld world(motion, 4);
+  auto frames = world.frames(kTenSeconds, kNoisePx);
+  const bool turns = GENERATE(true, false);
+  for (InertialFrame& frame : frames)
+    for (ImuSample& sample : frame.samples) {
+      if (turns)
+        sample.gyro.z() += 0.1;
+      else
+        sample.accel.x() += 0.7 * std::sin(3.0 * seconds_between(0, sample.stamp));
+    }
+  CHECK(images_before_rest(frames, motion) == kTenSeconds);
+}
+
+TEST_CASE("Who is thought to move does not rest, whatever is seen", "[vio][rest]") {
+  const SyntheticMotion motion = standing();
+  SyntheticWorld world(motion, 5);
+  CHECK(images_before_rest(world.frames(kTenSeconds, kNoisePx), motion,
+                           [](OdometryState& state) { state.v_odom.x() = 0.1; }) == kTenSeconds);
+}
+
+TEST_CASE("In the dark nobody rests", "[vio][rest]") {
+  const SyntheticMotion motion = standing();
+  SyntheticWorld world(motion, 6);
+  auto frames = world.frames(kTenSeconds, kNoisePx);
+  for (InertialFrame& frame : frames) frame.tracked.features.resize(10);
+  CHECK(images_before_rest(frames, motion) == kTenSeconds);
+}
+
+TEST_CASE("A rest ends with the first image that shows a motion, and not with what passes by",
+          "[vio][rest]") {
+  const SyntheticMotion motion = standing();
+  SyntheticWorld world(motion, 7);
+  auto frames = world.frames(60, kNoisePx);
+  RestDetector detector(rest_config(), synthetic_rig().stereo.cameras[0].fx);
+  const auto add = [&](std::size_t k, double share, double shift_px) {
+    auto& features = frames[k].tracked.features;
+    const auto count = static_cast<std::size_t>(share * static_cast<double>(features.size()));
+    for (std::size_t i = 0; i < count; ++i)
+      features[i].left.x() += shift_px / synthetic_rig().stereo.cameras[0].fx;
+    return detector.add(frames[k], motion.state(frames[k].tracked.stamp));
+  };
+  for (std::size_t k = 0; k <= 20; ++k) (void)add(k, 0.0, 0.0);
+  for (std::size_t k = 21; k < 30; ++k) CHECK(add(k, 0.3, 20.0));
+  CHECK(add(30, 1.0, 1.5));  // it trembles
+  CHECK_FALSE(add(31, 1.0, 3.0));
+  CHECK_FALSE(add(32, 0.0, 0.0));
+}
+
+}  // namespace
+}  // namespace km
