@@ -124,10 +124,15 @@ std::string inspect_recording(const fs::path& path, const fs::path& rig) {
   if (!is_absent(rig)) throw InputFileError(rig.string() + ": is there already: name another file");
   const auto reader = open_bag(path);
   const auto topics = summarise_topics(*reader);
+  const RigFile proposal = propose_rig(topics);
   write_file(rig, "# The sensors in " + path.string() + ": see that they are the right ones.\n" +
-                      rig_file_text(propose_rig(topics)));
+                      rig_file_text(proposal));
+  const bool has_infos = !proposal.left.info_topic.empty() &&
+                         (proposal.right.topic.empty() || !proposal.right.info_topic.empty());
   return text_of(topics) + to_string(reader->report()) + "\nwritten: " + rig.string() +
-         ": look at its topics, and name the calibration\n";
+         ": look at its topics, and name the calibration" +
+         (has_infos ? "; without it, topics of CameraInfo and /tf_static tell the cameras\n"
+                    : "\n");
 }
 
 }  // namespace km

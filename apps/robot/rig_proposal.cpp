@@ -82,6 +82,16 @@ void propose_imu(const std::vector<TopicSummary>& topics, RigFile& rig) {
   if (!rig.imu.topic.empty()) rig.imu.gyro_topic = rig.imu.accel_topic = "";
 }
 
+// Where drivers tell the camera of these images; empty if nobody does.
+void propose_info(const std::vector<TopicSummary>& topics, RigFile::Camera& camera) {
+  const std::string beside = camera_info_beside(camera.topic);
+  const bool is_there = std::ranges::any_of(topics, [&beside](const TopicSummary& topic) {
+    return topic.topic == beside && !topic.stamps.empty() &&
+           is_of_type({topic.topic, topic.type, topic.encoding, 0}, RosCameraInfo::kType);
+  });
+  if (is_there && !camera.topic.empty()) camera.info_topic = beside;
+}
+
 }  // namespace
 
 RigFile propose_rig(const std::vector<TopicSummary>& topics) {
@@ -89,6 +99,8 @@ RigFile propose_rig(const std::vector<TopicSummary>& topics) {
   propose_stereo(topics, rig);
   propose_depth(topics, rig);
   propose_imu(topics, rig);
+  propose_info(topics, rig.left);
+  propose_info(topics, rig.right);
   return rig;
 }
 

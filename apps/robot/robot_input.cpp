@@ -15,6 +15,7 @@
 #include "modules/sensors/euroc_reader.hpp"
 #include "modules/sensors/euroc_rig_codec.hpp"
 #include "modules/sensors/rig_file_codec.hpp"
+#include "modules/sensors/ros_image.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -69,22 +70,39 @@ std::unique_ptr<BagReader> subscribe(std::shared_ptr<const RosNetwork> network,
                                      const SensorTopicNames& topics) {
   constexpr int kImages = 10, kSamples = 4000;
   std::vector<RosTopic> wanted;
-  for (const std::string& topic : {topics.left, topics.right, topics.depth}) {
-    const bool is_compressed =
-        topic.ends_with("/compressed") || topic.ends_with("/compressedDepth");
-    const auto type = is_compressed ? RosCompressedImage::kType : RosImage::kType;
-    if (!topic.empty()) wanted.push_back({topic, std::string(type), RosQos::kSensorData, kImages});
-  }
+  for (const std::string& topic : {topics.left, topics.right, topics.depth})
+    if (!topic.empty())
+      wanted.push_back({topic, std::string(type_of_images(topic)), RosQos::kSensorData, kImages});
   for (const std::string& topic : {topics.imu, topics.gyro, topics.accel})
     if (!topic.empty())
       wanted.push_back({topic, std::string(RosImu::kType), RosQos::kSensorData, kSamples});
   return std::make_unique<RosSubscription>(std::move(network), std::move(wanted));
 }
 
+// What the rig file does not tell of the calibration.
+Rig complete(const RobotOptions& options, const PartialRig& rig,
+             const std::shared_ptr<const RosNetwork>& ros) {
+  if (rig.is_complete()) return rig.rig;
+  if (!options.is_live)
+    return complete_rig(options.dataset.string(), *open_bag(options.dataset), rig);
+  constexpr double kPatience_s = 30.0;
+  constexpr int kKept = 100;
+  std::vector<RosTopic> wanted;
+  for (const auto& teller : RigCompletion(rig).tellers())
+    wanted.push_back({teller.topic, std::string(teller.type),
+                      teller.type == RosTransforms::kType ? RosQos::kLatched : RosQos::kSensorData,
+                      kKept});
+  RosSubscription topics(ros, std::move(wanted));
+  topics.give_up_after(kPatience_s);
+  return complete_rig("live", topics, rig);
+}
+
 std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const RobotConfig& config,
-                                             const std::optional<MappingPlan>& mapping, Rig rig,
+                                             const std::optional<MappingPlan>& mapping,
+                                             const PartialRig& partial,
                                              std::shared_ptr<const RosNetwork> ros,
                                              std::optional<Stamp> not_before) {
+  Rig rig = complete(options, partial, ros);
   const bool needs_depth =
       rig.topics.right.empty() || config.sensors.depth || (mapping && mapping->reads_depth());
   if (!needs_depth) rig.topics.depth.clear();
@@ -100,7 +118,7 @@ std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const 
 
 std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const RobotConfig& config,
                                             const std::optional<MappingPlan>& mapping,
-                                            const std::optional<Rig>& rig,
+                                            const std::optional<PartialRig>& rig,
                                             std::shared_ptr<const RosNetwork> ros,
                                             const std::optional<RestoredRun>& restored) {
   const auto not_before = restored ? std::optional(restored->odometry.back().stamp) : std::nullopt;
@@ -139,7 +157,7 @@ RecordedGraph open_graph(const RobotOptions& options) {
 
 RobotInput open_robot_input(const RobotOptions& options, const RobotConfig& config,
                             const std::optional<MappingPlan>& mapping,
-                            const std::optional<Rig>& rig) {
+                            const std::optional<PartialRig>& rig) {
   if (!options.session.empty()) return {PastRun(), {}, open_session(options)};
   const bool is_dataset = options.is_live || !options.dataset.empty();
   const fs::path& path = options.is_live ? options.rig

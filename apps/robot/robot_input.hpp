@@ -12,6 +12,7 @@
 #include "modules/pose_graph/recorded_graph.hpp"
 #include "modules/ros_dds/ros_network.hpp"
 #include "modules/sensors/dataset_reader.hpp"
+#include "modules/sensors/rig_completion.hpp"
 
 namespace km {
 
@@ -33,6 +34,6 @@ struct RobotInput {
 /// file and what helps.
 [[nodiscard]] RobotInput open_robot_input(const RobotOptions& options, const RobotConfig& config,
                                           const std::optional<MappingPlan>& mapping,
-                                          const std::optional<Rig>& rig);
+                                          const std::optional<PartialRig>& rig);
 
 }  // namespace km

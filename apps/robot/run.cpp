@@ -22,6 +22,7 @@
 #include "modules/core/text_table.hpp"
 #include "modules/core/write_file.hpp"
 #include "modules/mesh/ply_file.hpp"
+#include "modules/sensors/rig_file_codec.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 #include "runtime/metrics.hpp"
@@ -425,8 +426,9 @@ int conclude(const RobotOptions& options, bool has_budget, Robot& robot,
   return verdict.exit_code;
 }
 
-std::optional<ImageSources> sources_of(const RobotOptions& options, const std::optional<Rig>& rig) {
-  if (rig) return image_sources(rig->topics, options.rig);
+std::optional<ImageSources> sources_of(const RobotOptions& options,
+                                       const std::optional<PartialRig>& rig) {
+  if (rig) return image_sources(rig->rig.topics, options.rig);
   if (options.dataset.empty()) return std::nullopt;
   return image_sources(options.dataset);
 }
@@ -436,7 +438,7 @@ std::optional<ImageSources> sources_of(const RobotOptions& options, const std::o
 int run_robot(const RobotOptions& options, SignalWatch& signals,
               const std::function<void(Topics&)>& listen) {
   const RobotConfig config = load_robot_config(options);
-  const std::optional<Rig> rig =
+  const std::optional<PartialRig> rig =
       options.rig.empty() ? std::nullopt : std::optional(read_rig_file(options.rig));
   const std::optional<MappingPlan> mapping = plan_mapping(
       config.mapping, config.stereo_depth, config.segmentation, sources_of(options, rig));

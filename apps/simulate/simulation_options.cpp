@@ -129,7 +129,7 @@ void complete_recorded(SimulationOptions& options) {
 // With them the cameras' resolution is not for the options to say.
 void complete_rig(SimulationOptions& options) {
   RigChoice choice;
-  if (options.cameras == CameraKind::kRgbd) choice.depth = DepthRange{};
+  if (options.cameras == CameraKind::kRgbd) choice = {.right = {}, .depth = DepthChoice{}};
   options.rig = read_rig(options.calibrations, choice).rig;
   const Camera& left = options.rig->stereo.cameras[0];
   options.width = left.width;

@@ -1,6 +1,7 @@
 #include "modules/recordings/ros_camera.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -41,18 +42,18 @@ Lens lens_of(const RosCameraInfo& info) {
                    "fisheye");
 }
 
-// R as the rotation from the camera to the rectified one.
-Eigen::Matrix3d rectifying_rotation(const RosCameraInfo& info) {
-  Eigen::Matrix4d T = Eigen::Matrix4d::Identity();
-  T.topLeftCorner<3, 3>() =
-      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(info.R.data());
-  if (const auto problem = transform_problem(T)) refuse(info, 'R' + *problem);
-  return rigid_transform(T).linear();
-}
-
-// B of P's fourth number, Tx = -fx B.
-double baseline_of(const RosCameraInfo& info) {
-  return -info.P[3] / info.P[0];
+void refuse_parts(const RosCameraInfo& info) {
+  const auto& region = info.region;
+  const bool is_whole = (region.width == 0 && region.height == 0) ||
+                        (region.width == info.width && region.height == info.height);
+  if (info.binning_x > 1 || info.binning_y > 1)
+    refuse(info, "binning_x " + std::to_string(info.binning_x) + ", binning_y " +
+                     std::to_string(info.binning_y) +
+                     ": binned images are not supported; name a calibration of them");
+  if (!is_whole || region.x_offset != 0 || region.y_offset != 0)
+    refuse(info,
+           "roi: images of a part of the camera are not supported; name a calibration of "
+           "them");
 }
 
 }  // namespace
@@ -60,6 +61,7 @@ double baseline_of(const RosCameraInfo& info) {
 Camera camera_of(const RosCameraInfo& info, RosImages images) {
   if (std::all_of(info.K.begin(), info.K.end(), [](double k) { return k == 0.0; }))
     refuse(info, "K is 0: the camera is not calibrated");
+  refuse_parts(info);
   if (const auto problem = resolution_problem(info.width, info.height))
     refuse(info, "width and height: " + *problem);
   Camera camera;
@@ -77,26 +79,20 @@ Camera camera_of(const RosCameraInfo& info, RosImages images) {
   return camera;
 }
 
-StereoRig stereo_of(const RosCameraInfo& left, const RosCameraInfo& right, RosImages images,
-                    const SE3& T_body_left) {
-  StereoRig rig{{camera_of(left, images), camera_of(right, images)}};
-  for (const RosCameraInfo* info : {&left, &right})
-    if (!(info->P[0] > 0.0)) refuse(*info, "P has no focal length: no stereo calibration");
-  // Both rectified cameras lie on one line, at the places along it that P tells.
-  const Eigen::Vector3d t(baseline_of(right) - baseline_of(left), 0.0, 0.0);
-  SE3 T_left_right = make_pose(Eigen::Matrix3d::Identity(), t);
-  if (images == RosImages::kRaw) {
-    const Eigen::Matrix3d R_left_rect = rectifying_rotation(left).transpose();
-    T_left_right = make_pose(R_left_rect * rectifying_rotation(right), R_left_rect * t);
-  }
-  rig.cameras[0].T_body_cam = T_body_left;
-  rig.cameras[1].T_body_cam = T_body_left * T_left_right;
-  if (!(t.x() > 0.0))
-    refuse(right, "P[3] = " + shortest_text(right.P[3]) +
-                      ": Tx = -fx * baseline of a right camera is negative");
-  if (const auto problem = transform_problem(T_left_right.matrix())) refuse(right, 'P' + *problem);
-  if (const auto problem = pair_problem(rig)) refuse(right, "P " + *problem);
-  return rig;
+SE3 T_frame_camera(const RosCameraInfo& info, RosImages images) {
+  const bool has_rotation = std::ranges::any_of(info.R, [](double r) { return r != 0.0; });
+  if (images == RosImages::kRectified || !has_rotation) return SE3::Identity();
+  Eigen::Matrix4d T = Eigen::Matrix4d::Identity();
+  T.topLeftCorner<3, 3>() =
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(info.R.data());
+  if (const auto problem = transform_problem(T)) refuse(info, 'R' + *problem);
+  return rigid_transform(T);
+}
+
+std::optional<double> baseline_m(const RosCameraInfo& right) {
+  const double baseline_m = -right.P[3] / right.P[0];
+  if (!(baseline_m > 0.0) || !std::isfinite(baseline_m)) return std::nullopt;
+  return baseline_m;
 }
 
 }  // namespace km

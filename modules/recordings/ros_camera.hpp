@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "modules/core/camera.hpp"
 #include "modules/recordings/ros_messages.hpp"
 
@@ -15,14 +17,16 @@ enum class RosImages {
 /// the identity. Distortion: plumb_bob (4 or 5 coefficients), rational_polynomial (8; further ones,
 /// of thin prisms and tilted sensors, must be 0), equidistant or fisheye (4), or none. Throws
 /// std::invalid_argument, naming the frame, the field and the value, for K = 0, an uncalibrated
-/// camera, for other models, and for what calibration_limits.hpp refuses.
+/// camera, for other models, binned images, images of a part of the camera, and for what
+/// calibration_limits.hpp refuses.
 [[nodiscard]] Camera camera_of(const RosCameraInfo& info, RosImages images);
 
-/// The pair of a stereo calibration: the baseline B is that of the right camera's P, whose fourth
-/// number is Tx = -fx B, the rotation that of both R. `T_body_left` is the left camera's pose, as
-/// its images are: of the rectified camera, if they are rectified. Throws likewise, and for a P
-/// without baseline.
-[[nodiscard]] StereoRig stereo_of(const RosCameraInfo& left, const RosCameraInfo& right,
-                                  RosImages images, const SE3& T_body_left);
+/// The pose of that camera in the message's frame, which is the rectified camera's: P projects its
+/// points. A rotation R of zeros is none. Throws std::invalid_argument if R is no rotation.
+[[nodiscard]] SE3 T_frame_camera(const RosCameraInfo& info, RosImages images);
+
+/// Distance of a right camera from the left one by Tx = -fx B, the fourth number of its P [m];
+/// nullopt where it says none.
+[[nodiscard]] std::optional<double> baseline_m(const RosCameraInfo& right);
 
 }  // namespace km

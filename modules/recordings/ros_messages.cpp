@@ -70,11 +70,13 @@ void fields(auto& wire, Is<RosCameraInfo> auto& camera) {
   wire.f64(camera.K);
   wire.f64(camera.R);
   wire.f64(camera.P);
-  // Binning in x and y; of the region of interest x, y, height and width.
-  std::array<std::uint32_t, 6> unused{};
-  for (std::uint32_t& value : unused) wire.u32(value);
-  bool is_region_rectified = false;
-  wire.flag(is_region_rectified);
+  wire.u32(camera.binning_x);
+  wire.u32(camera.binning_y);
+  wire.u32(camera.region.x_offset);
+  wire.u32(camera.region.y_offset);
+  wire.u32(camera.region.height);
+  wire.u32(camera.region.width);
+  wire.flag(camera.region.do_rectify);
 }
 
 void fields(auto& wire, Is<RosPoseStamped> auto& pose) {

@@ -65,6 +65,11 @@ struct RosCameraInfo {
   std::array<double, 9> K{};   ///< 3x3, row-major, as all.
   std::array<double, 9> R{};   ///< 3x3.
   std::array<double, 12> P{};  ///< 3x4.
+  std::uint32_t binning_x = 0, binning_y = 0;  ///< Pixels that are one in the images; 0 is 1.
+  struct Region {
+    std::uint32_t x_offset = 0, y_offset = 0, height = 0, width = 0;  ///< [px]; 0: all.
+    bool do_rectify = false;
+  } region;  ///< Of the camera, that images show.
 };
 
 /// geometry_msgs/Pose, and Transform, which has the same fields.

@@ -86,8 +86,13 @@ void RosSubscription::tell_silence() {
   }
 }
 
+void RosSubscription::give_up_after(double patience_s) {
+  end_s_ = steady_now_s() + patience_s;
+}
+
 std::optional<BagMessage> RosSubscription::next() {
-  while (taken_.empty() && !stopped_) {
+  const auto is_over = [this] { return stopped_ || steady_now_s() >= end_s_; };
+  while (taken_.empty() && !is_over()) {
     tell_silence();
     std::array<dds_attach_t, 16> ready{};
     const auto count = [&] {
@@ -99,7 +104,7 @@ std::optional<BagMessage> RosSubscription::next() {
     for (const dds_attach_t channel : std::span(ready).first(ready_count))
       if (channel >= 0) take_from(static_cast<std::size_t>(channel));
   }
-  if (stopped_) return std::nullopt;
+  if (is_over()) return std::nullopt;
   BagMessage message = std::move(taken_.front());
   taken_.pop_front();
   return message;

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstddef>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -30,10 +31,13 @@ class RosSubscription final : public BagReader {
   RosSubscription(std::shared_ptr<const RosNetwork> network, std::vector<RosTopic> topics);
 
   [[nodiscard]] const std::vector<BagChannel>& channels() const override { return channels_; }
-  /// Waits for a message. Nullopt after stop().
+  /// Waits for a message. Nullopt after stop() and give_up_after().
   [[nodiscard]] std::optional<BagMessage> next() override;
   /// Messages that came too fast for DDS or for next().
   [[nodiscard]] BagReport report() const override;
+
+  /// next() gives nothing once so much time has passed from now [s].
+  void give_up_after(double patience_s);
 
   [[nodiscard]] bool is_live() const override { return true; }
   void stop() noexcept override;
@@ -50,6 +54,7 @@ class RosSubscription final : public BagReader {
   std::deque<BagMessage> taken_;
   std::vector<double> heard_s_;  // of each channel, when last; steady clock
   double told_s_ = 0.0;          // when silence was looked for
+  double end_s_ = std::numeric_limits<double>::infinity();
   std::atomic<bool> stopped_ = false;
 };
 

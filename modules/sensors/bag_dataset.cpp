@@ -253,7 +253,7 @@ ReaderReport BagDataset::report() const {
 }
 
 std::vector<std::string> BagDataset::remarks() const {
-  std::vector<std::string> lines;
+  std::vector<std::string> lines = rig_.notes;
   const auto say = [&lines](const std::optional<Synchrony>& synchrony, const char* other) {
     if (synchrony && is_remarkable(*synchrony)) lines.push_back(to_string(*synchrony, other));
   };

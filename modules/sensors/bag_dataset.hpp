@@ -26,8 +26,9 @@ struct SensorTopicNames {
 struct Rig {
   SensorTopicNames topics;
   SensorRig sensors;
-  double depth_scale_m = 1e-3;        ///< Of a unit in depth images of 16 bits [m].
-  double camera_time_offset_s = 0.0;  ///< Added to the stamps of images: then they are the IMU's.
+  double depth_scale_m = 1e-3;          ///< Of a unit in depth images of 16 bits [m].
+  double camera_time_offset_s = 0.0;    ///< Added to the stamps of images: then they are the IMU's.
+  std::vector<std::string> notes = {};  ///< On the calibration, for people, a line each.
 };
 
 /// Part of a recording, in seconds since its first frame.

@@ -1,9 +1,9 @@
+#include "modules/sensors/basalt_codec.hpp"
+
 #include <algorithm>
 
 #include "modules/core/calibration_limits.hpp"
-#include "modules/sensors/calibration_map_codec.hpp"
 #include "modules/sensors/camera_codec.hpp"
-#include "modules/sensors/rig_calibration_codec.hpp"
 
 namespace km {
 namespace {
@@ -108,24 +108,20 @@ void note_biases(const CalibrationMap& root, RigCalibration& calibration) {
 
 }  // namespace
 
-RigCalibration read_basalt(const std::filesystem::path& file, const RigChoice& choice) {
-  const CalibrationMap root = CalibrationMap(file).map("value0");
+RigCalibration read_basalt(const CalibrationMap& map, const RigChoice& choice) {
+  const CalibrationMap root = map.map("value0");
   const std::size_t count = root.maps("intrinsics").size();
-  const std::size_t last = choice.depth ? choice.left : std::max(choice.left, choice.right);
+  const std::size_t last = std::max(choice.left, choice.right.value_or(choice.left));
   if (last >= count)
     root.fail("intrinsics", "intrinsics: no camera " + std::to_string(last) + " among " +
                                 std::to_string(count) +
                                 (count == 1 ? ": one camera without depth is not supported" : ""));
   RigCalibration calibration;
-  const Camera left = read_basalt_camera(root, choice.left);
-  if (choice.depth) {
-    calibration.rig.stereo = rgbd_rig(left, choice.virtual_baseline_m);
-    calibration.rig.depth = choice.depth;
-  } else {
-    calibration.rig.stereo.cameras = {left, read_basalt_camera(root, choice.right)};
-    if (const auto problem = pair_problem(calibration.rig.stereo))
-      root.fail("T_imu_cam", "T_imu_cam " + *problem);
-  }
+  std::optional<Camera> right;
+  if (choice.right) right = read_basalt_camera(root, *choice.right);
+  if (const auto problem =
+          join_cameras(read_basalt_camera(root, choice.left), right, choice, calibration.rig))
+    root.fail("T_imu_cam", "T_imu_cam " + *problem);
   calibration.rig.imu = {.gyro_noise_density = read_noise(root, "gyro_noise_std", kGyroNoise),
                          .gyro_random_walk = read_noise(root, "gyro_bias_std", kGyroWalk),
                          .accel_noise_density = read_noise(root, "accel_noise_std", kAccelNoise),

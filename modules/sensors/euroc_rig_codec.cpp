@@ -70,6 +70,12 @@ DepthRange read_depth_range(const CalibrationMap& yaml) {
   return range;
 }
 
+// Of cameras that stand in the frame that the files refer to.
+void move_to_imu(const CalibrationMap& imu, StereoRig& stereo) {
+  const SE3 T_imu_reference = extrinsics(imu).inverse();
+  for (Camera& camera : stereo.cameras) camera.T_body_cam = T_imu_reference * camera.T_body_cam;
+}
+
 StereoRig read_stereo(const std::filesystem::path& mav0, const Camera& left) {
   const std::filesystem::path file = mav0 / "cam1" / "sensor.yaml";
   if (!is_there(mav0 / "cam1"))
@@ -99,9 +105,24 @@ SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth) {
       rig.stereo =
           rgbd_rig(left, depth.number("baseline_m", kDepthBaseline_m, kDefaultDepthBaseline_m));
   }
-  const SE3 T_imu_body = extrinsics(imu).inverse();  // `body` here: the one the files refer to
-  for (Camera& camera : rig.stereo.cameras) camera.T_body_cam = T_imu_body * camera.T_body_cam;
+  move_to_imu(imu, rig.stereo);
   return rig;
+}
+
+RigCalibration read_euroc_calibration(const std::filesystem::path& mav0, const RigChoice& choice) {
+  RigCalibration calibration;
+  const CalibrationMap imu = sensor_yaml(mav0, "imu0");
+  calibration.rig.imu = read_imu_noise(imu);
+  const auto camera = [&mav0](std::size_t index) {
+    return sensor_yaml(mav0, ("cam" + std::to_string(index)).c_str());
+  };
+  std::optional<Camera> right;
+  if (choice.right) right = read_euroc_camera(camera(*choice.right));
+  if (const auto problem =
+          join_cameras(read_euroc_camera(camera(choice.left)), right, choice, calibration.rig))
+    camera(*choice.right).fail("T_BS", "T_BS " + *problem);
+  move_to_imu(imu, calibration.rig.stereo);
+  return calibration;
 }
 
 double read_depth_scale(const std::filesystem::path& mav0) {

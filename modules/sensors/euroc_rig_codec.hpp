@@ -4,6 +4,7 @@
 
 #include "modules/core/camera.hpp"
 #include "modules/sensors/euroc_reader.hpp"
+#include "modules/sensors/rig_calibration_codec.hpp"
 
 namespace km {
 
@@ -20,6 +21,11 @@ namespace km {
 /// the virtual baseline (see rgbd_rig(); default 0.1). SensorRig::depth is set for an RGB-D rig
 /// and, `with_depth`, for stereo cameras with depth0 beside them.
 [[nodiscard]] SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth = false);
+
+/// The calibration in such a folder, of the cameras and with the depth of `choice`: depth0 is not
+/// looked at. Errors as above.
+[[nodiscard]] RigCalibration read_euroc_calibration(const std::filesystem::path& mav0,
+                                                    const RigChoice& choice);
 
 /// `depth_scale` of depth0: metres of one unit stored in its images. Errors as above.
 [[nodiscard]] double read_depth_scale(const std::filesystem::path& mav0);

@@ -1,11 +1,11 @@
+#include "modules/sensors/kalibr_codec.hpp"
+
 #include <cmath>
 #include <utility>
 
 #include "modules/core/calibration_limits.hpp"
-#include "modules/sensors/calibration_map_codec.hpp"
 #include "modules/sensors/camera_codec.hpp"
 #include "modules/sensors/dataset_reader.hpp"
-#include "modules/sensors/rig_calibration_codec.hpp"
 
 namespace km {
 namespace {
@@ -25,8 +25,8 @@ struct Chains {
   std::optional<CalibrationMap> cameras;
   std::optional<CalibrationMap> imu;  // the map of imu0
 
-  void add(const std::filesystem::path& file) {
-    const CalibrationMap map(file);
+  void add(const CalibrationMap& map) {
+    const std::filesystem::path& file = map.file();
     const bool has_cameras = map.has("cam0");
     const bool has_imu = map.has("imu0") || is_flat_imu(map);
     if (!has_cameras && !has_imu)
@@ -41,7 +41,7 @@ struct Chains {
 };
 
 // T_cam_imu of camera `index`: its own, or through the cameras before it.
-SE3 read_extrinsics(const CalibrationMap& chain, std::size_t index) {
+SE3 read_T_cam_imu(const CalibrationMap& chain, std::size_t index) {
   const CalibrationMap camera = chain.map(camera_name(index).c_str());
   if (camera.has("T_cam_imu")) return camera.transform("T_cam_imu", "T_cam_imu");
   if (camera.has("T_imu_cam")) return camera.transform("T_imu_cam", "T_imu_cam").inverse();
@@ -49,13 +49,37 @@ SE3 read_extrinsics(const CalibrationMap& chain, std::size_t index) {
     camera.fail("T_cam_imu", camera_name(index) +
                                  ": key T_cam_imu is missing (or T_imu_cam, of OpenVINS): "
                                  "calibrate the cameras together with the inertial sensor");
-  return camera.transform("T_cn_cnm1", "T_cn_cnm1") * read_extrinsics(chain, index - 1);
+  return camera.transform("T_cn_cnm1", "T_cn_cnm1") * read_T_cam_imu(chain, index - 1);
+}
+
+// T_cam_cam0 of camera `index`, through the cameras before it.
+SE3 read_T_cam_cam0(const CalibrationMap& chain, std::size_t index) {
+  if (index == 0) return SE3::Identity();
+  const CalibrationMap camera = chain.map(camera_name(index).c_str());
+  return camera.transform("T_cn_cnm1", "T_cn_cnm1") * read_T_cam_cam0(chain, index - 1);
+}
+
+// A chain of cameras that were calibrated without the inertial sensor.
+bool is_placed(const CalibrationMap& chain, std::size_t index) {
+  const CalibrationMap camera = chain.map(camera_name(index).c_str());
+  if (camera.first_of({"T_cam_imu", "T_imu_cam"}) != nullptr) return true;
+  return index > 0 && is_placed(chain, index - 1);
 }
 
 Camera read_chain_camera(const CalibrationMap& chain, std::size_t index) {
-  Camera camera = read_camera(chain.map(camera_name(index).c_str()), "distortion_coeffs");
-  camera.T_body_cam = read_extrinsics(chain, index).inverse();
-  return camera;
+  return read_camera(chain.map(camera_name(index).c_str()), "distortion_coeffs");
+}
+
+// The cameras' T_body_cam; where there is none, in the left camera's frame.
+void read_poses(const CalibrationMap& chain, const RigChoice& choice, Camera& left,
+                std::optional<Camera>& right, bool is_placed) {
+  if (is_placed) {
+    left.T_body_cam = read_T_cam_imu(chain, choice.left).inverse();
+    if (right) right->T_body_cam = read_T_cam_imu(chain, *choice.right).inverse();
+  } else if (right) {
+    right->T_body_cam =
+        read_T_cam_cam0(chain, choice.left) * read_T_cam_cam0(chain, *choice.right).inverse();
+  }
 }
 
 std::string read_topic(const CalibrationMap& map) {
@@ -97,40 +121,48 @@ void read_imu(const CalibrationMap& imu, RigCalibration& calibration) {
       calibration.notes.push_back(imu.place_of(key) + ": " + key + " is not applied to samples");
 }
 
-}  // namespace
-
-RigCalibration read_kalibr(const std::vector<std::filesystem::path>& files,
-                           const RigChoice& choice) {
-  Chains chains;
-  for (const std::filesystem::path& file : files) chains.add(file);
-  if (!chains.cameras)
-    throw DatasetError(files.front().string() + ": no cam0; give Kalibr's chain of cameras, too");
-  const CalibrationMap& chain = *chains.cameras;
-  const std::string right_name = camera_name(choice.right);
-  const CalibrationMap left = chain.map(camera_name(choice.left).c_str());
-  RigCalibration calibration;
-  calibration.image_topics[0] = read_topic(left);
-  const Camera left_camera = read_chain_camera(chain, choice.left);
-  if (choice.depth) {
-    calibration.rig.stereo = rgbd_rig(left_camera, choice.virtual_baseline_m);
-    calibration.rig.depth = choice.depth;
-    calibration.image_time_offset_s = read_time_shift(left);
-  } else {
+void read_cameras(const CalibrationMap& chain, const RigChoice& choice,
+                  RigCalibration& calibration) {
+  const CalibrationMap left_map = chain.map(camera_name(choice.left).c_str());
+  calibration.image_topics[0] = read_topic(left_map);
+  calibration.image_time_offset_s = read_time_shift(left_map);
+  calibration.is_placed = !choice.may_be_partial || is_placed(chain, choice.left);
+  Camera left = read_chain_camera(chain, choice.left);
+  std::optional<Camera> right;
+  const std::string right_name = camera_name(choice.right.value_or(0));
+  if (choice.right) {
     if (!chain.has(right_name.c_str()))
       throw DatasetError(chain.file().string() + ": no " + right_name +
                          ": one camera without depth is not supported");
-    const CalibrationMap right = chain.map(right_name.c_str());
-    calibration.rig.stereo.cameras = {left_camera, read_chain_camera(chain, choice.right)};
-    if (const auto problem = pair_problem(calibration.rig.stereo))
-      right.fail(right.first_of({"T_cam_imu", "T_imu_cam", "T_cn_cnm1"}),
-                 right_name + ' ' + *problem);
-    calibration.image_topics[1] = read_topic(right);
-    calibration.image_time_offset_s = read_pair_shift(left, right);
+    right = read_chain_camera(chain, *choice.right);
   }
+  read_poses(chain, choice, left, right, calibration.is_placed);
+  const auto problem = join_cameras(left, right, choice, calibration.rig);
+  if (!choice.right) return;
+  const CalibrationMap right_map = chain.map(right_name.c_str());
+  if (problem)
+    right_map.fail(right_map.first_of({"T_cam_imu", "T_imu_cam", "T_cn_cnm1"}),
+                   right_name + ' ' + *problem);
+  calibration.image_topics[1] = read_topic(right_map);
+  calibration.image_time_offset_s = read_pair_shift(left_map, right_map);
+}
+
+}  // namespace
+
+RigCalibration read_kalibr(const std::vector<CalibrationMap>& maps, const RigChoice& choice) {
+  Chains chains;
+  for (const CalibrationMap& map : maps) chains.add(map);
+  RigCalibration calibration;
+  calibration.has_cameras = chains.cameras.has_value();
+  if (!chains.cameras && !choice.may_be_partial)
+    throw DatasetError(maps.front().file().string() +
+                       ": no cam0; give Kalibr's chain of cameras, too");
+  if (chains.cameras) read_cameras(*chains.cameras, choice, calibration);
+  calibration.is_placed = calibration.is_placed && calibration.has_cameras;
   if (chains.imu)
     read_imu(*chains.imu, calibration);
   else
-    calibration.notes.push_back(chain.file().string() +
+    calibration.notes.push_back(maps.front().file().string() +
                                 ": no imu0; noise figures are those of EuRoC's inertial sensor");
   return calibration;
 }

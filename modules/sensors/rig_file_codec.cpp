@@ -1,28 +1,102 @@
 #include "modules/sensors/rig_file_codec.hpp"
 
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include <utility>
+
+#include "modules/sensors/calibration_map_codec.hpp"
+#include "modules/sensors/rig_calibration_codec.hpp"
 #include "runtime/config_text.hpp"
 #include "runtime/yaml_config.hpp"
 
 namespace km {
+namespace {
 
-Rig read_rig_file(const std::filesystem::path& path) {
+// "/left" of "/left/image_raw", and of "/left/image_raw/compressed".
+std::pair<std::string, std::string> split_topic(std::string topic) {
+  for (const char* transport : {"/compressed", "/compressedDepth"})
+    if (topic.ends_with(transport)) topic.resize(topic.size() - std::string(transport).size());
+  const std::size_t slash = topic.rfind('/');
+  if (slash == topic.npos) return {"", topic};
+  return {topic.substr(0, slash), topic.substr(slash + 1)};
+}
+
+RosImages images_of(const RigFile::Camera& camera) {
+  const bool named = split_topic(camera.topic).second.find("rect") != std::string::npos;
+  return camera.rectified.value_or(named) ? RosImages::kRectified : RosImages::kRaw;
+}
+
+RigChoice choice_of(const RigFile& file) {
+  RigChoice choice{.left = static_cast<std::size_t>(file.left.camera), .may_be_partial = true};
+  choice.right.reset();
+  if (!file.right.topic.empty()) choice.right = static_cast<std::size_t>(file.right.camera);
+  if (!file.depth.topic.empty())
+    choice.depth =
+        DepthChoice{{file.depth.min_range_m, file.depth.max_range_m}, file.depth.baseline_m};
+  return choice;
+}
+
+// As written in the rig file itself, in files that it names, or all of it to be told by topics.
+RigCalibration read_calibration(const std::filesystem::path& path, bool is_inline,
+                                const RigFile& file) {
+  const RigChoice choice = choice_of(file);
+  if (is_inline) return read_inline_rig(CalibrationMap(path).map("calibration"), choice);
+  if (!file.calibration.empty()) return read_rig(file.calibration, choice);
+  RigCalibration calibration;
+  calibration.has_cameras = calibration.is_placed = false;
+  if (choice.depth) calibration.rig.depth = choice.depth->range;
+  calibration.notes.push_back(path.string() +
+                              ": no calibration: noise of the inertial sensor as of EuRoC's");
+  return calibration;
+}
+
+// A calibration that names other topics may be that of another pair of cameras.
+void note_topics(const RigFile& file, const std::string& path, RigCalibration& calibration) {
+  const std::pair<const std::string&, const std::string&> topics[] = {
+      {calibration.image_topics[0], file.left.topic},
+      {calibration.image_topics[1], file.right.topic},
+      {calibration.imu_topic, file.imu.topic}};
+  for (const auto& [calibrated, used] : topics)
+    if (!calibrated.empty() && !used.empty() && calibrated != used)
+      calibration.notes.push_back(path + ": " + used + " is calibrated as " + calibrated);
+}
+
+}  // namespace
+
+PartialRig read_rig_file(const std::filesystem::path& path) {
   ConfigProblems problems;
   const ConfigContext context{problems, std::filesystem::absolute(path).parent_path()};
   RigFile file;
-  fill_config(read_section(load_yaml(path), "", path.string(), context), "", context, file);
+  YAML::Node root = load_yaml(path);
+  const YAML::Node written = root.IsMap() ? root["calibration"] : YAML::Node();
+  const bool is_inline = written && written.IsMap();
+  if (is_inline) root.remove("calibration");
+  fill_config(read_section(root, "", path.string(), context), "", context, file);
   problems.finish();
-  Rig rig;
-  rig.topics = {.left = file.left.topic,
-                .right = file.right.topic,
-                .depth = file.depth.topic,
-                .imu = file.imu.topic,
-                .gyro = file.imu.gyro_topic,
-                .accel = file.imu.accel_topic};
-  rig.sensors = read_euroc_rig(find_mav0(file.calibration), !file.depth.topic.empty());
-  rig.depth_scale_m = file.depth.scale_m;
-  rig.camera_time_offset_s = file.camera_time_offset_s;
-  return rig;
+  RigCalibration calibration = read_calibration(path, is_inline, file);
+  note_topics(file, path.string(), calibration);
+  const auto info_topic = [](const RigFile::Camera& camera) {
+    return camera.info_topic.empty() ? camera_info_beside(camera.topic) : camera.info_topic;
+  };
+  return {.rig = {.topics = {.left = file.left.topic,
+                             .right = file.right.topic,
+                             .depth = file.depth.topic,
+                             .imu = file.imu.topic,
+                             .gyro = file.imu.gyro_topic,
+                             .accel = file.imu.accel_topic},
+                  .sensors = std::move(calibration.rig),
+                  .depth_scale_m = file.depth.scale_m,
+                  .camera_time_offset_s = file.camera_time_offset_s.value_or(
+                      calibration.image_time_offset_s.value_or(0.0)),
+                  .notes = std::move(calibration.notes)},
+          .has_cameras = calibration.has_cameras,
+          .is_placed = calibration.is_placed,
+          .virtual_baseline_m = file.depth.baseline_m,
+          .info_topics = {info_topic(file.left), info_topic(file.right)},
+          .images = {images_of(file.left), images_of(file.right)},
+          .body_frame = file.body_frame};
+}
+
+std::string camera_info_beside(const std::string& topic) {
+  return split_topic(topic).first + "/camera_info";
 }
 
 std::string rig_file_text(RigFile rig) {

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "modules/core/calibration_limits.hpp"
 #include "modules/core/config.hpp"
-#include "modules/sensors/bag_dataset.hpp"
+#include "modules/sensors/rig_completion.hpp"
 
 namespace km {
 
@@ -14,22 +16,41 @@ namespace km {
 struct RigFile {
   struct Camera {
     std::string topic;
+    int camera = 0;
+    std::string info_topic;
+    std::optional<bool> rectified;
 
     void visit_fields(auto& visitor) {
       visitor.field("topic", topic, "sensor_msgs/Image or CompressedImage");
+      visitor.field("camera", camera, {0, 99}, "number in the calibration: cam0, cam1, ...");
+      visitor.field("info_topic", info_topic,
+                    "sensor_msgs/CameraInfo, where the calibration does not tell the camera; "
+                    "empty: camera_info beside the images");
+      visitor.field("rectified", rectified,
+                    "images are rectified, as P of CameraInfo has them; none: if rect is in the "
+                    "topic's last name");
       visitor.required({"topic"});
     }
   };
   struct Depth {
     std::string topic;
     double scale_m = 1e-3;
+    double min_range_m = 0.0, max_range_m = 65.0;
+    double baseline_m = 0.1;
 
     void visit_fields(auto& visitor) {
       visitor.field("topic", topic,
                     "images of depth, aligned with the left ones; without a right camera, the "
                     "rig is an RGB-D one; empty: none");
-      visitor.field("scale_m", scale_m, {1e-6, 1.0},
+      visitor.field("scale_m", scale_m, kDepthScale_m,
                     "[m] of a unit in images of 16 bits; those of 32 bits are in metres");
+      visitor.field("min_range_m", min_range_m, {0.0, kDepthRange_m.max},
+                    "[m] least distance that the sensor measures");
+      visitor.field("max_range_m", max_range_m, kDepthRange_m, "[m] largest one");
+      visitor.field("baseline_m", baseline_m, kDepthBaseline_m,
+                    "[m] of an RGB-D sensor: errors of depth z are about z^2 / (focal length in "
+                    "px * baseline)");
+      visitor.check(min_range_m < max_range_m, "min_range_m", "is not less than max_range_m");
     }
   };
   struct Imu {
@@ -46,23 +67,28 @@ struct RigFile {
     }
   };
 
-  Camera left, right;
+  Camera left, right = {.topic = {}, .camera = 1, .info_topic = {}, .rectified = {}};
   Depth depth;
   Imu imu;
-  std::filesystem::path calibration;
-  double camera_time_offset_s = 0.0;
+  std::vector<std::filesystem::path> calibration;
+  std::string body_frame;
+  std::optional<double> camera_time_offset_s;
 
   void visit_fields(auto& visitor) {
     visitor.section("left", left);
     visitor.section("right", right, "leave it out for an RGB-D camera");
     visitor.section("depth", depth);
     visitor.section("imu", imu);
-    visitor.field(
-        "calibration", calibration, Input{},
-        "EuRoC folder with the sensor.yaml of cam0, cam1 and imu0, relative to this file");
-    visitor.field("camera_time_offset_s", camera_time_offset_s, {-1.0, 1.0},
-                  "[s] added to the stamps of images: they are then those of the IMU");
-    visitor.required({"left", "imu", "calibration"});
+    visitor.field("calibration", calibration, Input{},
+                  "relative to this file: Kalibr's files ([camchain.yaml, imu.yaml]), one of "
+                  "Basalt (.json), a EuRoC folder with the sensor.yaml of cam0, cam1 and imu0, or "
+                  "keys as in Kalibr's files; CameraInfo and /tf_static tell what it lacks");
+    visitor.field("body_frame", body_frame,
+                  "frame of the inertial sensor in /tf_static; empty: that of its messages");
+    visitor.field("camera_time_offset_s", camera_time_offset_s, kTimeOffset_s,
+                  "[s] added to the stamps of images: they are then those of the IMU; none: as the "
+                  "calibration says, or 0");
+    visitor.required({"left", "imu"});
     visitor.check(!right.topic.empty() || !depth.topic.empty(), "left",
                   "is alone: a right camera or depth is needed (one camera does not tell how far "
                   "things are)");
@@ -71,7 +97,11 @@ struct RigFile {
 
 /// Reads a rig file and its calibration. Throws ConfigError with every problem by file and line,
 /// and DatasetError for a calibration that cannot be used.
-[[nodiscard]] Rig read_rig_file(const std::filesystem::path& file);
+[[nodiscard]] PartialRig read_rig_file(const std::filesystem::path& file);
+
+/// Where drivers tell the camera of a topic of images: "/left/camera_info" of "/left/image_raw" and
+/// of "/left/image_raw/compressed".
+[[nodiscard]] std::string camera_info_beside(const std::string& topic);
 
 /// The text of a rig file: keys with their meaning.
 [[nodiscard]] std::string rig_file_text(RigFile rig);

@@ -126,6 +126,11 @@ bool has_images(const BagChannel& channel) {
   return is_raw(channel) || is_of_type(channel, RosCompressedImage::kType);
 }
 
+std::string_view type_of_images(std::string_view topic) {
+  const bool is_compressed = topic.ends_with("/compressed") || topic.ends_with("/compressedDepth");
+  return is_compressed ? RosCompressedImage::kType : RosImage::kType;
+}
+
 ImageResult gray_of_message(const BagChannel& channel, const BagMessage& message,
                             const std::string& place, const cv::Size& size) {
   RawImage raw =

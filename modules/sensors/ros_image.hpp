@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "modules/core/camera.hpp"
 #include "modules/recordings/bag_reader.hpp"
@@ -10,6 +11,9 @@ namespace km {
 
 /// True for sensor_msgs/Image and sensor_msgs/CompressedImage, of ROS 1 or 2.
 [[nodiscard]] bool has_images(const BagChannel& channel);
+
+/// The type of the messages on a topic of images, by the name that image_transport gives it.
+[[nodiscard]] std::string_view type_of_images(std::string_view topic);
 
 /// The grey values of an image message. Encodings: mono8, mono16 (its higher byte), bgr8, rgb8,
 /// bgra8, rgba8, bayer_*8, yuv422 (UYVY), yuv422_yuy2, the 8UC1, 8UC3, 8UC4 and 16UC1 of OpenCV

@@ -47,6 +47,14 @@ TEST_CASE("A rectified image's camera is that of P", "[recordings]") {
   CHECK(camera.lens.is_ideal());
 }
 
+TEST_CASE("A region that is the whole camera is none", "[recordings]") {
+  RosCameraInfo info = some_info();
+  info.binning_x = info.binning_y = 1;
+  info.region.width = info.width;
+  info.region.height = info.height;
+  CHECK(camera_of(info, RosImages::kRaw).fx == 458.0);
+}
+
 TEST_CASE("ROS's models of distortion are lenses", "[recordings]") {
   RosCameraInfo info = some_info();
   const auto lens = [&] { return camera_of(info, RosImages::kRaw).lens; };
@@ -69,29 +77,29 @@ TEST_CASE("ROS's models of distortion are lenses", "[recordings]") {
   CHECK(lens().is_ideal());
 }
 
-TEST_CASE("A rectified pair has the baseline of the right camera's P", "[recordings]") {
-  SE3 T_body_left = SE3::Identity();
-  T_body_left.translation() = Eigen::Vector3d(0.1, 0.2, 0.3);
-  const StereoRig rig =
-      stereo_of(some_info(), right_of(some_info()), RosImages::kRectified, T_body_left);
-  CHECK(rig.cameras[0].T_body_cam.isApprox(T_body_left));
-  CHECK(rig.T_left_right().translation().isApprox(Eigen::Vector3d(0.1, 0, 0)));
-  CHECK(rig.T_left_right().linear().isIdentity());
-  CHECK(rig.cameras[1].lens.is_ideal());
+TEST_CASE("The right camera's P tells the baseline", "[recordings]") {
+  CHECK(baseline_m(right_of(some_info())).value() == Approx(0.1));
+  CHECK(!baseline_m(some_info()));
+  RosCameraInfo info = right_of(some_info());
+  info.P[3] = 43.0;  // a camera to the left
+  CHECK(!baseline_m(info));
+  info.P.fill(0.0);
+  CHECK(!baseline_m(info));
 }
 
-TEST_CASE("A raw pair stands as its rectifying rotations say", "[recordings]") {
-  RosCameraInfo left = some_info(), right = right_of(some_info());
-  const Eigen::Matrix3d R_left = so3_exp({0.01, -0.03, 0.02}), R_right = so3_exp({-0.02, 0.01, 0});
-  using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  Eigen::Map<RowMajor>(left.R.data()) = R_left;
-  Eigen::Map<RowMajor>(right.R.data()) = R_right;
-  const StereoRig rig = stereo_of(left, right, RosImages::kRaw, SE3::Identity());
-  // A point in the rectified left camera, and where each raw camera has it.
-  const Eigen::Vector3d p(0.4, -0.3, 2.0);
-  const Eigen::Vector3d in_left = R_left.transpose() * p;
-  const Eigen::Vector3d in_right = R_right.transpose() * (p - Eigen::Vector3d(0.1, 0, 0));
-  CHECK((rig.T_left_right() * in_right).isApprox(in_left, 1e-12));
+TEST_CASE("The frame of a CameraInfo is the rectified camera's", "[recordings]") {
+  RosCameraInfo info = some_info();
+  const Eigen::Matrix3d R = so3_exp({0.01, -0.03, 0.02});
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(info.R.data()) = R;
+  // By the message's documentation R takes what the camera sees to the rectified camera.
+  const Eigen::Vector3d p_raw(0.4, -0.3, 2.0);
+  CHECK((T_frame_camera(info, RosImages::kRaw) * p_raw).isApprox(R * p_raw, 1e-12));
+  CHECK(T_frame_camera(info, RosImages::kRectified).isApprox(SE3::Identity()));
+  info.R.fill(0.0);
+  CHECK(T_frame_camera(info, RosImages::kRaw).isApprox(SE3::Identity()));
+  info.R[0] = 2.0;
+  CHECK_THROWS_WITH(T_frame_camera(info, RosImages::kRaw),
+                    Catch::Contains("frame 'left_optical': R is not a rotation"));
 }
 
 TEST_CASE("A CameraInfo that is no calibration is refused by frame and field", "[recordings]") {
@@ -129,29 +137,18 @@ TEST_CASE("A CameraInfo that is no calibration is refused by frame and field", "
     info.D = {0, 0, 0, 0, 0, 0, 0, 0, 1e-3, 0, 0, 0};
     refuses("D has 12 coefficients; of rational_polynomial only 8 are supported");
   }
+  SECTION("binned") {
+    info.binning_y = 2;
+    refuses("binning_x 0, binning_y 2: binned images are not supported");
+  }
+  SECTION("a part") {
+    info.region = {.x_offset = 8, .y_offset = 0, .height = 480, .width = 632, .do_rectify = false};
+    refuses("roi: images of a part of the camera are not supported");
+  }
   SECTION("not finite") {
     info.D[0] = std::nan("");
     refuses("D: nan is outside");
   }
-}
-
-TEST_CASE("A pair without baseline or rotation is refused", "[recordings]") {
-  const RosCameraInfo left = some_info();
-  const auto refuses = [&](const RosCameraInfo& right, const char* why) {
-    CHECK_THROWS_WITH(stereo_of(left, right, RosImages::kRaw, SE3::Identity()),
-                      Catch::Contains("frame 'right_optical': ") && Catch::Contains(why));
-  };
-  RosCameraInfo right = right_of(left);
-  right.P[3] = 0.0;
-  refuses(right, "P[3] = 0: Tx = -fx * baseline of a right camera is negative");
-  right.P[3] = 43.0;
-  refuses(right, "P[3] = 43");
-  right = right_of(left);
-  right.R.fill(0.0);
-  refuses(right, "R is not a rotation");
-  right = right_of(left);
-  right.P.fill(0.0);
-  refuses(right, "P has no focal length");
 }
 
 }  // namespace

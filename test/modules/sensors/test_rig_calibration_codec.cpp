@@ -304,7 +304,7 @@ TEST_CASE("A pair is chosen among more cameras, or one with depth", "[sensors][c
   const RigCalibration wide =
       files.read_kalibr(kCamera0 + kCamera1 + third, kImu, {.left = 0, .right = 2});
   CHECK(wide.rig.stereo.baseline_m() == Approx(0.4));
-  const RigChoice rgbd{.depth = DepthRange{0.3, 8.0}, .virtual_baseline_m = 0.07};
+  const RigChoice rgbd{.right = {}, .depth = DepthChoice{{0.3, 8.0}, 0.07}};
   for (const RigCalibration& calibration :
        {files.read_kalibr(kCamera0, kImu, rgbd), files.read("calib.json", kBasalt, rgbd)}) {
     CHECK(calibration.rig.stereo.depth_source == DepthSource::kDepthImage);

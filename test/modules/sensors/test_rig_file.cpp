@@ -24,7 +24,9 @@ TEST_CASE("A rig file names topics, and a calibration beside it", "[sensors]") {
   const EurocFolder recording;
   const TemporaryFolder folder;
   std::filesystem::create_directory_symlink(recording.root(), folder.path() / "recording");
-  const Rig rig = read_rig_file(folder.write("rig.yaml", kStereo));
+  const PartialRig partial = read_rig_file(folder.write("rig.yaml", kStereo));
+  CHECK(partial.is_complete());
+  const Rig& rig = partial.rig;
   CHECK(rig.topics.left == "/cam0");
   CHECK(rig.topics.right == "/cam1");
   CHECK(rig.topics.imu == "/imu0");
@@ -34,14 +36,107 @@ TEST_CASE("A rig file names topics, and a calibration beside it", "[sensors]") {
   CHECK(rig.sensors.stereo.baseline_m() == Approx(0.1));
 }
 
+const std::string kChain =
+    "cam0: {T_cam_imu: [[1,0,0,0], [0,1,0,0], [0,0,1,0], [0,0,0,1]], camera_model: pinhole,\n"
+    "  distortion_model: radtan, distortion_coeffs: [0,0,0,0], intrinsics: [300,300,320,240],\n"
+    "  resolution: [640,480], timeshift_cam_imu: 0.02, rostopic: /cam0}\n"
+    "cam1: {T_cam_imu: [[1,0,0,-0.2], [0,1,0,0], [0,0,1,0], [0,0,0,1]], camera_model: pinhole,\n"
+    "  distortion_model: radtan, distortion_coeffs: [0,0,0,0], intrinsics: [310,310,320,240],\n"
+    "  resolution: [640,480], timeshift_cam_imu: 0.02, rostopic: /cam1}\n";
+const std::string kTopics = "left: {topic: /cam0}\nright: {topic: /cam1}\nimu: {topic: /imu0}\n";
+
+PartialRig read(const TemporaryFolder& folder, const std::string& text) {
+  return read_rig_file(folder.write("rig.yaml", text));
+}
+
+TEST_CASE("A rig file names Kalibr's files, or has what would be in them", "[sensors]") {
+  const TemporaryFolder folder;
+  folder.write("camchain.yaml", kChain);
+  folder.write("imu.yaml",
+               "update_rate: 400\naccelerometer_noise_density: 0.006\n"
+               "accelerometer_random_walk: 0.0002\ngyroscope_noise_density: 0.0004\n"
+               "gyroscope_random_walk: 4.0e-06\n");
+  const PartialRig named = read(folder, kTopics + "calibration: [camchain.yaml, imu.yaml]\n");
+  CHECK(named.is_complete());
+  CHECK(named.rig.sensors.imu.rate_hz == 400.0);
+  CHECK(named.rig.sensors.stereo.cameras[1].fx == 310.0);
+  CHECK(named.rig.notes.empty());
+  // t_imu = t_cam + timeshift_cam_imu, unless the rig file knows better.
+  CHECK(named.rig.camera_time_offset_s == 0.02);
+  CHECK(read(folder, kTopics + "calibration: camchain.yaml\ncamera_time_offset_s: 0\n")
+            .rig.camera_time_offset_s == 0.0);
+
+  std::string indented;
+  for (std::size_t at = 0; at < kChain.size();) {
+    const std::size_t end = kChain.find('\n', at) + 1;
+    indented += "  " + kChain.substr(at, end - at);
+    at = end;
+  }
+  const PartialRig written = read(folder, kTopics + "calibration:\n" + indented);
+  CHECK(written.is_complete());
+  CHECK(written.rig.sensors.stereo.baseline_m() == Approx(0.2));
+  CHECK_THROWS_WITH(read(folder, kTopics + "calibration:\n  cam0: {resolution: 3}\n"),
+                    Contains("rig.yaml line 5: resolution is not a list of numbers"));
+  // Calibrated as other topics: it may be that of others.
+  const PartialRig other = read(folder,
+                                "left: {topic: /a}\nright: {topic: /cam1}\n"
+                                "imu: {topic: /imu0}\ncalibration: camchain.yaml\n");
+  REQUIRE(other.rig.notes.size() == 2);
+  CHECK_THAT(other.rig.notes[1], Contains("/a is calibrated as /cam0"));
+}
+
+TEST_CASE("A rig file for depth needs no calibration of depth", "[sensors]") {
+  const EurocFolder recording;
+  const TemporaryFolder folder;
+  std::filesystem::create_directory_symlink(recording.root(), folder.path() / "recording");
+  const PartialRig rig =
+      read(folder,
+           "left: {topic: /color}\ndepth: {topic: /depth, min_range_m: 0.4, max_range_m: 6, "
+           "baseline_m: 0.05}\nimu: {topic: /imu}\ncalibration: recording\n");
+  CHECK(rig.is_complete());
+  CHECK(rig.rig.sensors.stereo.depth_source == DepthSource::kDepthImage);
+  CHECK(rig.rig.sensors.stereo.baseline_m() == Approx(0.05));
+  REQUIRE(rig.rig.sensors.depth);
+  CHECK(rig.rig.sensors.depth->min_m == 0.4);
+  CHECK(rig.rig.sensors.depth->max_m == 6.0);
+}
+
+TEST_CASE("What a rig file does not tell is asked of topics", "[sensors]") {
+  const TemporaryFolder folder;
+  const PartialRig none =
+      read(folder,
+           "left: {topic: /l/image_raw/compressed}\n"
+           "right: {topic: /r/image_rect, info_topic: /r/info}\nimu: {topic: /imu}\n"
+           "body_frame: base\n");
+  CHECK(!none.has_cameras);
+  CHECK(!none.is_placed);
+  CHECK(none.info_topics == std::array<std::string, 2>{"/l/camera_info", "/r/info"});
+  CHECK(none.images == std::array{RosImages::kRaw, RosImages::kRectified});
+  CHECK(none.body_frame == "base");
+
+  std::string chain = kChain;
+  for (std::size_t at = 0; (at = chain.find("T_cam_imu")) != chain.npos;)
+    chain.replace(at, 9, "T_cn_cnm1");
+  folder.write("cameras.yaml", chain);
+  const PartialRig unplaced = read(folder, kTopics + "calibration: cameras.yaml\n");
+  CHECK(unplaced.has_cameras);
+  CHECK(!unplaced.is_placed);
+  CHECK(unplaced.rig.sensors.stereo.cameras[1].T_body_cam.translation().isApprox(
+      Eigen::Vector3d(0.2, 0, 0)));
+}
+
 TEST_CASE("What a rig file lacks is named by file and line", "[sensors]") {
   CHECK_THAT(complaint("left: {topic: /a}\nimu: {topic: /i}\ncalibration: /\n"),
              Contains("one camera does not tell how far things are"));
+  CHECK_THAT(complaint("left: {topic: /a}\ndepth: {topic: /d, min_range_m: 9, max_range_m: 8}\n"
+                       "imu: {topic: /i}\n"),
+             Contains("rig.yaml:2: depth.min_range_m = 9 is not less than max_range_m"));
   CHECK_THAT(complaint("left: {topic: /a}\nright: {topic: /b}\nimu: {gyro_topic: /g}\n"
                        "calibration: /\n"),
              Contains("rig.yaml:3") && Contains("gyro_topic and accel_topic"));
-  CHECK_THAT(complaint("left: {topic: /a}\nright: {topic: /b}\nimu: {topic: /i}\n"),
-             Contains("calibration"));
+  CHECK_THAT(complaint("left: {topic: /a}\nright: {topic: /b}\nimu: {topic: /i}\n"
+                       "calibration: [nowhere.yaml]\n"),
+             Contains("rig.yaml:4: calibration = [nowhere.yaml] is no file or folder"));
   CHECK_THAT(complaint("left: {topik: /a}\nright: {topic: /b}\nimu: {topic: /i}\n"
                        "calibration: /\n"),
              Contains("rig.yaml:1") && Contains("did you mean topic?"));

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <vector>
+
+#include "modules/sensors/rig_calibration_codec.hpp"
+
+namespace km {
+
+/// Kalibr's files, see read_rig().
+[[nodiscard]] RigCalibration read_kalibr(const std::vector<CalibrationMap>& maps,
+                                         const RigChoice& choice);
+
+}  // namespace km

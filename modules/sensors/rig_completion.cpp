@@ -1,0 +1,195 @@
+#include "modules/sensors/rig_completion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+#include "modules/core/calibration_limits.hpp"
+#include "modules/core/lie.hpp"
+#include "modules/core/text_rows.hpp"
+#include "modules/sensors/ros_image.hpp"
+
+namespace km {
+namespace {
+
+constexpr const char* kStaticTransforms = "/tf_static";
+constexpr const char* kSide[] = {"left", "right"};
+
+void append(std::string& list, const std::string& item) {
+  list += (list.empty() ? "" : "; ") + item;
+}
+
+}  // namespace
+
+const std::string& RigCompletion::imu_topic() const {
+  const SensorTopicNames& topics = partial_.rig.topics;
+  return topics.imu.empty() ? topics.gyro : topics.imu;
+}
+
+std::vector<RigCompletion::Teller> RigCompletion::tellers() const {
+  std::vector<Teller> tellers;
+  if (!partial_.has_cameras) {
+    tellers.push_back({partial_.info_topics[0], RosCameraInfo::kType});
+    if (has_right()) tellers.push_back({partial_.info_topics[1], RosCameraInfo::kType});
+  }
+  if (!partial_.is_complete())
+    tellers.push_back({kStaticTransforms, RosTransforms::kType,
+                       !partial_.is_placed && partial_.body_frame.empty()});
+  if (!partial_.is_placed) {
+    if (partial_.body_frame.empty()) tellers.push_back({imu_topic(), RosImu::kType});
+    if (partial_.has_cameras)
+      tellers.push_back({partial_.rig.topics.left, type_of_images(partial_.rig.topics.left)});
+  }
+  return tellers;
+}
+
+bool RigCompletion::take_info(std::size_t camera, const BagChannel& channel,
+                              const BagMessage& message) {
+  if (infos_[camera]) return false;
+  auto info = decode_ros<RosCameraInfo>(channel.encoding, message.bytes);
+  if (!info.value) return false;
+  try {
+    static_cast<void>(camera_of(*info.value, partial_.images[camera]));
+    const SE3 T = T_frame_camera(*info.value, partial_.images[camera]);
+    const double angle = so3_log(T.linear()).norm();
+    constexpr double kRemarkable_rad = 1e-3;
+    if (angle > kRemarkable_rad) {
+      std::ostringstream note;
+      note << channel.topic << ": R turns the camera by " << angle
+           << " rad: its frame is taken as that of the rectified camera";
+      partial_.rig.notes.push_back(note.str());
+    }
+  } catch (const std::invalid_argument& error) {
+    throw DatasetError(readable(channel.topic, 80) + ": " + error.what());
+  }
+  infos_[camera] = *std::move(info.value);
+  return true;
+}
+
+bool RigCompletion::add(const BagChannel& channel, const BagMessage& message) {
+  const auto take_frame = [&](std::optional<std::string>& frame) {
+    if (frame) return false;
+    auto header = decode_ros<RosHeader>(channel.encoding, message.bytes);
+    if (header.value) frame = std::move(header.value->frame);
+    return frame.has_value();
+  };
+  if (channel.topic == kStaticTransforms && is_of_type(channel, RosTransforms::kType)) {
+    const auto transforms = decode_ros<RosTransforms>(channel.encoding, message.bytes);
+    if (transforms.value) transforms_.add(*transforms.value);
+    return transforms.value.has_value();
+  }
+  if (!partial_.has_cameras && is_of_type(channel, RosCameraInfo::kType)) {
+    bool is_new = false;
+    for (const std::size_t camera : {0U, 1U})
+      if (channel.topic == partial_.info_topics[camera])
+        is_new = take_info(camera, channel, message) || is_new;
+    return is_new;
+  }
+  if (channel.topic == imu_topic()) return take_frame(imu_frame_);
+  return channel.topic == partial_.rig.topics.left && take_frame(image_frame_);
+}
+
+std::optional<std::string> RigCompletion::camera_frame(std::size_t camera) const {
+  if (infos_[camera]) return infos_[camera]->header.frame;
+  return camera == 0 && partial_.has_cameras ? image_frame_ : std::nullopt;
+}
+
+std::optional<std::string> RigCompletion::body_frame() const {
+  return partial_.body_frame.empty() ? imu_frame_ : partial_.body_frame;
+}
+
+std::optional<SE3> RigCompletion::T_body_left() const {
+  const auto body = body_frame(), left = camera_frame(0);
+  if (!body || !left) return std::nullopt;
+  const auto T_body_frame = transforms_.find(*body, *left);
+  if (!T_body_frame || !infos_[0]) return T_body_frame;
+  return *T_body_frame * T_frame_camera(*infos_[0], partial_.images[0]);
+}
+
+// By the stereo calibration in P, whose rectified cameras lie on one line, else by the frames.
+std::optional<SE3> RigCompletion::T_left_right() const {
+  if (!infos_[0] || !infos_[1]) return std::nullopt;
+  std::optional<SE3> T_frames;
+  if (const auto baseline = baseline_m(*infos_[1]))
+    T_frames = make_pose(Eigen::Matrix3d::Identity(), {*baseline, 0.0, 0.0});
+  else
+    T_frames = transforms_.find(*camera_frame(0), *camera_frame(1));
+  if (!T_frames) return std::nullopt;
+  return T_frame_camera(*infos_[0], partial_.images[0]).inverse() * *T_frames *
+         T_frame_camera(*infos_[1], partial_.images[1]);
+}
+
+std::optional<Rig> RigCompletion::rig() const {
+  Rig rig = partial_.rig;
+  StereoRig& stereo = rig.sensors.stereo;
+  if (!partial_.has_cameras) {
+    const auto T = T_left_right();
+    if (!infos_[0] || (has_right() && !T)) return std::nullopt;
+    const Camera left = camera_of(*infos_[0], partial_.images[0]);
+    stereo = rgbd_rig(left, partial_.virtual_baseline_m);
+    if (has_right()) {
+      stereo = {.cameras = {left, camera_of(*infos_[1], partial_.images[1])}};
+      stereo.cameras[1].T_body_cam = *T;
+      if (const auto problem = pair_problem(stereo))
+        throw DatasetError(partial_.info_topics[1] + ": " + *problem);
+    }
+  }
+  if (partial_.is_placed) return rig;
+  const auto T = T_body_left();
+  if (!T) return std::nullopt;
+  for (Camera& camera : stereo.cameras) camera.T_body_cam = *T * camera.T_body_cam;
+  return rig;
+}
+
+std::string RigCompletion::missing_chain(const std::string& a, const std::string& b) const {
+  return std::string(kStaticTransforms) + " does not join " + readable(a, 80) + " and " +
+         readable(b, 80) + ", its frames are: " + transforms_.frames();
+}
+
+std::string RigCompletion::missing() const {
+  std::string list;
+  bool has_infos = true;
+  for (std::size_t k = 0; k < (has_right() ? 2U : 1U) && !partial_.has_cameras; ++k) {
+    if (infos_[k]) continue;
+    has_infos = false;
+    append(list, std::string("the ") + kSide[k] + " camera: sensor_msgs/CameraInfo on " +
+                     partial_.info_topics[k]);
+  }
+  if (!partial_.has_cameras && has_infos && has_right() && !T_left_right())
+    append(list, "where the right camera is: a baseline in P of " + partial_.info_topics[1] +
+                     ", or " + missing_chain(*camera_frame(0), *camera_frame(1)));
+  if (partial_.is_placed) return list;
+  const auto body = body_frame(), left = camera_frame(0);
+  if (!body) append(list, "the body's frame: messages on " + imu_topic() + ", or body_frame");
+  if (!left && partial_.has_cameras)
+    append(list, "the left camera's frame: images on " + partial_.rig.topics.left);
+  if (!T_body_left())
+    append(list, std::string("where the left camera is on the body: ") +
+                     (body && left ? missing_chain(*body, *left) : kStaticTransforms) +
+                     " (body_frame names the inertial sensor's)");
+  return list;
+}
+
+Rig complete_rig(const std::string& name, BagReader& bag, PartialRig rig) {
+  RigCompletion completion(std::move(rig));
+  const auto fail = [&] {
+    throw DatasetError(name +
+                       ": the calibration is not complete; missing: " + completion.missing());
+  };
+  // What is not in a bag needs no search through it.
+  for (const auto& teller : completion.tellers())
+    if (!bag.is_live() && teller.is_needed &&
+        std::ranges::count(bag.channels(), teller.topic, &BagChannel::topic) == 0)
+      fail();
+  auto complete = completion.rig();
+  while (!complete) {
+    const auto message = bag.next();
+    if (!message) fail();
+    if (completion.add(bag.channels()[message->channel], *message)) complete = completion.rig();
+  }
+  return *std::move(complete);
+}
+
+}  // namespace km

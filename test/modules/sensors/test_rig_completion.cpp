@@ -1,0 +1,206 @@
+#include <catch2/catch.hpp>
+
+#include <numbers>
+
+#include "modules/core/lie.hpp"
+#include "modules/sensors/rig_completion.hpp"
+#include "test/modules/sensors/listed_bag.hpp"
+
+namespace km {
+namespace {
+
+using Catch::Matchers::Contains;
+
+RosCameraInfo info(const std::string& frame, double Tx) {
+  RosCameraInfo info;
+  info.header.frame = frame;
+  info.width = 640;
+  info.height = 480;
+  info.distortion_model = "plumb_bob";
+  info.D = {-0.28, 0.07, 2e-4, 1e-5, 0.0};
+  info.K = {458.0, 0, 320.5, 0, 457.0, 240.5, 0, 0, 1};
+  info.R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  info.P = {430.0, 0, 318.0, Tx, 0, 430.0, 239.0, 0, 0, 0, 1, 0};
+  return info;
+}
+
+RosImu imu(const std::string& frame) {
+  RosImu message;
+  message.header.frame = frame;
+  return message;
+}
+
+RosTransform transform(const std::string& parent, const std::string& child,
+                       const Eigen::Vector3d& position, const Eigen::Vector3d& rotation) {
+  return {{0, parent}, child, {position, Eigen::Quaterniond(so3_exp(rotation))}};
+}
+
+void tell(ListedBag& bag, const std::vector<RosTransform>& transforms) {
+  bag.add_bytes("/tf_static", RosTransforms::kType, 0, encode_ros(RosTransforms{transforms}));
+}
+
+// The inertial sensor a metre above the base and turned to its left, the left camera in front.
+const Eigen::Vector3d kQuarter(0, 0, std::numbers::pi / 2);
+const RosTransform kImuOnBase = transform("base", "imu", {0, 0, 1}, kQuarter);
+const RosTransform kLeftOnBase = transform("base", "left_optical", {0.2, 0, 0}, {0, 0, 0});
+
+PartialRig nothing_known() {
+  PartialRig rig;
+  rig.rig.topics = {
+      .left = "/left", .right = "/right", .depth = {}, .imu = "/imu", .gyro = {}, .accel = {}};
+  rig.has_cameras = rig.is_placed = false;
+  rig.info_topics = {"/left_info", "/right_info"};
+  return rig;
+}
+
+TEST_CASE("CameraInfo and static transforms tell a whole rig", "[sensors][calibration]") {
+  ListedBag bag;
+  bag.add("/left_info", info("left_optical", 0.0));
+  tell(bag, {kLeftOnBase});
+  bag.add("/imu", imu("imu"));
+  bag.add("/right_info", info("left_optical", -43.0));
+  tell(bag, {kImuOnBase});
+  const Rig rig = complete_rig("a.bag", bag, nothing_known());
+  const StereoRig& stereo = rig.sensors.stereo;
+  CHECK(stereo.cameras[0].fx == 458.0);
+  CHECK(stereo.cameras[1].lens.coefficients()[0] == -0.28);
+  CHECK(stereo.T_left_right().isApprox(make_pose(Eigen::Matrix3d::Identity(), {0.1, 0, 0})));
+  // The base's x axis is the inertial sensor's -y axis: the left camera is in front of the base.
+  CHECK(stereo.cameras[0].T_body_cam.translation().isApprox(Eigen::Vector3d(0, -0.2, -1)));
+  CHECK((stereo.cameras[0].T_body_cam.linear() * Eigen::Vector3d::UnitX())
+            .isApprox(-Eigen::Vector3d::UnitY()));
+  CHECK(rig.notes.empty());
+}
+
+TEST_CASE("Raw images stand as R turns them from their frame", "[sensors][calibration]") {
+  const Eigen::Matrix3d R_left = so3_exp({0.01, -0.03, 0.02}), R_right = so3_exp({-0.02, 0.01, 0});
+  using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  RosCameraInfo left = info("imu", 0.0), right = info("imu", -43.0);
+  Eigen::Map<RowMajor>(left.R.data()) = R_left;
+  Eigen::Map<RowMajor>(right.R.data()) = R_right;
+  const bool rectified = GENERATE(true, false);
+  CAPTURE(rectified);
+  PartialRig partial = nothing_known();
+  if (rectified) partial.images = {RosImages::kRectified, RosImages::kRectified};
+  partial.body_frame = "imu";
+  ListedBag bag;
+  bag.add("/left_info", left);
+  bag.add("/right_info", right);
+  const Rig rig = complete_rig("a.bag", bag, partial);
+  const auto& cameras = rig.sensors.stereo.cameras;
+  // A point of the rectified left camera, and where each raw camera has it.
+  const Eigen::Vector3d p(0.4, -0.3, 2.0), in_right_rectified = p - Eigen::Vector3d(0.1, 0, 0);
+  const Eigen::Vector3d in_left = rectified ? p : R_left.transpose() * p;
+  const Eigen::Vector3d in_right =
+      rectified ? in_right_rectified : R_right.transpose() * in_right_rectified;
+  CHECK((cameras[0].T_body_cam * in_left).isApprox(p, 1e-12));
+  CHECK((cameras[1].T_body_cam * in_right).isApprox(p, 1e-12));
+  CHECK(cameras[0].fx == (rectified ? 430.0 : 458.0));
+  CHECK(rig.notes.size() == (rectified ? 0U : 2U));
+}
+
+TEST_CASE("Without a stereo calibration the frames say where the right camera is",
+          "[sensors][calibration]") {
+  ListedBag bag;
+  bag.add("/left_info", info("left_optical", 0.0));
+  bag.add("/right_info", info("right_optical", 0.0));
+  bag.add("/imu", imu("/imu"));
+  tell(bag, {kImuOnBase, kLeftOnBase,
+             transform("left_optical", "right_optical", {0.12, 0, 0}, {0, 0.01, 0})});
+  const StereoRig stereo = complete_rig("a.bag", bag, nothing_known()).sensors.stereo;
+  CHECK(stereo.baseline_m() == Approx(0.12));
+  CHECK(stereo.T_left_right().linear().isApprox(so3_exp({0, 0.01, 0}), 1e-12));
+}
+
+TEST_CASE("One CameraInfo tells an RGB-D rig", "[sensors][calibration]") {
+  PartialRig partial = nothing_known();
+  partial.rig.topics.right.clear();
+  partial.rig.topics.depth = "/depth";
+  partial.rig.sensors.depth = DepthRange{0.3, 8.0};
+  partial.virtual_baseline_m = 0.07;
+  partial.body_frame = "base";
+  ListedBag bag;
+  bag.add("/left_info", info("left_optical", 0.0));
+  tell(bag, {kLeftOnBase});
+  const SensorRig rig = complete_rig("a.bag", bag, partial).sensors;
+  CHECK(rig.stereo.depth_source == DepthSource::kDepthImage);
+  CHECK(rig.stereo.baseline_m() == Approx(0.07));
+  CHECK(rig.depth->max_m == 8.0);
+  CHECK(rig.stereo.cameras[0].T_body_cam.translation().isApprox(Eigen::Vector3d(0.2, 0, 0)));
+}
+
+TEST_CASE("Calibrated cameras are put where their images' frame is", "[sensors][calibration]") {
+  PartialRig partial = nothing_known();
+  partial.has_cameras = true;
+  for (Camera& camera : partial.rig.sensors.stereo.cameras) camera.fx = 300.0;
+  partial.rig.sensors.stereo.cameras[1].T_body_cam.translation().x() = 0.11;
+  ListedBag bag;
+  bag.add("/left_info", info("another", 0.0));
+  bag.add("/imu", imu("base"));
+  RosImage image;
+  image.header = {5, "left_optical"};
+  bag.add("/left", image);
+  tell(bag, {kLeftOnBase});
+  const StereoRig stereo = complete_rig("a.bag", bag, partial).sensors.stereo;
+  CHECK(stereo.cameras[0].fx == 300.0);
+  CHECK(stereo.cameras[0].T_body_cam.translation().isApprox(Eigen::Vector3d(0.2, 0, 0)));
+  CHECK(stereo.cameras[1].T_body_cam.translation().isApprox(Eigen::Vector3d(0.31, 0, 0)));
+}
+
+TEST_CASE("What is missing of a calibration is named with what would tell it",
+          "[sensors][calibration]") {
+  const auto complaint = [](ListedBag& bag) -> std::string {
+    try {
+      static_cast<void>(complete_rig("a.bag", bag, nothing_known()));
+    } catch (const DatasetError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  ListedBag empty;
+  CHECK_THAT(complaint(empty),
+             Contains("a.bag: the calibration is not complete") &&
+                 Contains("the left camera: sensor_msgs/CameraInfo on /left_info") &&
+                 Contains("the right camera: sensor_msgs/CameraInfo on /right_info") &&
+                 Contains("the body's frame: messages on /imu, or body_frame") &&
+                 Contains("where the left camera is on the body: /tf_static"));
+  ListedBag bag;
+  bag.add("/left_info", info("left_optical", 0.0));
+  bag.add("/right_info", info("right_optical", 0.0));
+  bag.add("/imu", imu("imu"));
+  tell(bag, {kLeftOnBase});
+  CHECK_THAT(complaint(bag),
+             Contains("where the right camera is: a baseline in P of /right_info, or /tf_static "
+                      "does not join left_optical and right_optical") &&
+                 Contains("where the left camera is on the body: /tf_static does not join imu and "
+                          "left_optical, its frames are: base, left_optical (body_frame"));
+  ListedBag uncalibrated;
+  uncalibrated.add("/right_info", info("right_optical", 0.0));
+  uncalibrated.add("/imu", imu("imu"));
+  tell(uncalibrated, {});
+  RosCameraInfo zero = info("left_optical", 0.0);
+  zero.K.fill(0.0);
+  uncalibrated.add_bytes("/left_info", RosCameraInfo::kType, 1, encode_ros(zero));
+  CHECK_THAT(complaint(uncalibrated), Contains("/left_info: CameraInfo of frame 'left_optical': K "
+                                               "is 0: the camera is not calibrated"));
+}
+
+TEST_CASE("A chain of static transforms is followed in both directions", "[sensors]") {
+  StaticTransforms transforms;
+  transforms.add({{kImuOnBase, kLeftOnBase, transform("left_optical", "lens", {0, 0, 0.5}, {})}});
+  transforms.add({{transform("x", "y", {1, 0, 0}, {0, 0, 0})}});
+  CHECK(transforms.find("imu", "lens")->translation().isApprox(Eigen::Vector3d(0, -0.2, -0.5)));
+  CHECK(transforms.find("lens", "imu")->isApprox(transforms.find("imu", "lens")->inverse()));
+  CHECK(transforms.find("/lens", "lens")->isApprox(SE3::Identity()));
+  CHECK(!transforms.find("imu", "y"));
+  // Loops end; what is no transform is left out.
+  transforms.add({{transform("lens", "imu", {9, 9, 9}, {0, 0, 0})}});
+  CHECK(!transforms.find("imu", "z"));
+  RosTransform bad = transform("imu", "z", {0, 0, 0}, {0, 0, 0});
+  bad.pose.orientation.coeffs().setZero();
+  transforms.add({{bad}});
+  CHECK(!transforms.find("imu", "z"));
+}
+
+}  // namespace
+}  // namespace km
