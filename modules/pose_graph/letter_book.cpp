@@ -13,6 +13,9 @@ constexpr double kMeanOver = 8.0;  // letters
 // In periods.
 constexpr double kLeastPatience = 0.2;
 constexpr double kMostPatience = 3.0;
+// The transport loses nothing while it is there, and where it was not reachable_again() helps. What
+// is large also takes its reader long, who does not answer meanwhile.
+constexpr double kRepeated_Bps = 50e3;
 
 // A letter that is so far ahead of those that were taken is not one of a solver's.
 constexpr std::uint32_t kFarAhead = 10000;
@@ -66,7 +69,10 @@ double LetterBook::patience_s(const Correspondent& of, const Waiting& waiting) c
   const double first_s = of.answer_s ? kPatience * *of.answer_s : period_s_;
   const double least_s = kLeastPatience * period_s_;
   const double most_s = kMostPatience * period_s_;
-  return std::min(std::max(first_s, least_s) * std::ldexp(1.0, waiting.repetitions), most_s);
+  const double of_size_s = static_cast<double>(waiting.letter.bytes->size()) / kRepeated_Bps;
+  return std::max(
+      std::min(std::max(first_s, least_s) * std::ldexp(1.0, waiting.repetitions), most_s),
+      of_size_s);
 }
 
 std::vector<SessionLetter> LetterBook::due(double now_s) {

@@ -49,6 +49,27 @@ SolverLetter solver_letter(RobotId to, std::uint8_t content) {
 
 }  // namespace
 
+TEST_CASE("a large letter is repeated more rarely than a small one", "[pose_graph][agent]") {
+  LetterBook book({1, 1}, {}, 1.0);
+  const SolverLetter large{3, std::make_shared<const std::vector<std::uint8_t>>(1'000'000)};
+  (void)book.write(solver_letter(2, 10), 0.0);
+  (void)book.write(large, 0.0);
+  std::map<RobotId, int> repeated;
+  std::size_t bytes = 0;
+  constexpr int kSeconds = 100;
+  for (int s = 1; s <= kSeconds; ++s)
+    for (const SessionLetter& letter : book.due(s)) {
+      ++repeated[letter.to];
+      bytes += letter.bytes->size();
+    }
+  CHECK(repeated[2] >= kSeconds / 3);  // at least every three periods
+  CHECK(repeated[3] >= 3);
+  CHECK(bytes <= 60'000 * kSeconds);
+  book.reachable_again(3);
+  const auto due = book.due(kSeconds);
+  CHECK(std::ranges::any_of(due, [](const SessionLetter& letter) { return letter.to == 3; }));
+}
+
 TEST_CASE("letters are repeated until they are known to have arrived", "[pose_graph][agent]") {
   LetterBook a({1, 1}, {}, 1.0), b({2, 1}, {}, 1.0);
   const auto arrives = [](LetterBook& at, const SessionLetter& letter, double now_s) {
