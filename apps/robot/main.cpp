@@ -105,6 +105,10 @@ void add_input(CLI::App& app, RobotOptions& options) {
   app.add_option("--rig", options.rig,
                  "For a bag: file that says which topics are the sensors, and their calibration")
       ->check(CLI::ExistingFile);
+  app.add_option("--odometry", options.odometry,
+                 "Poses of the body by another odometry (TUM: t[s] x y z qx qy qz qw), in place of "
+                 "the own one; images still give features and depth")
+      ->check(CLI::ExistingFile);
   app.add_option("--from", options.from_s, "Start of the part to play [s since the first image]");
   app.add_option("--to", options.to_s, "End of the part to play [s since the first image]");
   app.add_option_function<std::string>(

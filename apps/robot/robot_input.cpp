@@ -14,6 +14,7 @@
 #include "modules/sensors/bag_dataset.hpp"
 #include "modules/sensors/euroc_reader.hpp"
 #include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/pose_file.hpp"
 #include "modules/sensors/rig_file_codec.hpp"
 #include "modules/sensors/ros_image.hpp"
 #include "runtime/log.hpp"
@@ -76,6 +77,9 @@ std::unique_ptr<BagReader> subscribe(std::shared_ptr<const RosNetwork> network,
   for (const std::string& topic : {topics.imu, topics.gyro, topics.accel})
     if (!topic.empty())
       wanted.push_back({topic, std::string(RosImu::kType), RosQos::kSensorData, kSamples});
+  if (!topics.odometry.empty())
+    wanted.push_back(
+        {topics.odometry, std::string(RosOdometry::kType), RosQos::kSensorData, kSamples});
   return std::make_unique<RosSubscription>(std::move(network), std::move(wanted));
 }
 
@@ -103,6 +107,10 @@ std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const 
                                              std::shared_ptr<const RosNetwork> ros,
                                              std::optional<Stamp> not_before) {
   Rig rig = complete(options, partial, ros);
+  const bool has_poses =
+      !rig.topics.odometry.empty() || !partial.pose_file.empty() || !options.odometry.empty();
+  if (has_poses) rig.topics.imu = rig.topics.gyro = rig.topics.accel = "";
+  if (!options.odometry.empty()) rig.topics.odometry.clear();
   const bool needs_depth =
       rig.topics.right.empty() || config.sensors.depth || (mapping && mapping->reads_depth());
   if (!needs_depth) rig.topics.depth.clear();
@@ -140,6 +148,20 @@ std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const R
   return std::make_unique<EurocReader>(open_euroc(options.dataset, euroc));
 }
 
+// Those of a file, if one is named.
+std::unique_ptr<DatasetReader> with_poses(const RobotOptions& options,
+                                          const std::optional<PartialRig>& rig,
+                                          std::unique_ptr<DatasetReader> reader) {
+  const fs::path file = options.odometry.empty() && rig ? rig->pose_file : options.odometry;
+  if (file.empty()) return reader;
+  if (options.is_live)
+    throw std::invalid_argument(file.string() +
+                                ": a file of poses is of a recording; --live hears an odometry on "
+                                "a topic: odometry: {topic: ...} in " +
+                                options.rig.string());
+  return std::make_unique<PoseFileReader>(std::move(reader), file);
+}
+
 RecordedGraph open_graph(const RobotOptions& options) {
   RecordedGraph graph = read_recorded_graph(options.graph);
   if (graph.robot != options.robot)
@@ -170,7 +192,8 @@ RobotInput open_robot_input(const RobotOptions& options, const RobotConfig& conf
     ros = std::make_shared<const RosNetwork>(config.ros);
   if (!is_dataset)
     return {open_graph(options), name, std::move(restored), std::nullopt, std::move(ros)};
-  auto reader = open_dataset(options, config, mapping, rig, ros, restored);
+  auto reader =
+      with_poses(options, rig, open_dataset(options, config, mapping, rig, ros, restored));
   auto map = restored && mapping ? restore_map(options, *restored) : std::nullopt;
   return {std::move(reader), name, std::move(restored), std::move(map), std::move(ros)};
 }

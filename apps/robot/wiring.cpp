@@ -20,6 +20,7 @@
 #include "modules/pose_graph/team_node.hpp"
 #include "modules/ros_dds/ros_output_node.hpp"
 #include "modules/semantic_mapping/semantic_mapping_node.hpp"
+#include "modules/vio/outside_odometry_node.hpp"
 #include "modules/vio/vio_node.hpp"
 #include "runtime/dds/robot_status.hpp"
 
@@ -129,20 +130,32 @@ void Robot::add_journal(const RobotOptions& options, const std::string& input,
                                              .restarts = topics_.closure_restarts});
 }
 
+template <typename OdometryNode, typename... Arguments>
+void Robot::add_odometry(Arguments&&... arguments) {
+  auto& node = add<OdometryNode>(true, identity_.robot, std::forward<Arguments>(arguments)...);
+  if (restored_)
+    node.continue_from(
+        {restored_->states[restored_->final_states() - 1], restored_->odometry.back()});
+}
+
 void Robot::add_sensing(const RobotConfig& config, double rate,
                         std::unique_ptr<DatasetReader> reader,
                         const std::optional<MappingPlan>& mapping,
                         std::optional<ContinuedMap> map) {
   const SensorRig rig = reader->rig();
+  const bool gives_poses = reader->gives_poses();
   sensors_ =
       &add<SensorsNode>(true, config.sensors, rate, std::move(reader),
                         SensorsTopics{.packets = topics_.packets, .end = topics_.sensors_end});
   add_restore();
-  auto& vio = add<VioNode>(true, identity_.robot, rig, config.tracker, config.vio,
-                           VioTopics{.packets = topics_.packets,
-                                     .odometry = topics_.odometry,
-                                     .keyframes = topics_.keyframe_odometry,
-                                     .frames = topics_.located_frames});
+  const VioTopics odometry{.packets = topics_.packets,
+                           .odometry = topics_.odometry,
+                           .keyframes = topics_.keyframe_odometry,
+                           .frames = topics_.located_frames};
+  if (gives_poses)
+    add_odometry<OutsideOdometryNode>(rig.stereo.depth_source, config.vio, odometry);
+  else
+    add_odometry<VioNode>(rig, config.tracker, config.vio, odometry);
   if (mapping) add_mapping(config, rate, rig.stereo, *mapping, std::move(map));
   auto& features =
       add<KeyframeFeaturesNode>(true, config.keyframe_features, rig.stereo,
@@ -150,9 +163,7 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
                                                        .frames = topics_.located_frames,
                                                        .keyframes = topics_.new_keyframes});
   topics_.sensors_end.subscribe([this](const auto&) { source_ended_ = true; });
-  if (!restored_) return;
-  vio.continue_from({restored_->states[restored_->final_states() - 1], restored_->odometry.back()});
-  features.continue_from(restored_->keyframes.back().odometry);
+  if (restored_) features.continue_from(restored_->keyframes.back().odometry);
 }
 
 void Robot::add_place_recognition(const RobotConfig& config) {

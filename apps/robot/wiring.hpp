@@ -141,6 +141,8 @@ class Robot {
  private:
   void add_sensing(const RobotConfig& config, double rate, std::unique_ptr<DatasetReader> reader,
                    const std::optional<MappingPlan>& mapping, std::optional<ContinuedMap> map);
+  template <typename OdometryNode, typename... Arguments>
+  void add_odometry(Arguments&&... arguments);
   void add_place_recognition(const RobotConfig& config);
   void add_past();
   void add_restore();

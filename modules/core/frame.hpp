@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "modules/core/geometry.hpp"
@@ -49,12 +50,19 @@ struct ImuSample {
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< Specific force [m/s^2]: at rest, minus g.
 };
 
+/// Where an odometry from outside says that the body is. Its frame `odom` is that odometry's own.
+struct MeasuredPose {
+  SE3 T_odom_body = SE3::Identity();
+  Matrix6 covariance = Matrix6::Zero();  ///< Of its perturbation on the right; zero: not known.
+};
+
 /// A frame and the inertial samples since the one before, in order of time. The last sample
 /// is the first at or after the frame's stamp, so that the interval is covered; it is repeated as
 /// the first of the next packet.
 struct SensorPacket {
   std::shared_ptr<const StereoFrame> frame;
   std::vector<ImuSample> imu;
+  std::optional<MeasuredPose> pose = {};  ///< At the frame, where there is such an odometry.
 };
 
 }  // namespace km

@@ -21,6 +21,10 @@ bool is_imu(const BagChannel& channel) {
   return is_of_type(channel, RosImu::kType);
 }
 
+bool is_odometry(const BagChannel& channel) {
+  return is_of_type(channel, RosOdometry::kType);
+}
+
 // " /a, /b", or " none".
 std::string names_of(const std::vector<BagChannel>& channels, bool (*is_kind)(const BagChannel&)) {
   std::string names;
@@ -58,7 +62,8 @@ BagDataset::BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig
   first_ = read_packet();
   if (first_) return;
   std::ostringstream message;
-  message << name_ << ": no frame with inertial samples";
+  message << name_ << ": no frame with "
+          << (gives_poses() ? "a pose of the odometry" : "inertial samples");
   if (start_) message << " from " << window.from_s << " s to " << window.to_s << " s";
   std::istringstream faults(to_string(report()));
   for (std::string line; std::getline(faults, line);) message << "; " << line;
@@ -69,8 +74,9 @@ void BagDataset::find_topics() {
   const SensorTopicNames& topics = rig_.topics;
   role_of_.assign(bag_->channels().size(), Role::kNone);
   const std::pair<const std::string&, Role> wanted[] = {
-      {topics.left, Role::kLeft}, {topics.right, Role::kRight}, {topics.depth, Role::kDepth},
-      {topics.imu, Role::kImu},   {topics.gyro, Role::kGyro},   {topics.accel, Role::kAccel}};
+      {topics.left, Role::kLeft},        {topics.right, Role::kRight}, {topics.depth, Role::kDepth},
+      {topics.imu, Role::kImu},          {topics.gyro, Role::kGyro},   {topics.accel, Role::kAccel},
+      {topics.odometry, Role::kOdometry}};
   for (const auto& [topic, role] : wanted)
     if (!topic.empty()) assign(topic, role);
   const auto count = [this](Role role) {
@@ -85,22 +91,27 @@ void BagDataset::find_topics() {
 }
 
 void BagDataset::assign(const std::string& topic, Role role) {
+  struct Kind {
+    bool (*is_kind)(const BagChannel&);
+    const char *types, *holds;
+  };
+  const Kind kind = role == Role::kOdometry ? Kind{is_odometry, "nav_msgs/Odometry", "odometry:"}
+                    : role == Role::kLeft || role == Role::kRight || role == Role::kDepth
+                        ? Kind{has_images, "sensor_msgs/Image or CompressedImage", "images:"}
+                        : Kind{is_imu, "sensor_msgs/Imu", "inertial samples:"};
   const auto& channels = bag_->channels();
-  const bool is_image = role == Role::kLeft || role == Role::kRight || role == Role::kDepth;
-  const auto is_kind = is_image ? has_images : is_imu;
   bool is_there = false;
   for (std::size_t k = 0; k < channels.size(); ++k) {
     if (channels[k].topic != topic) continue;
-    if (!is_kind(channels[k]))
+    if (!kind.is_kind(channels[k]))
       throw DatasetError(name_ + ": topic " + readable(topic, 80) + " has messages of " +
-                         readable(channels[k].type, 80) + ", not of sensor_msgs/" +
-                         (is_image ? "Image or CompressedImage" : "Imu"));
+                         readable(channels[k].type, 80) + ", not of " + kind.types);
     role_of_[k] = role;
     is_there = true;
   }
   if (!is_there)
-    throw DatasetError(name_ + ": no topic " + readable(topic, 80) + "; topics with " +
-                       (is_image ? "images:" : "inertial samples:") + names_of(channels, is_kind));
+    throw DatasetError(name_ + ": no topic " + readable(topic, 80) + "; topics with " + kind.holds +
+                       names_of(channels, kind.is_kind));
 }
 
 std::string BagDataset::place_of(const BagMessage& message) const {
@@ -140,11 +151,27 @@ void BagDataset::take(Role role, BagMessage message) {
     take_imu(role, stamp, message);
     return;
   }
+  if (role == Role::kOdometry) {
+    take_pose(stamp, message);
+    return;
+  }
   stamp += nanoseconds(rig_.camera_time_offset_s);
   const ImageRole image = role == Role::kLeft    ? ImageRole::kLeft
                           : role == Role::kRight ? ImageRole::kRight
                                                  : ImageRole::kDepth;
   joiner_.add(image, stamp, std::move(message));
+}
+
+void BagDataset::take_pose(Stamp stamp, const BagMessage& message) {
+  const auto odometry =
+      decode_ros<RosOdometry>(bag_->channels()[message.channel].encoding, message.bytes);
+  const auto pose =
+      odometry.value ? measured_pose(*odometry.value, rig_.T_child_body) : std::nullopt;
+  if (pose)
+    poses_.add(stamp, *pose);
+  else
+    report_.add(ReaderFault::kMalformedMessage,
+                place_of(message) + ": " + (odometry.value ? "no pose" : odometry.refusal));
 }
 
 void BagDataset::take_imu(Role role, Stamp stamp, const BagMessage& message) {
@@ -173,15 +200,25 @@ std::optional<JoinedFrame> BagDataset::next_frame() {
   return frame ? frame : joiner_.next();  // the end completes frames, too
 }
 
-bool BagDataset::has_imu(const JoinedFrame& frame) {
-  while (!imu_.reaches(frame.stamp) &&
-         seconds_between(frame.left.log_time, newest_log_time_) < kImuPatience_s &&
+bool BagDataset::has_imu() const {
+  return !rig_.topics.imu.empty() || !rig_.topics.gyro.empty();
+}
+
+// What moves between frames has come up to this one.
+bool BagDataset::has_motion(const JoinedFrame& frame) {
+  if (!gives_poses() && !has_imu()) return true;
+  const auto reaches = [&] {
+    return gives_poses() ? poses_.reaches(frame.stamp) : imu_.reaches(frame.stamp);
+  };
+  while (!reaches() && seconds_between(frame.left.log_time, newest_log_time_) < kImuPatience_s &&
          read_message()) {
   }
-  const bool starts_by = imu_.starts_by(frame.stamp);
-  if (starts_by && imu_.reaches(frame.stamp)) return true;
-  report_.add(ReaderFault::kPairWithoutImu, place_of(frame.left) + ": the inertial samples " +
-                                                (starts_by ? "end before it" : "start later"));
+  const bool starts_by =
+      gives_poses() ? poses_.starts_by(frame.stamp) : imu_.starts_by(frame.stamp);
+  if (starts_by && reaches()) return true;
+  report_.add(gives_poses() ? ReaderFault::kFrameWithoutPose : ReaderFault::kPairWithoutImu,
+              place_of(frame.left) + (gives_poses() ? ": the poses " : ": the inertial samples ") +
+                  (starts_by ? "end before it" : "start later"));
   return false;
 }
 
@@ -217,13 +254,19 @@ std::optional<SensorPacket> BagDataset::read_packet() {
       imu_.begin_at(joined->stamp);
       continue;
     }
-    if (!has_imu(*joined)) continue;
+    if (!has_motion(*joined)) continue;
+    const auto pose = gives_poses() ? poses_.at(joined->stamp) : std::nullopt;
+    if (gives_poses() && !pose) {
+      report_.add(ReaderFault::kFrameWithoutPose, place_of(joined->left) + ": a gap of the poses");
+      continue;
+    }
     auto frame = decode(*joined);
     if (!frame) continue;
-    auto samples = imu_.until(joined->stamp);
+    auto samples = has_imu() ? imu_.until(joined->stamp) : std::vector<ImuSample>{};
     count_gaps(samples);
     arrival_ = newest_log_time_;  // it may have waited for others: that is no consumer's fault
-    return SensorPacket{std::make_shared<const StereoFrame>(std::move(*frame)), std::move(samples)};
+    return SensorPacket{std::make_shared<const StereoFrame>(std::move(*frame)), std::move(samples),
+                        pose};
   }
   return std::nullopt;
 }

@@ -11,15 +11,18 @@
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/frame_joiner.hpp"
 #include "modules/sensors/imu_stream.hpp"
+#include "modules/sensors/pose_stream.hpp"
 #include "modules/sensors/stamp_order.hpp"
 
 namespace km {
 
 /// Which topics are a robot's sensors. Either `imu`, or `gyro` and `accel`: sensors with stamps of
 /// their own (see ImuJoiner), each as sensor_msgs/Imu. Without `right` the rig is an RGB-D one.
+/// With `odometry`, nav_msgs/Odometry of a robot that has its own, no inertial sensor is needed.
 struct SensorTopicNames {
   std::string left, right, depth;
   std::string imu, gyro, accel;
+  std::string odometry = {};
 };
 
 /// What a recording does not say of its sensors, or not in one place.
@@ -28,6 +31,7 @@ struct Rig {
   SensorRig sensors;
   double depth_scale_m = 1e-3;          ///< Of a unit in depth images of 16 bits [m].
   double camera_time_offset_s = 0.0;    ///< Added to the stamps of images: then they are the IMU's.
+  SE3 T_child_body = SE3::Identity();   ///< Of the odometry's child frame.
   std::vector<std::string> notes = {};  ///< On the calibration, for people, a line each.
 };
 
@@ -39,8 +43,8 @@ struct BagWindow {
 };
 
 /// Reads sensor packets from the messages of a bag, as they come: sensor_msgs/Image and
-/// CompressedImage, and sensor_msgs/Imu, whose stamps are those of their headers. Bad messages are
-/// skipped and counted. A bag may be live.
+/// CompressedImage, sensor_msgs/Imu and nav_msgs/Odometry, whose stamps are those of their headers.
+/// Bad messages are skipped and counted. A bag may be live.
 class BagDataset final : public DatasetReader {
  public:
   /// `name` begins messages: the path of the bag. `stereo_tolerance_s`: see FrameJoiner. Reads up
@@ -54,21 +58,24 @@ class BagDataset final : public DatasetReader {
   [[nodiscard]] ReaderReport report() const override;
   [[nodiscard]] std::size_t pair_count() const override { return pair_count_; }
   [[nodiscard]] std::vector<std::string> remarks() const override;
+  [[nodiscard]] bool gives_poses() const override { return !rig_.topics.odometry.empty(); }
   [[nodiscard]] bool is_live() const override { return bag_->is_live(); }
   [[nodiscard]] Stamp arrival() const override { return is_live() ? arrival_ : 0; }
   void stop() noexcept override { bag_->stop(); }
 
  private:
-  enum class Role { kNone, kLeft, kRight, kDepth, kImu, kGyro, kAccel };
-  static constexpr std::size_t kRoles = 7;
+  enum class Role { kNone, kLeft, kRight, kDepth, kImu, kGyro, kAccel, kOdometry };
+  static constexpr std::size_t kRoles = 8;
 
   void find_topics();
   void assign(const std::string& topic, Role role);
   [[nodiscard]] bool read_message();
   void take(Role role, BagMessage message);
   void take_imu(Role role, Stamp stamp, const BagMessage& message);
+  void take_pose(Stamp stamp, const BagMessage& message);
   [[nodiscard]] std::optional<JoinedFrame> next_frame();
-  [[nodiscard]] bool has_imu(const JoinedFrame& frame);
+  [[nodiscard]] bool has_imu() const;
+  [[nodiscard]] bool has_motion(const JoinedFrame& frame);
   [[nodiscard]] std::optional<StereoFrame> decode(const JoinedFrame& joined);
   [[nodiscard]] std::optional<SensorPacket> read_packet();
   void count_gaps(const std::vector<ImuSample>& samples);
@@ -83,6 +90,7 @@ class BagDataset final : public DatasetReader {
   FrameJoiner joiner_;
   ImuStream imu_;
   ImuJoiner imu_joiner_;
+  PoseStream poses_;
   ReaderReport report_;
   std::size_t pair_count_ = 0;
   std::optional<Stamp> start_;  // of the recording: its first frame

@@ -42,6 +42,8 @@ const char* to_string(ReaderFault fault) {
       return "samples of the gyroscope without an acceleration";
     case ReaderFault::kDamagedBag:
       return "damaged pieces of the recording";
+    case ReaderFault::kFrameWithoutPose:
+      return "frames without a pose of the odometry from outside";
     case ReaderFault::kLostMessage:
       return "messages lost on the way";
   }

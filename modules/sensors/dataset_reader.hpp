@@ -35,6 +35,7 @@ enum class ReaderFault {
   kMalformedMessage,   ///< A message of a bag that is not of its type.
   kNoAcceleration,     ///< A sample of a gyroscope with none of the accelerometer around it.
   kDamagedBag,         ///< A piece of a bag that cannot be read (see BagFault).
+  kFrameWithoutPose,   ///< An odometry from outside has no pose for the frame.
   kLostMessage,        ///< Of a live topic: it came faster than it was taken.
 };
 
@@ -66,6 +67,10 @@ class DatasetReader {
 
   /// What a user should know of how it is read, a line each; complete with the first packet.
   [[nodiscard]] virtual std::vector<std::string> remarks() const { return {}; }
+
+  /// True if packets have the poses of an odometry from outside. Then there may be no inertial
+  /// samples.
+  [[nodiscard]] virtual bool gives_poses() const { return false; }
 
   /// True for sensors that measure now: next() waits for them, and there is no end.
   [[nodiscard]] virtual bool is_live() const { return false; }

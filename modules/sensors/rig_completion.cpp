@@ -23,8 +23,10 @@ void append(std::string& list, const std::string& item) {
 
 }  // namespace
 
-const std::string& RigCompletion::imu_topic() const {
+// Whose messages name the body's frame.
+const std::string& RigCompletion::body_topic() const {
   const SensorTopicNames& topics = partial_.rig.topics;
+  if (topics.imu.empty() && topics.gyro.empty()) return topics.odometry;
   return topics.imu.empty() ? topics.gyro : topics.imu;
 }
 
@@ -38,7 +40,10 @@ std::vector<RigCompletion::Teller> RigCompletion::tellers() const {
     tellers.push_back({kStaticTransforms, RosTransforms::kType,
                        !partial_.is_placed && partial_.body_frame.empty()});
   if (!partial_.is_placed) {
-    if (partial_.body_frame.empty()) tellers.push_back({imu_topic(), RosImu::kType});
+    if (partial_.body_frame.empty() && !body_topic().empty())
+      tellers.push_back({body_topic(), body_topic() == partial_.rig.topics.odometry
+                                           ? RosOdometry::kType
+                                           : RosImu::kType});
     if (partial_.has_cameras)
       tellers.push_back({partial_.rig.topics.left, type_of_images(partial_.rig.topics.left)});
   }
@@ -71,6 +76,11 @@ bool RigCompletion::take_info(std::size_t camera, const BagChannel& channel,
 bool RigCompletion::add(const BagChannel& channel, const BagMessage& message) {
   const auto take_frame = [&](std::optional<std::string>& frame) {
     if (frame) return false;
+    if (is_of_type(channel, RosOdometry::kType)) {
+      auto odometry = decode_ros<RosOdometry>(channel.encoding, message.bytes);
+      if (odometry.value) frame = std::move(odometry.value->child_frame);
+      return frame.has_value();
+    }
     auto header = decode_ros<RosHeader>(channel.encoding, message.bytes);
     if (header.value) frame = std::move(header.value->frame);
     return frame.has_value();
@@ -87,7 +97,7 @@ bool RigCompletion::add(const BagChannel& channel, const BagMessage& message) {
         is_new = take_info(camera, channel, message) || is_new;
     return is_new;
   }
-  if (channel.topic == imu_topic()) return take_frame(imu_frame_);
+  if (channel.topic == body_topic()) return take_frame(body_frame_);
   return channel.topic == partial_.rig.topics.left && take_frame(image_frame_);
 }
 
@@ -97,7 +107,7 @@ std::optional<std::string> RigCompletion::camera_frame(std::size_t camera) const
 }
 
 std::optional<std::string> RigCompletion::body_frame() const {
-  return partial_.body_frame.empty() ? imu_frame_ : partial_.body_frame;
+  return partial_.body_frame.empty() ? body_frame_ : partial_.body_frame;
 }
 
 std::optional<SE3> RigCompletion::T_body_left() const {
@@ -162,13 +172,16 @@ std::string RigCompletion::missing() const {
                      ", or " + missing_chain(*camera_frame(0), *camera_frame(1)));
   if (partial_.is_placed) return list;
   const auto body = body_frame(), left = camera_frame(0);
-  if (!body) append(list, "the body's frame: messages on " + imu_topic() + ", or body_frame");
+  if (!body)
+    append(list, "the body's frame: " +
+                     (body_topic().empty() ? "" : "messages on " + body_topic() + ", or ") +
+                     "body_frame");
   if (!left && partial_.has_cameras)
     append(list, "the left camera's frame: images on " + partial_.rig.topics.left);
   if (!T_body_left())
     append(list, std::string("where the left camera is on the body: ") +
                      (body && left ? missing_chain(*body, *left) : kStaticTransforms) +
-                     " (body_frame names the inertial sensor's)");
+                     " (body_frame names the body's)");
   return list;
 }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -24,7 +25,10 @@ struct PartialRig {
   /// Of the left and the right camera; the latter is not used without its topic of images.
   std::array<std::string, 2> info_topics;
   std::array<RosImages, 2> images = {RosImages::kRaw, RosImages::kRaw};
-  std::string body_frame;  ///< The inertial sensor's; empty: that of its messages.
+  /// The inertial sensor's; empty: that of its messages, or the odometry's child frame where there
+  /// is no inertial sensor.
+  std::string body_frame;
+  std::filesystem::path pose_file;  ///< Of an odometry from outside, see read_pose_file().
 
   [[nodiscard]] bool is_complete() const { return has_cameras && is_placed; }
 };
@@ -54,7 +58,7 @@ class RigCompletion {
 
  private:
   [[nodiscard]] bool has_right() const { return !partial_.rig.topics.right.empty(); }
-  [[nodiscard]] const std::string& imu_topic() const;
+  [[nodiscard]] const std::string& body_topic() const;
   bool take_info(std::size_t camera, const BagChannel& channel, const BagMessage& message);
   /// Of the left or the right camera; nullopt as long as no message has told it.
   [[nodiscard]] std::optional<std::string> camera_frame(std::size_t camera) const;
@@ -65,7 +69,7 @@ class RigCompletion {
 
   PartialRig partial_;
   std::array<std::optional<RosCameraInfo>, 2> infos_;
-  std::optional<std::string> image_frame_, imu_frame_;
+  std::optional<std::string> image_frame_, body_frame_;
   StaticTransforms transforms_;
 };
 

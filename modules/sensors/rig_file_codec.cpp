@@ -59,6 +59,15 @@ void note_topics(const RigFile& file, const std::string& path, RigCalibration& c
       calibration.notes.push_back(path + ": " + used + " is calibrated as " + calibrated);
 }
 
+SE3 T_child_body(const std::filesystem::path& path, const RigFile::Odometry& odometry) {
+  if (odometry.T_child_body.empty()) return SE3::Identity();
+  const Eigen::Matrix4d T =
+      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(odometry.T_child_body.data());
+  if (const auto problem = transform_problem(T))
+    throw ConfigError(path.string() + ": odometry.T_child_body" + *problem);
+  return rigid_transform(T);
+}
+
 }  // namespace
 
 PartialRig read_rig_file(const std::filesystem::path& path) {
@@ -81,18 +90,21 @@ PartialRig read_rig_file(const std::filesystem::path& path) {
                              .depth = file.depth.topic,
                              .imu = file.imu.topic,
                              .gyro = file.imu.gyro_topic,
-                             .accel = file.imu.accel_topic},
+                             .accel = file.imu.accel_topic,
+                             .odometry = file.odometry.topic},
                   .sensors = std::move(calibration.rig),
                   .depth_scale_m = file.depth.scale_m,
                   .camera_time_offset_s = file.camera_time_offset_s.value_or(
                       calibration.image_time_offset_s.value_or(0.0)),
+                  .T_child_body = T_child_body(path, file.odometry),
                   .notes = std::move(calibration.notes)},
           .has_cameras = calibration.has_cameras,
           .is_placed = calibration.is_placed,
           .virtual_baseline_m = file.depth.baseline_m,
           .info_topics = {info_topic(file.left), info_topic(file.right)},
           .images = {images_of(file.left), images_of(file.right)},
-          .body_frame = file.body_frame};
+          .body_frame = file.body_frame,
+          .pose_file = file.odometry.file.value_or("")};
 }
 
 std::string camera_info_beside(const std::string& topic) {

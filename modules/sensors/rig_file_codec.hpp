@@ -67,9 +67,29 @@ struct RigFile {
     }
   };
 
+  struct Odometry {
+    std::string topic;
+    std::optional<std::filesystem::path> file;
+    std::vector<double> T_child_body;
+
+    void visit_fields(auto& visitor) {
+      visitor.field("topic", topic, "nav_msgs/Odometry without jumps (its tf `odom`, not `map`)");
+      visitor.field("file", file, Input{},
+                    "or poses of the body, TUM: t[s] x y z qx qy qz qw, each with or without the "
+                    "36 numbers of a covariance as in nav_msgs/Odometry");
+      visitor.field("T_child_body", T_child_body, {-1e3, 1e3},
+                    "[m] 16 numbers, row by row: the body in the topic's child frame; empty: they "
+                    "are one");
+      visitor.check(topic.empty() || !file, "topic", "is there beside file: name one");
+      visitor.check(T_child_body.empty() || T_child_body.size() == 16, "T_child_body",
+                    "has not 16 numbers");
+    }
+  };
+
   Camera left, right = {.topic = {}, .camera = 1, .info_topic = {}, .rectified = {}};
   Depth depth;
   Imu imu;
+  Odometry odometry;
   std::vector<std::filesystem::path> calibration;
   std::string body_frame;
   std::optional<double> camera_time_offset_s;
@@ -79,16 +99,26 @@ struct RigFile {
     visitor.section("right", right, "leave it out for an RGB-D camera");
     visitor.section("depth", depth);
     visitor.section("imu", imu);
+    visitor.section("odometry", odometry,
+                    "of the robot's own, in place of the one by cameras and inertial sensor");
     visitor.field("calibration", calibration, Input{},
                   "relative to this file: Kalibr's files ([camchain.yaml, imu.yaml]), one of "
                   "Basalt (.json), a EuRoC folder with the sensor.yaml of cam0, cam1 and imu0, or "
                   "keys as in Kalibr's files; CameraInfo and /tf_static tell what it lacks");
-    visitor.field("body_frame", body_frame,
-                  "frame of the inertial sensor in /tf_static; empty: that of its messages");
+    visitor.field(
+        "body_frame", body_frame,
+        "frame of the inertial sensor in /tf_static; empty: that of its messages, or without "
+        "them the child frame of the odometry");
     visitor.field("camera_time_offset_s", camera_time_offset_s, kTimeOffset_s,
                   "[s] added to the stamps of images: they are then those of the IMU; none: as the "
                   "calibration says, or 0");
-    visitor.required({"left", "imu"});
+    visitor.required({"left"});
+    visitor.check(
+        !imu.topic.empty() || !imu.gyro_topic.empty() || !odometry.topic.empty() ||
+            odometry.file.has_value(),
+        "imu",
+        "is missing: odometry goes by cameras and an inertial sensor; a robot without one "
+        "names the odometry that it has: odometry: {topic: ...} or {file: ...}");
     visitor.check(!right.topic.empty() || !depth.topic.empty(), "left",
                   "is alone: a right camera or depth is needed (one camera does not tell how far "
                   "things are)");

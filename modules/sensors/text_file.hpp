@@ -45,14 +45,13 @@ struct StampedRow {
                                          const std::vector<int>& lines,
                                          const std::filesystem::path& file, ReaderReport& report);
 
-/// The rows of `file` that start with a stamp, have at least `fields` fields and are in order of
-/// time, with what `parse(row)`, a std::variant<Value, RowFault>, makes of them. All others are
-/// counted in `report`. Throws DatasetError without `file`.
+/// The rows of `file` that start with a stamp (`stamp_of` reads it), have at least `fields` fields
+/// and are in order of time, with what `parse(row)`, a std::variant<Value, RowFault>, makes of
+/// them. All others are counted in `report`. Throws DatasetError without `file`.
 template <typename Value, typename Parse>
-[[nodiscard]] std::vector<StampedRow<Value>> read_ordered_rows(const std::filesystem::path& file,
-                                                               std::size_t fields,
-                                                               ReaderReport& report,
-                                                               const Parse& parse) {
+[[nodiscard]] std::vector<StampedRow<Value>> read_ordered_rows(
+    const std::filesystem::path& file, std::size_t fields, ReaderReport& report, const Parse& parse,
+    std::variant<Stamp, RowFault> (*stamp_of)(const TextRow&, std::size_t) = km::stamp_of) {
   const std::string text = read_file(file);
   std::vector<StampedRow<Value>> rows;
   std::vector<Stamp> stamps;

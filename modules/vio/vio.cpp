@@ -8,6 +8,7 @@
 #include "modules/core/depth_lookup.hpp"
 #include "modules/core/imu_limits.hpp"
 #include "modules/core/lie.hpp"
+#include "modules/vio/keyframe_rule.hpp"
 
 namespace km {
 namespace {
@@ -21,29 +22,8 @@ constexpr std::ptrdiff_t kSeenFeatures = 40;
 constexpr std::ptrdiff_t kFewOfSeen = 4;  // a quarter
 constexpr int kMostUnlocatedImages = 10;
 
-// The relative pose across a new start is hardly known: standard deviations [rad], [m].
-constexpr double kRestartRotation = 0.3;
-constexpr double kRestartTranslation = 1.0;
-
 constexpr double kLeastTiltSigma = 1e-4;  // [rad]; no inertial sensor knows better
 constexpr double kMostTiltSigma = 1.5;    // who is off by a right angle knows nothing
-
-// Of a relative pose between keyframes, each axis, in [rad^2] and [m^2]: no inertial sensor knows
-// one better than to a microradian and a micrometre, and what is worse than the most is no
-// estimate.
-constexpr double kLeastVariance = 1e-12;
-constexpr double kMostVariance = 1e6;
-
-bool is_usable(const Matrix6& covariance) {
-  return is_covariance(covariance) && covariance.diagonal().maxCoeff() <= kMostVariance;
-}
-
-Matrix6 restart_covariance() {
-  Vector6 sigma;
-  sigma << Eigen::Vector3d::Constant(kRestartRotation),
-      Eigen::Vector3d::Constant(kRestartTranslation);
-  return sigma.cwiseAbs2().asDiagonal();
-}
 
 }  // namespace
 
@@ -273,13 +253,9 @@ bool Vio::locates_points(const StereoFrame& frame) const {
 bool Vio::due(const OdometryState& state, const StereoFrame& frame) const {
   if (!locates_points(frame)) return false;  // no keyframe to close a loop with; a better one comes
   const double dt = moved_s(state.stamp);
-  if (dt < config_.output_interval_s - 1e-3) return false;
-  if (dt >= config_.output_rest_interval_s) return true;
   const WindowFrame* previous = smoother_.frame_at(last_keyframe_->stamp);
-  if (previous == nullptr) return true;
-  const SE3 T = previous->state.T_odom_body.inverse() * state.T_odom_body;
-  return T.translation().norm() >= config_.output_distance_m ||
-         angle_of(T.linear()) >= config_.output_rotation_rad;
+  if (previous == nullptr) return dt >= config_.output_interval_s - 1e-3;
+  return is_keyframe_due(config_, dt, previous->state.T_odom_body.inverse() * state.T_odom_body);
 }
 
 // Since the last keyframe, without rests.
@@ -331,15 +307,9 @@ void Vio::hand_on(const OdometryState& state, VioResult& result) {
   keyframe.T_previous_kf =
       relative ? relative->T
                : last_keyframe_->T_odom_kf.inverse() * T_chain_odom_ * state.T_odom_body;
-  keyframe.covariance = restart_covariance();
-  if (relative && is_usable(relative->Sigma)) {
-    const double dt = moved_s(state.stamp);
-    Vector6 drift;  // variance
-    drift.head<3>().setConstant(dt * config_.drift_rotation * config_.drift_rotation);
-    drift.tail<3>().setConstant(dt * config_.drift_translation * config_.drift_translation);
-    keyframe.covariance = relative->Sigma;
-    keyframe.covariance.diagonal() += (drift.array() + kLeastVariance).matrix();
-  }
+  keyframe.covariance = relative
+                            ? keyframe_covariance(config_, moved_s(state.stamp), relative->Sigma)
+                            : restart_covariance();
   keyframe.T_odom_kf = last_keyframe_->T_odom_kf * keyframe.T_previous_kf;
   keyframe.state_covariance = state_covariance_at(state);
   last_keyframe_ = keyframe;

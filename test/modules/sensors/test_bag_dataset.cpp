@@ -94,6 +94,44 @@ TEST_CASE("Messages of a bag become packets without a hole between them", "[sens
   CHECK(dataset.remarks().empty());
 }
 
+TEST_CASE("Poses of an odometry stand in for inertial samples", "[sensors][bag]") {
+  const bool is_live_late = GENERATE(false, true);  // logged after the frame that they are for
+  CAPTURE(is_live_late);
+  Rig rig = small_rig();
+  rig.topics.imu.clear();
+  rig.topics.odometry = "/odom";
+  rig.T_child_body.translation().z() = 0.5;
+  auto bag = std::make_unique<ListedBag>();
+  for (int k = 0; k < 20; ++k) {
+    const Stamp stamp = kFirst + k * kFramePeriod;
+    RosOdometry odometry;
+    odometry.header.stamp = stamp - kFramePeriod / 2;
+    odometry.pose.position.x() = k - 0.5;
+    if (!is_live_late && k != 7) bag->add("/odom", odometry);
+    bag->add("/left", image(stamp, static_cast<std::uint8_t>(k)));
+    bag->add("/right", image(stamp, static_cast<std::uint8_t>(k)));
+    if (is_live_late && k != 7) bag->add("/odom", odometry);
+  }
+  BagDataset dataset("test.bag", std::move(bag), rig, {});
+  CHECK(dataset.gives_poses());
+  const auto packets = packets_of(dataset);
+  REQUIRE(packets.size() == 19);  // behind the last image no pose comes
+  for (std::size_t k = 0; k < packets.size(); ++k) {
+    CAPTURE(k);
+    CHECK(packets[k].imu.empty());
+    REQUIRE(packets[k].pose);
+    CHECK(packets[k].pose->T_odom_body.translation().isApprox(
+        Eigen::Vector3d(static_cast<double>(k), 0, 0.5), 1e-9));
+  }
+  CHECK(dataset.report().count(ReaderFault::kFrameWithoutPose) == 1);
+  rig.topics.odometry = "/left";
+  auto other = std::make_unique<ListedBag>();
+  other->add("/left", image(kFirst, 1));
+  other->add("/right", image(kFirst, 1));
+  CHECK_THROWS_WITH(BagDataset("test.bag", std::move(other), rig, {}),
+                    Catch::Matchers::Contains("not of nav_msgs/Odometry"));
+}
+
 TEST_CASE("A camera that is stamped late by a constant is paired, and it is said",
           "[sensors][bag]") {
   BagDataset dataset("test.bag", recording({.right_late = 2'000'000}), small_rig(), {});

@@ -129,6 +129,23 @@ TEST_CASE("One CameraInfo tells an RGB-D rig", "[sensors][calibration]") {
   CHECK(rig.stereo.cameras[0].T_body_cam.translation().isApprox(Eigen::Vector3d(0.2, 0, 0)));
 }
 
+TEST_CASE("Without an inertial sensor the body is the odometry's child frame",
+          "[sensors][calibration]") {
+  PartialRig partial = nothing_known();
+  partial.rig.topics.imu.clear();
+  partial.rig.topics.odometry = "/odom";
+  ListedBag bag;
+  bag.add("/left_info", info("left_optical", 0.0));
+  bag.add("/right_info", info("left_optical", -43.0));
+  RosOdometry odometry;
+  odometry.header.frame = "odom";
+  odometry.child_frame = "base";
+  bag.add("/odom", odometry);
+  tell(bag, {kLeftOnBase});
+  const StereoRig stereo = complete_rig("a.bag", bag, partial).sensors.stereo;
+  CHECK(stereo.cameras[0].T_body_cam.translation().isApprox(Eigen::Vector3d(0.2, 0, 0)));
+}
+
 TEST_CASE("Calibrated cameras are put where their images' frame is", "[sensors][calibration]") {
   PartialRig partial = nothing_known();
   partial.has_cameras = true;

@@ -125,6 +125,31 @@ TEST_CASE("What a rig file does not tell is asked of topics", "[sensors]") {
       Eigen::Vector3d(0.2, 0, 0)));
 }
 
+TEST_CASE("A robot without an inertial sensor names the odometry that it has", "[sensors]") {
+  const TemporaryFolder folder;
+  folder.write("camchain.yaml", kChain);
+  folder.write("poses.tum", "1 0 0 0 0 0 0 1\n");
+  const std::string cameras =
+      "left: {topic: /cam0}\nright: {topic: /cam1}\ncalibration: camchain.yaml\n";
+  const PartialRig topic =
+      read(folder, cameras +
+                       "odometry: {topic: /odom, T_child_body: [1,0,0,0.5, 0,1,0,0, 0,0,1,0, "
+                       "0,0,0,1]}\n");
+  CHECK(topic.rig.topics.odometry == "/odom");
+  CHECK(topic.rig.T_child_body.translation().x() == 0.5);
+  const PartialRig file = read(folder, cameras + "odometry: {file: poses.tum}\n");
+  CHECK(file.pose_file == folder.path() / "poses.tum");
+  CHECK_THAT(complaint("left: {topic: /a}\nright: {topic: /b}\n"),
+             Contains("imu is missing") && Contains("odometry: {topic: ...}"));
+  CHECK_THAT(complaint("left: {topic: /a}\nright: {topic: /b}\n"
+                       "odometry: {topic: /odom, T_child_body: [1, 2]}\n"),
+             Contains("rig.yaml:3") && Contains("has not 16 numbers"));
+  CHECK_THAT(complaint("left: {topic: /a}\nright: {topic: /b}\n"
+                       "odometry: {topic: /odom, T_child_body: [2,0,0,0, 0,1,0,0, 0,0,1,0, "
+                       "0,0,0,1]}\n"),
+             Contains("odometry.T_child_body is not a rotation"));
+}
+
 TEST_CASE("What a rig file lacks is named by file and line", "[sensors]") {
   CHECK_THAT(complaint("left: {topic: /a}\nimu: {topic: /i}\ncalibration: /\n"),
              Contains("one camera does not tell how far things are"));

@@ -1,0 +1,84 @@
+#include "modules/vio/outside_odometry.hpp"
+
+#include <utility>
+
+#include "modules/core/covariance.hpp"
+#include "modules/vio/keyframe_rule.hpp"
+
+namespace km {
+
+OutsideOdometry::OutsideOdometry(RobotId robot, DepthSource depth_source, const VioConfig& config)
+    : robot_(robot), depth_source_(depth_source), config_(checked(config)) {}
+
+void OutsideOdometry::continue_from(const VioCheckpoint& checkpoint) {
+  goes_on_ = true;
+  last_keyframe_ = checkpoint.keyframe;
+  last_ = last_kf_ = {checkpoint.keyframe.stamp, {checkpoint.state.T_odom_body}};
+  T_chain_odom_ = checkpoint.keyframe.T_odom_kf * checkpoint.state.T_odom_body.inverse();
+}
+
+OutsideOdometryResult OutsideOdometry::process(const SensorPacket& packet) {
+  OutsideOdometryResult result;
+  if (packet.frame == nullptr || !packet.pose || !packet.pose->T_odom_body.matrix().allFinite())
+    return result;
+  const Fix fix{packet.frame->stamp, *packet.pose};
+  const bool is_taken_up = std::exchange(goes_on_, false) && fix.stamp == last_keyframe_->stamp;
+  if (last_ && fix.stamp <= last_->stamp && !is_taken_up) return result;
+  result.has_jumped = !is_taken_up && is_jump(fix);
+  if (result.has_jumped)
+    T_chain_odom_ = T_chain_odom_ * last_->pose.T_odom_body * fix.pose.T_odom_body.inverse();
+  const SE3 T_odom_body = T_chain_odom_ * fix.pose.T_odom_body;
+  OdometryState state;
+  state.stamp = fix.stamp;
+  state.T_odom_body = T_odom_body;
+  if (last_ && !result.has_jumped && !is_taken_up)
+    state.v_odom =
+        (T_odom_body.translation() - (T_chain_odom_ * last_->pose.T_odom_body).translation()) /
+        seconds_between(last_->stamp, fix.stamp);
+  const bool locates_points =
+      depth_source_ == DepthSource::kRightImage || packet.frame->depth != nullptr;
+  const bool is_due = !last_keyframe_ || result.has_jumped ||
+                      is_keyframe_due(config_, seconds_between(last_keyframe_->stamp, fix.stamp),
+                                      last_keyframe_->T_odom_kf.inverse() * T_odom_body);
+  // A first keyframe must be there for frames to hang on; one that locates points is better.
+  if (!is_taken_up && is_due && (locates_points || result.has_jumped))
+    hand_on(fix, T_odom_body, result.has_jumped, result);
+  if (!last_keyframe_) return result;
+  if (is_taken_up)  // its state was given out; the covariance was not kept
+    last_kf_ = fix;
+  else
+    result.state = state;
+  result.frame = LocatedFrame{packet.frame, last_keyframe_->id.index, T_odom_body};
+  last_ = fix;
+  return result;
+}
+
+bool OutsideOdometry::is_jump(const Fix& fix) const {
+  if (!last_) return false;
+  const double distance_m =
+      (fix.pose.T_odom_body.translation() - last_->pose.T_odom_body.translation()).norm();
+  return distance_m > config_.max_speed_mps * seconds_between(last_->stamp, fix.stamp);
+}
+
+void OutsideOdometry::hand_on(const Fix& fix, const SE3& T_odom_body, bool has_jumped,
+                              OutsideOdometryResult& result) {
+  KeyframeOdometry keyframe;
+  keyframe.id = {robot_, 0};
+  keyframe.stamp = fix.stamp;
+  keyframe.T_odom_kf = keyframe.T_previous_kf = T_odom_body;
+  if (last_keyframe_) {
+    keyframe.id.index = last_keyframe_->id.index + 1;
+    keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * T_odom_body;
+    const UncertainPose grown =
+        between_on_chain({last_kf_->pose.T_odom_body, last_kf_->pose.covariance},
+                         {fix.pose.T_odom_body, fix.pose.covariance});
+    const double dt_s = seconds_between(last_keyframe_->stamp, fix.stamp);
+    keyframe.covariance =
+        has_jumped ? restart_covariance() : keyframe_covariance(config_, dt_s, grown.Sigma);
+  }
+  last_keyframe_ = keyframe;
+  last_kf_ = fix;
+  result.keyframe = keyframe;
+}
+
+}  // namespace km

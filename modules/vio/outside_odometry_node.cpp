@@ -1,0 +1,43 @@
+#include "modules/vio/outside_odometry_node.hpp"
+
+#include "runtime/log.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kQueued = 4;  // as VioNode: what is late is skipped by the sensors
+
+}  // namespace
+
+OutsideOdometryNode::OutsideOdometryNode(RobotId robot, DepthSource depth_source,
+                                         const VioConfig& config, const VioTopics& topics)
+    : odometry_(robot, depth_source, config),
+      topics_(topics),
+      worker_(
+          kQueued, Overflow::kBlock, [this](const auto& packet) { step(*packet); }, "odometry") {
+  topics_.packets.subscribe([this](const auto& packet) { worker_.post(packet); });
+}
+
+void OutsideOdometryNode::stop() noexcept {
+  worker_.stop();
+  if (stopped_) return;
+  stopped_ = true;
+  log::info(name()) << images_ << " images, " << without_pose_ << " without a pose, " << jumps_
+                    << " jumps";
+}
+
+void OutsideOdometryNode::step(const SensorPacket& packet) {
+  const OutsideOdometryResult result = odometry_.process(packet);
+  ++images_;
+  if (!result.frame) ++without_pose_;
+  if (result.has_jumped) {
+    ++jumps_;
+    log::limited(log::Level::kWarn, name(), "jump")
+        << "at " << packet.frame->stamp << " ns: the odometry jumps faster than vio.max_speed_mps";
+  }
+  if (result.state) topics_.odometry.publish(*result.state);
+  if (result.keyframe) topics_.keyframes.publish(*result.keyframe);
+  if (result.frame) topics_.frames.publish(*result.frame);
+}
+
+}  // namespace km

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <exception>
+#include <string_view>
+#include <vector>
+
+#include "modules/vio/outside_odometry.hpp"
+#include "modules/vio/vio_node.hpp"
+
+namespace km {
+
+/// OutsideOdometry as a thread, in the place of a VioNode.
+class OutsideOdometryNode final : public Node {
+ public:
+  OutsideOdometryNode(RobotId robot, DepthSource depth_source, const VioConfig& config,
+                      const VioTopics& topics);
+  ~OutsideOdometryNode() override { stop(); }
+
+  /// See OutsideOdometry. Call before start().
+  void continue_from(const VioCheckpoint& checkpoint) { odometry_.continue_from(checkpoint); }
+
+  std::string_view name() const override { return "odometry"; }
+  void start() override { worker_.start(); }
+  /// Finishes queued packets and says in the log what came.
+  void stop() noexcept override;
+  std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
+  DurationHistogram timing() const override { return worker_.timing(); }
+
+  void step(const SensorPacket& packet);
+
+ private:
+  OutsideOdometry odometry_;
+  const VioTopics topics_;
+  std::size_t images_ = 0, without_pose_ = 0, jumps_ = 0;
+  bool stopped_ = false;
+  Worker<Topic<SensorPacket>::Message> worker_;  // last member: stops first
+};
+
+}  // namespace km
