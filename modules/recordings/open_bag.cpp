@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 std::unique_ptr<BagReader> open_file(const fs::path& path) {
   constexpr std::uint64_t kMagic_bytes = 8;
   const RandomAccessFile file(path);
+  if (file.size() == 0) throw InputFileError(path.string() + ": is empty");
   const auto bytes = file.read(0, std::min(file.size(), kMagic_bytes));
   const std::string magic(bytes.begin(), bytes.end());
   if (magic == "#ROSBAG ") return std::make_unique<Ros1BagReader>(path);

@@ -65,19 +65,31 @@ BagDataset::BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig
   message << name_ << ": no frame with "
           << (gives_poses() ? "a pose of the odometry" : "inertial samples");
   if (start_) message << " from " << window.from_s << " s to " << window.to_s << " s";
+  for (const auto& [topic, role] : wanted_topics())
+    if (!topic.empty() && taken_[static_cast<std::size_t>(role)] == 0)
+      message << "; no message on " << readable(topic, 80);
+  refuse(message.str());
+}
+
+// With what is wrong with the bag, which may be why.
+void BagDataset::refuse(std::string problem) const {
   std::istringstream faults(to_string(report()));
-  for (std::string line; std::getline(faults, line);) message << "; " << line;
-  throw DatasetError(message.str());
+  for (std::string line; std::getline(faults, line);) problem += "; " + line;
+  throw DatasetError(problem);
+}
+
+std::vector<std::pair<std::string, BagDataset::Role>> BagDataset::wanted_topics() const {
+  const SensorTopicNames& topics = rig_.topics;
+  return {{topics.left, Role::kLeft},        {topics.right, Role::kRight},
+          {topics.depth, Role::kDepth},      {topics.imu, Role::kImu},
+          {topics.gyro, Role::kGyro},        {topics.accel, Role::kAccel},
+          {topics.odometry, Role::kOdometry}};
 }
 
 void BagDataset::find_topics() {
   const SensorTopicNames& topics = rig_.topics;
   role_of_.assign(bag_->channels().size(), Role::kNone);
-  const std::pair<const std::string&, Role> wanted[] = {
-      {topics.left, Role::kLeft},        {topics.right, Role::kRight}, {topics.depth, Role::kDepth},
-      {topics.imu, Role::kImu},          {topics.gyro, Role::kGyro},   {topics.accel, Role::kAccel},
-      {topics.odometry, Role::kOdometry}};
-  for (const auto& [topic, role] : wanted)
+  for (const auto& [topic, role] : wanted_topics())
     if (!topic.empty()) assign(topic, role);
   const auto count = [this](Role role) {
     std::uint64_t messages = 0;
@@ -110,8 +122,8 @@ void BagDataset::assign(const std::string& topic, Role role) {
     is_there = true;
   }
   if (!is_there)
-    throw DatasetError(name_ + ": no topic " + readable(topic, 80) + "; topics with " + kind.holds +
-                       names_of(channels, kind.is_kind));
+    refuse(name_ + ": no topic " + readable(topic, 80) + "; topics with " + kind.holds +
+           names_of(channels, kind.is_kind));
 }
 
 std::string BagDataset::place_of(const BagMessage& message) const {
@@ -130,6 +142,7 @@ bool BagDataset::read_message() {
   newest_log_time_ = std::max(newest_log_time_, message->log_time);
   role_of_.resize(bag_->channels().size(), Role::kNone);
   const Role role = role_of_[message->channel];
+  ++taken_[static_cast<std::size_t>(role)];
   if (role != Role::kNone) take(role, std::move(*message));
   return true;
 }

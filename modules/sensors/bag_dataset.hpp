@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "modules/recordings/bag_reader.hpp"
@@ -67,6 +68,8 @@ class BagDataset final : public DatasetReader {
   enum class Role { kNone, kLeft, kRight, kDepth, kImu, kGyro, kAccel, kOdometry };
   static constexpr std::size_t kRoles = 8;
 
+  [[nodiscard]] std::vector<std::pair<std::string, Role>> wanted_topics() const;
+  [[noreturn]] void refuse(std::string problem) const;
   void find_topics();
   void assign(const std::string& topic, Role role);
   [[nodiscard]] bool read_message();
@@ -87,6 +90,7 @@ class BagDataset final : public DatasetReader {
   BagWindow window_;
   std::vector<Role> role_of_;  // by channel
   StampOrder order_[kRoles];
+  std::size_t taken_[kRoles] = {};  // messages
   FrameJoiner joiner_;
   ImuStream imu_;
   ImuJoiner imu_joiner_;

@@ -202,6 +202,7 @@ TEST_CASE("What is no recording is refused by name", "[recordings]") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(open_bag(folder.write("a.bag", "nothing of the kind")),
                     Catch::Contains("a.bag byte 0: begins as none of"));
+  CHECK_THROWS_WITH(open_bag(folder.write("none.bag", "")), Catch::Contains("none.bag: is empty"));
   fs::create_directory(folder.path() / "empty");
   CHECK_FALSE(may_be_bag(folder.path() / "empty"));
   CHECK_THROWS_WITH(open_bag(folder.path() / "empty"), Catch::Contains("no .db3 or .mcap file"));

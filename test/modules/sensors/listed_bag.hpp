@@ -21,11 +21,17 @@ class ListedBag final : public BagReader {
               encode_ros(message));
   }
 
-  void add_bytes(const std::string& topic, std::string_view type, Stamp log_time,
-                 std::vector<std::uint8_t> bytes) {
+  /// A channel, so far without a message; its index.
+  std::size_t describe(const std::string& topic, std::string_view type) {
     std::size_t channel = 0;
     while (channel < channels_.size() && channels_[channel].topic != topic) ++channel;
     if (channel == channels_.size()) channels_.push_back({topic, std::string(type), "cdr", 0});
+    return channel;
+  }
+
+  void add_bytes(const std::string& topic, std::string_view type, Stamp log_time,
+                 std::vector<std::uint8_t> bytes) {
+    const std::size_t channel = describe(topic, type);
     ++channels_[channel].message_count;
     messages_.push_back({channel, log_time, std::move(bytes)});
   }

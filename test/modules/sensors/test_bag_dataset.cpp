@@ -186,6 +186,47 @@ TEST_CASE("Topics that are not there are refused with those that are", "[sensors
                     "test.bag: no topic /imu; topics with inertial samples: none");
 }
 
+// A bag of which pieces could not be read.
+class DamagedBag final : public BagReader {
+ public:
+  explicit DamagedBag(std::unique_ptr<ListedBag> rest) : rest_(std::move(rest)) {}
+
+  const std::vector<BagChannel>& channels() const override { return rest_->channels(); }
+  std::optional<BagMessage> next() override { return rest_->next(); }
+  BagReport report() const override {
+    BagReport report;
+    report.add(BagFault::kCompression, "test.bag byte 77: compression lz5", 3);
+    report.add(BagFault::kTruncated, "test.bag byte 990: the file has no end");
+    return report;
+  }
+
+ private:
+  std::unique_ptr<ListedBag> rest_;
+};
+
+TEST_CASE("What of a bag cannot be read is counted with its place", "[sensors][bag]") {
+  const auto damaged = [](std::unique_ptr<ListedBag> rest) {
+    return std::make_unique<DamagedBag>(std::move(rest));
+  };
+  BagDataset dataset("test.bag", damaged(recording({})), small_rig(), {});
+  CHECK(packets_of(dataset).size() == 40);
+  CHECK(dataset.report().count(ReaderFault::kDamagedBag) == 4);
+  CHECK_THAT(dataset.report().entries().at(ReaderFault::kDamagedBag).first,
+             Catch::Matchers::Contains("test.bag byte"));
+  // Where nothing is left it may be why.
+  using Catch::Matchers::Contains;
+  CHECK_THROWS_WITH(BagDataset("test.bag", damaged(std::make_unique<ListedBag>()), small_rig(), {}),
+                    Contains("no topic /left; topics with images: none") &&
+                        Contains("4 damaged pieces of the recording, first: ") &&
+                        Contains("test.bag byte"));
+  auto bag = std::make_unique<ListedBag>();
+  for (const char* topic : {"/left", "/right"}) bag->describe(topic, RosImage::kType);
+  bag->describe("/imu", RosImu::kType);
+  CHECK_THROWS_WITH(BagDataset("test.bag", damaged(std::move(bag)), small_rig(), {}),
+                    Contains("no message on /left; no message on /right; no message on /imu") &&
+                        Contains("damaged pieces"));
+}
+
 TEST_CASE("Bad messages of a bag cost themselves", "[sensors][bag]") {
   auto bag = recording({.frames = 0});
   for (int k = 0; k < 30; ++k) {
