@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "apps/result_files.hpp"
+#include "apps/robot/diagnostics.hpp"
 #include "apps/robot/team_keys_node.hpp"
 #include "modules/dense_sensing/dense_sensing_node.hpp"
 #include "modules/loop_closure/keyframe_features_node.hpp"
@@ -76,10 +77,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   add_network(share_meshes(config.mesh_chunks));
   add_records();
   if (input.ros != nullptr && config.ros.publish.value_or(true))
-    add<RosOutputNode>(false, std::move(input.ros), options.name,
-                       RosOutputTopics{.odometry = topics_.odometry,
-                                       .keyframes = topics_.keyframe_odometry,
-                                       .trajectory = topics_.trajectory});
+    add_ros_output(config.ros, options.name, std::move(input.ros));
   if (seal_ != nullptr)
     add<TeamKeysNode>(false, options.security, *seal_, [this] { bridge_->tell_keys(); });
   nodes_.push_back(bridge_);
@@ -383,6 +381,25 @@ void Robot::add_records() {
   status_ = &add<RobotStatusNode>(
       false, [this] { return own_status(); },
       RobotStatusTopics{.own = topics_.status.to_peers(), .peers = topics_.status.from_peers()});
+}
+
+void Robot::add_ros_output(const RosConfig& config, const std::string& name,
+                           std::shared_ptr<const RosNetwork> network) {
+  auto& output = add<RosOutputNode>(
+      false, std::move(network), name, config.mesh_points,
+      [this, loads = ModuleLoads(nodes_)]() mutable {
+        std::vector<RosDiagnosticStatus> all = {loads.status()};
+        if (sensors_ != nullptr)
+          all.push_back(
+              sensors_status(sensors_->published(), sensors_->skipped(), sensors_->faults()));
+        return all;
+      },
+      RosOutputTopics{.odometry = topics_.odometry,
+                      .keyframes = topics_.keyframe_odometry,
+                      .trajectory = topics_.trajectory});
+  topics_.optimized_meshes.subscribe([&output](const auto& optimized) {
+    output.offer({optimized, &optimized->mesh});
+  });
 }
 
 RobotStatus Robot::own_status() const {

@@ -158,6 +158,8 @@ class Robot {
   void add_relay();
   void add_network(CrossingEnds meshes);
   void add_records();
+  void add_ros_output(const RosConfig& config, const std::string& name,
+                      std::shared_ptr<const RosNetwork> network);
   [[nodiscard]] RobotStatus own_status() const;
 
   /// Adds a node to the supervisor; `feeds` marks those that the end of the input drains.

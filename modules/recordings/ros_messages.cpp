@@ -111,6 +111,45 @@ void fields(auto& wire, Is<RosTransforms> auto& message) {
   }
 }
 
+void fields(auto& wire, Is<RosPointCloud> auto& cloud) {
+  constexpr std::size_t kLeast_bytes = 4 + 4 + 1 + 4;
+  fields(wire, cloud.header);
+  wire.u32(cloud.height);
+  wire.u32(cloud.width);
+  wire.resize(cloud.fields, kLeast_bytes);
+  for (auto& field : cloud.fields) {
+    wire.text(field.name);
+    wire.u32(field.offset);
+    wire.u8(field.datatype);
+    wire.u32(field.count);
+  }
+  wire.flag(cloud.is_bigendian);
+  wire.u32(cloud.point_step);
+  wire.u32(cloud.row_step);
+  wire.octets(cloud.data);
+  wire.flag(cloud.is_dense);
+}
+
+void fields(auto& wire, Is<RosDiagnosticStatus> auto& status) {
+  constexpr std::size_t kLeast_bytes = 4 + 4;
+  wire.u8(status.level);
+  wire.text(status.name);
+  wire.text(status.message);
+  wire.text(status.hardware_id);
+  wire.resize(status.values, kLeast_bytes);
+  for (auto& entry : status.values) {
+    wire.text(entry.key);
+    wire.text(entry.value);
+  }
+}
+
+void fields(auto& wire, Is<RosDiagnostics> auto& diagnostics) {
+  constexpr std::size_t kLeast_bytes = 1 + 4 * 4;
+  fields(wire, diagnostics.header);
+  wire.resize(diagnostics.status, kLeast_bytes);
+  for (auto& status : diagnostics.status) fields(wire, status);
+}
+
 }  // namespace
 
 bool is_of_type(const BagChannel& channel, std::string_view type) {
@@ -167,5 +206,9 @@ template Decoded<RosOdometry> decode_ros(std::string_view, std::span<const std::
 template std::vector<std::uint8_t> encode_ros(const RosOdometry&);
 template Decoded<RosTransforms> decode_ros(std::string_view, std::span<const std::uint8_t>);
 template std::vector<std::uint8_t> encode_ros(const RosTransforms&);
+template Decoded<RosPointCloud> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosPointCloud&);
+template Decoded<RosDiagnostics> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosDiagnostics&);
 
 }  // namespace km

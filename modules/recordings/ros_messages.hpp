@@ -62,9 +62,9 @@ struct RosCameraInfo {
   std::uint32_t width = 0;       ///< [px]
   std::string distortion_model;  ///< "plumb_bob", "equidistant", ...
   std::vector<double> D;
-  std::array<double, 9> K{};   ///< 3x3, row-major, as all.
-  std::array<double, 9> R{};   ///< 3x3.
-  std::array<double, 12> P{};  ///< 3x4.
+  std::array<double, 9> K{};                   ///< 3x3, row-major, as all.
+  std::array<double, 9> R{};                   ///< 3x3.
+  std::array<double, 12> P{};                  ///< 3x4.
   std::uint32_t binning_x = 0, binning_y = 0;  ///< Pixels that are one in the images; 0 is 1.
   struct Region {
     std::uint32_t x_offset = 0, y_offset = 0, height = 0, width = 0;  ///< [px]; 0: all.
@@ -111,6 +111,43 @@ struct RosTransform {
 struct RosTransforms {
   static constexpr std::string_view kType = "tf2_msgs/TFMessage";
   std::vector<RosTransform> transforms;
+};
+
+struct RosPointCloud {
+  static constexpr std::string_view kType = "sensor_msgs/PointCloud2";
+  static constexpr std::uint8_t kFloat32 = 7;  ///< A datatype.
+  struct Field {
+    std::string name;           ///< "x", "rgb", ...
+    std::uint32_t offset = 0;   ///< In a point [bytes].
+    std::uint8_t datatype = 0;  ///< kFloat32, ...
+    std::uint32_t count = 1;
+  };
+  RosHeader header;
+  std::uint32_t height = 0;  ///< 1: points in no order.
+  std::uint32_t width = 0;
+  std::vector<Field> fields;
+  bool is_bigendian = false;
+  std::uint32_t point_step = 0;  ///< Length of a point [bytes].
+  std::uint32_t row_step = 0;    ///< Length of a row [bytes].
+  std::vector<std::uint8_t> data;
+  bool is_dense = false;  ///< No point is invalid.
+};
+
+/// diagnostic_msgs/DiagnosticStatus.
+struct RosDiagnosticStatus {
+  static constexpr std::uint8_t kOk = 0, kWarn = 1, kError = 2;
+  struct KeyValue {
+    std::string key, value;
+  };
+  std::uint8_t level = kOk;
+  std::string name, message, hardware_id;
+  std::vector<KeyValue> values;
+};
+
+struct RosDiagnostics {
+  static constexpr std::string_view kType = "diagnostic_msgs/DiagnosticArray";
+  RosHeader header;
+  std::vector<RosDiagnosticStatus> status;
 };
 
 /// True if the channel's messages are of `type`, a name of ROS 1; ROS 2 writes "/msg/" in it.

@@ -16,6 +16,7 @@ struct RosConfig {
   std::string interface;
   std::vector<std::string> peers = {};
   std::optional<bool> publish = {};
+  int mesh_points = 200000;
   int receive_buffer_bytes = 33554432;
 
   void visit_fields(auto& visitor) {
@@ -23,8 +24,13 @@ struct RosConfig {
     visitor.field("interface", interface,
                   "network interface of theirs; empty: chosen; lo with ROS_LOCALHOST_ONLY=1");
     visitor.field("peers", peers, "addresses of their hosts, where multicast does not pass");
-    visitor.field("publish", publish,
-                  "tell viewers where the robot is: odometry, pose, tf, path; none: with --live");
+    visitor.field(
+        "publish", publish,
+        "tell viewers where the robot is and how it does: odometry, pose, tf, path, mesh, "
+        "diagnostics; none: with --live");
+    visitor.field("mesh_points", mesh_points, {0, 10000000},
+                  "vertices of the mesh that viewers are told at most, each 12 to 16 B, whenever "
+                  "it is corrected; 0: none are");
     visitor.field("receive_buffer_bytes", receive_buffer_bytes, {65536, 1 << 28},
                   "[B] for images that come faster than they are taken; the kernel may grant less: "
                   "net.core.rmem_max");

@@ -80,7 +80,7 @@ void SensorsNode::decode() {
       }();
       if (!std::exchange(has_remarked, true))
         for (const std::string& remark : reader_->remarks()) log::info(name()) << remark;
-      if (reader_->is_live()) tell_faults();
+      count_faults();
       if (!packet) {
         worker_.post(EndOfData{reader_->report()});
         return;
@@ -94,12 +94,18 @@ void SensorsNode::decode() {
 }
 
 // What is live has no end at which to tell it.
-void SensorsNode::tell_faults() {
+void SensorsNode::count_faults() {
   constexpr double kInterval_s = 5.0;
   const double now_s = steady_now_s();
-  if (now_s - told_s_ < kInterval_s) return;
-  told_s_ = now_s;
-  const std::string faults = to_string(reader_->report());
+  if (now_s - counted_s_ < kInterval_s) return;
+  counted_s_ = now_s;
+  const ReaderReport report = reader_->report();
+  {
+    const std::lock_guard lock(faults_mutex_);
+    faults_ = report;
+  }
+  if (!reader_->is_live()) return;
+  const std::string faults = to_string(report);
   if (faults != told_faults_) log_lines(faults, name());
   told_faults_ = faults;
 }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <exception>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -76,6 +77,11 @@ class SensorsNode final : public Node {
   /// Packets published and pairs skipped so far. Thread-safe.
   std::size_t published() const { return published_; }
   std::size_t skipped() const { return skipped_; }
+  /// Faults of the source, as counted up to 5 s ago. Thread-safe.
+  ReaderReport faults() const {
+    const std::lock_guard lock(faults_mutex_);
+    return faults_;
+  }
   /// Pairs of the recording, or so far, where that is more. Thread-safe.
   std::size_t listed() const { return std::max<std::size_t>(listed_, published_ + skipped_); }
 
@@ -90,7 +96,7 @@ class SensorsNode final : public Node {
   using Input = std::variant<Packet, EndOfData, std::exception_ptr>;
 
   void decode();
-  void tell_faults();
+  void count_faults();
   [[nodiscard]] std::optional<double> lag_when_due_s(const Packet& packet);
   void step(const Packet& packet);
   void step(const EndOfData& end);
@@ -104,8 +110,10 @@ class SensorsNode final : public Node {
   std::atomic<std::size_t> published_ = 0;
   std::atomic<std::size_t> skipped_ = 0;
   std::atomic<bool> stopped_ = false;
+  mutable std::mutex faults_mutex_;
+  ReaderReport faults_;
   std::string told_faults_;  // of a live source
-  double told_s_ = 0.0;
+  double counted_s_ = 0.0;
   Timing reading_;
   Heartbeat decoding_;  // a step reads one packet
   std::thread decoder_;

@@ -99,6 +99,11 @@ TEST_CASE("Every known type crosses", "[ros_dds]") {
   odometry.child_frame = "body";
   crosses(odometry);
   crosses(RosPath{{7, "map"}, {{{8, "map"}, {}}, {{9, "map"}, {}}}});
+  RosPointCloud cloud;
+  cloud.fields = {{"x", 0, RosPointCloud::kFloat32, 1}};
+  cloud.data = {1, 2, 3, 4};
+  crosses(cloud);
+  crosses(RosDiagnostics{{7, ""}, {{1, "a", "b", "c", {{"d", "e"}}}, {}}});
   crosses(RosTransforms{{{{7, "map"}, "odom", {}}, {{8, "odom"}, "body", {}}}});
 }
 
@@ -106,11 +111,16 @@ TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
   Topic<OdometryState> odometry;
   Topic<KeyframeOdometry> keyframes;
   Topic<Trajectory> trajectories;
-  RosOutputNode node(network(), "robot 3", {odometry, keyframes, trajectories});
+  const auto diagnose = [] {
+    return std::vector<RosDiagnosticStatus>{{1, "sensors", "faulty", "", {{"gaps", "3"}}}};
+  };
+  RosOutputNode node(network(), "robot 3", 2, diagnose, {odometry, keyframes, trajectories});
   RosSubscription viewer(network(), {{"/robot_3/odometry", "nav_msgs/Odometry", RosQos::kReliable},
                                      {"/robot_3/pose", "geometry_msgs/PoseStamped"},
                                      {"/tf", "tf2_msgs/TFMessage", RosQos::kReliable},
-                                     {"/robot_3/path", "nav_msgs/Path", RosQos::kLatched}});
+                                     {"/robot_3/path", "nav_msgs/Path", RosQos::kLatched},
+                                     {"/robot_3/mesh", "sensor_msgs/PointCloud2", RosQos::kLatched},
+                                     {"/diagnostics", "diagnostic_msgs/DiagnosticArray"}});
   OdometryState state;
   state.stamp = 5;
   state.T_odom_body.translation() = Eigen::Vector3d(1, 2, 3);
@@ -123,12 +133,17 @@ TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
   odometry.publish(state);
   keyframes.publish(keyframe);
   trajectories.publish(Trajectory{0, 0, {T_map_body}});
+  LabelledMesh mesh;
+  mesh.vertices = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
+  node.offer(std::make_shared<const LabelledMesh>(mesh));
   std::optional<RosPath> path;
   std::optional<RosPoseStamped> pose;
   std::optional<RosOdometry> told;
   std::optional<RosTransforms> transforms;
+  std::optional<RosPointCloud> cloud;
+  std::optional<RosDiagnostics> diagnostics;
   // States go on until the viewer has all: it may have come later.
-  while (!(path && pose && told && transforms)) {
+  while (!(path && pose && told && transforms && cloud && diagnostics)) {
     const auto message = [&] {
       state.stamp += 10;
       odometry.publish(state);
@@ -140,6 +155,9 @@ TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
     if (message->channel == 1) pose = decode_ros<RosPoseStamped>("cdr", bytes).value;
     if (message->channel == 2) transforms = decode_ros<RosTransforms>("cdr", bytes).value;
     if (message->channel == 3) path = decode_ros<RosPath>("cdr", bytes).value;
+    if (message->channel == 4) cloud = decode_ros<RosPointCloud>("cdr", bytes).value;
+    if (message->channel == 5) diagnostics = decode_ros<RosDiagnostics>("cdr", bytes).value;
+    if (diagnostics && diagnostics->header.stamp == 0) diagnostics.reset();  // before a pose
     if (pose && pose->pose.position.x() != 10.0) pose.reset();  // before the correction
     if (transforms && transforms->transforms[0].pose.position.x() != 9.0) transforms.reset();
   }
@@ -153,6 +171,14 @@ TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
   CHECK(transforms->transforms[1].child_frame == "robot_3/base_link");
   REQUIRE(path->poses.size() == 1);
   CHECK(path->poses[0].header.stamp == 5);
+  CHECK(cloud->header.frame == "map");
+  CHECK(cloud->width == 2);  // of three vertices two at most
+  REQUIRE(diagnostics->status.size() == 2);
+  CHECK(diagnostics->status[0].name == "robot_3: odometry");
+  CHECK(diagnostics->status[0].level == RosDiagnosticStatus::kOk);
+  CHECK(diagnostics->status[1].name == "robot_3: sensors");
+  CHECK(diagnostics->status[1].hardware_id == "robot_3");
+  CHECK(diagnostics->status[1].values[0].value == "3");
   CHECK(path->poses[0].pose.position == Eigen::Vector3d(10, 2, 3));
 }
 

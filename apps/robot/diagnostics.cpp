@@ -1,0 +1,49 @@
+#include "apps/robot/diagnostics.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "modules/core/text_table.hpp"
+#include "runtime/clock.hpp"
+
+namespace km {
+
+RosDiagnosticStatus sensors_status(std::size_t published, std::size_t skipped,
+                                   const ReaderReport& faults) {
+  RosDiagnosticStatus status;
+  status.name = "sensors";
+  status.values = {{"frames", std::to_string(published)},
+                   {"skipped frames", std::to_string(skipped)}};
+  for (const auto& [fault, entry] : faults.entries())
+    status.values.push_back(
+        {to_string(fault), std::to_string(entry.count) + ", first: " + entry.first});
+  const bool is_well = skipped == 0 && faults.empty();
+  status.level = is_well ? RosDiagnosticStatus::kOk : RosDiagnosticStatus::kWarn;
+  status.message = is_well          ? "ok"
+                   : faults.empty() ? "frames are skipped: odometry is too slow"
+                                    : "faulty: see below";
+  return status;
+}
+
+ModuleLoads::ModuleLoads(std::vector<const Node*> nodes)
+    : nodes_(std::move(nodes)), asked_s_(steady_now_s()) {}
+
+RosDiagnosticStatus ModuleLoads::status() {
+  constexpr double kBusy = 0.95;
+  const double now_s = steady_now_s();
+  const double elapsed_s = std::max(now_s - std::exchange(asked_s_, now_s), 1e-3);
+  RosDiagnosticStatus status;
+  status.name = "modules";
+  for (const Node* node : nodes_) {
+    const double total_s = node->timing().total_s();
+    const double share = (total_s - std::exchange(spent_s_[node], total_s)) / elapsed_s;
+    const std::string name(node->name());
+    status.values.push_back({name + " busy [%]", fixed(100.0 * share, 0)});
+    if (share > kBusy) status.message += (status.message.empty() ? "busy: " : ", ") + name;
+  }
+  if (!status.message.empty()) status.level = RosDiagnosticStatus::kWarn;
+  if (status.message.empty()) status.message = "ok";
+  return status;
+}
+
+}  // namespace km

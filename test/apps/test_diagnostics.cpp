@@ -1,0 +1,45 @@
+#include <catch2/catch.hpp>
+
+#include "apps/robot/diagnostics.hpp"
+
+namespace km {
+namespace {
+
+class BusyNode final : public Node {
+ public:
+  std::string_view name() const override { return "busy"; }
+  void start() override {}
+  void stop() noexcept override {}
+  std::exception_ptr error() const override { return nullptr; }
+  DurationHistogram timing() const override { return spent; }
+
+  DurationHistogram spent;
+};
+
+TEST_CASE("Sensors that skip or spoil frames are a warning, by kind", "[robot]") {
+  CHECK(sensors_status(10, 0, {}).level == RosDiagnosticStatus::kOk);
+  CHECK(sensors_status(10, 1, {}).level == RosDiagnosticStatus::kWarn);
+  ReaderReport faults;
+  faults.add(ReaderFault::kImuGap, "0.5 s after 7", 3);
+  const RosDiagnosticStatus status = sensors_status(10, 1, faults);
+  CHECK(status.level == RosDiagnosticStatus::kWarn);
+  REQUIRE(status.values.size() == 3);
+  CHECK(status.values[1].value == "1");
+  CHECK(status.values[2].key == "gaps between inertial samples");
+  CHECK(status.values[2].value == "3, first: 0.5 s after 7");
+}
+
+TEST_CASE("A module that hardly rests is a warning that names it", "[robot]") {
+  BusyNode node;
+  ModuleLoads loads({&node});
+  CHECK(loads.status().level == RosDiagnosticStatus::kOk);
+  node.spent.add(1e6);  // more than there can have been
+  const RosDiagnosticStatus busy = loads.status();
+  CHECK(busy.level == RosDiagnosticStatus::kWarn);
+  CHECK(busy.message == "busy: busy");
+  CHECK(busy.values.at(0).key == "busy busy [%]");
+  CHECK(loads.status().level == RosDiagnosticStatus::kOk);  // since the last call
+}
+
+}  // namespace
+}  // namespace km
