@@ -1,0 +1,201 @@
+#include <catch2/catch.hpp>
+
+#include <fstream>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "modules/recordings/ros_messages.hpp"
+#include "test/support/spoilt_input.hpp"
+
+namespace km {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+// Messages that another CDR library wrote, and read back (golden/make.mjs); the values stand below.
+struct Golden {
+  std::string type;
+  Bytes bytes;
+};
+
+std::vector<Golden> goldens() {
+  std::ifstream file("test/modules/recordings/golden/messages.txt");
+  std::vector<Golden> all;
+  std::string hex;
+  for (Golden golden; file >> golden.type >> hex; all.push_back(std::move(golden)))
+    for (std::size_t k = 0; k + 1 < hex.size(); k += 2)
+      golden.bytes.push_back(static_cast<std::uint8_t>(std::stoul(hex.substr(k, 2), nullptr, 16)));
+  return all;
+}
+
+// The doubles of a message ascend from 0.5.
+struct Doubles {
+  double next = 0.5;
+
+  void fill(auto& values) {
+    for (double& value : values) value = next++;
+  }
+  Eigen::Vector3d vector() {
+    const double x = next++, y = next++, z = next++;
+    return {x, y, z};
+  }
+  Eigen::Quaterniond quaternion() {
+    const double x = next++, y = next++, z = next++, w = next++;
+    return {w, x, y, z};
+  }
+  RosPose pose() {
+    const Eigen::Vector3d position = vector();
+    return {position, quaternion()};
+  }
+};
+
+RosHeader header(const std::string& frame) {
+  return {1700000001123456789, frame};
+}
+
+RosCameraInfo camera(bool is_empty) {
+  Doubles doubles;
+  RosCameraInfo info;
+  info.header = header(is_empty ? "le" : "left");
+  info.height = is_empty ? 1 : 480;
+  info.width = is_empty ? 2 : 752;
+  if (!is_empty) {
+    info.distortion_model = "plumb_bob";
+    info.D.resize(5);
+    info.binning_x = 1;
+    info.binning_y = 2;
+    info.region = {.x_offset = 3, .y_offset = 4, .height = 5, .width = 6, .do_rectify = true};
+  }
+  doubles.fill(info.D);
+  doubles.fill(info.K);
+  doubles.fill(info.R);
+  doubles.fill(info.P);
+  return info;
+}
+
+RosImu imu() {
+  Doubles doubles;
+  RosImu imu;
+  imu.header = header("imu0");
+  imu.orientation = doubles.quaternion();
+  doubles.fill(imu.orientation_covariance);
+  imu.angular_velocity = doubles.vector();
+  doubles.fill(imu.angular_velocity_covariance);
+  imu.linear_acceleration = doubles.vector();
+  doubles.fill(imu.linear_acceleration_covariance);
+  return imu;
+}
+
+RosOdometry odometry() {
+  Doubles doubles;
+  RosOdometry odometry;
+  odometry.header = header("odom");
+  odometry.child_frame = "base_link";
+  odometry.pose = doubles.pose();
+  doubles.fill(odometry.pose_covariance);
+  odometry.linear_velocity = doubles.vector();
+  odometry.angular_velocity = doubles.vector();
+  doubles.fill(odometry.twist_covariance);
+  return odometry;
+}
+
+RosPath path() {
+  Doubles doubles;
+  RosPath path{header("map"), {}};
+  for (const char* frame : {"map", "m", ""}) path.poses.push_back({header(frame), doubles.pose()});
+  return path;
+}
+
+RosTransforms transforms() {
+  Doubles doubles;
+  RosTransforms message;
+  message.transforms.push_back({header("map"), "odom", doubles.pose()});
+  message.transforms.push_back({header("odom"), "base", doubles.pose()});
+  return message;
+}
+
+RosPointCloud cloud() {
+  RosPointCloud cloud;
+  cloud.header = header("map");
+  cloud.height = 1;
+  cloud.width = 2;
+  cloud.fields = {{"x", 0, RosPointCloud::kFloat32, 1}, {"rgb", 4, RosPointCloud::kFloat32, 1}};
+  cloud.point_step = 8;
+  cloud.row_step = 16;
+  for (std::uint8_t k = 0; k < 16; ++k) cloud.data.push_back(k);
+  cloud.is_dense = true;
+  return cloud;
+}
+
+RosPointCloud empty_cloud() {
+  RosPointCloud cloud;
+  cloud.header = header("m");
+  cloud.is_bigendian = true;
+  return cloud;
+}
+
+RosDiagnostics diagnostics() {
+  return {header(""),
+          {{1, "a: odometry", "late", "a", {{"poses", "12"}, {"", "x"}}}, {0, "b", "", "", {}}}};
+}
+
+RosImage image(bool is_empty) {
+  if (is_empty)
+    return {.header = header(""),
+            .height = 0,
+            .width = 0,
+            .encoding = "",
+            .is_bigendian = true,
+            .step = 0,
+            .data = {}};
+  return {.header = header("left"),
+          .height = 2,
+          .width = 3,
+          .encoding = "mono8",
+          .is_bigendian = false,
+          .step = 3,
+          .data = {1, 2, 3, 4, 5, 6}};
+}
+
+}  // namespace
+
+TEST_CASE("Messages are to the byte those of another CDR library, in both directions",
+          "[recordings]") {
+  const std::vector<Golden> golden = goldens();
+  REQUIRE(golden.size() == 15);
+  std::size_t next = 0;
+  const auto check = [&]<typename Message>(const Message& message) {
+    const Golden& known = golden[next++];
+    CAPTURE(next, known.type);
+    CHECK(known.type == Message::kType);
+    CHECK(encode_ros(message) == known.bytes);
+    const auto read = decode_ros<Message>("cdr", known.bytes);
+    CAPTURE(read.refusal);
+    REQUIRE(read.value);
+    CHECK(encode_ros(*read.value) == known.bytes);
+    for (std::size_t size = 0; size < known.bytes.size(); ++size)
+      CHECK(decode_ros<Message>("cdr", std::span(known.bytes).first(size)).refusal);
+    for (unsigned seed = 0; seed < spoilt_files(); ++seed) {
+      const auto spoilt = decode_ros<Message>("cdr", InputSpoiler(seed)({known.bytes}));
+      CHECK(spoilt.value.has_value() == (spoilt.refusal == nullptr));
+    }
+  };
+  check(image(false));
+  check(image(true));
+  check(RosCompressedImage{header("a"), "jpeg", {1, 2, 3}});
+  check(imu());
+  check(camera(false));
+  check(camera(true));
+  check(RosPoseStamped{header("map"), Doubles{}.pose()});
+  check(odometry());
+  check(path());
+  check(RosPath{header("map"), {}});
+  check(transforms());
+  check(RosTransforms{});
+  check(cloud());
+  check(empty_cloud());
+  check(diagnostics());
+}
+
+}  // namespace km
