@@ -1,10 +1,13 @@
 // Odometry on EuRoC MH_01_easy as in the table of results: three pieces and 21 starts.
-//   bench_vio DATASET [rgbd] [starts] [black] [resume=SECONDS] [rest=SECONDS] [KEY=VALUE ...]
+//   bench_vio DATASET [rgbd] [starts] [black] [resume=SECONDS] [rest=SECONDS] [flight=SECONDS]
+//             [late=MILLISECONDS] [turned=DEGREES] [KEY=VALUE ...]
 // with keys of the sections vio and tracker.
 // "rgbd" replaces the right images by depth made from both, "starts" adds the 21 starts, "black"
 // runs with one second of black images at each of 12 places, "resume" kills odometry
 // within the first seconds at every keyframe, once or at every n-th, and takes it up there, from
-// its state and anew. "rest" stands still for so long; DATASET is V1_01_easy then.
+// its state and anew. "rest" stands still for so long; DATASET is V1_01_easy then. "flight" runs
+// once over the first seconds of a recording. Inertial samples are stamped "late" by so much, and
+// cameras "turned" from where they are taken to be.
 
 #include <algorithm>
 #include <array>
@@ -216,17 +219,21 @@ void run_rest(const Recording& standing, const TrackerConfig& tracker, const Vio
 
 int run(int argc, char** argv) {
   bool starts = false, black = false, rgbd = false;
-  double resume_s = 0.0, rest_s = 0.0;
+  double resume_s = 0.0, rest_s = 0.0, flight_s = 0.0, late_ms = 0.0, turned_deg = 0.0;
+  const std::map<std::string, double*> numbers = {{"resume", &resume_s},
+                                                  {"rest", &rest_s},
+                                                  {"flight", &flight_s},
+                                                  {"late", &late_ms},
+                                                  {"turned", &turned_deg}};
   Overrides overrides;
   for (int a = 2; a < argc; ++a) {
     const char* equals = std::strchr(argv[a], '=');
-    if (std::strncmp(argv[a], "resume=", 7) == 0)
-      resume_s = std::atof(argv[a] + 7);
-    else if (std::strncmp(argv[a], "rest=", 5) == 0)
-      rest_s = std::atof(argv[a] + 5);
+    const std::string name(argv[a], equals == nullptr ? std::strlen(argv[a])
+                                                      : static_cast<std::size_t>(equals - argv[a]));
+    if (equals != nullptr && numbers.contains(name))
+      *numbers.at(name) = std::atof(equals + 1);
     else if (equals != nullptr)
-      overrides.values[std::string(argv[a], static_cast<std::size_t>(equals - argv[a]))] =
-          equals + 1;
+      overrides.values[name] = equals + 1;
     else if (std::strcmp(argv[a], "rgbd") == 0)
       rgbd = true;
     else
@@ -247,7 +254,17 @@ int run(int argc, char** argv) {
     run_resume(read_recording(argv[1], 0.0, resume_s), tracker, config);
     return 0;
   }
-  Recording recording = read_recording(argv[1], 0.0, 16.0);
+  const auto read = [&](double to_s) {
+    return disturbed(read_recording(argv[1], 0.0, to_s), 1e-3 * late_ms,
+                     turned_deg * std::numbers::pi / 180.0);
+  };
+  if (flight_s > 0.0) {
+    const Recording flight = read(flight_s);
+    const std::size_t images = flight.packets.size();
+    print_piece("flight", run_odometry(flight, 0, images, tracker, config), images);
+    return 0;
+  }
+  Recording recording = read(16.0);
   if (rgbd) recording = as_rgbd(recording);
   const struct {
     const char* name;
@@ -296,8 +313,10 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) try {
   if (argc < 2) {
-    std::cerr << "usage: bench_vio DATASET [rgbd] [starts] [black] [resume=SECONDS] [rest=SECONDS] "
-                 "[KEY=VALUE ...]\n";
+    std::cerr
+        << "usage: bench_vio DATASET [rgbd] [starts] [black] [resume=SECONDS] [rest=SECONDS]\n"
+           "                 [flight=SECONDS] [late=MILLISECONDS] [turned=DEGREES] [KEY=VALUE "
+           "...]\n";
     return 2;
   }
   return km::run(argc, argv);

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "modules/core/depth_lookup.hpp"
+#include "modules/core/lie.hpp"
 #include "modules/dense_sensing/stereo_depth.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/sensors/euroc_rig_codec.hpp"
@@ -146,6 +147,26 @@ Recording standing_recording(const std::filesystem::path& folder, double duratio
   while (auto packet = reader.next()) result.packets.push_back(std::move(*packet));
   repeat(result.packets, static_cast<std::size_t>(std::lround(5.0 * duration_s)) + 1);
   result.T_world_body.assign(result.packets.size(), SE3::Identity());
+  return result;
+}
+
+Recording disturbed(const Recording& recording, double late_s, double turned_rad) {
+  Recording result = recording;
+  const Eigen::Matrix3d R = so3_exp(turned_rad * Eigen::Vector3d::Ones().normalized());
+  for (Camera& camera : result.rig.stereo.cameras) camera.T_body_cam.prerotate(R);
+  std::vector<ImuSample> samples;
+  for (const SensorPacket& packet : recording.packets)
+    for (const ImuSample& sample : packet.imu)
+      if (samples.empty() || sample.stamp > samples.back().stamp) samples.push_back(sample);
+  for (ImuSample& sample : samples) sample.stamp += static_cast<Stamp>(std::llround(1e9 * late_s));
+  std::size_t next = 0;
+  for (SensorPacket& packet : result.packets) {
+    packet.imu.clear();
+    if (next > 0) --next;  // the border sample of two packets
+    while (next < samples.size() &&
+           (packet.imu.empty() || packet.imu.back().stamp < packet.frame->stamp))
+      packet.imu.push_back(samples[next++]);
+  }
   return result;
 }
 

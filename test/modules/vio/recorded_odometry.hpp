@@ -33,6 +33,10 @@ OdometryRun run_odometry(const Recording& recording, std::size_t first, std::siz
 /// again and again for `duration_s`.
 Recording standing_recording(const std::filesystem::path& folder, double duration_s);
 
+/// `recording` with inertial samples that are stamped `late_s` too late and cameras that are taken
+/// to be turned by `turned_rad` about [1, 1, 1] of the body from where they are.
+Recording disturbed(const Recording& recording, double late_s, double turned_rad);
+
 /// Errors of a trajectory against the true poses of the same instants.
 struct OdometryErrors {
   double ate_m = 0.0;  ///< Root mean square after SE(3) alignment.
