@@ -43,8 +43,9 @@ RigCalibration read_calibration(const std::filesystem::path& path, bool is_inlin
   RigCalibration calibration;
   calibration.has_cameras = calibration.is_placed = false;
   if (choice.depth) calibration.rig.depth = choice.depth->range;
-  calibration.notes.push_back(path.string() +
-                              ": no calibration: noise of the inertial sensor as of EuRoC's");
+  if (file.odometry.topic.empty() && !file.odometry.file)
+    calibration.notes.push_back(path.string() +
+                                ": no calibration: noise of the inertial sensor as of EuRoC's");
   return calibration;
 }
 

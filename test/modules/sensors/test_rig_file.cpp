@@ -113,6 +113,10 @@ TEST_CASE("What a rig file does not tell is asked of topics", "[sensors]") {
   CHECK(none.info_topics == std::array<std::string, 2>{"/l/camera_info", "/r/info"});
   CHECK(none.images == std::array{RosImages::kRaw, RosImages::kRectified});
   CHECK(none.body_frame == "base");
+  REQUIRE(none.rig.notes.size() == 1);
+  CHECK_THAT(none.rig.notes[0], Contains("noise of the inertial sensor as of EuRoC's"));
+  CHECK(read(folder, "left: {topic: /l}\nright: {topic: /r}\nodometry: {topic: /odom}\n")
+            .rig.notes.empty());
 
   std::string chain = kChain;
   for (std::size_t at = 0; (at = chain.find("T_cam_imu")) != chain.npos;)
