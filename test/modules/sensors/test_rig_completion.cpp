@@ -204,7 +204,7 @@ TEST_CASE("What is missing of a calibration is named with what would tell it",
 
 TEST_CASE("A chain of static transforms is followed in both directions", "[sensors]") {
   StaticTransforms transforms;
-  transforms.add({{kImuOnBase, kLeftOnBase, transform("left_optical", "lens", {0, 0, 0.5}, {})}});
+  transforms.add({{kImuOnBase, kLeftOnBase, transform("left_optical", "lens", {0, 0, 0.5}, {0, 0, 0})}});
   transforms.add({{transform("x", "y", {1, 0, 0}, {0, 0, 0})}});
   CHECK(transforms.find("imu", "lens")->translation().isApprox(Eigen::Vector3d(0, -0.2, -0.5)));
   CHECK(transforms.find("lens", "imu")->isApprox(transforms.find("imu", "lens")->inverse()));
