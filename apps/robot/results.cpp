@@ -1,9 +1,12 @@
 #include "apps/robot/results.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <cinttypes>
+#include <cmath>
 #include <cstdio>
 
 #include "apps/output_file.hpp"
+#include "modules/core/lie.hpp"
 #include "modules/pose_graph/g2o_io.hpp"
 
 namespace km {
@@ -102,6 +105,24 @@ MappingSummary map_counts(const RunRecord& record) {
           .unbound_vertices = corrections.last.unbound_vertices};
 }
 
+CamerasSummary cameras_of(const UncertainCalibration& known) {
+  const auto sigma = [](const Eigen::Matrix3d& covariance) {
+    return std::sqrt(covariance.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff());
+  };
+  const SE3& T = known.calibration.T_body_rig;
+  const Eigen::Vector3d rotation = so3_log(T.linear());
+  return {.offset_s = known.calibration.offset_s,
+          .offset_sigma_s = std::sqrt(known.covariance(0, 0)),
+          .rotation_x_rad = rotation.x(),
+          .rotation_y_rad = rotation.y(),
+          .rotation_z_rad = rotation.z(),
+          .rotation_sigma_rad = sigma(known.covariance.block<3, 3>(1, 1)),
+          .translation_x_m = T.translation().x(),
+          .translation_y_m = T.translation().y(),
+          .translation_z_m = T.translation().z(),
+          .translation_sigma_m = sigma(known.covariance.block<3, 3>(4, 4))};
+}
+
 // TUM: "time[s] tx ty tz qx qy qz qw", nine decimals of seconds.
 void write_poses(std::ostream& out, const std::vector<StampedPose>& poses) {
   for (const StampedPose& pose : poses) {
@@ -151,6 +172,7 @@ RunSummary summary_of(const RunRecord& record) {
                  .anchor = progress.anchor,
                  .settled = progress.settled,
                  .members = progress.members};
+  if (record.calibration()) summary.cameras = cameras_of(*record.calibration());
   if (record.dense_sensing()) summary.mapping = map_counts(record);
   return summary;
 }

@@ -21,6 +21,7 @@
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
+#include "modules/vio/camera_calibration.hpp"
 #include "runtime/dds/peer_table.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
@@ -36,6 +37,7 @@ class RunRecord {
 
   void add(const OdometryState& state);  ///< Replaces those of this instant and later.
   void add(const KeyframeOdometry& keyframe);
+  void add(const UncertainCalibration& calibration) { calibration_ = calibration; }
   void add(const Keyframe& keyframe);  ///< Of this robot: what depth it sees.
   void add(const Closure& closure);
   void add(const InlierSet& set);  ///< Kept if newer than the pair's last.
@@ -64,6 +66,11 @@ class RunRecord {
 
   /// Keypoints of all keyframes.
   [[nodiscard]] std::size_t keypoints() const { return keypoints_; }
+
+  /// Of the cameras, as known last; absent where it is not estimated.
+  [[nodiscard]] const std::optional<UncertainCalibration>& calibration() const {
+    return calibration_;
+  }
 
   /// Absent where mapping is off, or no frame has come yet.
   [[nodiscard]] const std::optional<DenseSensingProgress>& dense_sensing() const {
@@ -109,6 +116,7 @@ class RunRecord {
   RobotId robot_;
   std::vector<StampedPose> odometry_;
   std::vector<KeyframeOdometry> keyframes_;
+  std::optional<UncertainCalibration> calibration_;
   std::map<std::uint32_t, double> median_depths_m_;  // by keyframe
   std::size_t keypoints_ = 0;
   std::map<ClosureId, Closure> closures_;

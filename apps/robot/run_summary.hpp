@@ -121,6 +121,31 @@ struct ProcessSummary {
   bool operator==(const ProcessSummary&) const = default;
 };
 
+/// How both cameras stand to the inertial sensor beyond what the rig says, and standard
+/// deviations: that of rotation and translation is the largest of any direction.
+struct CamerasSummary {
+  double offset_s = 0.0, offset_sigma_s = 0.0;  ///< Added to stamps of images: the sensor's.
+  /// T_body_cam is T of these times that of the rig; a rotation vector, about the body's axes.
+  double rotation_x_rad = 0.0, rotation_y_rad = 0.0, rotation_z_rad = 0.0;
+  double rotation_sigma_rad = 0.0;
+  double translation_x_m = 0.0, translation_y_m = 0.0, translation_z_m = 0.0;
+  double translation_sigma_m = 0.0;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("offset_s", offset_s);
+    visitor.field("offset_sigma_s", offset_sigma_s);
+    visitor.field("rotation_x_rad", rotation_x_rad);
+    visitor.field("rotation_y_rad", rotation_y_rad);
+    visitor.field("rotation_z_rad", rotation_z_rad);
+    visitor.field("rotation_sigma_rad", rotation_sigma_rad);
+    visitor.field("translation_x_m", translation_x_m);
+    visitor.field("translation_y_m", translation_y_m);
+    visitor.field("translation_z_m", translation_z_m);
+    visitor.field("translation_sigma_m", translation_sigma_m);
+  }
+  bool operator==(const CamerasSummary&) const = default;
+};
+
 /// What a robot's run came to: summary.json, and the robot's part of a team's --json. The names in
 /// visit_fields are the keys; they are written and read in this order. An absent optional has no
 /// key; NaN is written as null.
@@ -133,6 +158,7 @@ struct RunSummary {
   std::uint64_t frames_skipped = 0;  ///< Pairs that odometry was too slow for.
   ClosureCounts closures;            ///< That this robot found.
   OptimizerSummary pgo;
+  std::optional<CamerasSummary> cameras;         ///< Absent without vio.calibrate.
   std::optional<MappingSummary> mapping;         ///< Absent where mapping is off.
   std::map<std::string, std::uint64_t> traffic;  ///< Bytes sent, by category.
   std::optional<HeldBackSums> held_back;         ///< Absent without a budget.
@@ -153,6 +179,7 @@ struct RunSummary {
     visitor.field("frames_skipped", frames_skipped);
     visitor.field("closures", closures);
     visitor.field("pgo", pgo);
+    visitor.field("cameras", cameras);
     visitor.field("mapping", mapping);
     visitor.field("traffic", traffic);
     visitor.field("held_back", held_back);

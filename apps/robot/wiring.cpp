@@ -149,7 +149,8 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
   const VioTopics odometry{.packets = topics_.packets,
                            .odometry = topics_.odometry,
                            .keyframes = topics_.keyframe_odometry,
-                           .frames = topics_.located_frames};
+                           .frames = topics_.located_frames,
+                           .calibration = topics_.camera_calibration};
   if (gives_poses)
     add_odometry<OutsideOdometryNode>(rig.stereo.depth_source, config.vio, odometry);
   else
@@ -357,6 +358,7 @@ void Robot::add_records() {
   recorder_->record(topics_.restored_odometry);
   recorder_->record(topics_.odometry);
   recorder_->record(topics_.keyframe_odometry);
+  recorder_->record(topics_.camera_calibration);
   recorder_->record(topics_.keyframes);
   recorder_->record(topics_.closure_restarts);
   recorder_->record(topics_.closures);

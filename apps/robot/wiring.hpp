@@ -47,6 +47,7 @@ struct Topics {
   Topic<KeyframeOdometry> keyframe_odometry;
   Topic<Keyframe> new_keyframes, keyframes;  // the latter: those that are on the disk
   Topic<LocatedFrame> located_frames;
+  Topic<UncertainCalibration> camera_calibration;
   Topic<DenseFrame> dense_frames;
   Topic<DenseSensingProgress> dense_sensing_progress;
   Topic<MapMesh> maps;

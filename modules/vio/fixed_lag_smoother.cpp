@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "modules/core/lie.hpp"
@@ -24,6 +25,35 @@ bool locates_new(const Window& window) {
     return tracked_now(window, landmark) && landmark.observations.back().bearings[1];
   });
 }
+
+// Samples of both that cover [from, to], as far as there are any; the former ones first.
+std::vector<ImuSample> joined(std::span<const ImuSample> former, std::span<const ImuSample> later,
+                              Stamp from, Stamp to) {
+  std::vector<ImuSample> samples;
+  const auto take = [&](const ImuSample& sample) {
+    if (!samples.empty() && (sample.stamp <= samples.back().stamp || samples.back().stamp >= to))
+      return;
+    if (sample.stamp <= from) samples.clear();
+    samples.push_back(sample);
+  };
+  std::ranges::for_each(former, take);
+  std::ranges::for_each(later, take);
+  return samples;
+}
+
+// What the gyroscope measures at an instant: its last sample not after it.
+Eigen::Vector3d gyro_at(std::span<const ImuSample> samples, Stamp instant) {
+  const auto after = std::ranges::upper_bound(samples, instant, {}, &ImuSample::stamp);
+  return after == samples.begin() ? samples.front().gyro : std::prev(after)->gyro;
+}
+
+// [standard deviations] a calibration farther from what the rig says comes of an estimate that has
+// diverged.
+constexpr double kMostCalibration = 10.0;
+
+// Instants stay apart, and near to the stamps.
+constexpr double kMostOffset_s = 0.1;
+constexpr double kMostOffsetStep = 0.25;  // of the time between two images
 
 constexpr double kHeldPosition_m = 1e-3;  // of the first state: fixes the gauge, no more
 constexpr double kHeldHeading_rad = 1e-3;
@@ -55,7 +85,10 @@ FixedLagSmoother::FixedLagSmoother(const SensorRig& rig, const VioConfig& config
   noise_.gyro_noise_density *= config_.gyro_noise_factor;
   noise_.accel_noise_density *= config_.accel_noise_factor;
   for (std::size_t c = 0; c < 2; ++c)
-    window_.views[c] = view_model(rig.stereo.cameras[c], config_.noise_px);
+    window_.rig_views[c] = view_model(rig.stereo.cameras[c], config_.noise_px);
+  window_.calibrates = config_.calibrate;
+  calibrate(window_, {});
+  calibration_covariance_ = calibration_prior();
   window_.gravity_mps2 = config_.gravity_mps2;
   window_.loss_scale = config_.loss_scale;
   focal_px_ = window_.views[0].weight * config_.noise_px;
@@ -67,7 +100,7 @@ std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
   clear();
   Stamp last_keyframe = 0;
   for (std::size_t k = 0; k < frames.size(); ++k) {
-    if (!append(frames[k], guess[k])) return std::nullopt;
+    if (!append(frames[k], guess[k], 0.0)) return std::nullopt;
     observe(window_, frames[k].tracked);
     const Stamp stamp = frames[k].tracked.stamp;
     if (k > 0 && k + 1 < frames.size() && seconds_between(last_keyframe, stamp) < kStartKeyframe_s)
@@ -90,7 +123,7 @@ std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
 void FixedLagSmoother::start(const InertialFrame& frame, const OdometryState& state,
                              const StateCovariance& covariance) {
   clear();
-  (void)append(frame, state);  // the first needs no inertial factor
+  (void)append(frame, state, 0.0);  // the first needs no inertial factor
   observe(window_, frame.tracked);
   window_.frames.back().keyframe = true;
   StatePrior& prior = window_.prior;
@@ -98,10 +131,18 @@ void FixedLagSmoother::start(const InertialFrame& frame, const OdometryState& st
   prior.linearization = {window_.frames.back().state};
   prior.J.resize(15, 15);
   prior.J << held_gauge(state), covariance.llt().matrixL().solve(without_gauge(state));
-  prior.r = Eigen::VectorXd::Zero(15);
+  hold_calibration();
 }
 
+// What is known of the calibration stays, if it can be.
 void FixedLagSmoother::clear() {
+  const UncertainCalibration known = calibration();
+  const Vector7 moved = CameraCalibration{}.offset_to(known.calibration);
+  const bool possible =
+      known.covariance.llt().info() == Eigen::Success &&
+      moved.dot(calibration_prior().llt().solve(moved)) < kMostCalibration * kMostCalibration;
+  calibration_covariance_ = possible ? known.covariance : calibration_prior();
+  if (!possible) calibrate(window_, {});
   window_.frames.clear();
   window_.landmarks.clear();
   window_.prior = {};
@@ -109,7 +150,8 @@ void FixedLagSmoother::clear() {
 
 SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
   SmootherUpdate update;
-  if (!slide(rests) || !append(frame, window_.frames.back().state)) return update;
+  if (!slide(rests) || !append(frame, window_.frames.back().state, next_offset_s(frame)))
+    return update;
   WindowFrame& newest = window_.frames.back();
   const OdometryState predicted = predict(window_.frames[window_.frames.size() - 2].state,
                                           newest.imu->imu(), config_.gravity_mps2);
@@ -128,22 +170,49 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
   return update;
 }
 
-bool FixedLagSmoother::append(const InertialFrame& frame, OdometryState state) {
+bool FixedLagSmoother::append(const InertialFrame& frame, OdometryState state, double offset_s) {
   WindowFrame& added = window_.frames.emplace_back();
   added.id = next_id_++;
   added.state = state;
   added.state.stamp = frame.tracked.stamp;
-  if (window_.frames.size() == 1) return true;
+  added.offset_s = offset_s;
+  const std::size_t now = window_.frames.size() - 1;
+  if (now == 0) return true;
   added.samples = frame.samples;
-  return set_imu(window_.frames.size() - 1);
+  return window_.calibrates ? share_samples() && set_imu(now) : set_imu(now);
+}
+
+// An instant after its image's stamp needs samples that come with the next image, and one before it
+// has left some to the next.
+bool FixedLagSmoother::share_samples() {
+  const std::size_t now = window_.frames.size() - 1;
+  WindowFrame& newest = window_.frames[now];
+  WindowFrame& before = window_.frames[now - 1];
+  const std::vector<ImuSample> own = newest.samples;
+  if (own.empty()) return true;
+  if (now == 1) before.gyro = gyro_at(own, before.instant());
+  newest.samples = joined(before.samples, own, before.instant(), newest.samples.back().stamp);
+  if (now < 2 || before.imu->rests() || !(before.offset_s > 0.0)) return true;
+  before.samples = joined(before.samples, own, window_.frames[now - 2].instant(), before.instant());
+  return set_imu(now - 1);
 }
 
 bool FixedLagSmoother::set_imu(std::size_t frame) {
-  const OdometryState& before = window_.frames[frame - 1].state;
+  const WindowFrame& before = window_.frames[frame - 1];
   WindowFrame& f = window_.frames[frame];
-  ImuPreintegration imu(noise_, before.gyro_bias, before.accel_bias);
-  const bool covered = imu.add(f.samples, before.stamp, f.state.stamp);
+  ImuPreintegration imu(noise_, before.state.gyro_bias, before.state.accel_bias);
+  std::vector<ImuSample> held;  // the last sample, until those after it have come
+  std::span<const ImuSample> samples = f.samples;
+  if (frame + 1 == window_.frames.size() && !samples.empty() &&
+      samples.back().stamp >= f.state.stamp && samples.back().stamp < f.instant()) {
+    held = f.samples;
+    held.push_back(held.back());
+    held.back().stamp = f.instant();
+    samples = held;
+  }
+  const bool covered = imu.add(samples, before.instant(), f.instant());
   f.imu = covered ? ImuFactor::of(imu, config_.gravity_mps2) : std::nullopt;
+  if (f.imu) f.gyro = gyro_at(samples, f.instant());
   return f.imu.has_value();
 }
 
@@ -198,13 +267,28 @@ void FixedLagSmoother::decide_keyframe() {
 
 void FixedLagSmoother::locate_landmarks() {
   const double max_error = config_.outlier_px / config_.noise_px;
-  for (WindowLandmark& landmark : window_.landmarks)
+  const std::vector<SE3> images = image_poses(window_);
+  const auto behind = [&](const WindowLandmark& landmark) {
+    const WindowObservation& o = landmark.observations.back();
+    Eigen::Vector2d r;
+    for (std::size_t c = 0; c < 2; ++c)
+      if (o.bearings[c] && !reprojection_error(window_.views[c], *o.bearings[c], images[o.frame],
+                                               landmark.p_odom, r))
+        return true;
+    return false;
+  };
+  for (WindowLandmark& landmark : window_.landmarks) {
+    // What told its distance may have left the window since.
+    if (landmark.located && tracked_now(window_, landmark) && behind(landmark))
+      landmark.located = false;
     if (!landmark.located && landmark.observations.size() >= 2)
-      locate(window_, max_error, landmark);
+      locate(window_, images, max_error, landmark);
+  }
 }
 
 int FixedLagSmoother::reject_outliers() {
   const double limit = config_.outlier_px / config_.noise_px;
+  const std::vector<SE3> images = image_poses(window_);
   int dropped = 0;
   Eigen::Vector2d r;
   for (WindowLandmark& landmark : window_.landmarks) {
@@ -212,8 +296,8 @@ int FixedLagSmoother::reject_outliers() {
     for (WindowObservation& o : landmark.observations)
       for (std::size_t c = 0; c < 2; ++c) {
         if (!o.bearings[c]) continue;
-        if (reprojection_error(window_.views[c], *o.bearings[c],
-                               window_.frames[o.frame].state.T_odom_body, landmark.p_odom, r) &&
+        if (reprojection_error(window_.views[c], *o.bearings[c], images[o.frame], landmark.p_odom,
+                               r) &&
             r.squaredNorm() <= limit * limit)
           continue;
         o.bearings[c].reset();
@@ -245,8 +329,7 @@ std::optional<UncertainPose> FixedLagSmoother::relative_pose(Stamp from, Stamp t
   UncertainPose result;
   result.T = a->state.T_odom_body.inverse() * b->state.T_odom_body;
   // xi = -Ad(T_to_from) xi_from + xi_to
-  Eigen::MatrixXd D_T =
-      Eigen::MatrixXd::Zero(15 * static_cast<Eigen::Index>(window_.frames.size()), 6);
+  Eigen::MatrixXd D_T = Eigen::MatrixXd::Zero(variables(), 6);
   D_T.middleRows<6>(15 * (a - window_.frames.data())) = -adjoint(result.T.inverse()).transpose();
   D_T.middleRows<6>(15 * (b - window_.frames.data())) += Matrix6::Identity();
   const auto Sigma = covariance_of(std::move(D_T));
@@ -258,13 +341,19 @@ std::optional<UncertainPose> FixedLagSmoother::relative_pose(Stamp from, Stamp t
 std::optional<StateCovariance> FixedLagSmoother::state_covariance(Stamp stamp) const {
   const WindowFrame* frame = frame_at(stamp);
   if (frame == nullptr) return std::nullopt;
-  Eigen::MatrixXd D_T =
-      Eigen::MatrixXd::Zero(15 * static_cast<Eigen::Index>(window_.frames.size()), 11);
+  Eigen::MatrixXd D_T = Eigen::MatrixXd::Zero(variables(), 11);
   D_T.middleRows<15>(15 * (frame - window_.frames.data())) =
       without_gauge(frame->state).transpose();
   const auto Sigma = covariance_of(std::move(D_T));
   if (!Sigma) return std::nullopt;
   return StateCovariance(Sigma->selfadjointView<Eigen::Upper>());  // rounding leaves none exact
+}
+
+double FixedLagSmoother::next_offset_s(const InertialFrame& frame) const {
+  const WindowFrame& before = window_.frames.back();
+  const double step = kMostOffsetStep * seconds_between(before.state.stamp, frame.tracked.stamp);
+  const double wanted = std::clamp(window_.calibration.offset_s, -kMostOffset_s, kMostOffset_s);
+  return std::clamp(wanted, before.offset_s - step, before.offset_s + step);
 }
 
 // Sigma = D H^-1 D^T = |L^-1 D^T|^2.
@@ -284,10 +373,44 @@ void FixedLagSmoother::hold_first() {
   prior.frames = {window_.frames.front().id};
   prior.linearization = {first};
   prior.J = Eigen::MatrixXd::Zero(10, 15);
-  prior.r = Eigen::VectorXd::Zero(10);
   prior.J.topRows<4>() = held_gauge(first);
   prior.J.block<3, 3>(4, 9).diagonal().setConstant(1.0 / kGyroBiasSigma);
   prior.J.block<3, 3>(7, 12).diagonal().setConstant(1.0 / config_.accel_bias_sigma);
+  hold_calibration();
+}
+
+void FixedLagSmoother::hold_calibration() {
+  StatePrior& prior = window_.prior;
+  prior.calibrates = window_.calibrates;
+  prior.calibration = window_.calibration;
+  if (prior.calibrates) {
+    const Eigen::Index rows = prior.J.rows(), columns = prior.J.cols();
+    prior.J.conservativeResizeLike(Eigen::MatrixXd::Zero(rows + 7, columns + 7));
+    prior.J.bottomRightCorner<7, 7>() =
+        calibration_covariance_.llt().matrixL().solve(Matrix7::Identity());
+  }
+  prior.r = Eigen::VectorXd::Zero(prior.J.rows());
+}
+
+UncertainCalibration FixedLagSmoother::calibration() const {
+  UncertainCalibration result{window_.calibration, calibration_covariance_};
+  if (!window_.calibrates || window_.frames.empty()) return result;
+  Eigen::MatrixXd D_T = Eigen::MatrixXd::Zero(variables(), 7);
+  D_T.bottomRows<7>().setIdentity();
+  if (const auto Sigma = covariance_of(std::move(D_T))) result.covariance = *Sigma;
+  return result;
+}
+
+Matrix7 FixedLagSmoother::calibration_prior() const {
+  Vector7 sigma;
+  sigma << config_.calibration_offset_s,
+      Eigen::Vector3d::Constant(config_.calibration_rotation_rad),
+      Eigen::Vector3d::Constant(config_.calibration_translation_m);
+  return sigma.cwiseAbs2().asDiagonal();
+}
+
+Eigen::Index FixedLagSmoother::variables() const {
+  return 15 * static_cast<Eigen::Index>(window_.frames.size()) + (window_.calibrates ? 7 : 0);
 }
 
 bool FixedLagSmoother::slide(bool rests) {
@@ -298,7 +421,7 @@ bool FixedLagSmoother::slide(bool rests) {
     if (recent || frame.keyframe) continue;
     if (rests && frame.rests && window_.frames[k - 1].rests)
       rest_out(k);
-    else if (frame.samples.empty())
+    else if (frame.imu->rests())
       frame.keyframe = true;  // the last one at rest: what follows is measured from it
     else if (!merge_out(k))
       return false;
@@ -313,11 +436,9 @@ bool FixedLagSmoother::slide(bool rests) {
 }
 
 bool FixedLagSmoother::merge_out(std::size_t frame) {
-  std::vector<ImuSample> samples = std::move(window_.frames[frame].samples);
   std::vector<ImuSample>& later = window_.frames[frame + 1].samples;
-  for (const ImuSample& sample : later)
-    if (sample.stamp > samples.back().stamp) samples.push_back(sample);
-  later = std::move(samples);
+  later = joined(window_.frames[frame].samples, later, window_.frames[frame - 1].instant(),
+                 window_.frames[frame + 1].instant());
   forget_frame(window_, frame);
   return set_imu(frame);
 }
@@ -330,7 +451,6 @@ void FixedLagSmoother::rest_out(std::size_t frame) {
   for (WindowLandmark& landmark : window_.landmarks)  // may have lost what told its distance
     if (std::ranges::none_of(landmark.observations, in_keyframe)) landmark.located = false;
   WindowFrame& later = window_.frames[frame];
-  later.samples.clear();
   later.imu = ImuFactor::at_rest(
       noise_, seconds_between(window_.frames[frame - 1].state.stamp, later.state.stamp));
 }

@@ -77,22 +77,30 @@ class FixedLagSmoother {
   /// Of the state at an image in the window; nullopt if it has left or the information is singular.
   [[nodiscard]] std::optional<StateCovariance> state_covariance(Stamp stamp) const;
 
+  /// The current estimate with its marginal covariance; what the rig says if it is not estimated.
+  [[nodiscard]] UncertainCalibration calibration() const;
+
   /// True if the image at `stamp` will not be in the window any more after the next add().
   [[nodiscard]] bool leaving(Stamp stamp) const;
 
  private:
   // These are false where an inertial factor cannot be made. The state is taken by value: it may be
   // the window's.
-  [[nodiscard]] bool append(const InertialFrame& frame, OdometryState state);
+  [[nodiscard]] bool append(const InertialFrame& frame, OdometryState state, double offset_s);
   [[nodiscard]] bool slide(bool rests);
   [[nodiscard]] bool merge_out(std::size_t frame);
   void rest_out(std::size_t frame);
+  [[nodiscard]] bool share_samples();
   [[nodiscard]] bool set_imu(std::size_t frame);
   void decide_keyframe();
   int reject_outliers();
   void locate_landmarks();
   void clear();
   void hold_first();
+  void hold_calibration();
+  [[nodiscard]] double next_offset_s(const InertialFrame& frame) const;
+  [[nodiscard]] Matrix7 calibration_prior() const;
+  [[nodiscard]] Eigen::Index variables() const;
   // Of D times the error of all frames, from its transpose.
   [[nodiscard]] std::optional<Eigen::MatrixXd> covariance_of(Eigen::MatrixXd D_T) const;
   [[nodiscard]] std::size_t keyframes() const;
@@ -102,6 +110,7 @@ class FixedLagSmoother {
   double focal_px_;
   Eigen::Matrix3d R_cam_body_;
   Window window_;
+  Matrix7 calibration_covariance_;  // As known when the window was started.
   std::uint64_t next_id_ = 0;
 };
 

@@ -82,8 +82,10 @@ std::optional<std::vector<SE3>> stereo_odometry(std::span<const InertialFrame> f
       if (!resect(window)) return std::nullopt;
       last_motion = window.frames[k - 1].state.T_odom_body.inverse() * frame.state.T_odom_body;
     }
+    const std::vector<SE3> images = image_poses(window);
     for (WindowLandmark& landmark : window.landmarks)
-      if (!landmark.located && tracked_now(window, landmark)) locate(window, max_error, landmark);
+      if (!landmark.located && tracked_now(window, landmark))
+        locate(window, images, max_error, landmark);
   }
   std::vector<SE3> poses;
   const SE3 T_first = window.frames.front().state.T_odom_body.inverse();

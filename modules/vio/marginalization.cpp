@@ -59,8 +59,8 @@ SquareRootPrior marginalize(const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
   return prior;
 }
 
-Eigen::VectorXd prior_offset(const StatePrior& prior,
-                             std::span<const OdometryState* const> states) {
+Eigen::VectorXd prior_offset(const StatePrior& prior, std::span<const OdometryState* const> states,
+                             const CameraCalibration& calibration) {
   Eigen::VectorXd dx(prior.dimension());
   for (std::size_t k = 0; k < states.size(); ++k) {
     const OdometryState& from = prior.linearization[k];
@@ -70,6 +70,7 @@ Eigen::VectorXd prior_offset(const StatePrior& prior,
       dx.segment<9>(6) << states[k]->v_odom - from.v_odom, states[k]->gyro_bias - from.gyro_bias,
           states[k]->accel_bias - from.accel_bias;
   }
+  if (prior.calibrates) dx.tail<7>() = prior.calibration.offset_to(calibration);
   return dx;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "modules/core/odometry.hpp"
+#include "modules/vio/camera_calibration.hpp"
 
 namespace km {
 
@@ -25,21 +26,27 @@ struct SquareRootPrior {
                                           Eigen::Index count);
 
 /// What marginalised states left behind on the oldest states of a window: a square-root prior on
-/// dx = [pose_0 (6), motion_0 (9), pose_1 (6), pose_2 (6), ...], the retracted differences to
-/// `linearization`. Only the first state has its velocity and biases in it.
+/// dx = [pose_0 (6), motion_0 (9), pose_1 (6), pose_2 (6), ..., calibration (7)], the retracted
+/// differences to `linearization` and `calibration`. Only the first state has its velocity and
+/// biases in it, and only a prior with `calibrates` the calibration.
 struct StatePrior {
   std::vector<std::uint64_t> frames;         ///< Ids; equally long as linearization.
   std::vector<OdometryState> linearization;  ///< Where the prior was made: the first estimates.
+  CameraCalibration calibration;             ///< Likewise.
+  bool calibrates = false;
   Eigen::MatrixXd J;
   Eigen::VectorXd r;
 
-  [[nodiscard]] Eigen::Index dimension() const {
+  /// Of the states' part.
+  [[nodiscard]] Eigen::Index states_dimension() const {
     return frames.empty() ? 0 : 9 + 6 * static_cast<Eigen::Index>(frames.size());
   }
+  [[nodiscard]] Eigen::Index dimension() const { return states_dimension() + (calibrates ? 7 : 0); }
 };
 
-/// dx of StatePrior for the current `states`, one for each of prior.frames.
+/// dx of StatePrior for the current `states`, one for each of prior.frames, and calibration.
 [[nodiscard]] Eigen::VectorXd prior_offset(const StatePrior& prior,
-                                           std::span<const OdometryState* const> states);
+                                           std::span<const OdometryState* const> states,
+                                           const CameraCalibration& calibration = {});
 
 }  // namespace km

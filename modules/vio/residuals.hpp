@@ -80,6 +80,9 @@ class ImuFactor {
 
   [[nodiscard]] const ImuPreintegration& imu() const { return imu_; }
 
+  /// True for at_rest().
+  [[nodiscard]] bool rests() const { return !(imu_.dt_s() > 0.0); }
+
   /// Whitened error.
   [[nodiscard]] Vector15 error(const OdometryState& i, const OdometryState& j) const;
 

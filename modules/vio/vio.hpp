@@ -78,6 +78,9 @@ class Vio {
 
   [[nodiscard]] VioResult process(const SensorPacket& packet);
 
+  /// How the cameras stand to the inertial sensor, as known by now; see VioConfig::calibrate.
+  [[nodiscard]] UncertainCalibration calibration() const { return smoother_.calibration(); }
+
   [[nodiscard]] const VioStatistics& statistics() const { return statistics_; }
 
  private:

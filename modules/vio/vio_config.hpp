@@ -21,6 +21,10 @@ struct VioConfig {
   double keyframe_parallax_px = 12.0;
   double keyframe_tracked_share = 0.6;
   double keyframe_interval_s = 1.0;
+  bool calibrate = true;
+  double calibration_offset_s = 0.01;
+  double calibration_rotation_rad = 0.01;
+  double calibration_translation_m = 0.003;
   double start_s = 0.75;
   double start_timeout_s = 3.0;
   double rest_parallax_px = 1.0;
@@ -66,6 +70,16 @@ struct VioConfig {
                   "or this share of the last one's features, or less, is still tracked");
     visitor.field("keyframe_interval_s", keyframe_interval_s, {0.05, 5.0},
                   "[s] or after this long");
+    visitor.field("calibrate", calibrate,
+                  "estimates how the cameras' stamps and mounting differ from what the rig says, "
+                  "both cameras in common");
+    visitor.field("calibration_offset_s", calibration_offset_s, {1e-9, 1.0},
+                  "[s] standard deviation of the stamps before anything is known of them; small: "
+                  "they are right");
+    visitor.field("calibration_rotation_rad", calibration_rotation_rad, {1e-9, 1.0},
+                  "[rad] of the mounting, each axis");
+    visitor.field("calibration_translation_m", calibration_translation_m, {1e-9, 1.0},
+                  "[m] likewise");
     visitor.field("start_s", start_s, {0.2, 5.0},
                   "[s] of images held back to start from; all their poses come when it is over");
     visitor.field("start_timeout_s", start_timeout_s, {0.5, 60.0},

@@ -51,6 +51,7 @@ VioNode::VioNode(RobotId robot, const SensorRig& rig, const TrackerConfig& track
                  const VioConfig& config, const VioTopics& topics)
     : vio_(robot, rig, tracker, config),
       topics_(topics),
+      calibrates_(config.calibrate),
       worker_(
           kQueuedPackets, Overflow::kBlock, [this](const auto& packet) { step(*packet); },
           VioConfig::kSection) {
@@ -75,6 +76,7 @@ void VioNode::step(const SensorPacket& packet) {
   for (const OdometryState& state : result.states) topics_.odometry.publish(state);
   for (const KeyframeOdometry& keyframe : result.keyframes) topics_.keyframes.publish(keyframe);
   for (const LocatedFrame& frame : result.frames) topics_.frames.publish(frame);
+  if (calibrates_ && !result.keyframes.empty()) topics_.calibration.publish(vio_.calibration());
 }
 
 void VioNode::report(const VioResult& result, Stamp stamp) const {

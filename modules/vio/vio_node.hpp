@@ -13,10 +13,11 @@ namespace km {
 
 /// Channels of the odometry node; they must outlive it.
 struct VioTopics {
-  In<SensorPacket> packets;         ///< In order of time.
-  Out<OdometryState> odometry;      ///< One per image, in order of time.
-  Out<KeyframeOdometry> keyframes;  ///< Indices without gaps.
-  Out<LocatedFrame> frames;         ///< One per image, after its keyframe.
+  In<SensorPacket> packets;               ///< In order of time.
+  Out<OdometryState> odometry;            ///< One per image, in order of time.
+  Out<KeyframeOdometry> keyframes;        ///< Indices without gaps.
+  Out<LocatedFrame> frames;               ///< One per image, after its keyframe.
+  Out<UncertainCalibration> calibration;  ///< With each keyframe, where it is estimated.
 };
 
 /// Stereo-inertial odometry as a thread: one Vio. A full queue holds the sensors up.
@@ -46,6 +47,7 @@ class VioNode final : public Node {
 
   Vio vio_;
   const VioTopics topics_;
+  const bool calibrates_;
   bool stopped_ = false;
   Worker<Topic<SensorPacket>::Message> worker_;  // last member: stops first
 };

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 #include <optional>
+#include <span>
 #include <utility>
 
 namespace km {
@@ -14,7 +15,7 @@ constexpr int kRefinements = 3;
 constexpr double kMaxRelativeSigma = 1.0 / 3.0;
 
 // Least squares of the distances to all rays.
-std::optional<Eigen::Vector3d> nearest_to_rays(const Window& window,
+std::optional<Eigen::Vector3d> nearest_to_rays(const Window& window, std::span<const SE3> images,
                                                const WindowLandmark& landmark) {
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
@@ -22,7 +23,7 @@ std::optional<Eigen::Vector3d> nearest_to_rays(const Window& window,
     for (std::size_t c = 0; c < 2; ++c) {
       if (!o.bearings[c]) continue;
       const ViewModel& view = window.views[c];
-      const SE3& T_odom_body = window.frames[o.frame].state.T_odom_body;
+      const SE3& T_odom_body = images[o.frame];
       const Eigen::Matrix3d R_odom_cam = T_odom_body.linear() * view.R_cam_body.transpose();
       const Eigen::Vector3d origin = T_odom_body.translation() - R_odom_cam * view.t_cam_body;
       const Eigen::Vector3d ray = (R_odom_cam * o.bearings[c]->homogeneous()).normalized();
@@ -42,14 +43,15 @@ struct PointEquations {
   int count = 0;
 };
 
-std::optional<PointEquations> equations(const Window& window, const WindowLandmark& landmark,
+std::optional<PointEquations> equations(const Window& window, std::span<const SE3> images,
+                                        const WindowLandmark& landmark,
                                         const Eigen::Vector3d& p_odom) {
   PointEquations e;
   ReprojectionTerm term;
   for (const WindowObservation& o : landmark.observations)
     for (std::size_t c = 0; c < 2; ++c) {
       if (!o.bearings[c]) continue;
-      const SE3& T = window.frames[o.frame].state.T_odom_body;
+      const SE3& T = images[o.frame];
       if (!linearize_reprojection(window.views[c], *o.bearings[c], T, T, p_odom, term))
         return std::nullopt;
       e.H.noalias() += term.J_point.transpose() * term.J_point;
@@ -79,6 +81,29 @@ std::vector<FirstEstimate> first_estimates(const Window& window) {
   return result;
 }
 
+void calibrate(Window& window, const CameraCalibration& calibration) {
+  window.calibration = calibration;
+  const SE3 T_rig_body = calibration.T_body_rig.inverse();
+  for (std::size_t c = 0; c < 2; ++c) {
+    const ViewModel& rig = window.rig_views[c];
+    window.views[c].R_cam_body = rig.R_cam_body * T_rig_body.linear();
+    window.views[c].t_cam_body = rig.R_cam_body * T_rig_body.translation() + rig.t_cam_body;
+    window.views[c].weight = rig.weight;
+  }
+}
+
+ImagePose image_pose(const Window& window, const WindowFrame& frame, const OdometryState& state) {
+  return ImagePose::at(state, frame.gyro, window.calibration.offset_s - frame.offset_s);
+}
+
+std::vector<SE3> image_poses(const Window& window) {
+  std::vector<SE3> poses;
+  for (const WindowFrame& frame : window.frames)
+    poses.push_back(window.calibrates ? image_pose(window, frame, frame.state).T_odom_body
+                                      : frame.state.T_odom_body);
+  return poses;
+}
+
 void observe(Window& window, const TrackedFrame& tracked) {
   std::vector<WindowLandmark> added;
   auto at = window.landmarks.begin();
@@ -102,19 +127,19 @@ bool tracked_now(const Window& window, const WindowLandmark& landmark) {
          landmark.observations.back().frame + 1 == window.frames.size();
 }
 
-void locate(const Window& window, double max_error, WindowLandmark& landmark) {
+void locate(const Window& window, std::span<const SE3> images, double max_error,
+            WindowLandmark& landmark) {
   landmark.located = false;
-  std::optional<Eigen::Vector3d> p = nearest_to_rays(window, landmark);
+  std::optional<Eigen::Vector3d> p = nearest_to_rays(window, images, landmark);
   if (!p) return;
   for (int k = 0; k < kRefinements; ++k) {
-    const auto e = equations(window, landmark, *p);
+    const auto e = equations(window, images, landmark, *p);
     if (!e) return;
     *p -= e->H.ldlt().solve(e->g);
   }
-  const auto e = equations(window, landmark, *p);
+  const auto e = equations(window, images, landmark, *p);
   if (!e || e->squared_error > e->count * max_error * max_error) return;
-  const Eigen::Vector3d ray =
-      *p - window.frames[landmark.observations.back().frame].state.T_odom_body.translation();
+  const Eigen::Vector3d ray = *p - images[landmark.observations.back().frame].translation();
   const double range = ray.norm();
   const double variance = ray.dot(e->H.ldlt().solve(ray)) / (range * range);
   if (!(variance < std::pow(kMaxRelativeSigma * range, 2))) return;

@@ -3,10 +3,12 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "modules/core/frame.hpp"
 #include "modules/core/odometry.hpp"
+#include "modules/vio/camera_calibration.hpp"
 #include "modules/vio/marginalization.hpp"
 #include "modules/vio/residuals.hpp"
 #include "modules/vio/tracked_frame.hpp"
@@ -19,9 +21,14 @@ struct WindowFrame {
   OdometryState state;
   bool keyframe = false;
   bool rests = false;  ///< The body stands still here.
-  /// Cover the time since the frame before; empty for the first, and where it has been rest.
+  /// Cover the time since the frame before, where it was not spent at rest; empty for the first.
   std::vector<ImuSample> samples;
   std::optional<ImuFactor> imu;  ///< From the frame before; none for the first.
+  /// The state is that of the inertial sensor's instant state.stamp + offset_s.
+  double offset_s = 0.0;
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();  ///< Measured there [rad/s].
+
+  [[nodiscard]] Stamp instant() const { return state.stamp + nanoseconds(offset_s); }
 };
 
 /// Bearings of one landmark in one frame of the window.
@@ -39,7 +46,10 @@ struct WindowLandmark {
 
 /// Everything that the optimisation works on.
 struct Window {
-  std::array<ViewModel, 2> views;
+  std::array<ViewModel, 2> rig_views;  ///< As the rig says.
+  std::array<ViewModel, 2> views;      ///< As the calibration says.
+  CameraCalibration calibration;
+  bool calibrates = false;  ///< The calibration is one of the unknowns.
   double gravity_mps2 = 9.81;
   double loss_scale = 1.5;  ///< Of the Cauchy loss on reprojection errors [standard deviations].
   std::vector<WindowFrame> frames;        ///< In order of time.
@@ -53,6 +63,16 @@ struct Window {
 /// For each frame what the prior holds of it.
 [[nodiscard]] std::vector<FirstEstimate> first_estimates(const Window& window);
 
+/// Sets the calibration, and the views by it.
+void calibrate(Window& window, const CameraCalibration& calibration);
+
+/// Where the body was when the image of `frame` was taken, if `state` was its state.
+[[nodiscard]] ImagePose image_pose(const Window& window, const WindowFrame& frame,
+                                   const OdometryState& state);
+
+/// The same for all frames by their states, without derivatives.
+[[nodiscard]] std::vector<SE3> image_poses(const Window& window);
+
 /// Enters what was seen in the window's last frame: known landmarks gain an observation, new ones
 /// are added, not located yet.
 void observe(Window& window, const TrackedFrame& tracked);
@@ -60,10 +80,11 @@ void observe(Window& window, const TrackedFrame& tracked);
 /// True if the landmark was seen in the last frame.
 [[nodiscard]] bool tracked_now(const Window& window, const WindowLandmark& landmark);
 
-/// Sets landmark.p_odom and `located` from its observations and the window's poses: the point
+/// Sets landmark.p_odom and `located` from its observations and image_poses(window): the point
 /// nearest to all rays, refined on the reprojection errors (Gauss-Newton). It stays unlocated if
 /// it comes to lie behind a camera, if an error exceeds `max_error` [standard deviations, root mean
 /// square], or if its distance along the last ray is uncertain by more than a third.
-void locate(const Window& window, double max_error, WindowLandmark& landmark);
+void locate(const Window& window, std::span<const SE3> images, double max_error,
+            WindowLandmark& landmark);
 
 }  // namespace km

@@ -33,14 +33,16 @@ constexpr double kSmallStep = 1e-6;  // largest of rad, m, m/s: far below what i
 
 // What an iteration changes, to take it back.
 struct Snapshot {
+  CameraCalibration calibration;
   std::vector<OdometryState> states;
   std::vector<Eigen::Vector3d> points;
 
-  explicit Snapshot(const Window& window) {
+  explicit Snapshot(const Window& window) : calibration(window.calibration) {
     for (const WindowFrame& frame : window.frames) states.push_back(frame.state);
     for (const WindowLandmark& landmark : window.landmarks) points.push_back(landmark.p_odom);
   }
   void restore(Window& window) const {
+    if (window.calibrates) calibrate(window, calibration);
     for (std::size_t k = 0; k < states.size(); ++k) window.frames[k].state = states[k];
     for (std::size_t k = 0; k < points.size(); ++k) window.landmarks[k].p_odom = points[k];
   }
@@ -73,11 +75,14 @@ StatePrior prior_after_oldest(const Window& window) {
   equations.add_imu(1);
   for (const WindowLandmark& landmark : window.landmarks)
     if (seen_by_oldest(landmark)) equations.add_landmark(landmark, true);
+  equations.add_images();
 
   const std::vector<FirstEstimate> held = first_estimates(window);
   std::vector<Eigen::Index> variables;
   std::vector<const OdometryState*> states;
   StatePrior prior;
+  prior.calibrates = window.calibrates;
+  prior.calibration = window.calibration;
   for (const std::size_t k : concerned_frames(window)) {
     for (Eigen::Index v = 0; v < (k <= 1 ? 15 : 6); ++v)
       variables.push_back(15 * static_cast<Eigen::Index>(k) + v);
@@ -87,12 +92,14 @@ StatePrior prior_after_oldest(const Window& window) {
     prior.frames.push_back(frame.id);
     prior.linearization.push_back(held[k].applied_to(frame.state));
   }
+  for (auto v = 15 * static_cast<Eigen::Index>(window.frames.size()); v < equations.g().size(); ++v)
+    variables.push_back(v);
   const Eigen::MatrixXd full = equations.H().selfadjointView<Eigen::Lower>();
   const SquareRootPrior root =
       marginalize(full(variables, variables), equations.g()(variables), 15);
   prior.J = root.J;
   // The gradient was taken at the current states; the prior counts from the first estimates.
-  prior.r = root.r - root.J * prior_offset(prior, states);
+  prior.r = root.r - root.J * prior_offset(prior, states, window.calibration);
   return prior;
 }
 
@@ -101,11 +108,21 @@ StatePrior prior_after_oldest(const Window& window) {
 WindowEquations::WindowEquations(const Window& window, double damping)
     : window_(window), damping_(damping) {
   const std::vector<FirstEstimate> held = first_estimates(window);
-  for (std::size_t k = 0; k < held.size(); ++k)
-    linearization_.push_back(held[k].applied_to(window.frames[k].state));
-  const auto n = 15 * static_cast<Eigen::Index>(window.frames.size());
+  for (std::size_t k = 0; k < held.size(); ++k) {
+    const OdometryState& state =
+        linearization_.emplace_back(held[k].applied_to(window.frames[k].state));
+    if (window.calibrates)
+      image_linearization_.push_back(image_pose(window, window.frames[k], state));
+    else
+      image_linearization_.emplace_back().T_odom_body = state.T_odom_body;
+  }
+  images_ = image_poses(window);
+  const auto frames = static_cast<Eigen::Index>(window.frames.size());
+  const auto n = 15 * frames + (window.calibrates ? 7 : 0);
   H_.setZero(n, n);
   g_.setZero(n);
+  images_H_.setZero(6 * frames, 6 * frames);
+  images_g_.setZero(6 * frames);
   couplings_.reserve(8 * window.landmarks.size());
   eliminated_.reserve(window.landmarks.size());
 }
@@ -113,7 +130,8 @@ WindowEquations::WindowEquations(const Window& window, double damping)
 void WindowEquations::add_prior() {
   const StatePrior& prior = window_.prior;
   if (prior.frames.empty()) return;
-  const Eigen::VectorXd r = prior.J * prior_offset(prior, prior_states(window_)) + prior.r;
+  const Eigen::VectorXd r =
+      prior.J * prior_offset(prior, prior_states(window_), window_.calibration) + prior.r;
   cost_ += 0.5 * r.squaredNorm();
   const Eigen::MatrixXd H = prior.J.transpose() * prior.J;
   const Eigen::VectorXd g = prior.J.transpose() * r;
@@ -125,6 +143,9 @@ void WindowEquations::add_prior() {
     spans.push_back({k == 0 ? 0 : 9 + 6 * static_cast<Eigen::Index>(k),
                      15 * static_cast<Eigen::Index>(frame_index(window_, prior.frames[k])),
                      k == 0 ? 15 : 6});
+  if (prior.calibrates)
+    spans.push_back(
+        {prior.states_dimension(), 15 * static_cast<Eigen::Index>(window_.frames.size()), 7});
   for (const Span& row : spans) {
     g_.segment(row.to, row.size) += g.segment(row.from, row.size);
     for (const Span& col : spans)
@@ -161,9 +182,9 @@ void WindowEquations::add_landmark(const WindowLandmark& landmark, bool keyframe
   ReprojectionTerm term;
   for (const WindowObservation& o : landmark.observations) {
     if (!counts(o)) continue;
-    const SE3& T = window_.frames[o.frame].state.T_odom_body;
-    const SE3& T_linearization = linearization_[o.frame].T_odom_body;
-    const auto at = 15 * static_cast<Eigen::Index>(o.frame);
+    const SE3& T = images_[o.frame];
+    const SE3& T_linearization = image_linearization_[o.frame].T_odom_body;
+    const auto at = 6 * static_cast<Eigen::Index>(o.frame);
     Coupling coupling{o.frame, Eigen::Matrix<double, 6, 3>::Zero(),
                       Eigen::Matrix<double, 6, 3>::Zero()};
     Matrix6 A = Matrix6::Zero();
@@ -182,8 +203,8 @@ void WindowEquations::add_landmark(const WindowLandmark& landmark, bool keyframe
       V.noalias() += w * term.J_point.transpose() * term.J_point;
       b.noalias() += w * term.J_point.transpose() * term.r;
     }
-    H_.block<6, 6>(at, at) += A;
-    g_.segment<6>(at) += a;
+    images_H_.block<6, 6>(at, at) += A;
+    images_g_.segment<6>(at) += a;
     couplings_.push_back(coupling);
   }
   V.diagonal() *= 1.0 + damping_;
@@ -193,14 +214,51 @@ void WindowEquations::add_landmark(const WindowLandmark& landmark, bool keyframe
   for (std::size_t k = first; k < couplings_.size(); ++k) {
     Coupling& row = couplings_[k];
     row.Y.noalias() = row.W * V_inverse;
-    const auto at = 15 * static_cast<Eigen::Index>(row.frame);
-    g_.segment<6>(at).noalias() -= row.W * step;
+    const auto at = 6 * static_cast<Eigen::Index>(row.frame);
+    images_g_.segment<6>(at).noalias() -= row.W * step;
     for (std::size_t m = first; m <= k; ++m)
-      H_.block<6, 6>(at, 15 * static_cast<Eigen::Index>(couplings_[m].frame)).noalias() -=
+      images_H_.block<6, 6>(at, 6 * static_cast<Eigen::Index>(couplings_[m].frame)).noalias() -=
           row.Y * couplings_[m].W.transpose();
   }
   eliminated_.push_back({static_cast<std::size_t>(&landmark - window_.landmarks.data()), step,
                          first, couplings_.size() - first});
+}
+
+// The poses at the images follow from states and calibration, dx_image = M dx + B dc.
+void WindowEquations::add_images() {
+  const auto frames = static_cast<Eigen::Index>(window_.frames.size());
+  Eigen::MatrixXd H = images_H_.selfadjointView<Eigen::Lower>();
+  Eigen::VectorXd& g = images_g_;
+  if (window_.calibrates) {
+    Eigen::MatrixXd B(6 * frames, 7);
+    for (Eigen::Index k = 0; k < frames; ++k)
+      B.middleRows<6>(6 * k) = image_linearization_[static_cast<std::size_t>(k)].by_calibration;
+    Eigen::MatrixXd HB = H * B;
+    H_.bottomRightCorner<7, 7>().noalias() += B.transpose() * HB;
+    g_.tail<7>().noalias() += B.transpose() * g;
+    for (Eigen::Index half = 0; half < 2 * frames; ++half) {
+      const Eigen::Matrix3d& M = image_linearization_[static_cast<std::size_t>(half / 2)].by_state;
+      HB.middleRows<3>(3 * half) = (M.transpose() * HB.middleRows<3>(3 * half)).eval();
+      H.middleRows<3>(3 * half) = (M.transpose() * H.middleRows<3>(3 * half)).eval();
+      H.middleCols<3>(3 * half) = (H.middleCols<3>(3 * half) * M).eval();
+      g.segment<3>(3 * half) = (M.transpose() * g.segment<3>(3 * half)).eval();
+    }
+    for (Eigen::Index k = 0; k < frames; ++k)
+      H_.block<7, 6>(15 * frames, 15 * k) += HB.middleRows<6>(6 * k).transpose();
+  }
+  for (Eigen::Index k = 0; k < frames; ++k) {
+    g_.segment<6>(15 * k) += g.segment<6>(6 * k);
+    for (Eigen::Index m = 0; m <= k; ++m)
+      H_.block<6, 6>(15 * k, 15 * m) += H.block<6, 6>(6 * k, 6 * m);
+  }
+}
+
+Vector6 WindowEquations::image_step(const Eigen::VectorXd& dx, std::size_t frame) const {
+  Vector6 step = dx.segment<6>(15 * static_cast<Eigen::Index>(frame));
+  if (!window_.calibrates) return step;
+  const ImagePose& image = image_linearization_[frame];
+  step << image.by_state * step.head<3>(), image.by_state * step.tail<3>();
+  return step + image.by_calibration * dx.tail<7>();
 }
 
 void WindowEquations::add_all() {
@@ -208,6 +266,7 @@ void WindowEquations::add_all() {
   for (std::size_t k = 1; k < window_.frames.size(); ++k)
     if (window_.frames[k].imu) add_imu(k);
   for (const WindowLandmark& landmark : window_.landmarks) add_landmark(landmark);
+  add_images();
 }
 
 Eigen::VectorXd WindowEquations::solve() const {
@@ -222,10 +281,10 @@ void WindowEquations::apply(const Eigen::VectorXd& dx, Window& target) const {
   for (const Eliminated& e : eliminated_) {
     Eigen::Vector3d step = e.step;
     for (std::size_t k = e.first; k < e.first + e.count; ++k)
-      step.noalias() += couplings_[k].Y.transpose() *
-                        dx.segment<6>(15 * static_cast<Eigen::Index>(couplings_[k].frame));
+      step.noalias() += couplings_[k].Y.transpose() * image_step(dx, couplings_[k].frame);
     target.landmarks[e.landmark].p_odom -= step;
   }
+  if (target.calibrates) calibrate(target, target.calibration.moved(dx.tail<7>()));
   for (std::size_t k = 0; k < target.frames.size(); ++k) {
     const auto at = 15 * static_cast<Eigen::Index>(k);
     OdometryState& state = target.frames[k].state;
@@ -239,7 +298,7 @@ void WindowEquations::apply(const Eigen::VectorXd& dx, Window& target) const {
 double window_cost(const Window& window) {
   double cost = 0.0;
   if (!window.prior.frames.empty()) {
-    const auto dx = prior_offset(window.prior, prior_states(window));
+    const auto dx = prior_offset(window.prior, prior_states(window), window.calibration);
     cost += 0.5 * (window.prior.J * dx + window.prior.r).squaredNorm();
   }
   for (std::size_t k = 1; k < window.frames.size(); ++k)
@@ -247,14 +306,15 @@ double window_cost(const Window& window) {
       cost += 0.5 * window.frames[k]
                         .imu->error(window.frames[k - 1].state, window.frames[k].state)
                         .squaredNorm();
+  const std::vector<SE3> images = image_poses(window);
   Eigen::Vector2d r;
   for (const WindowLandmark& landmark : window.landmarks) {
     if (!landmark.located || landmark.observations.size() < 2) continue;
     for (const WindowObservation& o : landmark.observations)
       for (std::size_t c = 0; c < 2; ++c) {
         if (!o.bearings[c]) continue;
-        if (!reprojection_error(window.views[c], *o.bearings[c],
-                                window.frames[o.frame].state.T_odom_body, landmark.p_odom, r))
+        if (!reprojection_error(window.views[c], *o.bearings[c], images[o.frame], landmark.p_odom,
+                                r))
           return std::numeric_limits<double>::infinity();
         cost += 0.5 * cauchy(r.squaredNorm(), window.loss_scale);
       }

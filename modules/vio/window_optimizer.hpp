@@ -11,7 +11,8 @@ namespace km {
 
 /// Gauss-Newton normal equations of a Window, H dx = -g, over its frames, with every landmark
 /// eliminated as it is added (Schur complement). Frame k has the columns 15 k: pose (6), velocity,
-/// gyro bias, accelerometer bias. Derivatives by a state that the prior holds are taken at its
+/// gyro bias, accelerometer bias. Where the window calibrates, 7 columns of the calibration follow
+/// those of the frames. Derivatives by a state that the prior holds are taken at its
 /// first estimate. Reprojection errors have a Cauchy loss, applied as a weight.
 class WindowEquations {
  public:
@@ -23,8 +24,12 @@ class WindowEquations {
   void add_imu(std::size_t frame);  ///< The factor that ends at `frame`.
 
   /// Adds the observations of `landmark` and eliminates it; with `keyframes_only`, those in
-  /// keyframes. A landmark seen in fewer than two frames adds nothing.
+  /// keyframes. A landmark seen in fewer than two frames adds nothing. add_images() must follow.
   void add_landmark(const WindowLandmark& landmark, bool keyframes_only = false);
+
+  /// Adds what landmarks say of the images to the equations of states and calibration: once, after
+  /// the last landmark.
+  void add_images();
 
   /// The above for the whole window.
   void add_all();
@@ -36,8 +41,8 @@ class WindowEquations {
   /// Solution for the frames; empty if H is not positive definite.
   [[nodiscard]] Eigen::VectorXd solve() const;
 
-  /// Moves every state and landmark of `target`, a window of the same structure, by `dx` and the
-  /// landmarks' part of the solution that follows from it.
+  /// Moves every state and landmark, and the calibration, of `target`, a window of the same
+  /// structure, by `dx` and the landmarks' part of the solution that follows from it.
   void apply(const Eigen::VectorXd& dx, Window& target) const;
 
  private:
@@ -53,9 +58,15 @@ class WindowEquations {
     Eigen::Matrix<double, 6, 3> Y;  // W V_inverse
   };
 
+  [[nodiscard]] Vector6 image_step(const Eigen::VectorXd& dx, std::size_t frame) const;
+
   const Window& window_;
   double damping_;
   std::vector<OdometryState> linearization_;  // per frame, where derivatives are taken
+  std::vector<SE3> images_;                   // per frame, where the body was at the image
+  std::vector<ImagePose> image_linearization_;
+  Eigen::MatrixXd images_H_;  // by the pose at each image (6), landmarks eliminated
+  Eigen::VectorXd images_g_;
   Eigen::MatrixXd H_;
   Eigen::VectorXd g_;
   double cost_ = 0.0;

@@ -61,6 +61,9 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/closures/candidates /closures/verified /closures/inliers "
         "/pgo/rounds /pgo/seconds /pgo/cost /pgo/gradient_norm /pgo/anchor /pgo/settled "
         "/pgo/members/0 /pgo/members/1 "
+        "/cameras/offset_s /cameras/offset_sigma_s /cameras/rotation_x_rad /cameras/rotation_y_rad "
+        "/cameras/rotation_z_rad /cameras/rotation_sigma_rad /cameras/translation_x_m "
+        "/cameras/translation_y_m /cameras/translation_z_m /cameras/translation_sigma_m "
         "/mapping/frames /mapping/skipped_wrong_size /mapping/skipped_bad_pose "
         "/mapping/skipped_too_late /mapping/without_labels /mapping/label_pixels_outside_palette "
         "/mapping/blocks_refused /mapping/blocks /mapping/vertices /mapping/faces "
@@ -74,6 +77,7 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/seconds /lost_peers/x /apart_peers/x /exit_reason ");
   const Json least = RunSummary{};
   CHECK_FALSE(least.contains("mapping"));  // what is absent has no key
+  CHECK_FALSE(least.contains("cameras"));
   CHECK_FALSE(least.contains("held_back"));
   CHECK_FALSE(least["pgo"].contains("anchor"));
 }

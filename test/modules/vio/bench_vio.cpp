@@ -41,6 +41,9 @@ struct Overrides {
     std::istringstream(it->second) >> value;
     used[name] = true;
   }
+  void field(const char* name, bool& value, const char* /*comment*/) {
+    field(name, value, Bounds<bool>{});
+  }
 };
 
 OdometryErrors errors_since(const OdometryRun& run, double seconds) {

@@ -95,7 +95,8 @@ TEST_CASE("MH_01_easy: a second of black images does not lose it", "[vio]") {
   CHECK(errors.max_m < 0.10);
 }
 
-// The velocity that is left after them fits nothing of what is seen then.
+// The velocity that is left after them fits nothing of what is seen then, if the stamps are
+// believed.
 TEST_CASE("MH_01_easy: after five seconds of black images with late stamps odometry sees again",
           "[vio]") {
   const auto folder = shared_data("euroc/MH_01_easy");
@@ -107,7 +108,9 @@ TEST_CASE("MH_01_easy: after five seconds of black images with late stamps odome
     frame->stamp += kLate;
     packet.frame = frame;
   }
-  const OdometryRun run = run_odometry(late, 0, late.packets.size(), TrackerConfig{}, {});
+  VioConfig config;
+  config.calibrate = false;
+  const OdometryRun run = run_odometry(late, 0, late.packets.size(), TrackerConfig{}, config);
   CHECK(run.statistics.starts == 2);
   CHECK(run.statistics.divergences == 1);
   constexpr std::size_t kLast = 60;  // three seconds
@@ -115,6 +118,16 @@ TEST_CASE("MH_01_easy: after five seconds of black images with late stamps odome
   const OdometryErrors errors =
       odometry_errors(std::span(run.states).last(kLast), std::span(run.truth).last(kLast));
   CHECK(errors.ate_m < 0.01);
+}
+
+TEST_CASE("MH_01_easy: stamps of images that are 20 ms late are found out", "[vio][calibration]") {
+  const Recording* const data = recording();
+  if (data == nullptr) return;
+  const Recording late = disturbed(*data, -0.02, 0.0);
+  const OdometryRun run = run_odometry(late, 0, late.packets.size(), TrackerConfig{}, {});
+  CHECK(run.statistics.starts == 1);
+  CHECK(run.statistics.divergences == 0);
+  CHECK(odometry_errors(run.states, run.truth).ate_m < 0.01);
 }
 
 TEST_CASE("MH_01_easy: what goes on from a keyframe is as good as what never stopped", "[vio]") {
@@ -204,15 +217,21 @@ TEST_CASE("The odometry node publishes what odometry gives, in order of time", "
   Topic<OdometryState> odometry;
   Topic<KeyframeOdometry> keyframes;
   Topic<LocatedFrame> frames;
+  Topic<UncertainCalibration> calibrations;
   std::vector<Stamp> stamps;  // of the node's thread, read after it has ended
   std::vector<std::uint32_t> indices;
   std::vector<LocatedFrame> located;
   odometry.subscribe([&](const auto& state) { stamps.push_back(state->stamp); });
   keyframes.subscribe([&](const auto& keyframe) { indices.push_back(keyframe->id.index); });
   frames.subscribe([&](const auto& frame) { located.push_back(*frame); });
-  VioNode node(
-      5, data->rig, TrackerConfig{}, VioConfig{},
-      {.packets = packets, .odometry = odometry, .keyframes = keyframes, .frames = frames});
+  std::vector<UncertainCalibration> calibrated;
+  calibrations.subscribe([&](const auto& known) { calibrated.push_back(*known); });
+  VioNode node(5, data->rig, TrackerConfig{}, VioConfig{},
+               {.packets = packets,
+                .odometry = odometry,
+                .keyframes = keyframes,
+                .frames = frames,
+                .calibration = calibrations});
   node.start();
   for (std::size_t k = 0; k < 40; ++k) packets.publish(data->packets[k]);
   node.stop();  // drains the queue
@@ -224,6 +243,8 @@ TEST_CASE("The odometry node publishes what odometry gives, in order of time", "
   REQUIRE(located.size() == stamps.size());
   for (std::size_t k = 0; k < stamps.size(); ++k) CHECK(located[k].frame->stamp == stamps[k]);
   CHECK(located.back().keyframe == indices.back());
+  REQUIRE_FALSE(calibrated.empty());
+  CHECK(std::abs(calibrated.back().calibration.offset_s) < 5e-3);
 }
 
 }  // namespace

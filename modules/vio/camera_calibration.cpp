@@ -1,0 +1,31 @@
+#include "modules/vio/camera_calibration.hpp"
+
+#include "modules/core/lie.hpp"
+
+namespace km {
+
+CameraCalibration CameraCalibration::moved(const Vector7& delta) const {
+  return {offset_s + delta(0), retract(SE3::Identity(), delta.tail<6>()) * T_body_rig};
+}
+
+Vector7 CameraCalibration::offset_to(const CameraCalibration& to) const {
+  Vector7 delta;
+  delta << to.offset_s - offset_s,
+      local_coordinates(SE3::Identity(), to.T_body_rig * T_body_rig.inverse());
+  return delta;
+}
+
+ImagePose ImagePose::at(const OdometryState& state, const Eigen::Vector3d& gyro, double shift_s) {
+  ImagePose image;
+  const Eigen::Vector3d rate = gyro - state.gyro_bias;
+  const Eigen::Matrix3d turn = so3_exp(shift_s * rate);
+  const Eigen::Matrix3d R = state.T_odom_body.linear() * turn;
+  image.T_odom_body = make_pose(R, state.T_odom_body.translation() + shift_s * state.v_odom);
+  image.by_state = turn.transpose();
+  image.by_calibration << rate, Eigen::Matrix<double, 3, 6>::Identity(),
+      R.transpose() * state.v_odom, Eigen::Matrix<double, 3, 6>::Zero();
+  image.by_calibration.bottomRightCorner<3, 3>().setIdentity();
+  return image;
+}
+
+}  // namespace km

@@ -1,0 +1,167 @@
+#include <catch2/catch.hpp>
+#include <numbers>
+
+#include "modules/core/lie.hpp"
+#include "modules/vio/camera_calibration.hpp"
+#include "modules/vio/fixed_lag_smoother.hpp"
+#include "synthetic_motion.hpp"
+#include "test/support/numeric_jacobian.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kDerivative = 1e-6;  // entries are about 1
+
+CameraCalibration some_calibration(std::mt19937& rng) {
+  CameraCalibration calibration;
+  calibration.offset_s = -0.02;
+  calibration.T_body_rig = retract(SE3::Identity(), 0.3 * random_vector<6>(rng));
+  return calibration;
+}
+
+TEST_CASE("A calibration has moved by what it was moved by", "[vio][calibration]") {
+  std::mt19937 rng(1);
+  const CameraCalibration calibration = some_calibration(rng);
+  const Vector7 delta = 0.1 * random_vector<7>(rng);
+  CHECK((calibration.offset_to(calibration.moved(delta)) - delta).norm() < 1e-12);
+  CHECK(calibration.offset_to(calibration).norm() < 1e-12);
+}
+
+TEST_CASE("Derivatives of the pose at an image agree with differences", "[vio][calibration]") {
+  const unsigned seed = GENERATE(range(0U, 5U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  OdometryState state;
+  state.T_odom_body = retract(SE3::Identity(), random_vector<6>(rng));
+  state.v_odom = random_vector<3>(rng);
+  state.gyro_bias = 0.1 * random_vector<3>(rng);
+  const Eigen::Vector3d gyro = random_vector<3>(rng);
+  constexpr double kShift_s = 0.03;
+  const ImagePose image = ImagePose::at(state, gyro, kShift_s);
+  const Eigen::MatrixXd by_state = numeric_jacobian<6>([&](const Vector6& d) -> Eigen::VectorXd {
+    OdometryState moved = state;
+    moved.T_odom_body = retract(state.T_odom_body, d);
+    return local_coordinates(image.T_odom_body, ImagePose::at(moved, gyro, kShift_s).T_odom_body);
+  });
+  Matrix6 expected = Matrix6::Zero();
+  expected.topLeftCorner<3, 3>() = expected.bottomRightCorner<3, 3>() = image.by_state;
+  CHECK((by_state - expected).norm() < kDerivative);
+  using Vector1 = Eigen::Matrix<double, 1, 1>;
+  const Eigen::MatrixXd by_offset = numeric_jacobian<1>([&](const Vector1& d) -> Eigen::VectorXd {
+    return local_coordinates(image.T_odom_body,
+                             ImagePose::at(state, gyro, kShift_s + d(0)).T_odom_body);
+  });
+  CHECK((by_offset - image.by_calibration.leftCols<1>()).norm() < kDerivative);
+}
+
+TEST_CASE("Derivatives of a reprojection by the calibration agree with differences",
+          "[vio][calibration]") {
+  const unsigned seed = GENERATE(range(0U, 5U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  Window window;
+  window.calibrates = true;
+  for (std::size_t c = 0; c < 2; ++c)
+    window.rig_views[c] = view_model(synthetic_rig().stereo.cameras[c], 0.7);
+  CameraCalibration calibration;
+  calibration.offset_s = 0.02;
+  calibration.T_body_rig = retract(SE3::Identity(), 0.05 * random_vector<6>(rng));
+  calibrate(window, calibration);
+  const SyntheticMotion motion;
+  WindowFrame& frame = window.frames.emplace_back();
+  frame.state = motion.state(1'000'000'000);
+  frame.gyro = motion.sample(1'000'000'000).gyro;
+  frame.offset_s = 0.01;
+  const Eigen::Vector3d p_odom = frame.state.T_odom_body * Eigen::Vector3d(3.0, 0.2, -0.4);
+  for (const std::size_t c : {0U, 1U}) {
+    const ImagePose image = image_pose(window, frame, frame.state);
+    ReprojectionTerm term;
+    REQUIRE(linearize_reprojection(window.views[c], Eigen::Vector2d::Zero(), image.T_odom_body,
+                                   image.T_odom_body, p_odom, term));
+    const Eigen::MatrixXd numeric = numeric_jacobian<7>([&](const Vector7& d) -> Eigen::VectorXd {
+      Window moved = window;
+      calibrate(moved, calibration.moved(d));
+      Eigen::Vector2d r;
+      REQUIRE(reprojection_error(moved.views[c], Eigen::Vector2d::Zero(), image_poses(moved)[0],
+                                 p_odom, r));
+      return r;
+    });
+    const Eigen::MatrixXd analytic = term.J_pose * image.by_calibration;
+    CHECK((analytic - numeric).norm() < 1e-5 * numeric.norm());
+  }
+}
+
+// A rig whose cameras are taken to be turned and moved from where they are.
+SensorRig disturbed_rig(const SE3& T_body_rig) {
+  SensorRig rig = synthetic_rig();
+  for (Camera& camera : rig.stereo.cameras)
+    camera.T_body_cam = T_body_rig.inverse() * camera.T_body_cam;
+  return rig;
+}
+
+// Twelve seconds of a motion, with inertial samples stamped `late_s` too late.
+std::vector<InertialFrame> late_frames(SyntheticWorld& world, Stamp late) {
+  auto frames = world.frames(240, 0.5);
+  for (InertialFrame& frame : frames)
+    for (ImuSample& sample : frame.samples) {
+      const Stamp stamp = sample.stamp;
+      sample = world.motion().sample(stamp - late);
+      sample.stamp = stamp;
+    }
+  return frames;
+}
+
+// Of a smoother that has gone through `frames`, started on the first 16 from their true states.
+UncertainCalibration estimated(const std::vector<InertialFrame>& frames,
+                               const SyntheticWorld& world, const SensorRig& rig,
+                               bool rests = false) {
+  constexpr std::size_t kStart = 16;
+  VioConfig config;
+  config.gravity_mps2 = kGravity_mps2;
+  FixedLagSmoother smoother(rig, config);
+  REQUIRE(smoother.start(std::span(frames).first(kStart), world.states(kStart)));
+  for (std::size_t k = kStart; k < frames.size(); ++k)
+    CHECK(smoother.add(frames[k], rests).solution.usable);
+  return smoother.calibration();
+}
+
+TEST_CASE("Stamps that are off are found out", "[vio][calibration]") {
+  const Stamp late = GENERATE(-30'000'000, 0, 10'000'000, 30'000'000);
+  CAPTURE(late);
+  SyntheticWorld world(SyntheticMotion{}, 21);
+  const auto [calibration, covariance] =
+      estimated(late_frames(world, late), world, synthetic_rig());
+  CHECK(calibration.offset_s == Approx(seconds_between(0, late)).margin(5e-4));
+  CHECK(std::sqrt(covariance(0, 0)) < 1e-3);  // 0.7 ms with noise weighed as it is
+  CHECK(angle_of(calibration.T_body_rig.linear()) < 2e-3);
+}
+
+TEST_CASE("Cameras that are turned are found out", "[vio][calibration]") {
+  const unsigned seed = GENERATE(range(0U, 3U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const double angle = 1.5 * std::numbers::pi / 180.0;
+  const SE3 T_body_rig =
+      make_pose(so3_exp(angle * random_vector<3>(rng).normalized()), Eigen::Vector3d::Zero());
+  SyntheticWorld world(SyntheticMotion{}, seed);
+  const auto [calibration, covariance] =
+      estimated(late_frames(world, 0), world, disturbed_rig(T_body_rig));
+  CHECK(angle_of(T_body_rig.linear().transpose() * calibration.T_body_rig.linear()) < 2e-3);
+  CHECK(std::abs(calibration.offset_s) < 5e-4);
+  CHECK(calibration.T_body_rig.translation().norm() < 0.01);
+}
+
+TEST_CASE("A body that does not move keeps the calibration that it had", "[vio][calibration]") {
+  SyntheticMotion motion;
+  motion.amplitude_m.setZero();
+  motion.turn_amplitude.setZero();
+  SyntheticWorld world(motion, 22);
+  const auto [calibration, covariance] =
+      estimated(late_frames(world, 0), world, synthetic_rig(), true);
+  CHECK(std::abs(calibration.offset_s) < 1e-3);
+  CHECK(angle_of(calibration.T_body_rig.linear()) < 5e-3);
+  CHECK(std::sqrt(covariance(0, 0)) == Approx(VioConfig{}.calibration_offset_s).epsilon(0.1));
+}
+
+}  // namespace
+}  // namespace km
