@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "modules/core/stamp.hpp"
-#include "modules/ros_dds/ros_subscription.hpp"
+#include "runtime/dds/ros_subscription.hpp"
 
 namespace km {
 

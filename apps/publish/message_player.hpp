@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "modules/recordings/bag_reader.hpp"
-#include "modules/ros_dds/ros_publisher.hpp"
 #include "runtime/clock.hpp"
+#include "runtime/dds/ros_publisher.hpp"
 
 namespace km {
 

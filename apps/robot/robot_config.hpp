@@ -19,13 +19,13 @@
 #include "modules/place_recognition/place_recognition_config.hpp"
 #include "modules/pose_graph/graph_playback_config.hpp"
 #include "modules/pose_graph/pose_graph_config.hpp"
-#include "modules/ros_dds/ros_config.hpp"
 #include "modules/semantic_mapping/semantic_mapping_config.hpp"
 #include "modules/sensors/sensors_config.hpp"
 #include "modules/vio/tracker_config.hpp"
 #include "modules/vio/vio_config.hpp"
 #include "runtime/dds/budget_config.hpp"
 #include "runtime/dds/dds_config.hpp"
+#include "runtime/dds/ros_config.hpp"
 
 namespace km {
 

@@ -10,7 +10,7 @@
 #include "modules/mesh/map_file.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/ros_dds/ros_subscription.hpp"
+#include "modules/ros_dds/live_bag_codec.hpp"
 #include "modules/sensors/bag_dataset.hpp"
 #include "modules/sensors/euroc_reader.hpp"
 #include "modules/sensors/euroc_rig_codec.hpp"
@@ -80,7 +80,7 @@ std::unique_ptr<BagReader> subscribe(std::shared_ptr<const RosNetwork> network,
   if (!topics.odometry.empty())
     wanted.push_back(
         {topics.odometry, std::string(RosOdometry::kType), RosQos::kSensorData, kSamples});
-  return std::make_unique<RosSubscription>(std::move(network), std::move(wanted));
+  return std::make_unique<LiveBag>(std::move(network), std::move(wanted));
 }
 
 // What the rig file does not tell of the calibration.
@@ -96,7 +96,7 @@ Rig complete(const RobotOptions& options, const PartialRig& rig,
     wanted.push_back({teller.topic, std::string(teller.type),
                       teller.type == RosTransforms::kType ? RosQos::kLatched : RosQos::kSensorData,
                       kKept});
-  RosSubscription topics(ros, std::move(wanted));
+  LiveBag topics(ros, std::move(wanted));
   topics.give_up_after(kPatience_s);
   return complete_rig("live", topics, rig);
 }

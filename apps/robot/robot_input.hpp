@@ -10,9 +10,9 @@
 #include "modules/journal/restored_run.hpp"
 #include "modules/mesh/continued_map.hpp"
 #include "modules/pose_graph/recorded_graph.hpp"
-#include "modules/ros_dds/ros_network.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/rig_completion.hpp"
+#include "runtime/dds/ros_network.hpp"
 
 namespace km {
 

@@ -13,7 +13,7 @@
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/live_frames.hpp"
-#include "modules/ros_dds/ros_publisher.hpp"
+#include "runtime/dds/ros_publisher.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
 #include "runtime/topic.hpp"

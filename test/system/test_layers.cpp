@@ -13,7 +13,7 @@
 //   modules/core        Eigen, nlohmann-json and the standard library
 //   modules/<m>         core, its own folder, and the modules listed below
 //   runtime             core, security
-//   modules/<m>/*_node, *_codec, modules/ros_dds   their own module, core, runtime
+//   modules/<m>/*_node, *_codec   their own module, core, runtime
 //   apps, test          everything
 // Everywhere: what takes seconds to compile, JSON, is no header's to include.
 
@@ -60,7 +60,6 @@ std::string module_of(const std::string& path) {
 }
 
 bool joins_runtime(const fs::path& file) {
-  if (module_of(file.generic_string()) == "ros_dds") return true;
   const std::string stem = file.stem().string();
   return stem.ends_with("_node") || stem.ends_with("_codec");
 }

@@ -7,7 +7,7 @@
 #include "apps/publish/euroc_messages.hpp"
 #include "apps/publish/message_player.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/ros_dds/ros_subscription.hpp"
+#include "runtime/dds/ros_subscription.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/modules/sensors/listed_bag.hpp"
 

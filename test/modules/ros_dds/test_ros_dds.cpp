@@ -5,9 +5,10 @@
 #include <thread>
 
 #include "modules/recordings/ros_messages.hpp"
+#include "modules/ros_dds/live_bag_codec.hpp"
 #include "modules/ros_dds/ros_output_node.hpp"
-#include "modules/ros_dds/ros_publisher.hpp"
-#include "modules/ros_dds/ros_subscription.hpp"
+#include "runtime/dds/ros_publisher.hpp"
+#include "runtime/dds/ros_subscription.hpp"
 #include "test/support/patience.hpp"
 
 namespace km {
@@ -49,9 +50,8 @@ void wait_for_reader(const RosPublisher& publisher) {
 }
 
 TEST_CASE("What is published on a topic of ROS is what is received", "[ros_dds]") {
-  RosSubscription subscription(network(),
-                               {{"/a/imu", "sensor_msgs/msg/Imu", RosQos::kSensorData, 100},
-                                {"a/image", "sensor_msgs/Image", RosQos::kSensorData, 10}});
+  LiveBag subscription(network(), {{"/a/imu", "sensor_msgs/msg/Imu", RosQos::kSensorData, 100},
+                                   {"a/image", "sensor_msgs/Image", RosQos::kSensorData, 10}});
   const RosPublisher images(network(), "/a/image", "sensor_msgs/msg/Image", RosQos::kSensorData,
                             10);
   const RosPublisher imus(network(), "/a/imu", "sensor_msgs/Imu", RosQos::kReliable, 10);
@@ -151,12 +151,12 @@ TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
     }();
     REQUIRE(message);
     const auto& bytes = message->bytes;
-    if (message->channel == 0) told = decode_ros<RosOdometry>("cdr", bytes).value;
-    if (message->channel == 1) pose = decode_ros<RosPoseStamped>("cdr", bytes).value;
-    if (message->channel == 2) transforms = decode_ros<RosTransforms>("cdr", bytes).value;
-    if (message->channel == 3) path = decode_ros<RosPath>("cdr", bytes).value;
-    if (message->channel == 4) cloud = decode_ros<RosPointCloud>("cdr", bytes).value;
-    if (message->channel == 5) diagnostics = decode_ros<RosDiagnostics>("cdr", bytes).value;
+    if (message->topic == 0) told = decode_ros<RosOdometry>("cdr", bytes).value;
+    if (message->topic == 1) pose = decode_ros<RosPoseStamped>("cdr", bytes).value;
+    if (message->topic == 2) transforms = decode_ros<RosTransforms>("cdr", bytes).value;
+    if (message->topic == 3) path = decode_ros<RosPath>("cdr", bytes).value;
+    if (message->topic == 4) cloud = decode_ros<RosPointCloud>("cdr", bytes).value;
+    if (message->topic == 5) diagnostics = decode_ros<RosDiagnostics>("cdr", bytes).value;
     if (diagnostics && diagnostics->header.stamp == 0) diagnostics.reset();  // before a pose
     if (pose && pose->pose.position.x() != 10.0) pose.reset();  // before the correction
     if (transforms && transforms->transforms[0].pose.position.x() != 9.0) transforms.reset();

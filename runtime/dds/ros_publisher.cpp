@@ -1,4 +1,4 @@
-#include "modules/ros_dds/ros_publisher.hpp"
+#include "runtime/dds/ros_publisher.hpp"
 
 #include <dds/ddsi/ddsi_serdata.h>
 

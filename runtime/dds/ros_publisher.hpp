@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "modules/ros_dds/ros_network.hpp"
+#include "runtime/dds/ros_network.hpp"
 
 struct ddsi_serdata;
 

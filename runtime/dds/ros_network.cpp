@@ -1,4 +1,4 @@
-#include "modules/ros_dds/ros_network.hpp"
+#include "runtime/dds/ros_network.hpp"
 
 #include <ros2.h>
 

@@ -1,4 +1,4 @@
-#include "modules/ros_dds/ros_subscription.hpp"
+#include "runtime/dds/ros_subscription.hpp"
 
 #include <dds/ddsi/ddsi_serdata.h>
 
@@ -27,15 +27,15 @@ Stamp wall_now() {
 RosSubscription::RosSubscription(std::shared_ptr<const RosNetwork> network,
                                  std::vector<RosTopic> topics)
     : network_(std::move(network)),
+      topics_(std::move(topics)),
       waitset_(dds_create_waitset(network_->participant()), "waitset"),
       guard_(dds_create_guardcondition(network_->participant()), "guard condition") {
   check_dds(dds_waitset_attach(waitset_.handle(), guard_.handle(), -1), "cannot wait for a stop");
-  for (const RosTopic& wanted : topics) {
-    channels_.push_back({wanted.topic, wanted.type, "cdr", 0});
-    topics_.push_back(network_->create_topic(wanted.topic, wanted.type));
+  for (const RosTopic& wanted : topics_) {
+    dds_topics_.push_back(network_->create_topic(wanted.topic, wanted.type));
     const DdsQos qos = ros_qos(wanted.qos, wanted.depth);
     readers_.emplace_back(
-        dds_create_reader(network_->participant(), topics_.back().handle(), qos.get(), nullptr),
+        dds_create_reader(network_->participant(), dds_topics_.back().handle(), qos.get(), nullptr),
         "reader of " + wanted.topic);
     const dds_entity_t reader = readers_.back().handle();
     check_dds(dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS), "cannot wait for data");
@@ -48,27 +48,26 @@ RosSubscription::RosSubscription(std::shared_ptr<const RosNetwork> network,
 }
 
 // All there are: DDS tells of those that come, not of those that are left.
-void RosSubscription::take_from(std::size_t channel) {
+void RosSubscription::take_from(std::size_t topic) {
   constexpr std::size_t kAtOnce = 16;
   std::array<ddsi_serdata*, kAtOnce> samples{};
   std::array<dds_sample_info_t, kAtOnce> infos{};
   for (std::size_t count = kAtOnce; count == kAtOnce;) {
-    count =
-        static_cast<std::size_t>(check_dds(dds_takecdr(readers_[channel].handle(), samples.data(),
-                                                       kAtOnce, infos.data(), DDS_ANY_STATE),
-                                           "cannot take messages"));
+    count = static_cast<std::size_t>(check_dds(
+        dds_takecdr(readers_[topic].handle(), samples.data(), kAtOnce, infos.data(), DDS_ANY_STATE),
+        "cannot take messages"));
     for (std::size_t k = 0; k < count; ++k) {
-      if (infos[k].valid_data) add(channel, *samples[k]);
+      if (infos[k].valid_data) add(topic, *samples[k]);
       ddsi_serdata_unref(samples[k]);
     }
   }
 }
 
-void RosSubscription::add(std::size_t channel, const ddsi_serdata& sample) {
-  BagMessage message{channel, wall_now(), std::vector<std::uint8_t>(ddsi_serdata_size(&sample))};
+void RosSubscription::add(std::size_t topic, const ddsi_serdata& sample) {
+  RosMessage message{topic, wall_now(), std::vector<std::uint8_t>(ddsi_serdata_size(&sample))};
   ddsi_serdata_to_ser(&sample, 0, message.bytes.size(), message.bytes.data());
   taken_.push_back(std::move(message));
-  heard_s_[channel] = steady_now_s();
+  heard_s_[topic] = steady_now_s();
 }
 
 // A driver that died, or a topic by another name, is what people look for first.
@@ -76,12 +75,12 @@ void RosSubscription::tell_silence() {
   const double now_s = steady_now_s();
   if (now_s - told_s_ < kSilence_s) return;
   told_s_ = now_s;
-  for (std::size_t channel = 0; channel < readers_.size(); ++channel) {
-    if (now_s - heard_s_[channel] < kSilence_s) continue;
+  for (std::size_t topic = 0; topic < topics_.size(); ++topic) {
+    if (now_s - heard_s_[topic] < kSilence_s) continue;
     dds_subscription_matched_status_t status{};
-    dds_get_subscription_matched_status(readers_[channel].handle(), &status);
-    log::warn("ros") << "nothing on " << channels_[channel].topic << " (" << channels_[channel].type
-                     << ") for " << std::lround(now_s - heard_s_[channel]) << " s; "
+    dds_get_subscription_matched_status(readers_[topic].handle(), &status);
+    log::warn("ros") << "nothing on " << topics_[topic].topic << " (" << topics_[topic].type
+                     << ") for " << std::lround(now_s - heard_s_[topic]) << " s; "
                      << status.current_count << " publish it";
   }
 }
@@ -90,7 +89,7 @@ void RosSubscription::give_up_after(double patience_s) {
   end_s_ = steady_now_s() + patience_s;
 }
 
-std::optional<BagMessage> RosSubscription::next() {
+std::optional<RosMessage> RosSubscription::next() {
   const auto is_over = [this] { return stopped_ || steady_now_s() >= end_s_; };
   while (taken_.empty() && !is_over()) {
     tell_silence();
@@ -101,11 +100,11 @@ std::optional<BagMessage> RosSubscription::next() {
                        "cannot wait for messages");
     }();
     const auto ready_count = std::min(ready.size(), static_cast<std::size_t>(count));
-    for (const dds_attach_t channel : std::span(ready).first(ready_count))
-      if (channel >= 0) take_from(static_cast<std::size_t>(channel));
+    for (const dds_attach_t topic : std::span(ready).first(ready_count))
+      if (topic >= 0) take_from(static_cast<std::size_t>(topic));
   }
   if (is_over()) return std::nullopt;
-  BagMessage message = std::move(taken_.front());
+  RosMessage message = std::move(taken_.front());
   taken_.pop_front();
   return message;
 }
@@ -115,16 +114,11 @@ void RosSubscription::stop() noexcept {
   dds_set_guardcondition(guard_.handle(), true);
 }
 
-BagReport RosSubscription::report() const {
-  BagReport report;
-  for (std::size_t channel = 0; channel < readers_.size(); ++channel) {
-    dds_sample_lost_status_t status{};
-    check_dds(dds_get_sample_lost_status(readers_[channel].handle(), &status),
-              "cannot count lost messages");
-    if (status.total_count > 0)
-      report.add(BagFault::kLost, channels_[channel].topic, status.total_count);
-  }
-  return report;
+std::uint64_t RosSubscription::lost(std::size_t topic) const {
+  dds_sample_lost_status_t status{};
+  check_dds(dds_get_sample_lost_status(readers_[topic].handle(), &status),
+            "cannot count lost messages");
+  return status.total_count;
 }
 
 }  // namespace km

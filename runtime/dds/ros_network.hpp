@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "modules/ros_dds/ros_config.hpp"
 #include "runtime/dds/entity.hpp"
+#include "runtime/dds/ros_config.hpp"
 
 namespace km {
 

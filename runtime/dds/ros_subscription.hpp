@@ -2,13 +2,16 @@
 
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
-#include "modules/recordings/bag_reader.hpp"
-#include "modules/ros_dds/ros_network.hpp"
+#include "modules/core/stamp.hpp"
+#include "runtime/dds/ros_network.hpp"
 
 struct ddsi_serdata;
 
@@ -22,37 +25,44 @@ struct RosTopic {
   int depth = 10;  ///< Messages kept until next() takes them; the oldest go.
 };
 
+/// A message as it is on the wire: CDR with its encapsulation header.
+struct RosMessage {
+  std::size_t topic = 0;  ///< Index into RosSubscription::topics().
+  Stamp arrival = 0;      ///< System clock [ns].
+  std::vector<std::uint8_t> bytes;
+};
+
 /// Messages of ROS 2 as they come. What is silent for kSilence_s is named in the log. Not
 /// thread-safe but for stop().
-class RosSubscription final : public BagReader {
+class RosSubscription {
  public:
   static constexpr double kSilence_s = 5.0;
 
   RosSubscription(std::shared_ptr<const RosNetwork> network, std::vector<RosTopic> topics);
 
-  [[nodiscard]] const std::vector<BagChannel>& channels() const override { return channels_; }
+  [[nodiscard]] const std::vector<RosTopic>& topics() const { return topics_; }
   /// Waits for a message. Nullopt after stop() and give_up_after().
-  [[nodiscard]] std::optional<BagMessage> next() override;
-  /// Messages that came too fast for DDS or for next().
-  [[nodiscard]] BagReport report() const override;
+  [[nodiscard]] std::optional<RosMessage> next();
+  /// Messages of a topic that came too fast for DDS or for next().
+  [[nodiscard]] std::uint64_t lost(std::size_t topic) const;
 
   /// next() gives nothing once so much time has passed from now [s].
   void give_up_after(double patience_s);
 
-  [[nodiscard]] bool is_live() const override { return true; }
-  void stop() noexcept override;
+  /// Ends next(), now and later. Thread-safe.
+  void stop() noexcept;
 
  private:
-  void take_from(std::size_t channel);
-  void add(std::size_t channel, const ddsi_serdata& sample);
+  void take_from(std::size_t topic);
+  void add(std::size_t topic, const ddsi_serdata& sample);
   void tell_silence();
 
   std::shared_ptr<const RosNetwork> network_;  // outlives what follows
-  std::vector<BagChannel> channels_;
-  std::vector<DdsEntity> topics_, readers_;
+  std::vector<RosTopic> topics_;
+  std::vector<DdsEntity> dds_topics_, readers_;
   DdsEntity waitset_, guard_;
-  std::deque<BagMessage> taken_;
-  std::vector<double> heard_s_;  // of each channel, when last; steady clock
+  std::deque<RosMessage> taken_;
+  std::vector<double> heard_s_;  // of each topic, when last; steady clock
   double told_s_ = 0.0;          // when silence was looked for
   double end_s_ = std::numeric_limits<double>::infinity();
   std::atomic<bool> stopped_ = false;
