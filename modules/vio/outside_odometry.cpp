@@ -1,11 +1,27 @@
 #include "modules/vio/outside_odometry.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "modules/core/covariance.hpp"
+#include "modules/core/lie.hpp"
 #include "modules/vio/keyframe_rule.hpp"
 
 namespace km {
+namespace {
+
+// Slower steps are rest, unless they lead farther than 1 s at these speeds.
+constexpr double kLeastSpeed_mps = 0.01;
+constexpr double kLeastRate_radps = 0.01;
+constexpr double kRest_s = 1.0;
+
+// The motion takes so long at these speeds.
+double slowest_s(const SE3& motion) {
+  return std::max(motion.translation().norm() / kLeastSpeed_mps,
+                  angle_of(motion.linear()) / kLeastRate_radps);
+}
+
+}  // namespace
 
 OutsideOdometry::OutsideOdometry(RobotId robot, DepthSource depth_source, const VioConfig& config)
     : robot_(robot), depth_source_(depth_source), config_(checked(config)) {}
@@ -27,6 +43,10 @@ OutsideOdometryResult OutsideOdometry::process(const SensorPacket& packet) {
   result.has_jumped = !is_taken_up && is_jump(fix);
   if (result.has_jumped)
     T_chain_odom_ = T_chain_odom_ * last_->pose.T_odom_body * fix.pose.T_odom_body.inverse();
+  if (last_ && !result.has_jumped && !is_taken_up)
+    count_motion(fix);
+  else
+    T_odom_rest_ = fix.pose.T_odom_body;
   const SE3 T_odom_body = T_chain_odom_ * fix.pose.T_odom_body;
   OdometryState state;
   state.stamp = fix.stamp;
@@ -37,9 +57,9 @@ OutsideOdometryResult OutsideOdometry::process(const SensorPacket& packet) {
         seconds_between(last_->stamp, fix.stamp);
   const bool locates_points =
       depth_source_ == DepthSource::kRightImage || packet.frame->depth != nullptr;
-  const bool is_due = !last_keyframe_ || result.has_jumped ||
-                      is_keyframe_due(config_, seconds_between(last_keyframe_->stamp, fix.stamp),
-                                      last_keyframe_->T_odom_kf.inverse() * T_odom_body);
+  const bool is_due =
+      !last_keyframe_ || result.has_jumped ||
+      is_keyframe_due(config_, moved_s_, last_keyframe_->T_odom_kf.inverse() * T_odom_body);
   // A first keyframe must be there for frames to hang on; one that locates points is better.
   if (!is_taken_up && is_due && (locates_points || result.has_jumped))
     hand_on(fix, T_odom_body, result.has_jumped, result);
@@ -60,6 +80,17 @@ bool OutsideOdometry::is_jump(const Fix& fix) const {
   return distance_m > config_.max_speed_mps * seconds_between(last_->stamp, fix.stamp);
 }
 
+// What creeps away counts as if it went at the least speed.
+void OutsideOdometry::count_motion(const Fix& fix) {
+  const SE3& T_odom_body = fix.pose.T_odom_body;
+  const double dt_s = seconds_between(last_->stamp, fix.stamp);
+  const double away_s = slowest_s(T_odom_rest_.inverse() * T_odom_body);
+  const bool is_fast = slowest_s(last_->pose.T_odom_body.inverse() * T_odom_body) > dt_s;
+  if (!is_fast && away_s < kRest_s) return;
+  moved_s_ += is_fast ? dt_s : away_s;
+  T_odom_rest_ = T_odom_body;
+}
+
 void OutsideOdometry::hand_on(const Fix& fix, const SE3& T_odom_body, bool has_jumped,
                               OutsideOdometryResult& result) {
   KeyframeOdometry keyframe;
@@ -72,11 +103,11 @@ void OutsideOdometry::hand_on(const Fix& fix, const SE3& T_odom_body, bool has_j
     const UncertainPose grown =
         between_on_chain({last_kf_->pose.T_odom_body, last_kf_->pose.covariance},
                          {fix.pose.T_odom_body, fix.pose.covariance});
-    const double dt_s = seconds_between(last_keyframe_->stamp, fix.stamp);
     keyframe.covariance =
-        has_jumped ? restart_covariance() : keyframe_covariance(config_, dt_s, grown.Sigma);
+        has_jumped ? restart_covariance() : keyframe_covariance(config_, moved_s_, grown.Sigma);
   }
   last_keyframe_ = keyframe;
+  moved_s_ = 0.0;
   last_kf_ = fix;
   result.keyframe = keyframe;
 }

@@ -40,6 +40,7 @@ class OutsideOdometry {
   };
 
   [[nodiscard]] bool is_jump(const Fix& fix) const;
+  void count_motion(const Fix& fix);
   void hand_on(const Fix& fix, const SE3& T_odom_body, bool has_jumped,
                OutsideOdometryResult& result);
 
@@ -49,6 +50,8 @@ class OutsideOdometry {
   bool goes_on_ = false;               // until the first pose
   std::optional<Fix> last_, last_kf_;  // as measured
   std::optional<KeyframeOdometry> last_keyframe_;
+  double moved_s_ = 0.0;                // since then, without rests
+  SE3 T_odom_rest_ = SE3::Identity();   // where it last was in motion, as measured
   SE3 T_chain_odom_ = SE3::Identity();  // from what is measured to what is handed on: after a jump
 };
 

@@ -57,14 +57,12 @@ TEST_CASE("Poses from outside are handed on, with keyframes by time and distance
   CHECK(run.states[7].T_odom_body.isApprox(ahead(0.35)));
   CHECK(run.states[7].v_odom.isApprox(Eigen::Vector3d(0.5, 0, 0), 1e-9));
   CHECK(run.states[30].v_odom.isZero());
-  // Every 0.25 m, which is 5 images; at rest after 2 s.
+  // Every 0.25 m, which is 5 images.
   std::vector<Stamp> expected;
   for (const int k : {0, 5, 10, 15, 20}) expected.push_back(nanoseconds(100.0 + kPeriod_s * k));
   std::vector<Stamp> stamps;
   for (const KeyframeOdometry& keyframe : run.keyframes) stamps.push_back(keyframe.stamp);
   CHECK(stamps == expected);
-  run.add(packet(40, ahead(1.0)));
-  REQUIRE(run.keyframes.size() == 6);
   for (std::size_t k = 0; k < run.keyframes.size(); ++k) {
     const KeyframeOdometry& keyframe = run.keyframes[k];
     CHECK(keyframe.id.robot == 3);
@@ -77,6 +75,39 @@ TEST_CASE("Poses from outside are handed on, with keyframes by time and distance
   CHECK(run.frames[7].keyframe == 1);
   CHECK(run.frames[7].T_odom_body.isApprox(ahead(0.35)));
   CHECK(run.jumps == 0);
+}
+
+TEST_CASE("A body that stands still makes no keyframes, for however long", "[outside_odometry]") {
+  Run run;
+  for (int k = 0; k <= 600; ++k) run.add(packet(k, ahead(0.0)));
+  CHECK(run.keyframes.size() == 1);
+  CHECK(run.states.size() == 601);
+  for (int k = 601; k < 604; ++k) run.add(packet(k, ahead(0.1 * (k - 600))));
+  REQUIRE(run.keyframes.size() == 2);  // the rest behind it is no drift
+  CHECK(run.keyframes[1].covariance(3, 3) == Approx(0.3 * 1e-4));
+}
+
+TEST_CASE("A body that trembles in its place stands still, one that creeps away does not",
+          "[outside_odometry]") {
+  Run trembling, creeping;
+  constexpr double kSpeed_mps = 0.005;
+  for (int k = 0; k <= 600; ++k) {
+    trembling.add(packet(k, ahead(k % 2 == 0 ? 0.0 : 0.0005)));
+    creeping.add(packet(k, ahead(kSpeed_mps * kPeriod_s * k)));
+  }
+  CHECK(trembling.keyframes.size() == 1);
+  // 2 s at 1 cm/s, which takes 4 s.
+  REQUIRE(creeping.keyframes.size() >= 2);
+  CHECK(seconds_between(creeping.keyframes[0].stamp, creeping.keyframes[1].stamp) == Approx(4.0));
+  CHECK(creeping.keyframes[1].covariance(3, 3) == Approx(2.0 * 1e-4));
+}
+
+TEST_CASE("A body that turns about in its place makes keyframes", "[outside_odometry]") {
+  Run run;
+  for (int k = 0; k <= 60; ++k)
+    run.add(packet(k, make_pose(so3_exp(Eigen::Vector3d(0, 0, k % 2 == 0 ? 0.0 : 0.05)),
+                                Eigen::Vector3d::Zero())));
+  CHECK(run.keyframes.size() == 4);  // each 2 s
 }
 
 TEST_CASE("A keyframe's covariance is what that of the odometry grew by, and drift",
