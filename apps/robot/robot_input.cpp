@@ -1,8 +1,10 @@
 #include "apps/robot/robot_input.hpp"
 
+#include <atomic>
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "apps/result_files.hpp"
@@ -83,59 +85,107 @@ std::unique_ptr<BagReader> subscribe(std::shared_ptr<const RosNetwork> network,
   return std::make_unique<LiveBag>(std::move(network), std::move(wanted));
 }
 
-// What the rig file does not tell of the calibration.
-Rig complete(const RobotOptions& options, const PartialRig& rig,
-             const std::shared_ptr<const RosNetwork>& ros) {
-  if (rig.is_complete()) return rig.rig;
-  if (!options.is_live)
-    return complete_rig(options.dataset.string(), *open_bag(options.dataset), rig);
+// Ends a wait for messages when a signal comes.
+class SignalStop {
+ public:
+  SignalStop(SignalWatch& signals, LiveBag& bag)
+      : watcher_([&signals, &bag, this](const std::stop_token& over) {
+          constexpr double kInterval_s = 0.1;
+          while (!over.stop_requested() && !came_) came_ = signals.wait(kInterval_s).has_value();
+          if (came_) bag.stop();
+        }) {}
+
+  [[nodiscard]] bool came() const { return came_; }
+
+ private:
+  std::atomic<bool> came_ = false;
+  std::jthread watcher_;
+};
+
+// nullopt: a signal came.
+std::optional<Rig> hear_calibration(const PartialRig& rig,
+                                    const std::shared_ptr<const RosNetwork>& ros,
+                                    SignalWatch& signals) {
   constexpr double kPatience_s = 30.0;
   constexpr int kKept = 100;
   std::vector<RosTopic> wanted;
-  for (const auto& teller : RigCompletion(rig).tellers())
+  std::string names;
+  for (const auto& teller : RigCompletion(rig).tellers()) {
     wanted.push_back({teller.topic, std::string(teller.type),
                       teller.type == RosTransforms::kType ? RosQos::kLatched : RosQos::kSensorData,
                       kKept});
+    names += (names.empty() ? "" : ", ") + teller.topic;
+  }
   LiveBag topics(ros, std::move(wanted));
+  log::info("sensors") << "waiting for what tells the calibration: " << names;
   topics.give_up_after(kPatience_s);
-  return complete_rig("live", topics, rig);
+  const SignalStop stop(signals, topics);
+  try {
+    return complete_rig("live", topics, rig);
+  } catch (const DatasetError&) {
+    if (stop.came()) return std::nullopt;
+    throw;
+  }
 }
 
+// What the rig file does not tell of the calibration. nullopt: a signal came.
+std::optional<Rig> complete(const RobotOptions& options, const PartialRig& rig,
+                            const std::shared_ptr<const RosNetwork>& ros, SignalWatch& signals) {
+  if (rig.is_complete()) return rig.rig;
+  return options.is_live ? hear_calibration(rig, ros, signals)
+                         : complete_rig(options.dataset.string(), *open_bag(options.dataset), rig);
+}
+
+// Those of the rig that are used.
+SensorTopicNames used_topics(const RobotOptions& options, const RobotConfig& config,
+                             const std::optional<MappingPlan>& mapping, const PartialRig& rig) {
+  SensorTopicNames topics = rig.rig.topics;
+  const bool has_poses =
+      !topics.odometry.empty() || !rig.pose_file.empty() || !options.odometry.empty();
+  if (has_poses) topics.imu = topics.gyro = topics.accel = "";
+  if (!options.odometry.empty()) topics.odometry.clear();
+  const bool needs_depth =
+      topics.right.empty() || config.sensors.depth || (mapping && mapping->reads_depth());
+  if (!needs_depth) topics.depth.clear();
+  return topics;
+}
+
+// Null: a signal came. Live sensors are heard before the calibration is complete: a driver may wait
+// for its readers.
 std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const RobotConfig& config,
                                              const std::optional<MappingPlan>& mapping,
                                              const PartialRig& partial,
                                              std::shared_ptr<const RosNetwork> ros,
-                                             std::optional<Stamp> not_before) {
-  Rig rig = complete(options, partial, ros);
-  const bool has_poses =
-      !rig.topics.odometry.empty() || !partial.pose_file.empty() || !options.odometry.empty();
-  if (has_poses) rig.topics.imu = rig.topics.gyro = rig.topics.accel = "";
-  if (!options.odometry.empty()) rig.topics.odometry.clear();
-  const bool needs_depth =
-      rig.topics.right.empty() || config.sensors.depth || (mapping && mapping->reads_depth());
-  if (!needs_depth) rig.topics.depth.clear();
+                                             std::optional<Stamp> not_before,
+                                             SignalWatch& signals) {
+  const SensorTopicNames topics = used_topics(options, config, mapping, partial);
+  auto messages = options.is_live ? subscribe(ros, topics) : open_bag(options.dataset);
+  std::optional<Rig> rig = complete(options, partial, ros, signals);
+  if (!rig) return nullptr;
+  rig->topics = topics;
   const BagWindow window{.from_s = options.from_s.value_or(0.0),
                          .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
                          .not_before = not_before};
-  auto messages =
-      options.is_live ? subscribe(std::move(ros), rig.topics) : open_bag(options.dataset);
   return std::make_unique<BagDataset>(options.is_live ? "live" : options.dataset.string(),
-                                      std::move(messages), std::move(rig),
+                                      std::move(messages), *std::move(rig),
                                       config.sensors.stereo_tolerance_s, window);
 }
 
+// Null: a signal came.
 std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const RobotConfig& config,
                                             const std::optional<MappingPlan>& mapping,
                                             const std::optional<PartialRig>& rig,
                                             std::shared_ptr<const RosNetwork> ros,
-                                            const std::optional<RestoredRun>& restored) {
+                                            const std::optional<RestoredRun>& restored,
+                                            SignalWatch& signals) {
   const auto not_before = restored ? std::optional(restored->odometry.back().stamp) : std::nullopt;
   const std::string dataset = options.dataset.string();
   const bool is_bag = options.is_live || may_be_bag(options.dataset);
   if (is_bag && !rig)
     throw std::invalid_argument(dataset + ": --rig FILE must tell which of its topics are the " +
                                 "sensors; --inspect " + dataset + " rig.yaml writes one");
-  if (is_bag) return open_messages(options, config, mapping, *rig, std::move(ros), not_before);
+  if (is_bag)
+    return open_messages(options, config, mapping, *rig, std::move(ros), not_before, signals);
   if (rig)
     throw std::invalid_argument("--rig " + options.rig.string() + " is for a bag, " + dataset +
                                 " is none");
@@ -177,10 +227,11 @@ RecordedGraph open_graph(const RobotOptions& options) {
 
 }  // namespace
 
-RobotInput open_robot_input(const RobotOptions& options, const RobotConfig& config,
-                            const std::optional<MappingPlan>& mapping,
-                            const std::optional<PartialRig>& rig) {
-  if (!options.session.empty()) return {PastRun(), {}, open_session(options)};
+std::optional<RobotInput> open_robot_input(const RobotOptions& options, const RobotConfig& config,
+                                           const std::optional<MappingPlan>& mapping,
+                                           const std::optional<PartialRig>& rig,
+                                           SignalWatch& signals) {
+  if (!options.session.empty()) return RobotInput{PastRun(), {}, open_session(options)};
   const bool is_dataset = options.is_live || !options.dataset.empty();
   const fs::path& path = options.is_live ? options.rig
                          : is_dataset    ? options.dataset
@@ -191,11 +242,12 @@ RobotInput open_robot_input(const RobotOptions& options, const RobotConfig& conf
   if (options.is_live || config.ros.publish.value_or(false))
     ros = std::make_shared<const RosNetwork>(config.ros);
   if (!is_dataset)
-    return {open_graph(options), name, std::move(restored), std::nullopt, std::move(ros)};
-  auto reader =
-      with_poses(options, rig, open_dataset(options, config, mapping, rig, ros, restored));
+    return RobotInput{open_graph(options), name, std::move(restored), std::nullopt, std::move(ros)};
+  auto reader = open_dataset(options, config, mapping, rig, ros, restored, signals);
+  if (reader == nullptr) return std::nullopt;
+  reader = with_poses(options, rig, std::move(reader));
   auto map = restored && mapping ? restore_map(options, *restored) : std::nullopt;
-  return {std::move(reader), name, std::move(restored), std::move(map), std::move(ros)};
+  return RobotInput{std::move(reader), name, std::move(restored), std::move(map), std::move(ros)};
 }
 
 }  // namespace km

@@ -13,6 +13,7 @@
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/rig_completion.hpp"
 #include "runtime/dds/ros_network.hpp"
+#include "runtime/supervisor.hpp"
 
 namespace km {
 
@@ -29,11 +30,14 @@ struct RobotInput {
   std::shared_ptr<const RosNetwork> ros = nullptr;  ///< Null unless it hears or tells something.
 };
 
-/// Opens what the options name, and with --resume the journal of the run to go on with. Throws
-/// DatasetError, DdsError, InputFileError and std::invalid_argument with one line that names the
-/// file and what helps.
-[[nodiscard]] RobotInput open_robot_input(const RobotOptions& options, const RobotConfig& config,
-                                          const std::optional<MappingPlan>& mapping,
-                                          const std::optional<PartialRig>& rig);
+/// Opens what the options name, and with --resume the journal of the run to go on with. nullopt:
+/// one of `signals` came while live topics were to complete the calibration. Throws DatasetError,
+/// DdsError, InputFileError and std::invalid_argument with one line that names the file and what
+/// helps.
+[[nodiscard]] std::optional<RobotInput> open_robot_input(const RobotOptions& options,
+                                                         const RobotConfig& config,
+                                                         const std::optional<MappingPlan>& mapping,
+                                                         const std::optional<PartialRig>& rig,
+                                                         SignalWatch& signals);
 
 }  // namespace km

@@ -442,10 +442,14 @@ int run_robot(const RobotOptions& options, SignalWatch& signals,
       options.rig.empty() ? std::nullopt : std::optional(read_rig_file(options.rig));
   const std::optional<MappingPlan> mapping = plan_mapping(
       config.mapping, config.stereo_depth, config.segmentation, sources_of(options, rig));
-  RobotInput input = open_robot_input(options, config, mapping, rig);
-  const bool goes_on = options.resume && input.restored;
+  std::optional<RobotInput> input = open_robot_input(options, config, mapping, rig, signals);
+  if (!input) {
+    log::info("robot") << "interrupted before the calibration was complete: no results";
+    return 0;
+  }
+  const bool goes_on = options.resume && input->restored;
   ResultWriter results;
-  Robot robot(options, config, std::move(input), mapping, results, signals);
+  Robot robot(options, config, *std::move(input), mapping, results, signals);
   if (listen) listen(robot.topics());
   log_network(config, robot.interface());
   if (mapping && mapping->sensor.labels == LabelsFrom::kImages &&

@@ -43,8 +43,14 @@ RosSubscription::RosSubscription(std::shared_ptr<const RosNetwork> network,
                                  static_cast<dds_attach_t>(readers_.size() - 1)),
               "cannot wait for " + wanted.topic);
   }
+}
+
+// Who does not listen yet misses nothing.
+void RosSubscription::begin() {
   told_s_ = steady_now_s();
   heard_s_.assign(readers_.size(), told_s_);
+  for (std::size_t topic = 0; topic < readers_.size(); ++topic)
+    lost_before_.push_back(lost_ever(topic));
 }
 
 // All there are: DDS tells of those that come, not of those that are left.
@@ -90,6 +96,7 @@ void RosSubscription::give_up_after(double patience_s) {
 }
 
 std::optional<RosMessage> RosSubscription::next() {
+  if (heard_s_.empty()) begin();
   const auto is_over = [this] { return stopped_ || steady_now_s() >= end_s_; };
   while (taken_.empty() && !is_over()) {
     tell_silence();
@@ -115,6 +122,10 @@ void RosSubscription::stop() noexcept {
 }
 
 std::uint64_t RosSubscription::lost(std::size_t topic) const {
+  return lost_before_.empty() ? 0 : lost_ever(topic) - lost_before_[topic];
+}
+
+std::uint64_t RosSubscription::lost_ever(std::size_t topic) const {
   dds_sample_lost_status_t status{};
   check_dds(dds_get_sample_lost_status(readers_[topic].handle(), &status),
             "cannot count lost messages");

@@ -32,8 +32,8 @@ struct RosMessage {
   std::vector<std::uint8_t> bytes;
 };
 
-/// Messages of ROS 2 as they come. What is silent for kSilence_s is named in the log. Not
-/// thread-safe but for stop().
+/// Messages of ROS 2 as they come. What is silent for kSilence_s is named in the log, from the
+/// first next() on. Not thread-safe but for stop().
 class RosSubscription {
  public:
   static constexpr double kSilence_s = 5.0;
@@ -43,7 +43,7 @@ class RosSubscription {
   [[nodiscard]] const std::vector<RosTopic>& topics() const { return topics_; }
   /// Waits for a message. Nullopt after stop() and give_up_after().
   [[nodiscard]] std::optional<RosMessage> next();
-  /// Messages of a topic that came too fast for DDS or for next().
+  /// Messages of a topic that came too fast for DDS or for next(), since that was called first.
   [[nodiscard]] std::uint64_t lost(std::size_t topic) const;
 
   /// next() gives nothing once so much time has passed from now [s].
@@ -53,16 +53,19 @@ class RosSubscription {
   void stop() noexcept;
 
  private:
+  void begin();
   void take_from(std::size_t topic);
   void add(std::size_t topic, const ddsi_serdata& sample);
   void tell_silence();
+  [[nodiscard]] std::uint64_t lost_ever(std::size_t topic) const;
 
   std::shared_ptr<const RosNetwork> network_;  // outlives what follows
   std::vector<RosTopic> topics_;
   std::vector<DdsEntity> dds_topics_, readers_;
   DdsEntity waitset_, guard_;
   std::deque<RosMessage> taken_;
-  std::vector<double> heard_s_;  // of each topic, when last; steady clock
+  std::vector<std::uint64_t> lost_before_;  // of each topic, before the first next()
+  std::vector<double> heard_s_;  // of each topic, when last; steady clock; empty before next()
   double told_s_ = 0.0;          // when silence was looked for
   double end_s_ = std::numeric_limits<double>::infinity();
   std::atomic<bool> stopped_ = false;

@@ -5,6 +5,9 @@
 #include <filesystem>
 #include <fstream>
 
+#include "modules/recordings/ros_messages.hpp"
+#include "runtime/dds/ros_publisher.hpp"
+#include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/system/team_run.hpp"
@@ -77,6 +80,71 @@ TEST_CASE("On live topics of ROS 2 odometry is that of the recording they are pl
   CHECK(replay.wait() == 0);
   CHECK(first_lines(folder.path() / "live/odometry.tum", kPoses) ==
         first_lines(folder.path() / "folder/odometry.tum", kPoses));
+}
+
+namespace {
+
+// Cameras that were calibrated without the inertial sensor: /tf_static tells where they are on it.
+const std::string kUnplaced = R"(left: {topic: /cam0/image_raw}
+right: {topic: /cam1/image_raw}
+imu: {topic: /imu0}
+calibration:
+  cam0: {camera_model: pinhole, distortion_model: radtan, distortion_coeffs: [0, 0, 0, 0],
+    intrinsics: [30, 30, 16, 12], resolution: [32, 24]}
+  cam1: {camera_model: pinhole, distortion_model: radtan, distortion_coeffs: [0, 0, 0, 0],
+    intrinsics: [30, 30, 16, 12], resolution: [32, 24],
+    T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}
+)";
+
+// With its log, which is on stderr.
+std::vector<std::string> logged(const std::vector<std::string>& command) {
+  std::vector<std::string> shell = {"sh", "-c", R"(exec "$0" "$@" 2>&1)"};
+  shell.insert(shell.end(), command.begin(), command.end());
+  return shell;
+}
+
+bool waits_for_calibration(const std::string& line) {
+  return line.find("waiting for what tells the calibration") != line.npos;
+}
+
+}  // namespace
+
+TEST_CASE("A robot that waits for its calibration ends at once on a signal", "[system][live]") {
+  const TemporaryFolder folder;
+  const fs::path rig = folder.write("rig.yaml", kUnplaced);
+  const std::string domain = std::to_string(random_domain());
+  Process robot(logged(robot_command(
+      folder.path() / "live",
+      {"--live", rig.string(), "--set", "ros.domain=" + domain, "--set", "ros.interface=lo"})));
+  REQUIRE(robot.wait_until(waits_for_calibration));
+  robot.kill(GENERATE(SIGINT, SIGTERM));
+  CHECK(robot.wait() == 0);  // 1 once its patience is over
+}
+
+TEST_CASE("A robot reads all topics of its sensors while it waits for its calibration",
+          "[system][live]") {
+  const EurocFolder recording;
+  const TemporaryFolder folder;
+  const fs::path rig = folder.write("rig.yaml", kUnplaced);
+  const int domain = random_domain();
+  Process robot(
+      logged(robot_command(folder.path() / "live",
+                           {"--live", rig.string(), "--set", "ros.domain=" + std::to_string(domain),
+                            "--set", "ros.interface=lo"})));
+  const auto network =
+      std::make_shared<const RosNetwork>(RosConfig{.domain = domain, .interface = "lo"});
+  const RosPublisher description(network, "/tf_static", RosTransforms::kType, RosQos::kLatched, 1);
+  description.publish(encode_ros(RosTransforms{{{{0, "imu0"}, "cam0", {}}}}));
+  // It plays once each topic is read, so that the frames of the samples are told.
+  Process driver({KM_BIN_DIR "/kimera_multi_publish", recording.root().string(), "--domain",
+                  std::to_string(domain), "--interface", "lo", "--wait", "1", "--reliable"});
+  const auto is_complete = [](const std::string& line) {
+    return line.find("domain ") != line.npos;
+  };
+  CHECK(robot.wait_until(is_complete));
+  CHECK(driver.wait() == 0);
+  robot.kill(SIGINT);
+  CHECK(robot.wait() == 0);
 }
 
 }  // namespace km
