@@ -173,7 +173,7 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
 bool FixedLagSmoother::append(const InertialFrame& frame, OdometryState state, double offset_s) {
   WindowFrame& added = window_.frames.emplace_back();
   added.id = next_id_++;
-  added.state = state;
+  added.state = std::move(state);
   added.state.stamp = frame.tracked.stamp;
   added.offset_s = offset_s;
   const std::size_t now = window_.frames.size() - 1;

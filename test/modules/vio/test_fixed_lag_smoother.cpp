@@ -1,9 +1,14 @@
-#include <ceres/ceres.h>
 #include <Eigen/LU>
 #include <catch2/catch.hpp>
 #include <memory>
 #include <optional>
 #include <vector>
+
+// glog, which comes with Ceres, has a CHECK of its own that ends the program.
+#pragma push_macro("CHECK")
+#undef CHECK
+#include <ceres/ceres.h>
+#pragma pop_macro("CHECK")
 
 #include "modules/core/lie.hpp"
 #include "modules/vio/fixed_lag_smoother.hpp"
