@@ -193,6 +193,7 @@ std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const R
                      .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
                      .not_before = not_before,
                      .stereo_tolerance_s = config.sensors.stereo_tolerance_s,
+                     .imu = options.odometry.empty(),
                      .depth = config.sensors.depth || (mapping && mapping->reads_depth()),
                      .labels = config.sensors.labels || (mapping && mapping->reads_labels())};
   return std::make_unique<EurocReader>(open_euroc(options.dataset, euroc));

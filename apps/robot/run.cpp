@@ -439,7 +439,8 @@ int run_robot(const RobotOptions& options, SignalWatch& signals,
               const std::function<void(Topics&)>& listen) {
   const RobotConfig config = load_robot_config(options);
   const std::optional<PartialRig> rig =
-      options.rig.empty() ? std::nullopt : std::optional(read_rig_file(options.rig));
+      options.rig.empty() ? std::nullopt
+                          : std::optional(read_rig_file(options.rig, !options.odometry.empty()));
   const std::optional<MappingPlan> mapping = plan_mapping(
       config.mapping, config.stereo_depth, config.segmentation, sources_of(options, rig));
   std::optional<RobotInput> input = open_robot_input(options, config, mapping, rig, signals);

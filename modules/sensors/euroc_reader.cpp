@@ -51,7 +51,7 @@ std::filesystem::path find_mav0(const std::filesystem::path& folder) {
   if (!is_folder(folder)) throw DatasetError(folder.string() + ": no such folder");
   if (is_folder(folder / "mav0")) return folder / "mav0";
   const auto has = [&folder](const char* sensor) { return is_folder(folder / sensor); };
-  for (const char* sensor : {"cam0", "cam1", "imu0"})
+  for (const char* sensor : {"cam0", "cam1"})
     if (!has(sensor) && !(sensor == std::string_view("cam1") && has("depth0")))
       throw DatasetError(folder.string() + ": neither a folder mav0 nor " + sensor +
                          " in it: not a EuRoC recording");
@@ -65,7 +65,8 @@ EurocReader::EurocReader(const std::filesystem::path& folder, EurocCalibration c
       side_images_(mav0_, rig_.depth, calibration.depth_scale_m, options.labels),
       files_(is_rgbd(rig_) ? StereoPairFiles{list_euroc_lefts(mav0_, report_), {}}
                            : list_euroc_pairs(mav0_, options.stereo_tolerance_s, report_)),
-      imu_(read_imu(mav0_ / "imu0" / "data.csv", report_)),
+      reads_imu_(options.imu),
+      imu_(reads_imu_ ? read_imu(mav0_ / "imu0" / "data.csv", report_) : ImuStream()),
       recording_start_(files_.pairs.front().stamp) {
   if (!(options.from_s < options.to_s))
     throw std::invalid_argument("EurocReader: the window from " + std::to_string(options.from_s) +
@@ -90,6 +91,7 @@ void EurocReader::select(const EurocOptions& options) {
 }
 
 bool EurocReader::has_imu(const StereoPairFile& pair) {
+  if (!reads_imu_) return true;
   const bool starts_by = imu_.starts_by(pair.stamp);
   if (starts_by && imu_.reaches(pair.stamp)) return true;
   report_.add(ReaderFault::kPairWithoutImu, at_line(mav0_ / "cam0" / "data.csv", pair.line) +
@@ -99,6 +101,7 @@ bool EurocReader::has_imu(const StereoPairFile& pair) {
 }
 
 std::vector<ImuSample> EurocReader::imu_until(Stamp stamp) {
+  if (!reads_imu_) return {};
   std::vector<ImuSample> samples = imu_.until(stamp);
   for (const ImuGap& gap : imu_gaps(samples, rig_.imu.rate_hz))
     report_.add(ReaderFault::kImuGap,

@@ -25,11 +25,12 @@ struct EurocOptions {
   std::optional<Stamp> not_before = {};                   ///< No frame before this instant.
   /// Left to right (depth, label) stamp, at most; nullopt: see find_synchrony().
   std::optional<double> stereo_tolerance_s = {};
+  bool imu = true;      ///< False: there need not be an inertial sensor, packets have no samples.
   bool depth = false;   ///< Depth images also beside a right camera (open_euroc()).
   bool labels = false;  ///< Label images.
 };
 
-/// The folder of a EuRoC recording that holds cam0 and imu0: `folder`/mav0, or `folder` itself.
+/// The folder of a EuRoC recording that holds cam0: `folder`/mav0, or `folder` itself.
 /// Throws DatasetError if there is neither.
 [[nodiscard]] std::filesystem::path find_mav0(const std::filesystem::path& folder);
 
@@ -76,7 +77,8 @@ class EurocReader final : public DatasetReader {
   SensorRig rig_;
   SideImages side_images_;
   StereoPairFiles files_;  // of the window
-  ImuStream imu_;          // of the recording
+  const bool reads_imu_;
+  ImuStream imu_;  // of the recording
   Stamp recording_start_ = 0;
   std::size_t next_pair_ = 0;
 };

@@ -90,10 +90,8 @@ StereoRig read_stereo(const std::filesystem::path& mav0, const Camera& left) {
 
 }  // namespace
 
-SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth) {
+SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth, bool needs_imu) {
   SensorRig rig;
-  const CalibrationMap imu = sensor_yaml(mav0, "imu0");
-  rig.imu = read_imu_noise(imu);
   const Camera left = read_euroc_camera(sensor_yaml(mav0, "cam0"));
   const bool rgbd = !is_there(mav0 / "cam1") && is_there(mav0 / "depth0");
   if (!rgbd) rig.stereo = read_stereo(mav0, left);
@@ -105,6 +103,9 @@ SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth) {
       rig.stereo =
           rgbd_rig(left, depth.number("baseline_m", kDepthBaseline_m, kDefaultDepthBaseline_m));
   }
+  if (!needs_imu && !is_there(mav0 / "imu0")) return rig;
+  const CalibrationMap imu = sensor_yaml(mav0, "imu0");
+  rig.imu = read_imu_noise(imu);
   move_to_imu(imu, rig.stereo);
   return rig;
 }
@@ -131,7 +132,7 @@ double read_depth_scale(const std::filesystem::path& mav0) {
 
 EurocReader open_euroc(const std::filesystem::path& folder, const EurocOptions& options) {
   const std::filesystem::path mav0 = find_mav0(folder);
-  EurocCalibration calibration{.rig = read_euroc_rig(mav0, options.depth)};
+  EurocCalibration calibration{.rig = read_euroc_rig(mav0, options.depth, options.imu)};
   if (calibration.rig.depth) calibration.depth_scale_m = read_depth_scale(mav0);
   return EurocReader(folder, std::move(calibration), options);
 }

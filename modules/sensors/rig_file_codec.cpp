@@ -71,10 +71,11 @@ SE3 T_child_body(const std::filesystem::path& path, const RigFile::Odometry& odo
 
 }  // namespace
 
-PartialRig read_rig_file(const std::filesystem::path& path) {
+PartialRig read_rig_file(const std::filesystem::path& path, bool has_poses) {
   ConfigProblems problems;
   const ConfigContext context{problems, std::filesystem::absolute(path).parent_path()};
   RigFile file;
+  file.has_poses = has_poses;
   YAML::Node root = load_yaml(path);
   const YAML::Node written = root.IsMap() ? root["calibration"] : YAML::Node();
   const bool is_inline = written && written.IsMap();

@@ -93,6 +93,7 @@ struct RigFile {
   std::vector<std::filesystem::path> calibration;
   std::string body_frame;
   std::optional<double> camera_time_offset_s;
+  bool has_poses = false;  ///< An odometry that the file need not name.
 
   void visit_fields(auto& visitor) {
     visitor.section("left", left);
@@ -115,19 +116,21 @@ struct RigFile {
     visitor.required({"left"});
     visitor.check(
         !imu.topic.empty() || !imu.gyro_topic.empty() || !odometry.topic.empty() ||
-            odometry.file.has_value(),
+            odometry.file.has_value() || has_poses,
         "imu",
         "is missing: odometry goes by cameras and an inertial sensor; a robot without one "
-        "names the odometry that it has: odometry: {topic: ...} or {file: ...}");
+        "names the odometry that it has: odometry: {topic: ...} or {file: ...}, or --odometry "
+        "FILE");
     visitor.check(!right.topic.empty() || !depth.topic.empty(), "left",
                   "is alone: a right camera or depth is needed (one camera does not tell how far "
                   "things are)");
   }
 };
 
-/// Reads a rig file and its calibration. Throws ConfigError with every problem by file and line,
-/// and DatasetError for a calibration that cannot be used.
-[[nodiscard]] PartialRig read_rig_file(const std::filesystem::path& file);
+/// Reads a rig file and its calibration; `has_poses`: an odometry is named elsewhere, in place of
+/// the file's. Throws ConfigError with every problem by file and line, and DatasetError for a
+/// calibration that cannot be used.
+[[nodiscard]] PartialRig read_rig_file(const std::filesystem::path& file, bool has_poses = false);
 
 /// Where drivers tell the camera of a topic of images: "/left/camera_info" of "/left/image_raw" and
 /// of "/left/image_raw/compressed".

@@ -162,6 +162,25 @@ TEST_CASE("Missing files and folders are refused by name", "[sensors]") {
   CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::Contains("not a EuRoC recording"));
 }
 
+TEST_CASE("Where there is another odometry, a recording needs no inertial sensor", "[sensors]") {
+  const EurocFolder folder;
+  const EurocOptions options{.imu = false};
+  const SE3 T_imu_left = open_euroc(folder.root()).rig().stereo.cameras[0].T_body_cam;
+  SECTION("one that is there is the body") {}
+  SECTION("without, the body is what all poses of sensors refer to") {
+    fs::remove_all(folder.mav0() / "imu0");
+    CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::Contains("imu0/sensor.yaml: no such file"));
+    CHECK(open_euroc(folder.mav0(), options).pair_count() == EurocFolder::kPairs);
+  }
+  EurocReader reader = open_euroc(folder.root(), options);
+  CHECK(
+      reader.rig().stereo.cameras[0].T_body_cam.isApprox(T_imu_left));  // its T_BS is the identity
+  const auto packets = packets_of(reader);
+  REQUIRE(packets.size() == EurocFolder::kPairs);
+  for (const SensorPacket& packet : packets) CHECK(packet.imu.empty());
+  CHECK(reader.report().empty());
+}
+
 TEST_CASE("Lists without a usable row are refused", "[sensors]") {
   const EurocFolder folder;
   SECTION("images") {

@@ -101,6 +101,16 @@ TEST_CASE("A rig file for depth needs no calibration of depth", "[sensors]") {
   CHECK(rig.rig.sensors.depth->max_m == 6.0);
 }
 
+TEST_CASE("A rig file needs no inertial sensor beside an odometry named elsewhere", "[sensors]") {
+  const EurocFolder recording;
+  const TemporaryFolder folder;
+  const auto file =
+      folder.write("rig.yaml", "left: {topic: /cam0}\nright: {topic: /cam1}\ncalibration: " +
+                                   recording.root().string() + "\n");
+  CHECK_THROWS_WITH(read_rig_file(file), Contains("--odometry FILE"));
+  CHECK(read_rig_file(file, true).is_complete());
+}
+
 TEST_CASE("What a rig file does not tell is asked of topics", "[sensors]") {
   const TemporaryFolder folder;
   const PartialRig none =
