@@ -19,6 +19,10 @@ inline constexpr std::array kResultFiles = {
 /// Those that grow during the run, and go on when it is taken up.
 inline constexpr std::array kGrowingFiles = {"optimizer.csv", "traffic.csv", "process.csv"};
 
+/// The rig with the stamps and mounting of the cameras as a run found them, for --rig of the next
+/// one, which may have the same folder: it stays until it is written anew.
+inline constexpr const char* kEstimatedRig = "rig_estimated.yaml";
+
 /// What a run needs to be taken up, or to be joined as one of the past.
 inline constexpr const char* kJournal = "run.journal";
 

@@ -43,8 +43,8 @@ Examples
     kimera_multi_robot --config config/datasets/tunnels.yaml --robot 3 --graph robot3.csv --rate max --output results/3
 
 Files written to --output: odometry.tum, optimized.tum, pose_graph.g2o, keyframes.csv, loop_closures.csv,
-optimizer.csv, traffic.csv, process.csv, timing.csv, config.yaml, summary.json, run.journal (for --resume and
---session); with mapping.mode on also mesh.ply,
+optimizer.csv, traffic.csv, process.csv, timing.csv, config.yaml, summary.json, rig_estimated.yaml (for --rig of
+the next run), run.journal (for --resume and --session); with mapping.mode on also mesh.ply,
 mesh_optimized.ply and label_palette.csv.
 Ctrl-C, SIGTERM and SIGHUP end the run in order with everything written; a second Ctrl-C or SIGTERM ends it at once.
 Exit codes: 0 done; 1 bad input or configuration, or a recording that gave no pose; 2 bad command line;
@@ -102,8 +102,10 @@ void add_input(CLI::App& app, RobotOptions& options) {
                    "themselves in its map")
       ->check(CLI::ExistingDirectory);
   group->require_option(1);
-  app.add_option("--rig", options.rig,
-                 "For a bag: file that says which topics are the sensors, and their calibration")
+  app.add_option(
+         "--rig", options.rig,
+         "For a bag: file that says which topics are the sensors, and their calibration; for a "
+         "EuRoC folder, what its calibration is off by (rig_estimated.yaml of a run)")
       ->check(CLI::ExistingFile);
   app.add_option("--odometry", options.odometry,
                  "Poses of the body by another odometry (TUM: t[s] x y z qx qy qz qw), in place of "

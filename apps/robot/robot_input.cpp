@@ -26,6 +26,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Of ROS, recorded or live; else a EuRoC folder.
+bool has_messages(const RobotOptions& options) {
+  return options.is_live || (!options.dataset.empty() && may_be_bag(options.dataset));
+}
+
 // The run to go on with; none where its process had not come to a keyframe yet.
 std::optional<RestoredRun> restore(const RobotOptions& options, const std::string& input) {
   const fs::path file = options.output / kJournal;
@@ -154,15 +159,17 @@ SensorTopicNames used_topics(const RobotOptions& options, const RobotConfig& con
 // for its readers.
 std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const RobotConfig& config,
                                              const std::optional<MappingPlan>& mapping,
-                                             const PartialRig& partial,
+                                             const RigInput& input,
                                              std::shared_ptr<const RosNetwork> ros,
                                              std::optional<Stamp> not_before,
                                              SignalWatch& signals) {
+  const PartialRig& partial = *input.messages;
   const SensorTopicNames topics = used_topics(options, config, mapping, partial);
   auto messages = options.is_live ? subscribe(ros, topics) : open_bag(options.dataset);
   std::optional<Rig> rig = complete(options, partial, ros, signals);
   if (!rig) return nullptr;
   rig->topics = topics;
+  input.correction.apply_to(rig->sensors.stereo);
   const BagWindow window{.from_s = options.from_s.value_or(0.0),
                          .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
                          .not_before = not_before};
@@ -174,25 +181,23 @@ std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const 
 // Null: a signal came.
 std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const RobotConfig& config,
                                             const std::optional<MappingPlan>& mapping,
-                                            const std::optional<PartialRig>& rig,
+                                            const RigInput& rig,
                                             std::shared_ptr<const RosNetwork> ros,
                                             const std::optional<RestoredRun>& restored,
                                             SignalWatch& signals) {
   const auto not_before = restored ? std::optional(restored->odometry.back().stamp) : std::nullopt;
   const std::string dataset = options.dataset.string();
-  const bool is_bag = options.is_live || may_be_bag(options.dataset);
-  if (is_bag && !rig)
+  const bool is_bag = has_messages(options);
+  if (is_bag && !rig.messages)
     throw std::invalid_argument(dataset + ": --rig FILE must tell which of its topics are the " +
                                 "sensors; --inspect " + dataset + " rig.yaml writes one");
   if (is_bag)
-    return open_messages(options, config, mapping, *rig, std::move(ros), not_before, signals);
-  if (rig)
-    throw std::invalid_argument("--rig " + options.rig.string() + " is for a bag, " + dataset +
-                                " is none");
+    return open_messages(options, config, mapping, rig, std::move(ros), not_before, signals);
   EurocOptions euroc{.from_s = options.from_s.value_or(0.0),
                      .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
                      .not_before = not_before,
                      .stereo_tolerance_s = config.sensors.stereo_tolerance_s,
+                     .correction = rig.correction,
                      .imu = options.odometry.empty(),
                      .depth = config.sensors.depth || (mapping && mapping->reads_depth()),
                      .labels = config.sensors.labels || (mapping && mapping->reads_labels())};
@@ -200,10 +205,10 @@ std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const R
 }
 
 // Those of a file, if one is named.
-std::unique_ptr<DatasetReader> with_poses(const RobotOptions& options,
-                                          const std::optional<PartialRig>& rig,
+std::unique_ptr<DatasetReader> with_poses(const RobotOptions& options, const RigInput& rig,
                                           std::unique_ptr<DatasetReader> reader) {
-  const fs::path file = options.odometry.empty() && rig ? rig->pose_file : options.odometry;
+  const fs::path file =
+      options.odometry.empty() && rig.messages ? rig.messages->pose_file : options.odometry;
   if (file.empty()) return reader;
   if (options.is_live)
     throw std::invalid_argument(file.string() +
@@ -228,10 +233,17 @@ RecordedGraph open_graph(const RobotOptions& options) {
 
 }  // namespace
 
+RigInput read_rig_input(const RobotOptions& options) {
+  if (options.rig.empty()) return {};
+  if (!has_messages(options)) return {std::nullopt, read_rig_correction(options.rig)};
+  PartialRig rig = read_rig_file(options.rig, !options.odometry.empty());
+  const RigCorrection correction{rig.rig.camera_time_offset_s, rig.T_body_rig};
+  return {std::move(rig), correction};
+}
+
 std::optional<RobotInput> open_robot_input(const RobotOptions& options, const RobotConfig& config,
                                            const std::optional<MappingPlan>& mapping,
-                                           const std::optional<PartialRig>& rig,
-                                           SignalWatch& signals) {
+                                           const RigInput& rig, SignalWatch& signals) {
   if (!options.session.empty()) return RobotInput{PastRun(), {}, open_session(options)};
   const bool is_dataset = options.is_live || !options.dataset.empty();
   const fs::path& path = options.is_live ? options.rig

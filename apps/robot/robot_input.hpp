@@ -12,6 +12,7 @@
 #include "modules/pose_graph/recorded_graph.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/rig_completion.hpp"
+#include "modules/sensors/rig_correction.hpp"
 #include "runtime/dds/ros_network.hpp"
 #include "runtime/supervisor.hpp"
 
@@ -30,6 +31,15 @@ struct RobotInput {
   std::shared_ptr<const RosNetwork> ros = nullptr;  ///< Null unless it hears or tells something.
 };
 
+/// What --rig says of the sensors. A EuRoC folder has its own calibration, and takes a correction.
+struct RigInput {
+  std::optional<PartialRig> messages;  ///< Of messages.
+  RigCorrection correction;            ///< What the calibration is corrected by.
+};
+
+/// Throws ConfigError and DatasetError, see read_rig_file() and read_rig_correction().
+[[nodiscard]] RigInput read_rig_input(const RobotOptions& options);
+
 /// Opens what the options name, and with --resume the journal of the run to go on with. nullopt:
 /// one of `signals` came while live topics were to complete the calibration. Throws DatasetError,
 /// DdsError, InputFileError and std::invalid_argument with one line that names the file and what
@@ -37,7 +47,6 @@ struct RobotInput {
 [[nodiscard]] std::optional<RobotInput> open_robot_input(const RobotOptions& options,
                                                          const RobotConfig& config,
                                                          const std::optional<MappingPlan>& mapping,
-                                                         const std::optional<PartialRig>& rig,
-                                                         SignalWatch& signals);
+                                                         const RigInput& rig, SignalWatch& signals);
 
 }  // namespace km

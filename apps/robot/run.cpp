@@ -426,6 +426,20 @@ int conclude(const RobotOptions& options, bool has_budget, Robot& robot,
   return verdict.exit_code;
 }
 
+// What is estimated is beyond what the run began with. A EuRoC folder keeps its own calibration.
+void write_estimated_rig(const RobotOptions& options, const RigInput& rig, const RunRecord& record,
+                         ResultWriter& results) {
+  if (!record.calibration()) return;
+  const CameraCalibration& found = record.calibration()->calibration;
+  const RigCorrection correction{rig.correction.camera_time_offset_s + found.offset_s,
+                                 found.T_body_rig * rig.correction.T_body_rig};
+  results.write(options.output / kEstimatedRig, [&](const auto& file) {
+    write_file(file,
+               "# Stamps and mounting of the cameras as vio.calibrate found them: for --rig\n" +
+                   corrected_rig_text(rig.messages ? options.rig : "", correction));
+  });
+}
+
 std::optional<ImageSources> sources_of(const RobotOptions& options,
                                        const std::optional<PartialRig>& rig) {
   if (rig) return image_sources(rig->rig.topics, options.rig);
@@ -438,11 +452,9 @@ std::optional<ImageSources> sources_of(const RobotOptions& options,
 int run_robot(const RobotOptions& options, SignalWatch& signals,
               const std::function<void(Topics&)>& listen) {
   const RobotConfig config = load_robot_config(options);
-  const std::optional<PartialRig> rig =
-      options.rig.empty() ? std::nullopt
-                          : std::optional(read_rig_file(options.rig, !options.odometry.empty()));
+  const RigInput rig = read_rig_input(options);
   const std::optional<MappingPlan> mapping = plan_mapping(
-      config.mapping, config.stereo_depth, config.segmentation, sources_of(options, rig));
+      config.mapping, config.stereo_depth, config.segmentation, sources_of(options, rig.messages));
   std::optional<RobotInput> input = open_robot_input(options, config, mapping, rig, signals);
   if (!input) {
     log::info("robot") << "interrupted before the calibration was complete: no results";
@@ -469,6 +481,7 @@ int run_robot(const RobotOptions& options, SignalWatch& signals,
   watch.emplace(options, config, goes_on, robot, results);
   const RunResult result = robot.run([&watch] { return watch->poll(); });
   const auto end = [&](const RunRecord& record) {
+    write_estimated_rig(options, rig, record, results);
     return conclude(options, config.budget.is_limited(), robot, watch, result, record, results);
   };
   if (result.is_left_behind("recorder"))

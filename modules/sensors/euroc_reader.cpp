@@ -66,13 +66,15 @@ EurocReader::EurocReader(const std::filesystem::path& folder, EurocCalibration c
       files_(is_rgbd(rig_) ? StereoPairFiles{list_euroc_lefts(mav0_, report_), {}}
                            : list_euroc_pairs(mav0_, options.stereo_tolerance_s, report_)),
       reads_imu_(options.imu),
-      imu_(reads_imu_ ? read_imu(mav0_ / "imu0" / "data.csv", report_) : ImuStream()),
-      recording_start_(files_.pairs.front().stamp) {
+      imu_(reads_imu_ ? read_imu(mav0_ / "imu0" / "data.csv", report_) : ImuStream()) {
   if (!(options.from_s < options.to_s))
     throw std::invalid_argument("EurocReader: the window from " + std::to_string(options.from_s) +
                                 " s to " + std::to_string(options.to_s) + " s is empty");
   side_images_.list(options.stereo_tolerance_s.value_or(Synchrony().tolerance_s), files_.pairs,
                     report_);
+  for (StereoPairFile& pair : files_.pairs)
+    pair.stamp += nanoseconds(options.correction.camera_time_offset_s);
+  recording_start_ = files_.pairs.front().stamp;
   select(options);
 }
 

@@ -9,6 +9,7 @@
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/frame_files.hpp"
 #include "modules/sensors/imu_stream.hpp"
+#include "modules/sensors/rig_correction.hpp"
 
 namespace km {
 
@@ -18,13 +19,15 @@ struct EurocCalibration {
   double depth_scale_m = 1e-3;  ///< Of a unit stored in depth images [m].
 };
 
-/// Part of a recording, in seconds since the first frame of the WHOLE recording, and what is read.
+/// Part of a recording, in seconds since the first frame of the WHOLE recording, and how it is
+/// read.
 struct EurocOptions {
   double from_s = 0.0;                                    ///< First instant that belongs to it.
   double to_s = std::numeric_limits<double>::infinity();  ///< First that does not.
   std::optional<Stamp> not_before = {};                   ///< No frame before this instant.
   /// Left to right (depth, label) stamp, at most; nullopt: see find_synchrony().
   std::optional<double> stereo_tolerance_s = {};
+  RigCorrection correction = {};  ///< Stamps here; the cameras in open_euroc().
   bool imu = true;      ///< False: there need not be an inertial sensor, packets have no samples.
   bool depth = false;   ///< Depth images also beside a right camera (open_euroc()).
   bool labels = false;  ///< Label images.

@@ -133,6 +133,7 @@ double read_depth_scale(const std::filesystem::path& mav0) {
 EurocReader open_euroc(const std::filesystem::path& folder, const EurocOptions& options) {
   const std::filesystem::path mav0 = find_mav0(folder);
   EurocCalibration calibration{.rig = read_euroc_rig(mav0, options.depth, options.imu)};
+  options.correction.apply_to(calibration.rig.stereo);
   if (calibration.rig.depth) calibration.depth_scale_m = read_depth_scale(mav0);
   return EurocReader(folder, std::move(calibration), options);
 }

@@ -10,6 +10,8 @@
 namespace km {
 namespace {
 
+using RowMajor4 = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
+
 // "/left" of "/left/image_raw", and of "/left/image_raw/compressed".
 std::pair<std::string, std::string> split_topic(std::string topic) {
   for (const char* transport : {"/compressed", "/compressedDepth"})
@@ -60,13 +62,22 @@ void note_topics(const RigFile& file, const std::string& path, RigCalibration& c
       calibration.notes.push_back(path + ": " + used + " is calibrated as " + calibrated);
 }
 
-SE3 T_child_body(const std::filesystem::path& path, const RigFile::Odometry& odometry) {
-  if (odometry.T_child_body.empty()) return SE3::Identity();
-  const Eigen::Matrix4d T =
-      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(odometry.T_child_body.data());
+// Of 16 numbers or none.
+SE3 transform_of(const std::filesystem::path& path, const char* key,
+                 const std::vector<double>& numbers) {
+  if (numbers.empty()) return SE3::Identity();
+  const Eigen::Matrix4d T = Eigen::Map<const RowMajor4>(numbers.data());
   if (const auto problem = transform_problem(T))
-    throw ConfigError(path.string() + ": odometry.T_child_body" + *problem);
+    throw ConfigError(path.string() + ": " + key + *problem);
   return rigid_transform(T);
+}
+
+// The file may be read from elsewhere.
+void make_absolute(YAML::Node node, const std::filesystem::path& folder) {
+  if (!node) return;
+  if (node.IsScalar()) node = (folder / node.as<std::string>()).lexically_normal().string();
+  if (node.IsSequence())
+    for (YAML::Node part : node) make_absolute(part, folder);
 }
 
 }  // namespace
@@ -96,9 +107,10 @@ PartialRig read_rig_file(const std::filesystem::path& path, bool has_poses) {
                              .odometry = file.odometry.topic},
                   .sensors = std::move(calibration.rig),
                   .depth_scale_m = file.depth.scale_m,
-                  .camera_time_offset_s = file.camera_time_offset_s.value_or(
+                  .camera_time_offset_s = file.correction.camera_time_offset_s.value_or(
                       calibration.image_time_offset_s.value_or(0.0)),
-                  .T_child_body = T_child_body(path, file.odometry),
+                  .T_child_body =
+                      transform_of(path, "odometry.T_child_body", file.odometry.T_child_body),
                   .notes = std::move(calibration.notes)},
           .has_cameras = calibration.has_cameras,
           .is_placed = calibration.is_placed,
@@ -106,7 +118,35 @@ PartialRig read_rig_file(const std::filesystem::path& path, bool has_poses) {
           .info_topics = {info_topic(file.left), info_topic(file.right)},
           .images = {images_of(file.left), images_of(file.right)},
           .body_frame = file.body_frame,
+          .T_body_rig = transform_of(path, "T_body_rig", file.correction.T_body_rig),
           .pose_file = file.odometry.file.value_or("")};
+}
+
+RigCorrection read_rig_correction(const std::filesystem::path& path) {
+  ConfigProblems problems;
+  const ConfigContext context{problems, std::filesystem::absolute(path).parent_path()};
+  RigCorrectionFile file;
+  fill_config(read_section(load_yaml(path), "", path.string(), context), "", context, file);
+  problems.finish();
+  return {file.camera_time_offset_s.value_or(0.0),
+          transform_of(path, "T_body_rig", file.T_body_rig)};
+}
+
+std::string corrected_rig_text(const std::filesystem::path& base, const RigCorrection& correction) {
+  YAML::Node root;
+  if (!base.empty()) {
+    root = load_yaml(base);
+    const std::filesystem::path folder = std::filesystem::absolute(base).parent_path();
+    if (!root["calibration"].IsMap()) make_absolute(root["calibration"], folder);
+    if (root["odometry"]) make_absolute(root["odometry"]["file"], folder);
+  }
+  root["camera_time_offset_s"] = correction.camera_time_offset_s;
+  const RowMajor4 T = correction.T_body_rig.matrix();
+  root["T_body_rig"] = std::vector<double>(T.data(), T.data() + T.size());
+  root["T_body_rig"].SetStyle(YAML::EmitterStyle::Flow);
+  YAML::Emitter text;
+  text << root;
+  return std::string(text.c_str()) + '\n';
 }
 
 std::string camera_info_beside(const std::string& topic) {

@@ -8,8 +8,27 @@
 #include "modules/core/calibration_limits.hpp"
 #include "modules/core/config.hpp"
 #include "modules/sensors/rig_completion.hpp"
+#include "modules/sensors/rig_correction.hpp"
 
 namespace km {
+
+/// What a calibration is off by, in a file.
+struct RigCorrectionFile {
+  std::optional<double> camera_time_offset_s;
+  std::vector<double> T_body_rig;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("camera_time_offset_s", camera_time_offset_s, kTimeOffset_s,
+                  "[s] added to the stamps of images: they are then those of the IMU; none: as the "
+                  "calibration says, or 0");
+    visitor.field(
+        "T_body_rig", T_body_rig, {-1e3, 1e3},
+        "[m] 16 numbers, row by row: poses of the cameras in the body are this times those "
+        "of the calibration; empty: they are right");
+    visitor.check(T_body_rig.empty() || T_body_rig.size() == 16, "T_body_rig",
+                  "has not 16 numbers");
+  }
+};
 
 /// What a user says of the sensors in a recording, or of a live robot: which topics they are, and
 /// where their calibration is.
@@ -92,7 +111,7 @@ struct RigFile {
   Odometry odometry;
   std::vector<std::filesystem::path> calibration;
   std::string body_frame;
-  std::optional<double> camera_time_offset_s;
+  RigCorrectionFile correction;
   bool has_poses = false;  ///< An odometry that the file need not name.
 
   void visit_fields(auto& visitor) {
@@ -110,9 +129,7 @@ struct RigFile {
         "body_frame", body_frame,
         "frame of the inertial sensor in /tf_static; empty: that of its messages, or without "
         "them the child frame of the odometry");
-    visitor.field("camera_time_offset_s", camera_time_offset_s, kTimeOffset_s,
-                  "[s] added to the stamps of images: they are then those of the IMU; none: as the "
-                  "calibration says, or 0");
+    correction.visit_fields(visitor);
     visitor.required({"left"});
     visitor.check(
         !imu.topic.empty() || !imu.gyro_topic.empty() || !odometry.topic.empty() ||
@@ -131,6 +148,16 @@ struct RigFile {
 /// the file's. Throws ConfigError with every problem by file and line, and DatasetError for a
 /// calibration that cannot be used.
 [[nodiscard]] PartialRig read_rig_file(const std::filesystem::path& file, bool has_poses = false);
+
+/// Reads a file that has nothing but RigCorrectionFile's keys, for a recording that tells the rest.
+/// Errors as above.
+[[nodiscard]] RigCorrection read_rig_correction(const std::filesystem::path& file);
+
+/// The text of a rig file that says what `correction` does; all else is as in the rig file `base`,
+/// wherever it is read from. With an empty path it is one for read_rig_correction(). Comments are
+/// not kept. Throws ConfigError if `base` cannot be read.
+[[nodiscard]] std::string corrected_rig_text(const std::filesystem::path& base,
+                                             const RigCorrection& correction);
 
 /// Where drivers tell the camera of a topic of images: "/left/camera_info" of "/left/image_raw" and
 /// of "/left/image_raw/compressed".

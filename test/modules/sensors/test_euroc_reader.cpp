@@ -181,6 +181,26 @@ TEST_CASE("Where there is another odometry, a recording needs no inertial sensor
   CHECK(reader.report().empty());
 }
 
+TEST_CASE("A correction moves the stamps of images and the cameras", "[sensors]") {
+  const EurocFolder folder;
+  folder.add_depth();
+  EurocReader right = open_euroc(folder.root());
+  const RigCorrection correction{0.0125, make_pose(Eigen::Matrix3d::Identity(), {0.1, 0.2, 0.3})};
+  EurocReader corrected = open_euroc(folder.root(), {.correction = correction, .depth = true});
+  const auto packets = packets_of(corrected), unmoved = packets_of(right);
+  REQUIRE(packets.size() == EurocFolder::kPairs);
+  for (std::size_t k = 0; k < packets.size(); ++k) {
+    CHECK(packets[k].frame->stamp == EurocFolder::image_stamp(static_cast<int>(k)) + 12'500'000);
+    CHECK(packets[k].imu.back().stamp >= packets[k].frame->stamp);
+    CHECK(packets[k].frame->left.pixels == unmoved[k].frame->left.pixels);
+    CHECK(packets[k].frame->depth != nullptr);
+  }
+  for (const std::size_t c : {0U, 1U})
+    CHECK(corrected.rig().stereo.cameras[c].T_body_cam.isApprox(
+        correction.T_body_rig * right.rig().stereo.cameras[c].T_body_cam));
+  CHECK(open_euroc(folder.root(), {.from_s = 0.1, .correction = correction}).pair_count() == 6);
+}
+
 TEST_CASE("Lists without a usable row are refused", "[sensors]") {
   const EurocFolder folder;
   SECTION("images") {

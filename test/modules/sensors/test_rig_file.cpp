@@ -1,5 +1,8 @@
 #include <catch2/catch.hpp>
 
+#include <sstream>
+
+#include "modules/core/lie.hpp"
 #include "modules/sensors/rig_file_codec.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 
@@ -109,6 +112,50 @@ TEST_CASE("A rig file needs no inertial sensor beside an odometry named elsewher
                                    recording.root().string() + "\n");
   CHECK_THROWS_WITH(read_rig_file(file), Contains("--odometry FILE"));
   CHECK(read_rig_file(file, true).is_complete());
+}
+
+const RigCorrection kCorrection{0.0123456789,
+                                make_pose(so3_exp({0.02, -0.01, 0.03}), {0.004, -0.005, 0.006})};
+
+TEST_CASE("A rig with a correction is the rig file's with it", "[sensors]") {
+  const EurocFolder recording;
+  const TemporaryFolder folder, elsewhere;
+  std::filesystem::create_directory_symlink(recording.root(), folder.path() / "recording");
+  const bool is_inline = GENERATE(false, true);
+  CAPTURE(is_inline);
+  std::string text = kTopics;
+  if (is_inline) {
+    text += "calibration:\n";
+    std::istringstream lines(kChain);
+    for (std::string line; std::getline(lines, line);) text += "  " + line + '\n';
+  } else {
+    text += "calibration: recording\ncamera_time_offset_s: -0.003\n";
+  }
+  const auto base = folder.write("rig.yaml", text);
+  CHECK(read_rig_file(base).T_body_rig.isApprox(SE3::Identity()));
+  const std::string corrected = corrected_rig_text(base, kCorrection);
+  const PartialRig rig = read_rig_file(elsewhere.write("rig_estimated.yaml", corrected));
+  CHECK(rig.rig.camera_time_offset_s == kCorrection.camera_time_offset_s);
+  CHECK(rig.T_body_rig.isApprox(kCorrection.T_body_rig, 1e-9));
+  CHECK(rig.rig.topics.right == "/cam1");
+  CHECK(rig.rig.sensors.stereo.cameras[1].width == (is_inline ? 640 : 32));
+  // Once more, from the file that was written.
+  CHECK(corrected_rig_text(elsewhere.path() / "rig_estimated.yaml", kCorrection) == corrected);
+}
+
+TEST_CASE("A recording that tells its rig takes a correction alone", "[sensors]") {
+  const TemporaryFolder folder;
+  const auto file = folder.write("rig.yaml", corrected_rig_text("", kCorrection));
+  const RigCorrection read = read_rig_correction(file);
+  CHECK(read.camera_time_offset_s == kCorrection.camera_time_offset_s);
+  CHECK(read.T_body_rig.isApprox(kCorrection.T_body_rig, 1e-9));
+  CHECK_THROWS_WITH(read_rig_correction(folder.write("topics.yaml", kTopics)),
+                    Contains("topics.yaml:1: unknown key left"));
+  CHECK_THROWS_WITH(read_rig_correction(folder.write("short.yaml", "T_body_rig: [1, 0, 0]\n")),
+                    Contains("has not 16 numbers"));
+  const std::string scaled = "T_body_rig: [2,0,0,0, 0,2,0,0, 0,0,2,0, 0,0,0,1]\n";
+  CHECK_THROWS_WITH(read_rig_correction(folder.write("scaled.yaml", scaled)),
+                    Contains("scaled.yaml: T_body_rig"));
 }
 
 TEST_CASE("What a rig file does not tell is asked of topics", "[sensors]") {
