@@ -206,7 +206,7 @@ log::Level level_of(const std::string& name) {
 // robot of 100 s without a map occupies 112 MB instead of 142.
 void give_memory_back() {
 #ifdef __GLIBC__
-  constexpr int kLarge_bytes = 256 << 10;
+  constexpr int kLarge_bytes = 96 << 10;
   mallopt(M_MMAP_THRESHOLD, kLarge_bytes);
   mallopt(M_TRIM_THRESHOLD, kLarge_bytes);
 #endif

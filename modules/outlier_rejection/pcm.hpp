@@ -37,8 +37,9 @@ void check_usable(const Closure& closure, RobotId a, RobotId b);
 /// thread-safe. Copyable.
 class Pcm {
  public:
-  /// Bounds the memory that a flood of closures can take: 30 MB.
-  static constexpr std::size_t kMaxClosures = 10000;
+  /// Bounds the memory that a flood of closures can take, here and wherever else they are kept:
+  /// less than 64 MB of a robot's in all (test/endure floods).
+  static constexpr std::size_t kMaxClosures = 6000;
 
   /// For the closures between robots `a` and `b`; equal: those inside one robot.
   /// Throws ConfigError if `config` is out of bounds.

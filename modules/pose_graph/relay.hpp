@@ -51,7 +51,7 @@ class Relay {
 
   /// Of all that one robot hands over so much is held [octets in memory]; what is beyond is not
   /// taken. Statuses, sessions and public poses of a thousand keyframes of a hundred robots fit.
-  static constexpr std::size_t kMaxHeldFromOne = 8U << 20U;
+  static constexpr std::size_t kMaxHeldFromOne = 4U << 20U;
 
   /// `peer` is heard directly from now on, or no more.
   void link_up(TeamPeer peer, double now_s);
