@@ -163,6 +163,7 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
   locate_landmarks();
   update.solution = optimize(window_, config_.iterations);
   update.outliers = reject_outliers();
+  if (!newest.imu->rests()) compare_gyro();
   update.state = newest.state;
   update.keyframe = newest.keyframe;
   update.landmarks = static_cast<int>(std::count_if(
@@ -200,7 +201,9 @@ bool FixedLagSmoother::share_samples() {
 bool FixedLagSmoother::set_imu(std::size_t frame) {
   const WindowFrame& before = window_.frames[frame - 1];
   WindowFrame& f = window_.frames[frame];
-  ImuPreintegration imu(noise_, before.state.gyro_bias, before.state.accel_bias);
+  ImuNoise noise = noise_;
+  noise.gyro_noise_density *= gyro_noise_.scale();
+  ImuPreintegration imu(noise, before.state.gyro_bias, before.state.accel_bias);
   std::vector<ImuSample> held;  // the last sample, until those after it have come
   std::span<const ImuSample> samples = f.samples;
   if (frame + 1 == window_.frames.size() && !samples.empty() &&
@@ -214,6 +217,16 @@ bool FixedLagSmoother::set_imu(std::size_t frame) {
   f.imu = covered ? ImuFactor::of(imu, config_.gravity_mps2) : std::nullopt;
   if (f.imu) f.gyro = gyro_at(samples, f.instant());
   return f.imu.has_value();
+}
+
+void FixedLagSmoother::compare_gyro() {
+  const WindowFrame& newest = window_.frames.back();
+  const WindowFrame& before = window_.frames[window_.frames.size() - 2];
+  const ImuPreintegration& imu = newest.imu->imu();
+  const SE3 by_samples = predict(before.state, imu, config_.gravity_mps2).T_odom_body;
+  const double scale = gyro_noise_.scale();
+  gyro_noise_.add(angle_of(by_samples.linear().transpose() * newest.state.T_odom_body.linear()),
+                  imu.covariance().topLeftCorner<3, 3>().trace() / (scale * scale), imu.dt_s());
 }
 
 std::size_t FixedLagSmoother::keyframes() const {

@@ -6,6 +6,7 @@
 
 #include "modules/core/camera.hpp"
 #include "modules/core/covariance.hpp"
+#include "modules/vio/gyro_noise_scale.hpp"
 #include "modules/vio/tracked_frame.hpp"
 #include "modules/vio/vio_config.hpp"
 #include "modules/vio/window.hpp"
@@ -80,6 +81,9 @@ class FixedLagSmoother {
   /// The current estimate with its marginal covariance; what the rig says if it is not estimated.
   [[nodiscard]] UncertainCalibration calibration() const;
 
+  /// Of the gyroscope, beyond VioConfig::gyro_noise_factor.
+  [[nodiscard]] double gyro_noise_scale() const { return gyro_noise_.scale(); }
+
   /// True if the image at `stamp` will not be in the window any more after the next add().
   [[nodiscard]] bool leaving(Stamp stamp) const;
 
@@ -92,6 +96,7 @@ class FixedLagSmoother {
   void rest_out(std::size_t frame);
   [[nodiscard]] bool share_samples();
   [[nodiscard]] bool set_imu(std::size_t frame);
+  void compare_gyro();
   void decide_keyframe();
   int reject_outliers();
   void locate_landmarks();
@@ -107,6 +112,7 @@ class FixedLagSmoother {
 
   VioConfig config_;
   ImuNoise noise_;
+  GyroNoiseScale gyro_noise_;
   double focal_px_;
   Eigen::Matrix3d R_cam_body_;
   Window window_;

@@ -58,7 +58,7 @@ struct VioConfig {
                   "[px] observations farther from their landmark are dropped");
     visitor.field("gyro_noise_factor", gyro_noise_factor, {0.1, 1e3},
                   "on the sensor's noise density: vibration, imperfect time stamps and calibration "
-                  "add to it");
+                  "add to it; where images contradict it, up to four times as much");
     visitor.field("accel_noise_factor", accel_noise_factor, {0.1, 1e3}, "the same");
     visitor.field("gravity_mps2", gravity_mps2, {9.7, 9.9}, "[m/s^2] where the robots are");
     visitor.field("accel_bias_sigma", accel_bias_sigma, {1e-4, 5.0},

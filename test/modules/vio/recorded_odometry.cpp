@@ -121,6 +121,7 @@ OdometryErrors odometry_errors(std::span<const OdometryState> states, std::span<
   for (std::size_t k = 0; k < states.size(); ++k) {
     const Stamp stamp = states[k].stamp;
     const SE3& T = states[k].T_odom_body;
+    if (truth[k].matrix().hasNaN()) continue;
     estimated.push_back({stamp, T});
     true_poses.push_back({stamp, truth[k]});
     pairs.push_back({stamp, truth[k], T});
@@ -134,7 +135,7 @@ OdometryErrors odometry_errors(std::span<const OdometryState> states, std::span<
       .max_m = error.position_m.max,
       .rpe_m = error.rpe_translation_m.rmse,
       .rpe_deg = error.rpe_rotation_deg.rmse,
-      .tilt_deg = 180.0 / std::numbers::pi * std::sqrt(tilt / static_cast<double>(states.size())),
+      .tilt_deg = 180.0 / std::numbers::pi * std::sqrt(tilt / static_cast<double>(pairs.size())),
       .scale = align(pairs, true).scale};
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <limits>
 #include <map>
 #include <numbers>
 
@@ -113,8 +114,11 @@ Recording read_recording(const std::filesystem::path& folder, double from_s, dou
   Recording result;
   result.rig = reader.rig();
   const auto truth = read_trajectory(folder / "mav0/state_groundtruth_estimate0");
+  const Eigen::Matrix4d unknown =
+      Eigen::Matrix4d::Constant(std::numeric_limits<double>::quiet_NaN());
   while (auto packet = reader.next()) {
-    result.T_world_body.push_back(pose_at(truth, packet->frame->stamp, 0.1, 0.0).value());
+    result.T_world_body.push_back(
+        pose_at(truth, packet->frame->stamp, 0.1, 0.0).value_or(SE3(unknown)));
     result.packets.push_back(std::move(*packet));
   }
   return result;

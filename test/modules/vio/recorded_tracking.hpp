@@ -13,7 +13,7 @@ namespace km {
 struct Recording {
   SensorRig rig;
   std::vector<SensorPacket> packets;
-  std::vector<SE3> T_world_body;
+  std::vector<SE3> T_world_body;  ///< NaN where the truth has a gap.
 };
 
 /// Images of `folder` (EuRoC) from `from_s` to `to_s`, with poses of its groundtruth_tum.txt.

@@ -398,6 +398,26 @@ void add_inertial_noise(std::vector<InertialFrame>& frames, const VioConfig& con
     }
 }
 
+TEST_CASE("A gyroscope that is noisier than assumed is trusted less", "[vio]") {
+  const auto scale_with = [](double factor) {
+    const VioConfig config = gaussian_config();
+    VioConfig noisy = config;
+    noisy.gyro_noise_factor *= factor;
+    std::mt19937 rng(5);
+    SyntheticWorld world({}, 6, 40);
+    std::vector<InertialFrame> frames = world.frames(100, 0.5);
+    add_inertial_noise(frames, noisy, rng);
+    FixedLagSmoother smoother(synthetic_rig(), config);
+    REQUIRE(smoother.start(std::span(frames).first(kStartImages), world.states(kStartImages)));
+    for (std::size_t k = kStartImages; k < frames.size(); ++k) (void)smoother.add(frames[k]);
+    return smoother.gyro_noise_scale();
+  };
+  CHECK(scale_with(1.0) == 1.0);
+  const double tenfold = scale_with(10.0);
+  CHECK(tenfold > 2.0);
+  CHECK(tenfold <= GyroNoiseScale::kMost);
+}
+
 TEST_CASE("States err as their covariance says", "[vio]") {
   // Noise in images and samples, and biases off their guess, all as modelled. Mean of chi-squared
   // with 11 degrees of freedom over 20 runs: 11 with a standard deviation of 1.05.
