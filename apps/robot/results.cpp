@@ -123,6 +123,18 @@ CamerasSummary cameras_of(const UncertainCalibration& known) {
           .translation_sigma_m = sigma(known.covariance.block<3, 3>(4, 4))};
 }
 
+OdometrySummary odometry_of(const VioStatistics& met) {
+  const auto count = [](int value) { return static_cast<std::uint64_t>(value); };
+  return {.starts = count(met.starts),
+          .divergences = count(met.divergences),
+          .inertial_gaps = count(met.gaps),
+          .refused_images = count(met.refused_images),
+          .refused_samples = count(met.refused_samples),
+          .images_without_pose = count(met.images_without_pose),
+          .vision_losses = count(met.vision_losses),
+          .blind_seconds = met.blind_s};
+}
+
 // TUM: "time[s] tx ty tz qx qy qz qw", nine decimals of seconds.
 void write_poses(std::ostream& out, const std::vector<StampedPose>& poses) {
   for (const StampedPose& pose : poses) {
@@ -172,6 +184,7 @@ RunSummary summary_of(const RunRecord& record) {
                  .anchor = progress.anchor,
                  .settled = progress.settled,
                  .members = progress.members};
+  if (record.odometry_statistics()) summary.odometry = odometry_of(*record.odometry_statistics());
   if (record.calibration()) summary.cameras = cameras_of(*record.calibration());
   if (record.dense_sensing()) summary.mapping = map_counts(record);
   return summary;

@@ -22,6 +22,7 @@
 #include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/vio/camera_calibration.hpp"
+#include "modules/vio/vio_statistics.hpp"
 #include "runtime/dds/peer_table.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
@@ -38,6 +39,7 @@ class RunRecord {
   void add(const OdometryState& state);  ///< Replaces those of this instant and later.
   void add(const KeyframeOdometry& keyframe);
   void add(const UncertainCalibration& calibration) { calibration_ = calibration; }
+  void add(const VioStatistics& statistics) { odometry_statistics_ = statistics; }
   void add(const Keyframe& keyframe);  ///< Of this robot: what depth it sees.
   void add(const Closure& closure);
   void add(const InlierSet& set);  ///< Kept if newer than the pair's last.
@@ -68,6 +70,10 @@ class RunRecord {
   [[nodiscard]] std::size_t keypoints() const { return keypoints_; }
 
   /// Of the cameras, as known last; absent where it is not estimated.
+  /// As of the last event; none with an odometry from outside.
+  [[nodiscard]] const std::optional<VioStatistics>& odometry_statistics() const {
+    return odometry_statistics_;
+  }
   [[nodiscard]] const std::optional<UncertainCalibration>& calibration() const {
     return calibration_;
   }
@@ -117,6 +123,7 @@ class RunRecord {
   std::vector<StampedPose> odometry_;
   std::vector<KeyframeOdometry> keyframes_;
   std::optional<UncertainCalibration> calibration_;
+  std::optional<VioStatistics> odometry_statistics_;
   std::map<std::uint32_t, double> median_depths_m_;  // by keyframe
   std::size_t keypoints_ = 0;
   std::map<ClosureId, Closure> closures_;

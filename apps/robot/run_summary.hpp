@@ -146,6 +146,29 @@ struct CamerasSummary {
   bool operator==(const CamerasSummary&) const = default;
 };
 
+/// What odometry by cameras and inertial sensor met with.
+struct OdometrySummary {
+  std::uint64_t starts = 0;         ///< More than one: it began anew on the way.
+  std::uint64_t divergences = 0;    ///< New starts because the estimate was impossible.
+  std::uint64_t inertial_gaps = 0;  ///< Times without samples for more than vio.max_imu_gap_s.
+  std::uint64_t refused_images = 0, refused_samples = 0;
+  std::uint64_t images_without_pose = 0;
+  std::uint64_t vision_losses = 0;  ///< Times that too little was seen to hold the pose.
+  double blind_seconds = 0.0;       ///< Time of them.
+
+  void visit_fields(auto& visitor) {
+    visitor.field("starts", starts);
+    visitor.field("divergences", divergences);
+    visitor.field("inertial_gaps", inertial_gaps);
+    visitor.field("refused_images", refused_images);
+    visitor.field("refused_samples", refused_samples);
+    visitor.field("images_without_pose", images_without_pose);
+    visitor.field("vision_losses", vision_losses);
+    visitor.field("blind_seconds", blind_seconds);
+  }
+  bool operator==(const OdometrySummary&) const = default;
+};
+
 /// What a robot's run came to: summary.json, and the robot's part of a team's --json. The names in
 /// visit_fields are the keys; they are written and read in this order. An absent optional has no
 /// key; NaN is written as null.
@@ -158,6 +181,7 @@ struct RunSummary {
   std::uint64_t frames_skipped = 0;  ///< Pairs that odometry was too slow for.
   ClosureCounts closures;            ///< That this robot found.
   OptimizerSummary pgo;
+  std::optional<OdometrySummary> odometry;       ///< Absent with an odometry from outside.
   std::optional<CamerasSummary> cameras;         ///< Absent without vio.calibrate.
   std::optional<MappingSummary> mapping;         ///< Absent where mapping is off.
   std::map<std::string, std::uint64_t> traffic;  ///< Bytes sent, by category.
@@ -179,6 +203,7 @@ struct RunSummary {
     visitor.field("frames_skipped", frames_skipped);
     visitor.field("closures", closures);
     visitor.field("pgo", pgo);
+    visitor.field("odometry", odometry);
     visitor.field("cameras", cameras);
     visitor.field("mapping", mapping);
     visitor.field("traffic", traffic);

@@ -150,7 +150,8 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
                            .odometry = topics_.odometry,
                            .keyframes = topics_.keyframe_odometry,
                            .frames = topics_.located_frames,
-                           .calibration = topics_.camera_calibration};
+                           .calibration = topics_.camera_calibration,
+                           .statistics = topics_.odometry_statistics};
   if (gives_poses)
     add_odometry<OutsideOdometryNode>(rig.stereo.depth_source, config.vio, odometry);
   else
@@ -359,6 +360,7 @@ void Robot::add_records() {
   recorder_->record(topics_.odometry);
   recorder_->record(topics_.keyframe_odometry);
   recorder_->record(topics_.camera_calibration);
+  recorder_->record(topics_.odometry_statistics);
   recorder_->record(topics_.keyframes);
   recorder_->record(topics_.closure_restarts);
   recorder_->record(topics_.closures);

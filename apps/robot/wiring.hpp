@@ -48,6 +48,7 @@ struct Topics {
   Topic<Keyframe> new_keyframes, keyframes;  // the latter: those that are on the disk
   Topic<LocatedFrame> located_frames;
   Topic<UncertainCalibration> camera_calibration;
+  Topic<VioStatistics> odometry_statistics;
   Topic<DenseFrame> dense_frames;
   Topic<DenseSensingProgress> dense_sensing_progress;
   Topic<MapMesh> maps;

@@ -166,8 +166,11 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
   if (!newest.imu->rests()) compare_gyro();
   update.state = newest.state;
   update.keyframe = newest.keyframe;
-  update.landmarks = static_cast<int>(std::count_if(
-      window_.landmarks.begin(), window_.landmarks.end(), [](const auto& l) { return l.located; }));
+  for (const WindowLandmark& landmark : window_.landmarks) {
+    if (!landmark.located) continue;
+    ++update.landmarks;
+    update.seen += tracked_now(window_, landmark);
+  }
   return update;
 }
 

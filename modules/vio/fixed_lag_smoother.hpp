@@ -26,6 +26,7 @@ struct SmootherUpdate {
   OdometryState state;  ///< Of the newest image.
   bool keyframe = false;
   int landmarks = 0;  ///< That took part.
+  int seen = 0;       ///< Of them in this image.
   int outliers = 0;   ///< Observations dropped.
   WindowSolution solution;
 };

@@ -59,6 +59,7 @@ VioResult Vio::process(const SensorPacket& packet) {
   Held held{{{}, samples.value_or(std::vector<ImuSample>{})}, frame};
   held.data.tracked = tracker_.track(*frame, turn(held.data.samples, before, frame->stamp));
   result.tracking = tracker_.statistics();
+  const int features = static_cast<int>(held.data.tracked.features.size());
   const bool first = !last_image_.has_value();
   last_image_ = frame->stamp;
   while (samples_.size() > 1 && samples_[1].stamp <= frame->stamp) samples_.erase(samples_.begin());
@@ -76,6 +77,7 @@ VioResult Vio::process(const SensorPacket& packet) {
     try_start(result);
   }
   if (!result.states.empty()) last_ = result.states.back();
+  watch_vision(frame->stamp, features, result);
   return result;
 }
 
@@ -219,6 +221,17 @@ void Vio::advance(const Held& held, VioResult& result) {
   if (result.smoother->keyframe && (last_chance || due(result.smoother->state, *held.frame)))
     hand_on(result.smoother->state, result);
   locate(result.smoother->state, held.frame, result);
+}
+
+// A start is made on what is seen.
+void Vio::watch_vision(Stamp stamp, int features, VioResult& result) {
+  const bool has_started = result.start && started(*result.start);
+  const int seen = has_started                   ? VisionWatch::kLeastSeen
+                   : result.smoother && running_ ? result.smoother->seen
+                                                 : 0;
+  result.vision = vision_.add(stamp, features, seen);
+  statistics_.vision_losses = vision_.losses();
+  statistics_.blind_s = vision_.lost_s();
 }
 
 bool Vio::plausible(const SmootherUpdate& update) const {

@@ -12,6 +12,8 @@
 #include "modules/vio/initialization.hpp"
 #include "modules/vio/rest_detector.hpp"
 #include "modules/vio/vio_config.hpp"
+#include "modules/vio/vio_statistics.hpp"
+#include "modules/vio/vision_watch.hpp"
 
 namespace km {
 
@@ -27,19 +29,6 @@ enum class VioProblem {
   kStartTimeout,  ///< Could not start: the oldest images held back are given up, without a pose.
 };
 
-/// Counts since construction.
-struct VioStatistics {
-  int images = 0;  ///< Accepted.
-  int refused_images = 0;
-  int refused_samples = 0;
-  int gaps = 0;
-  int divergences = 0;
-  int starts = 0;
-  int start_attempts = 0;
-  int rests = 0;                ///< Times that the body came to stand still.
-  int images_without_pose = 0;  ///< Given up: no start was possible with them.
-};
-
 /// What came out of one packet.
 struct VioResult {
   VioProblem problem = VioProblem::kNone;
@@ -49,6 +38,7 @@ struct VioResult {
   std::optional<StartStatus> start;         ///< Outcome, if a start was attempted.
   TrackerStatistics tracking;               ///< Of this image.
   std::optional<SmootherUpdate> smoother;   ///< Not before the start.
+  std::optional<VisionEvent> vision;        ///< Lost, or back.
 };
 
 /// Where an earlier process of the robot left off: at a keyframe, whose image is the first that
@@ -99,6 +89,7 @@ class Vio {
   void try_start(VioResult& result);
   void advance(const Held& held, VioResult& result);
   void restart(Held held);
+  void watch_vision(Stamp stamp, int features, VioResult& result);
   [[nodiscard]] bool plausible(const SmootherUpdate& update) const;
   void continue_from_last_pose(std::vector<OdometryState>& states) const;
   void take_up_or_hand_on_first(VioResult& result);
@@ -118,6 +109,7 @@ class Vio {
   FeatureTracker tracker_;
   FixedLagSmoother smoother_;
   RestDetector rest_detector_;
+  VisionWatch vision_;
   VioStatistics statistics_;
   std::vector<ImuSample> samples_;  // From the last one not after the last image on.
   std::optional<Stamp> last_image_;

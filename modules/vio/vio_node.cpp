@@ -1,5 +1,6 @@
 #include "modules/vio/vio_node.hpp"
 
+#include "modules/core/text_table.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -66,8 +67,9 @@ void VioNode::stop() noexcept {
   log::info(name()) << s.images << " images, " << s.images_without_pose << " without a pose, "
                     << s.starts << " starts in " << s.start_attempts << " attempts, "
                     << s.divergences << " divergences, " << s.gaps << " inertial gaps, " << s.rests
-                    << " rests; refused " << s.refused_images << " images, " << s.refused_samples
-                    << " samples";
+                    << " rests, vision lost " << s.vision_losses << " times, for "
+                    << fixed(s.blind_s, 1) << " s; refused " << s.refused_images << " images, "
+                    << s.refused_samples << " samples";
 }
 
 void VioNode::step(const SensorPacket& packet) {
@@ -76,13 +78,28 @@ void VioNode::step(const SensorPacket& packet) {
   for (const OdometryState& state : result.states) topics_.odometry.publish(state);
   for (const KeyframeOdometry& keyframe : result.keyframes) topics_.keyframes.publish(keyframe);
   for (const LocatedFrame& frame : result.frames) topics_.frames.publish(frame);
+  if (result.problem != VioProblem::kNone || result.start || result.vision ||
+      vio_.statistics().blind_s > blind_s_)
+    topics_.statistics.publish(vio_.statistics());
+  blind_s_ = vio_.statistics().blind_s;
   if (calibrates_ && !result.keyframes.empty()) topics_.calibration.publish(vio_.calibration());
+}
+
+void VioNode::tell(const VisionEvent& event) const {
+  const std::string since = fixed(1e-9 * static_cast<double>(event.since), 3) + " s";
+  if (event.is_lost)
+    log::warn(name()) << "vision lost since " << since << ", " << event.features
+                      << " features: the pose is by inertial sensing alone";
+  else
+    log::info(name()) << "vision lost since " << since << " is back after "
+                      << fixed(event.lasted_s, 2) << " s, " << event.features << " features";
 }
 
 void VioNode::report(const VioResult& result, Stamp stamp) const {
   if (result.problem != VioProblem::kNone)
     log::limited(log::Level::kWarn, name(), text(result.problem))
         << "at " << stamp << " ns: " << text(result.problem);
+  if (result.vision) tell(*result.vision);
   if (!result.start) return;
   if (*result.start == StartStatus::kGoesOn)
     log::info(name()) << text(*result.start);

@@ -18,6 +18,7 @@ struct VioTopics {
   Out<KeyframeOdometry> keyframes;        ///< Indices without gaps.
   Out<LocatedFrame> frames;               ///< One per image, after its keyframe.
   Out<UncertainCalibration> calibration;  ///< With each keyframe, where it is estimated.
+  Out<VioStatistics> statistics;          ///< When something has happened, and while blind.
 };
 
 /// Stereo-inertial odometry as a thread: one Vio. A full queue holds the sensors up.
@@ -44,10 +45,12 @@ class VioNode final : public Node {
 
  private:
   void report(const VioResult& result, Stamp stamp) const;
+  void tell(const VisionEvent& event) const;
 
   Vio vio_;
   const VioTopics topics_;
   const bool calibrates_;
+  double blind_s_ = 0.0;
   bool stopped_ = false;
   Worker<Topic<SensorPacket>::Message> worker_;  // last member: stops first
 };

@@ -218,6 +218,7 @@ TEST_CASE("The odometry node publishes what odometry gives, in order of time", "
   Topic<KeyframeOdometry> keyframes;
   Topic<LocatedFrame> frames;
   Topic<UncertainCalibration> calibrations;
+  Topic<VioStatistics> statistics;
   std::vector<Stamp> stamps;  // of the node's thread, read after it has ended
   std::vector<std::uint32_t> indices;
   std::vector<LocatedFrame> located;
@@ -231,7 +232,8 @@ TEST_CASE("The odometry node publishes what odometry gives, in order of time", "
                 .odometry = odometry,
                 .keyframes = keyframes,
                 .frames = frames,
-                .calibration = calibrations});
+                .calibration = calibrations,
+                .statistics = statistics});
   node.start();
   for (std::size_t k = 0; k < 40; ++k) packets.publish(data->packets[k]);
   node.stop();  // drains the queue

@@ -1,0 +1,58 @@
+#include <catch2/catch.hpp>
+#include <vector>
+
+#include "modules/vio/vision_watch.hpp"
+
+namespace km {
+namespace {
+
+constexpr Stamp kStart = 7'000'000'000, kPeriod = 50'000'000;
+
+// The events of images in a row, each with the landmarks that it sees.
+struct Watched {
+  VisionWatch watch = {};
+  Stamp stamp = kStart;
+  std::vector<VisionEvent> events = {};
+
+  void add(int images, int seen) {
+    for (int k = 0; k < images; ++k, stamp += kPeriod)
+      if (const auto event = watch.add(stamp, 2 * seen + 1, seen)) events.push_back(*event);
+  }
+};
+
+TEST_CASE("A loss of vision is told with its first image, and its end", "[vio][vision]") {
+  Watched run;
+  run.add(20, 50);
+  run.add(100, 3);
+  REQUIRE(run.events.size() == 1);
+  CHECK(run.events[0].is_lost);
+  CHECK(run.events[0].since == kStart + 20 * kPeriod);
+  CHECK(run.events[0].lasted_s == Approx(VisionWatch::kPatience_s));
+  CHECK(run.events[0].features == 7);
+  CHECK(run.watch.is_lost());
+  CHECK(run.watch.lost_s() == Approx(99 * 0.05));
+  run.add(20, 50);
+  REQUIRE(run.events.size() == 2);
+  CHECK(!run.events[1].is_lost);
+  CHECK(run.events[1].lasted_s == Approx(5.0));
+  CHECK(!run.watch.is_lost());
+  run.add(40, 0);
+  CHECK(run.watch.losses() == 2);
+  CHECK(run.watch.lost_s() == Approx(5.0 + 39 * 0.05));
+}
+
+TEST_CASE("An image or two without landmarks are no loss, nor is what was never seen",
+          "[vio][vision]") {
+  Watched run;
+  run.add(100, 0);
+  CHECK(run.events.empty());
+  for (int k = 0; k < 20; ++k) {
+    run.add(1, VisionWatch::kLeastSeen);
+    run.add(5, VisionWatch::kLeastSeen - 1);
+  }
+  CHECK(run.events.empty());
+  CHECK(run.watch.lost_s() == 0.0);
+}
+
+}  // namespace
+}  // namespace km
