@@ -57,6 +57,11 @@ constexpr double kMostOffsetStep = 0.25;  // of the time between two images
 
 constexpr double kHeldPosition_m = 1e-3;  // of the first state: fixes the gauge, no more
 constexpr double kHeldHeading_rad = 1e-3;
+// Noise of samples that are interpolated over a gap, so weak that the images tell the motion: after
+// 0.5 s 0.35 rad and 1.4 m/s.
+constexpr double kBridgeGyro = 0.5;   // [rad/s/sqrt(Hz)]
+constexpr double kBridgeAccel = 2.0;  // [m/s^2/sqrt(Hz)]
+
 constexpr double kGyroBiasSigma = 0.02;  // around the guess of the start [rad/s]
 
 // Rows that hold heading, the rotation about the vertical as seen from the body, and position.
@@ -163,7 +168,7 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
   locate_landmarks();
   update.solution = optimize(window_, config_.iterations);
   update.outliers = reject_outliers();
-  if (!newest.imu->rests()) compare_gyro();
+  if (!newest.imu->rests() && !newest.is_bridged) compare_gyro();
   update.state = newest.state;
   update.keyframe = newest.keyframe;
   for (const WindowLandmark& landmark : window_.landmarks) {
@@ -183,6 +188,7 @@ bool FixedLagSmoother::append(const InertialFrame& frame, OdometryState state, d
   const std::size_t now = window_.frames.size() - 1;
   if (now == 0) return true;
   added.samples = frame.samples;
+  added.is_bridged = frame.is_bridged;
   return window_.calibrates ? share_samples() && set_imu(now) : set_imu(now);
 }
 
@@ -206,6 +212,10 @@ bool FixedLagSmoother::set_imu(std::size_t frame) {
   WindowFrame& f = window_.frames[frame];
   ImuNoise noise = noise_;
   noise.gyro_noise_density *= gyro_noise_.scale();
+  if (f.is_bridged) {
+    noise.gyro_noise_density = std::max(noise.gyro_noise_density, kBridgeGyro);
+    noise.accel_noise_density = std::max(noise.accel_noise_density, kBridgeAccel);
+  }
   ImuPreintegration imu(noise, before.state.gyro_bias, before.state.accel_bias);
   std::vector<ImuSample> held;  // the last sample, until those after it have come
   std::span<const ImuSample> samples = f.samples;
@@ -455,6 +465,7 @@ bool FixedLagSmoother::merge_out(std::size_t frame) {
   std::vector<ImuSample>& later = window_.frames[frame + 1].samples;
   later = joined(window_.frames[frame].samples, later, window_.frames[frame - 1].instant(),
                  window_.frames[frame + 1].instant());
+  window_.frames[frame + 1].is_bridged |= window_.frames[frame].is_bridged;
   forget_frame(window_, frame);
   return set_imu(frame);
 }

@@ -19,6 +19,7 @@ namespace km {
 struct InertialFrame {
   TrackedFrame tracked;
   std::vector<ImuSample> samples;
+  bool is_bridged = false;  ///< Between some samples nobody knows what was.
 };
 
 /// What one image did to the smoother.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "modules/core/covariance.hpp"
@@ -21,6 +22,19 @@ constexpr double kMaxCostPerObservation = 100.0;  // a fit has less than 1
 constexpr std::ptrdiff_t kSeenFeatures = 40;
 constexpr std::ptrdiff_t kFewOfSeen = 4;  // a quarter
 constexpr int kMostUnlocatedImages = 10;
+
+// Features, and time, with which images alone carry the pose over a gap of inertial samples.
+constexpr int kLeastTracked = 30;
+constexpr double kLongestBridge_s = 3.0;
+
+// Between two samples; infinite without any.
+double longest_step_s(const std::vector<ImuSample>& samples) {
+  if (samples.empty()) return std::numeric_limits<double>::infinity();
+  double longest_s = 0.0;
+  for (std::size_t k = 1; k < samples.size(); ++k)
+    longest_s = std::max(longest_s, seconds_between(samples[k - 1].stamp, samples[k].stamp));
+  return longest_s;
+}
 
 constexpr double kLeastTiltSigma = 1e-4;  // [rad]; no inertial sensor knows better
 constexpr double kMostTiltSigma = 1.5;    // who is off by a right angle knows nothing
@@ -55,8 +69,8 @@ VioResult Vio::process(const SensorPacket& packet) {
   }
   ++statistics_.images;
   const Stamp before = last_image_.value_or(frame->stamp);
-  const auto samples = samples_since(before, frame->stamp);
-  Held held{{{}, samples.value_or(std::vector<ImuSample>{})}, frame};
+  Held held{{{}, samples_since(before, frame->stamp)}, frame};
+  const double gap_s = longest_step_s(held.data.samples);
   held.data.tracked = tracker_.track(*frame, turn(held.data.samples, before, frame->stamp));
   result.tracking = tracker_.statistics();
   const int features = static_cast<int>(held.data.tracked.features.size());
@@ -64,9 +78,12 @@ VioResult Vio::process(const SensorPacket& packet) {
   last_image_ = frame->stamp;
   while (samples_.size() > 1 && samples_[1].stamp <= frame->stamp) samples_.erase(samples_.begin());
 
-  if (!samples && !first) {
-    ++statistics_.gaps;
-    result.problem = VioProblem::kInertialGap;
+  held.data.is_bridged = !first && gap_s > config_.max_imu_gap_s;
+  statistics_.gaps += held.data.is_bridged && !in_gap_;
+  in_gap_ = held.data.is_bridged;
+  if (in_gap_) result.problem = VioProblem::kInertialGap;
+  if (in_gap_ && !takes_over(result.tracking, gap_s)) {
+    held.data.samples.clear();
     restart(std::move(held));
   } else if (first && goes_on_at(held)) {
     go_on(held, result);
@@ -97,22 +114,25 @@ int Vio::take_samples(const SensorPacket& packet) {
   return refused;
 }
 
-std::optional<std::vector<ImuSample>> Vio::samples_since(Stamp last, Stamp now) const {
+// Empty if they do not begin by `last`.
+std::vector<ImuSample> Vio::samples_since(Stamp last, Stamp now) const {
   std::vector<ImuSample> covering;
   for (std::size_t k = 0; k < samples_.size(); ++k) {
     const bool before = k + 1 < samples_.size() && samples_[k + 1].stamp <= last;
     const bool after = k > 0 && samples_[k - 1].stamp >= now;
     if (!before && !after) covering.push_back(samples_[k]);
   }
-  if (covering.empty() || covering.front().stamp > last) return std::nullopt;
+  if (covering.empty() || covering.front().stamp > last) return {};
   if (covering.back().stamp < now) {  // held: the last sample before the image is late
     covering.push_back(covering.back());
     covering.back().stamp = now;
   }
-  for (std::size_t k = 1; k < covering.size(); ++k)
-    if (seconds_between(covering[k - 1].stamp, covering[k].stamp) > config_.max_imu_gap_s)
-      return std::nullopt;
   return covering;
+}
+
+// Images, which go on over a gap of the samples, tell the motion.
+bool Vio::takes_over(const TrackerStatistics& tracking, double gap_s) const {
+  return running_ && tracking.tracked >= kLeastTracked && gap_s <= kLongestBridge_s;
 }
 
 Eigen::Matrix3d Vio::turn(const std::vector<ImuSample>& samples, Stamp from, Stamp to) const {

@@ -23,7 +23,9 @@ enum class VioProblem {
   kNoImage,         ///< The packet has none that fit the rig: inertial samples are kept.
   kUnorderedImage,  ///< Not later than the image before: dropped.
   kBadSamples,      ///< Some inertial samples are implausible or not in order: those are dropped.
-  kInertialGap,     ///< Too long without inertial samples: a new start from the last pose.
+  /// Too long without inertial samples: the images alone tell the motion, or, where they do not, a
+  /// new start from the last pose.
+  kInertialGap,
   /// The estimate was impossible, or had no place for what is seen: a new start from the last pose.
   kDiverged,
   kStartTimeout,  ///< Could not start: the oldest images held back are given up, without a pose.
@@ -81,7 +83,8 @@ class Vio {
   };
 
   int take_samples(const SensorPacket& packet);
-  [[nodiscard]] std::optional<std::vector<ImuSample>> samples_since(Stamp last, Stamp now) const;
+  [[nodiscard]] std::vector<ImuSample> samples_since(Stamp last, Stamp now) const;
+  [[nodiscard]] bool takes_over(const TrackerStatistics& tracking, double gap_s) const;
   [[nodiscard]] Eigen::Matrix3d turn(const std::vector<ImuSample>& samples, Stamp from,
                                      Stamp to) const;
   [[nodiscard]] bool goes_on_at(const Held& held) const;
@@ -115,6 +118,7 @@ class Vio {
   std::optional<Stamp> last_image_;
   std::vector<Held> held_;  // Not empty: starting.
   bool running_ = false;
+  bool in_gap_ = false;                // of the inertial samples
   int unlocated_images_ = 0;           // In a row: with many features and hardly a landmark.
   std::optional<OdometryState> last_;  // Last state that was given out.
   std::optional<KeyframeOdometry> last_keyframe_;

@@ -118,7 +118,8 @@ struct VioConfig {
         "and beyond 1.5 rad none are handed on");
     visitor.field(
         "max_imu_gap_s", max_imu_gap_s, {1e-3, 1.0},
-        "[s] longest between two inertial samples that is interpolated; longer: a new start");
+        "[s] longest between two inertial samples that is interpolated; longer: images alone tell "
+        "the motion, or, where they do not, a new start");
     visitor.field("max_speed_mps", max_speed_mps, {0.1, 1e3},
                   "[m/s] a faster body means that the estimate has diverged");
     visitor.field("max_gyro_bias_radps", max_gyro_bias_radps, {1e-3, 10.0},

@@ -19,7 +19,7 @@ const char* text(VioProblem problem) {
     case VioProblem::kBadSamples:
       return "inertial samples out of order or beyond what sensors measure, refused";
     case VioProblem::kInertialGap:
-      return "gap in the inertial samples, starting anew";
+      return "gap in the inertial samples: images alone tell the motion, or a new start";
     case VioProblem::kDiverged:
       return "estimate diverged, starting anew from the last pose";
     case VioProblem::kStartTimeout:

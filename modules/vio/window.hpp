@@ -23,6 +23,7 @@ struct WindowFrame {
   bool rests = false;  ///< The body stands still here.
   /// Cover the time since the frame before, where it was not spent at rest; empty for the first.
   std::vector<ImuSample> samples;
+  bool is_bridged = false;       ///< With a gap in them: see InertialFrame.
   std::optional<ImuFactor> imu;  ///< From the frame before; none for the first.
   /// The state is that of the inertial sensor's instant state.stamp + offset_s.
   double offset_s = 0.0;

@@ -95,6 +95,24 @@ TEST_CASE("MH_01_easy: a second of black images does not lose it", "[vio]") {
   CHECK(errors.max_m < 0.10);
 }
 
+TEST_CASE("MH_01_easy: half a second without inertial samples does not lose it", "[vio]") {
+  const Recording* const data = recording();
+  if (data == nullptr) return;
+  Recording gap = *data;
+  const Stamp begin = gap.packets[36].frame->stamp, end = gap.packets[46].frame->stamp;
+  for (SensorPacket& packet : gap.packets)
+    std::erase_if(packet.imu, [&](const ImuSample& sample) {
+      return sample.stamp >= begin && sample.stamp < end;
+    });
+  const OdometryRun run = run_odometry(gap, 0, gap.packets.size(), TrackerConfig{}, {});
+  CHECK(run.states.size() == gap.packets.size());
+  CHECK(run.statistics.starts == 1);
+  CHECK(run.statistics.gaps == 1);
+  const OdometryErrors errors = odometry_errors(run.states, run.truth);
+  CHECK(errors.ate_m < 0.02);
+  CHECK(errors.max_m < 0.05);
+}
+
 // The velocity that is left after them fits nothing of what is seen then, if the stamps are
 // believed.
 TEST_CASE("MH_01_easy: after five seconds of black images with late stamps odometry sees again",

@@ -168,15 +168,35 @@ TEST_CASE("Broken inertial samples are refused, the image still has a pose", "[v
   CHECK(feed(vio, bench, 21, 30).states.size() == 9);
 }
 
-TEST_CASE("A gap in the inertial samples leads to a new start from the last pose", "[vio]") {
+TEST_CASE("Images carry the pose over a gap in the inertial samples", "[vio]") {
   const Bench bench;
   Vio vio = bench.vio();
   const VioResult before = feed(vio, bench, 0, 30);
-  SensorPacket gap = bench.packet(40);  // half a second later
+  VioResult gap;
+  for (int k = 30; k < 40; ++k) {
+    SensorPacket packet = bench.packet(k);
+    packet.imu = {bench.packet(29).imu.back(), bench.packet(40).imu.front()};
+    const VioResult result = vio.process(packet);
+    CHECK(result.problem == VioProblem::kInertialGap);
+    REQUIRE(result.states.size() == 1);
+    const SE3 moved = before.states.back().T_odom_body.inverse() * result.states[0].T_odom_body;
+    CHECK(moved.translation().norm() < 5e-3);
+    CHECK(angle_of(moved.linear()) < 5e-3);
+  }
+  CHECK(feed(vio, bench, 40, 60).problem == VioProblem::kNone);
+  CHECK(vio.statistics().gaps == 1);
+  CHECK(vio.statistics().starts == 1);
+}
+
+TEST_CASE("A long gap in the inertial samples leads to a new start from the last pose", "[vio]") {
+  const Bench bench;
+  Vio vio = bench.vio();
+  const VioResult before = feed(vio, bench, 0, 30);
+  SensorPacket gap = bench.packet(100);  // 3.5 s later
   const VioResult at_gap = vio.process(gap);
   CHECK(at_gap.problem == VioProblem::kInertialGap);
   CHECK(at_gap.states.empty());
-  const VioResult after = feed(vio, bench, 41, 41 + Bench::kStartImages);
+  const VioResult after = feed(vio, bench, 101, 101 + Bench::kStartImages);
   CHECK(vio.statistics().gaps == 1);
   CHECK(vio.statistics().starts == 2);
   REQUIRE(after.states.size() == 1 + Bench::kStartImages);  // those held back, too
