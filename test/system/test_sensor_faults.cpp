@@ -1,0 +1,308 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <optional>
+#include <random>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "apps/robot/run_summary.hpp"
+#include "modules/core/lie.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/evaluation/trajectory_error.hpp"
+#include "modules/evaluation/trajectory_file.hpp"
+#include "test/support/command.hpp"
+#include "test/support/process.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/temporary_folder.hpp"
+#include "test/system/sensor_faults.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Alone: no other robot is on this domain but those of tests that are as deaf to it.
+CommandResult run_robot(const fs::path& dataset, const fs::path& output,
+                        const std::string& options = "") {
+  return run_command(KM_BIN_DIR
+                     "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0"
+                     " --rate max --serve-limit 0 --interface lo --domain 99 --set dds.team=" +
+                     output.parent_path().filename().string() + " --dataset " + dataset.string() +
+                     " --output " + output.string() + ' ' + options);
+}
+
+// The first `length_s` of a recording, from its first image on.
+EurocCopy first_seconds(const fs::path& recording, double length_s) {
+  EurocCopy copy(recording);
+  const Stamp end = copy.cameras[0].front().stamp + nanoseconds(length_s);
+  for (auto& images : copy.cameras)
+    std::erase_if(images, [&](const auto& image) { return image.stamp >= end; });
+  std::erase_if(copy.samples,
+                [&](const auto& sample) { return sample.stamp >= end + nanoseconds(0.5); });
+  return copy;
+}
+
+// A recording on which sensors fail.
+struct Stage {
+  std::string name;
+  fs::path recording;
+  double length_s = 0.0;  // that is used
+  double begin_s = 0.0;   // of the fault
+};
+
+struct Outcome {
+  int exit_code = -1;
+  std::string output;
+  std::size_t poses = 0;
+  RunSummary summary;
+  // Of the position, in the frame that fits what was before the fault.
+  double before_m = 0.0, worst_m = 0.0, last_m = 0.0;
+  std::optional<double> back_s;  // after the fault
+};
+
+double error_m(const PosePair& pair, const Alignment& alignment) {
+  return (alignment.apply(pair.T_estimate_body).translation() - pair.T_truth_body.translation())
+      .norm();
+}
+
+template <typename Accepts>
+double rms_m(const std::vector<PosePair>& pairs, const Alignment& alignment, Accepts accepts) {
+  double sum = 0.0, count = 0.0;
+  for (const PosePair& pair : pairs)
+    if (accepts(pair.stamp)) sum += std::pow(error_m(pair, alignment), 2), count += 1.0;
+  return std::sqrt(sum / count);
+}
+
+// From then on it is right: over no second the motion errs by more than this.
+std::optional<double> back_after_s(const std::vector<PosePair>& pairs, Stamp end) {
+  constexpr double kRight_m = 0.03, kOver_s = 1.0;
+  std::optional<Stamp> back;
+  for (std::size_t i = 0, j = 0; i < pairs.size(); ++i) {
+    if (pairs[i].stamp < end) continue;
+    while (j < pairs.size() && seconds_between(pairs[i].stamp, pairs[j].stamp) < kOver_s) ++j;
+    if (j == pairs.size()) break;
+    const SE3 truth = pairs[i].T_truth_body.inverse() * pairs[j].T_truth_body;
+    const SE3 estimate = pairs[i].T_estimate_body.inverse() * pairs[j].T_estimate_body;
+    if ((truth.inverse() * estimate).translation().norm() > kRight_m)
+      back.reset();
+    else if (!back)
+      back = pairs[i].stamp;
+  }
+  return back ? std::optional(seconds_between(end, *back)) : std::nullopt;
+}
+
+Outcome meet(const Stage& stage, const SensorFault& fault) {
+  const TemporaryFolder folder;
+  EurocCopy copy = first_seconds(stage.recording, stage.length_s);
+  const Stamp first = copy.cameras[0].front().stamp;
+  const Stamp begin = first + (fault.is_at_start ? 0 : nanoseconds(stage.begin_s));
+  const Stamp end = begin + nanoseconds(fault.lasts_s);
+  fault.spoil(copy, begin, end);
+  copy.write(folder.path() / "recording");
+  const CommandResult run = run_robot(folder.path() / "recording", folder.path() / "results");
+  Outcome outcome;
+  outcome.exit_code = run.exit_code;
+  outcome.output = run.output;
+  if (run.exit_code != 0) return outcome;
+  outcome.summary = read_summary(folder.path() / "results/summary.json");
+  const auto estimate = read_trajectory(folder.path() / "results/odometry.tum");
+  const auto truth = read_trajectory(
+      find_trajectory(stage.recording / "mav0/state_groundtruth_estimate0").value());
+  const auto pairs = associate(truth, estimate, {first, estimate.back().stamp}, 0.1, 0.01);
+  outcome.poses = estimate.size();
+  std::vector<PosePair> fitted;
+  for (const PosePair& pair : pairs)
+    if (pair.stamp < begin || fault.is_at_start) fitted.push_back(pair);
+  const Alignment alignment = align(fitted, false);
+  outcome.before_m = rms_m(fitted, alignment, [](Stamp) { return true; });
+  for (const PosePair& pair : pairs)
+    if (pair.stamp >= begin && pair.stamp < end + nanoseconds(1.0))
+      outcome.worst_m = std::max(outcome.worst_m, error_m(pair, alignment));
+  const Stamp last = pairs.back().stamp - nanoseconds(3.0);
+  outcome.last_m = rms_m(pairs, alignment, [last](Stamp stamp) { return stamp >= last; });
+  outcome.back_s = back_after_s(pairs, end);
+  return outcome;
+}
+
+std::string line_with(const std::string& text, const std::string& part) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);)
+    if (!part.empty() && line.find(part) != line.npos) return line;
+  return "";
+}
+
+std::vector<std::string> row_of(const Stage& stage, const SensorFault& fault,
+                                const Outcome& outcome) {
+  const OdometrySummary odometry = outcome.summary.odometry.value_or(OdometrySummary{});
+  const auto mm = [](double m) { return fixed(1e3 * m, 1); };
+  return {stage.name,
+          fault.name,
+          fixed(fault.lasts_s, 1),
+          std::to_string(outcome.poses),
+          mm(outcome.worst_m),
+          mm(outcome.last_m),
+          outcome.back_s ? fixed(*outcome.back_s, 2) : "-",
+          std::to_string(odometry.starts),
+          fixed(odometry.blind_seconds, 1),
+          std::to_string(outcome.exit_code)};
+}
+
+std::vector<Stage> stages() {
+  std::vector<Stage> stages;
+  if (const auto recording = shared_data("euroc/MH_01_easy"))
+    stages.push_back({"MH_01", fs::absolute(*recording), 16.0, 5.0});
+  if (const char* flight = std::getenv("KM_FLIGHT"))
+    stages.push_back({fs::path(flight).filename(), fs::absolute(flight), 40.0, 15.0});
+  return stages;
+}
+
+// In short, those that differ most.
+bool is_wanted(const SensorFault& fault) {
+  static const char* const wanted = std::getenv("KM_SENSOR_FAULTS");
+  if (wanted == nullptr)
+    return fault.name == "no light" || fault.name == "samples 1 s ahead" ||
+           fault.name == "drivers restart";
+  return std::string(wanted) == "all" || fault.name == wanted;
+}
+
+}  // namespace
+
+TEST_CASE("A robot survives what happens to its sensors", "[sensor_faults]") {
+  std::vector<std::vector<std::string>> rows = {{"recording", "fault", "lasts [s]", "poses",
+                                                 "worst [mm]", "last 3 s [mm]", "back after [s]",
+                                                 "starts", "blind [s]", "exit"}};
+  for (const Stage& stage : stages())
+    for (const SensorFault& fault : sensor_faults()) {
+      constexpr double kAfter_s = 4.0;  // that there is to see
+      const double begin_s = fault.is_at_start ? 0.0 : stage.begin_s;
+      if (!is_wanted(fault) || begin_s + fault.lasts_s + kAfter_s > stage.length_s) continue;
+      const Outcome outcome = meet(stage, fault);
+      rows.push_back(row_of(stage, fault, outcome));
+      std::cout << align_columns({rows.back()}) << "    " << line_with(outcome.output, fault.event)
+                << '\n';
+      CAPTURE(stage.name, fault.name, fault.lasts_s, outcome.output);
+      CHECK(outcome.exit_code == 0);
+      CHECK_THAT(outcome.output, Catch::Contains(fault.event));
+      CHECK(outcome.worst_m < fault.bound_m);
+      CHECK(outcome.last_m < fault.bound_m);
+      CHECK(outcome.back_s.value_or(1e9) <= 1.0);
+      REQUIRE(outcome.summary.odometry);
+      CHECK((outcome.summary.odometry->vision_losses > 0) == fault.is_blind);
+    }
+  std::cout << align_columns(rows);
+}
+
+TEST_CASE("A driver that restarts does not end a live robot", "[sensor_faults][live]") {
+  const auto recording = shared_data("euroc/MH_01_easy");
+  if (!recording) return;
+  const TemporaryFolder folder;
+  const fs::path rig =
+      folder.write("rig.yaml",
+                   "left: {topic: /cam0/image_raw}\nright: {topic: /cam1/image_raw}\n"
+                   "imu: {topic: /imu0}\ncalibration: " +
+                       fs::absolute(*recording).string() + "\n");
+  const EurocCopy whole = first_seconds(fs::absolute(*recording), 12.0);
+  const Stamp first = whole.cameras[0].front().stamp;
+  const Stamp silent = first + nanoseconds(5.0), again = first + nanoseconds(7.0);
+  const std::string domain = std::to_string(100 + std::random_device()() % 100);
+  Process robot({KM_BIN_DIR "/kimera_multi_robot",
+                 "--config",
+                 "config/datasets/euroc.yaml",
+                 "--robot",
+                 "0",
+                 "--live",
+                 rig.string(),
+                 "--set",
+                 "ros.domain=" + domain,
+                 "--set",
+                 "ros.interface=lo",
+                 "--domain",
+                 "99",
+                 "--interface",
+                 "lo",
+                 "--set",
+                 "dds.team=" + folder.path().filename().string(),
+                 "--serve-limit",
+                 "0",
+                 "--output",
+                 (folder.path() / "results").string()});
+  for (const bool is_first : {true, false}) {
+    EurocCopy part = whole;
+    const auto is_outside = [&](const auto& item) {
+      return is_first ? item.stamp >= silent : item.stamp < again;
+    };
+    for (auto& images : part.cameras) std::erase_if(images, is_outside);
+    std::erase_if(part.samples, is_outside);
+    const fs::path played = folder.path() / (is_first ? "before" : "after");
+    part.write(played);
+    Process driver({KM_BIN_DIR "/kimera_multi_publish", played.string(), "--domain", domain,
+                    "--interface", "lo", "--wait", "1", "--reliable", "--rate", "0.7"});
+    CHECK(driver.wait() == 0);
+  }
+  const auto goes_on = [](const std::string& line) {  // "10.6 s, 164 images, ..."
+    double seconds = 0.0;
+    int images = 0;
+    return std::sscanf(line.c_str(), "%lf s, %d images", &seconds, &images) == 2 && seconds > 7.5;
+  };
+  CHECK(robot.wait_until(goes_on));
+  robot.kill(SIGINT);
+  CHECK(robot.wait() == 0);
+  const auto poses = read_trajectory(folder.path() / "results/odometry.tum");
+  CHECK(std::ranges::count_if(poses, [&](const auto& pose) { return pose.stamp < silent; }) > 50);
+  CHECK(std::ranges::count_if(poses, [&](const auto& pose) { return pose.stamp >= again; }) > 20);
+  const RunSummary summary = read_summary(folder.path() / "results/summary.json");
+  REQUIRE(summary.odometry);
+  CHECK(summary.odometry->starts == 2);
+  CHECK(summary.odometry->inertial_gaps == 1);
+}
+
+TEST_CASE("What a run finds of its cameras is where the next one starts from", "[sensor_faults]") {
+  const auto recording = shared_data("euroc/MH_01_easy");
+  if (!recording) return;
+  constexpr double kLate_s = 0.02;
+  const TemporaryFolder folder;
+  EurocCopy copy = first_seconds(fs::absolute(*recording), 10.0);
+  for (auto& sample : copy.samples) sample.stamp += nanoseconds(kLate_s);
+  copy.write(folder.path() / "late");
+  const auto found = [&](const std::string& output, const std::string& options) {
+    const CommandResult run = run_robot(folder.path() / "late", folder.path() / output, options);
+    CAPTURE(run.output);
+    REQUIRE(run.exit_code == 0);
+    return read_summary(folder.path() / output / "summary.json").cameras.value();
+  };
+  const CamerasSummary first = found("first", "");
+  const CamerasSummary second =
+      found("second", "--rig " + (folder.path() / "first/rig_estimated.yaml").string());
+  std::cout << "offset found: " << 1e3 * first.offset_s << " ms, then " << 1e3 * second.offset_s
+            << " ms\n";
+  CHECK(first.offset_s == Approx(kLate_s).margin(0.003));
+  CHECK(std::abs(second.offset_s) < 0.001);
+  CHECK(std::abs(second.rotation_x_rad) < 0.5 * 0.01);
+}
+
+TEST_CASE("A robot without an inertial sensor goes by an odometry from outside",
+          "[sensor_faults]") {
+  const auto recording = shared_data("euroc/MH_01_easy");
+  if (!recording) return;
+  const TemporaryFolder folder;
+  first_seconds(fs::absolute(*recording), 3.0).write(folder.path() / "bare");
+  REQUIRE(run_robot(folder.path() / "bare", folder.path() / "own").exit_code == 0);
+  fs::remove_all(folder.path() / "bare/mav0/imu0");
+  const std::string poses = (folder.path() / "own/odometry.tum").string();
+  const CommandResult run =
+      run_robot(folder.path() / "bare", folder.path() / "outside", "--odometry " + poses);
+  CAPTURE(run.output);
+  CHECK(run.exit_code == 0);
+  CHECK(read_trajectory(folder.path() / "outside/odometry.tum").size() ==
+        read_trajectory(poses).size());
+  CHECK(!fs::exists(folder.path() / "outside/rig_estimated.yaml"));
+}
+
+}  // namespace km
