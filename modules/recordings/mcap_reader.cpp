@@ -14,8 +14,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr std::uint64_t kFooter_bytes = kMcapRecordHeader_bytes + 20;
-constexpr std::uint64_t kDataEnd_bytes = kMcapRecordHeader_bytes + 4;
+constexpr std::uint64_t kFooter_bytes = kMcapRecordHeader_bytes + kMcapFooterFields_bytes;
 constexpr std::uint64_t kMaxDefinition_bytes = std::uint64_t{64} << 20U;
 // Messages outside of chunks are read together up to so many.
 constexpr std::uint64_t kBarePart_bytes = std::uint64_t{4} << 20U;
@@ -81,7 +80,8 @@ std::uint64_t McapReader::find_data_end() {
       std::equal(kMcapMagic.begin(), kMcapMagic.end(), bytes.end() - 8,
                  [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; });
   const auto header = parse_mcap_record_header(bytes);
-  const auto footer = parse_mcap_footer(std::span(bytes).subspan(kMcapRecordHeader_bytes, 20));
+  const auto footer = parse_mcap<McapFooter>(
+      std::span(bytes).subspan(kMcapRecordHeader_bytes, kMcapFooterFields_bytes));
   if (!ends || !header || !header->is(McapOpcode::kFooter) || !footer) {
     report_.add(BagFault::kTruncated, size, "the file has no end");
     return size;
@@ -107,11 +107,11 @@ void McapReader::read_summary(std::uint64_t begin, std::uint64_t footer, const M
   bool is_whole = true;
   is_whole &= for_each_record(std::span(bytes).first(footer - begin), [&](const McapRecord& read) {
     if (read.header.is(McapOpcode::kChunkIndex)) {
-      const auto index = parse_mcap_chunk_index(read.content);
+      const auto index = parse_mcap<McapChunkIndex>(read.content);
       is_whole &= index.has_value();
       if (index) summary.chunks.push_back(*index);
     } else if (read.header.is(McapOpcode::kStatistics)) {
-      summary.statistics = parse_mcap_statistics(read.content);
+      summary.statistics = parse_mcap<McapStatistics>(read.content);
       is_whole &= summary.statistics.has_value();
     } else {
       add_definition(read.header, read.content, begin + read.begin);
@@ -157,7 +157,8 @@ bool McapReader::describes_all(const Summary& summary) const {
   for (const auto& [channel, count] : summary.statistics->channel_message_counts)
     if (!is_known(channel)) return false;
   for (const McapChunkIndex& chunk : summary.chunks)
-    if (!std::all_of(chunk.channel_ids.begin(), chunk.channel_ids.end(), is_known)) return false;
+    for (const auto& [channel, offset] : chunk.message_index_offsets)
+      if (!is_known(channel)) return false;
   return !summary.statistics->channel_message_counts.empty();
 }
 
@@ -286,7 +287,7 @@ Bytes McapReader::records_of(const ChunkPlace& place) {
   const auto header = parse_mcap_record_header(bytes);
   if (!header || !header->is(McapOpcode::kChunk) || header->size != size - kMcapRecordHeader_bytes)
     return refuse(BagFault::kIndex, "no chunk where the index says");
-  const auto chunk = parse_mcap_chunk(std::span(bytes).subspan(kMcapRecordHeader_bytes));
+  const auto chunk = parse_mcap<McapChunk>(std::span(bytes).subspan(kMcapRecordHeader_bytes));
   if (!chunk) return refuse(BagFault::kMalformed, "a chunk that ends within its fields");
   auto records = decompress(chunk->compression, chunk->records, chunk->uncompressed_size);
   if (!records.value)
@@ -300,11 +301,11 @@ Bytes McapReader::records_of(const ChunkPlace& place) {
 void McapReader::add_definition(const McapRecordHeader& header, std::span<const std::uint8_t> bytes,
                                 std::uint64_t place) {
   if (header.is(McapOpcode::kSchema)) {
-    const auto schema = parse_mcap_schema(bytes);
+    const auto schema = parse_mcap<McapSchema>(bytes);
     if (!schema) return report_.add(BagFault::kMalformed, place, "what is no schema");
     schemas_.try_emplace(schema->id, schema->name);
   } else if (header.is(McapOpcode::kChannel)) {
-    const auto channel = parse_mcap_channel(bytes);
+    const auto channel = parse_mcap<McapChannel>(bytes);
     if (!channel) return report_.add(BagFault::kMalformed, place, "what is no channel");
     add_channel(*channel, place);
   }

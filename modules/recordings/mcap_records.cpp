@@ -1,41 +1,184 @@
 #include "modules/recordings/mcap_records.hpp"
 
+#include <concepts>
 #include <limits>
-
-#include "modules/core/bytes.hpp"
+#include <type_traits>
 
 namespace km {
 namespace {
 
 constexpr auto kLatest = static_cast<std::uint64_t>(std::numeric_limits<Stamp>::max());
 
-std::string read_string(ByteReader& reader) {
-  const auto bytes = reader.bytes(reader.u32());
-  return {bytes.begin(), bytes.end()};
-}
+// Reads fields, one after the other.
+class McapIn {
+ public:
+  explicit McapIn(std::span<const std::uint8_t> bytes) : reader_(bytes) {}
 
-Stamp read_time(ByteReader& reader) {
-  const std::uint64_t time = reader.u64();
-  return static_cast<Stamp>(time <= kLatest ? time : reader.fail());
-}
-
-// A map from channel to a number, of which the length in bytes comes first.
-std::vector<std::pair<std::uint16_t, std::uint64_t>> read_map(ByteReader& reader) {
-  constexpr std::size_t kPair_bytes = 10;
-  ByteReader pairs(reader.bytes(reader.u32()));
-  std::vector<std::pair<std::uint16_t, std::uint64_t>> map;
-  map.reserve(pairs.left() / kPair_bytes);
-  while (pairs.left() > 0) {
-    const std::uint16_t channel = pairs.u16();
-    map.emplace_back(channel, pairs.u64());
+  void u8(std::uint8_t& value) { value = reader_.u8(); }
+  void u16(std::uint16_t& value) { value = reader_.u16(); }
+  void u32(std::uint32_t& value) { value = reader_.u32(); }
+  void u64(std::uint64_t& value) { value = reader_.u64(); }
+  void time(Stamp& value) {
+    const std::uint64_t time = reader_.u64();
+    value = static_cast<Stamp>(time <= kLatest ? time : reader_.fail());
   }
-  if (pairs.failed()) reader.fail();
-  return map;
+  void text(std::string& value) {
+    const auto bytes = reader_.bytes(reader_.u32());
+    value.assign(bytes.begin(), bytes.end());
+  }
+  void octets(std::span<const std::uint8_t>& value) { value = reader_.bytes(reader_.u64()); }
+
+  // A map or list of pairs, of which the length in bytes comes first.
+  template <typename Key, typename Value>
+  void pairs(std::vector<std::pair<Key, Value>>& values) {
+    McapIn in(reader_.bytes(reader_.u32()));
+    values.reserve(in.reader_.left() / (sizeof(Key) + sizeof(Value)));
+    while (in.reader_.left() > 0) {
+      auto& [key, value] = values.emplace_back();
+      in.number(key);
+      in.number(value);
+    }
+    if (in.failed()) reader_.fail();
+  }
+  void texts(std::map<std::string, std::string>& values) {
+    McapIn in(reader_.bytes(reader_.u32()));
+    while (in.reader_.left() > 0) {
+      std::string key;
+      in.text(key);
+      in.text(values[key]);
+    }
+    if (in.failed()) reader_.fail();
+  }
+
+  [[nodiscard]] bool failed() const { return reader_.failed(); }
+
+ private:
+  void number(std::uint16_t& value) { u16(value); }
+  void number(std::uint64_t& value) { u64(value); }
+
+  ByteReader reader_;
+};
+
+// Writes what McapIn reads.
+class McapOut {
+ public:
+  void u8(std::uint8_t value) { writer_.u8(value); }
+  void u16(std::uint16_t value) { writer_.u16(value); }
+  void u32(std::uint32_t value) { writer_.u32(value); }
+  void u64(std::uint64_t value) { writer_.u64(value); }
+  void time(Stamp value) { writer_.u64(static_cast<std::uint64_t>(value)); }
+  void text(const std::string& value) {
+    writer_.u32(static_cast<std::uint32_t>(value.size()));
+    writer_.bytes({reinterpret_cast<const std::uint8_t*>(value.data()), value.size()});
+  }
+  void octets(std::span<const std::uint8_t> value) {
+    writer_.u64(value.size());
+    writer_.bytes(value);
+  }
+  template <typename Key, typename Value>
+  void pairs(const std::vector<std::pair<Key, Value>>& values) {
+    writer_.u32(static_cast<std::uint32_t>(values.size() * (sizeof(Key) + sizeof(Value))));
+    for (const auto& [key, value] : values) {
+      number(key);
+      number(value);
+    }
+  }
+  void texts(const std::map<std::string, std::string>& values) {
+    McapOut out;
+    for (const auto& [key, value] : values) {
+      out.text(key);
+      out.text(value);
+    }
+    const auto bytes = out.release();
+    writer_.u32(static_cast<std::uint32_t>(bytes.size()));
+    writer_.bytes(bytes);
+  }
+
+  [[nodiscard]] std::vector<std::uint8_t> release() { return writer_.release(); }
+
+ private:
+  void number(std::uint16_t value) { u16(value); }
+  void number(std::uint64_t value) { u64(value); }
+
+  ByteWriter writer_;
+};
+
+// Fields stand in the order of the specification. One list of them serves for reading and writing.
+template <typename Record, typename Type>
+concept RecordIs = std::same_as<std::remove_const_t<Record>, Type>;
+
+void fields(auto& wire, RecordIs<McapHeader> auto& header) {
+  wire.text(header.profile);
+  wire.text(header.library);
 }
 
-template <typename T>
-std::optional<T> checked(const ByteReader& reader, T record) {
-  return reader.failed() ? std::nullopt : std::optional(std::move(record));
+void fields(auto& wire, RecordIs<McapFooter> auto& footer) {
+  wire.u64(footer.summary_start);
+  wire.u64(footer.summary_offset_start);
+  wire.u32(footer.summary_crc);
+}
+
+void fields(auto& wire, RecordIs<McapSchema> auto& schema) {
+  wire.u16(schema.id);
+  wire.text(schema.name);
+  wire.text(schema.encoding);
+  wire.text(schema.data);
+}
+
+void fields(auto& wire, RecordIs<McapChannel> auto& channel) {
+  wire.u16(channel.id);
+  wire.u16(channel.schema_id);
+  wire.text(channel.topic);
+  wire.text(channel.message_encoding);
+  wire.texts(channel.metadata);
+}
+
+void fields(auto& wire, RecordIs<McapChunk> auto& chunk) {
+  wire.time(chunk.message_start_time);
+  wire.time(chunk.message_end_time);
+  wire.u64(chunk.uncompressed_size);
+  wire.u32(chunk.uncompressed_crc);
+  wire.text(chunk.compression);
+  wire.octets(chunk.records);
+}
+
+void fields(auto& wire, RecordIs<McapMessageIndex> auto& index) {
+  wire.u16(index.channel_id);
+  wire.pairs(index.messages);
+}
+
+void fields(auto& wire, RecordIs<McapChunkIndex> auto& index) {
+  wire.time(index.message_start_time);
+  wire.time(index.message_end_time);
+  wire.u64(index.chunk_start);
+  wire.u64(index.chunk_length);
+  wire.pairs(index.message_index_offsets);
+  wire.u64(index.message_index_length);
+  wire.text(index.compression);
+  wire.u64(index.compressed_size);
+  wire.u64(index.uncompressed_size);
+}
+
+void fields(auto& wire, RecordIs<McapStatistics> auto& statistics) {
+  wire.u64(statistics.message_count);
+  wire.u16(statistics.schema_count);
+  wire.u32(statistics.channel_count);
+  wire.u32(statistics.attachment_count);
+  wire.u32(statistics.metadata_count);
+  wire.u32(statistics.chunk_count);
+  wire.time(statistics.message_start_time);
+  wire.time(statistics.message_end_time);
+  wire.pairs(statistics.channel_message_counts);
+}
+
+void fields(auto& wire, RecordIs<McapSummaryOffset> auto& offset) {
+  wire.u8(offset.group_opcode);
+  wire.u64(offset.group_start);
+  wire.u64(offset.group_length);
+}
+
+void fields(auto& wire, RecordIs<McapDataEnd> auto& end) {
+  wire.u32(end.data_section_crc);
 }
 
 }  // namespace
@@ -45,36 +188,19 @@ std::optional<McapRecordHeader> parse_mcap_record_header(std::span<const std::ui
   McapRecordHeader header;
   header.opcode = reader.u8();
   header.size = reader.u64();
-  if (header.opcode == 0) reader.fail();
-  return checked(reader, header);
+  if (reader.failed() || header.opcode == 0) return std::nullopt;
+  return header;
 }
 
-std::optional<McapFooter> parse_mcap_footer(std::span<const std::uint8_t> bytes) {
-  ByteReader reader(bytes);
-  McapFooter footer;
-  footer.summary_start = reader.u64();
-  footer.summary_offset_start = reader.u64();
-  footer.summary_crc = reader.u32();
-  return checked(reader, footer);
-}
-
-std::optional<McapSchema> parse_mcap_schema(std::span<const std::uint8_t> bytes) {
-  ByteReader reader(bytes);
-  McapSchema schema;
-  schema.id = reader.u16();
-  schema.name = read_string(reader);
-  if (schema.id == 0) reader.fail();
-  return checked(reader, std::move(schema));
-}
-
-std::optional<McapChannel> parse_mcap_channel(std::span<const std::uint8_t> bytes) {
-  ByteReader reader(bytes);
-  McapChannel channel;
-  channel.id = reader.u16();
-  channel.schema_id = reader.u16();
-  channel.topic = read_string(reader);
-  channel.message_encoding = read_string(reader);
-  return checked(reader, std::move(channel));
+template <typename Record>
+std::optional<Record> parse_mcap(std::span<const std::uint8_t> bytes) {
+  McapIn in(bytes);
+  Record record;
+  fields(in, record);
+  if (in.failed()) return std::nullopt;
+  if constexpr (std::same_as<Record, McapSchema>)
+    if (record.id == 0) return std::nullopt;
+  return record;
 }
 
 std::optional<McapMessage> parse_mcap_message(std::span<const std::uint8_t> bytes,
@@ -82,53 +208,57 @@ std::optional<McapMessage> parse_mcap_message(std::span<const std::uint8_t> byte
   ByteReader reader(bytes);
   McapMessage message;
   message.channel_id = reader.u16();
-  static_cast<void>(reader.u32());  // sequence
-  message.log_time = read_time(reader);
-  static_cast<void>(reader.u64());  // publish time
-  if (reader.failed() ||
+  message.sequence = reader.u32();
+  const std::uint64_t log_time = reader.u64();
+  message.log_time = static_cast<Stamp>(log_time);
+  message.publish_time = static_cast<Stamp>(reader.u64());  // of clocks that are not looked at
+  if (reader.failed() || log_time > kLatest ||
       size - kMcapMessageFields_bytes > std::numeric_limits<std::uint32_t>::max())
     return std::nullopt;
   message.data_size = static_cast<std::uint32_t>(size - kMcapMessageFields_bytes);
   return message;
 }
 
-std::optional<McapChunk> parse_mcap_chunk(std::span<const std::uint8_t> bytes) {
-  ByteReader reader(bytes);
-  McapChunk chunk;
-  chunk.message_start_time = read_time(reader);
-  static_cast<void>(reader.u64());  // end
-  chunk.uncompressed_size = reader.u64();
-  chunk.uncompressed_crc = reader.u32();
-  chunk.compression = read_string(reader);
-  chunk.records = reader.bytes(reader.u64());
-  return checked(reader, std::move(chunk));
+template <typename Record>
+void put_mcap(ByteWriter& out, const Record& record) {
+  McapOut content;
+  fields(content, record);
+  const auto bytes = content.release();
+  out.u8(static_cast<std::uint8_t>(Record::kOpcode));
+  out.u64(bytes.size());
+  out.bytes(bytes);
 }
 
-std::optional<McapChunkIndex> parse_mcap_chunk_index(std::span<const std::uint8_t> bytes) {
-  ByteReader reader(bytes);
-  McapChunkIndex index;
-  index.message_start_time = read_time(reader);
-  static_cast<void>(reader.u64());  // end
-  index.chunk_start = reader.u64();
-  index.chunk_length = reader.u64();
-  for (const auto& [channel, offset] : read_map(reader)) index.channel_ids.push_back(channel);
-  index.message_index_length = reader.u64();
-  return checked(reader, std::move(index));
+void put_mcap_message(ByteWriter& out, const McapMessage& message,
+                      std::span<const std::uint8_t> data) {
+  out.u8(static_cast<std::uint8_t>(McapMessage::kOpcode));
+  out.u64(kMcapMessageFields_bytes + data.size());
+  out.u16(message.channel_id);
+  out.u32(message.sequence);
+  out.u64(static_cast<std::uint64_t>(message.log_time));
+  out.u64(static_cast<std::uint64_t>(message.publish_time));
+  out.bytes(data);
 }
 
-std::optional<McapStatistics> parse_mcap_statistics(std::span<const std::uint8_t> bytes) {
-  ByteReader reader(bytes);
-  McapStatistics statistics;
-  statistics.message_count = reader.u64();
-  static_cast<void>(reader.u16());  // schemas
-  static_cast<void>(reader.u32());  // channels
-  static_cast<void>(reader.u32());  // attachments
-  static_cast<void>(reader.u32());  // metadata
-  statistics.chunk_count = reader.u32();
-  static_cast<void>(reader.u64());  // first time
-  static_cast<void>(reader.u64());  // last time
-  statistics.channel_message_counts = read_map(reader);
-  return checked(reader, std::move(statistics));
-}
+template std::optional<McapHeader> parse_mcap(std::span<const std::uint8_t>);
+template void put_mcap(ByteWriter&, const McapHeader&);
+template std::optional<McapFooter> parse_mcap(std::span<const std::uint8_t>);
+template void put_mcap(ByteWriter&, const McapFooter&);
+template std::optional<McapSchema> parse_mcap(std::span<const std::uint8_t>);
+template void put_mcap(ByteWriter&, const McapSchema&);
+template std::optional<McapChannel> parse_mcap(std::span<const std::uint8_t>);
+template void put_mcap(ByteWriter&, const McapChannel&);
+template std::optional<McapChunk> parse_mcap(std::span<const std::uint8_t>);
+template void put_mcap(ByteWriter&, const McapChunk&);
+template std::optional<McapMessageIndex> parse_mcap(std::span<const std::uint8_t>);
+template void put_mcap(ByteWriter&, const McapMessageIndex&);
+template std::optional<McapChunkIndex> parse_mcap(std::span<const std::uint8_t>);
+template void put_mcap(ByteWriter&, const McapChunkIndex&);
+template std::optional<McapStatistics> parse_mcap(std::span<const std::uint8_t>);
+template void put_mcap(ByteWriter&, const McapStatistics&);
+template std::optional<McapSummaryOffset> parse_mcap(std::span<const std::uint8_t>);
+template void put_mcap(ByteWriter&, const McapSummaryOffset&);
+template std::optional<McapDataEnd> parse_mcap(std::span<const std::uint8_t>);
+template void put_mcap(ByteWriter&, const McapDataEnd&);
 
 }  // namespace km

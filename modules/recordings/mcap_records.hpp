@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -8,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "modules/core/bytes.hpp"
 #include "modules/core/stamp.hpp"
 
 namespace km {
@@ -22,8 +24,10 @@ enum class McapOpcode : std::uint8_t {
   kChannel = 0x04,
   kMessage = 0x05,
   kChunk = 0x06,
+  kMessageIndex = 0x07,
   kChunkIndex = 0x08,
   kStatistics = 0x0B,
+  kSummaryOffset = 0x0E,
   kDataEnd = 0x0F,
 };
 
@@ -39,69 +43,124 @@ struct McapRecordHeader {
   [[nodiscard]] bool is(McapOpcode kind) const { return opcode == static_cast<std::uint8_t>(kind); }
 };
 
-struct McapFooter {
-  std::uint64_t summary_start = 0;  ///< [bytes from the beginning of the file]; 0: no summary.
-  std::uint64_t summary_offset_start = 0;
-  std::uint32_t summary_crc = 0;  ///< 0: none.
+struct McapHeader {
+  static constexpr McapOpcode kOpcode = McapOpcode::kHeader;
+  std::string profile;  ///< "ros2", ...
+  std::string library;  ///< That wrote the file.
 };
 
+struct McapFooter {
+  static constexpr McapOpcode kOpcode = McapOpcode::kFooter;
+  std::uint64_t summary_start = 0;         ///< [bytes from the beginning of the file]; 0: none.
+  std::uint64_t summary_offset_start = 0;  ///< Likewise.
+  std::uint32_t summary_crc = 0;           ///< 0: none.
+};
+inline constexpr std::uint64_t kMcapFooterFields_bytes = 8 + 8 + 4;
+
 struct McapSchema {
-  std::uint16_t id = 0;
-  std::string name;
+  static constexpr McapOpcode kOpcode = McapOpcode::kSchema;
+  std::uint16_t id = 0;  ///< Not 0.
+  std::string name;      ///< "nav_msgs/msg/Path"
+  std::string encoding;  ///< Of the definition: "ros2msg", ...
+  std::string data;      ///< The definition.
 };
 
 struct McapChannel {
+  static constexpr McapOpcode kOpcode = McapOpcode::kChannel;
   std::uint16_t id = 0;
   std::uint16_t schema_id = 0;  ///< 0: none.
   std::string topic;
-  std::string message_encoding;
+  std::string message_encoding;  ///< "cdr", ...
+  std::map<std::string, std::string> metadata = {};
 };
 
+/// Of a message the fields before its data.
 struct McapMessage {
+  static constexpr McapOpcode kOpcode = McapOpcode::kMessage;
   std::uint16_t channel_id = 0;
+  std::uint32_t sequence = 0;
   Stamp log_time = 0;
+  Stamp publish_time = 0;
   std::uint32_t data_size = 0;
 };
-/// Fields of a message before its data: channel, sequence, log time, publish time.
 inline constexpr std::uint64_t kMcapMessageFields_bytes = 2 + 4 + 8 + 8;
 
-/// Of a chunk the fields before its records.
 struct McapChunk {
+  static constexpr McapOpcode kOpcode = McapOpcode::kChunk;
   Stamp message_start_time = 0;
+  Stamp message_end_time = 0;
   std::uint64_t uncompressed_size = 0;
   std::uint32_t uncompressed_crc = 0;  ///< 0: none.
   std::string compression;
-  std::span<const std::uint8_t> records;  ///< Into what was parsed.
+  std::span<const std::uint8_t> records;  ///< Into what was parsed, or is to be written.
+};
+
+/// Of one channel in the chunk before it.
+struct McapMessageIndex {
+  static constexpr McapOpcode kOpcode = McapOpcode::kMessageIndex;
+  std::uint16_t channel_id = 0;
+  /// Log time, and where the record begins in the chunk's, not compressed [bytes].
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> messages;
 };
 
 struct McapChunkIndex {
+  static constexpr McapOpcode kOpcode = McapOpcode::kChunkIndex;
   Stamp message_start_time = 0;
+  Stamp message_end_time = 0;
   std::uint64_t chunk_start = 0;   ///< [bytes from the beginning of the file].
   std::uint64_t chunk_length = 0;  ///< With opcode and length.
-  std::vector<std::uint16_t> channel_ids;
+  /// By channel, where its index begins [bytes from the beginning of the file].
+  std::vector<std::pair<std::uint16_t, std::uint64_t>> message_index_offsets = {};
   std::uint64_t message_index_length = 0;  ///< Of the indexes right behind the chunk.
+  std::string compression;
+  std::uint64_t compressed_size = 0;
+  std::uint64_t uncompressed_size = 0;
 };
 
 struct McapStatistics {
+  static constexpr McapOpcode kOpcode = McapOpcode::kStatistics;
   std::uint64_t message_count = 0;
+  std::uint16_t schema_count = 0;
+  std::uint32_t channel_count = 0;
+  std::uint32_t attachment_count = 0;
+  std::uint32_t metadata_count = 0;
   std::uint32_t chunk_count = 0;
+  Stamp message_start_time = 0;
+  Stamp message_end_time = 0;
   std::vector<std::pair<std::uint16_t, std::uint64_t>> channel_message_counts;
 };
 
-/// Each takes what follows a record's header; nullopt for bytes that cannot be such a record.
-/// Times beyond 2^63 - 1 ns are none.
+/// Where the records of a kind are in the summary.
+struct McapSummaryOffset {
+  static constexpr McapOpcode kOpcode = McapOpcode::kSummaryOffset;
+  std::uint8_t group_opcode = 0;
+  std::uint64_t group_start = 0;   ///< [bytes from the beginning of the file].
+  std::uint64_t group_length = 0;  ///< [bytes]
+};
+
+struct McapDataEnd {
+  static constexpr McapOpcode kOpcode = McapOpcode::kDataEnd;
+  std::uint32_t data_section_crc = 0;  ///< 0: none.
+};
+
 [[nodiscard]] std::optional<McapRecordHeader> parse_mcap_record_header(
     std::span<const std::uint8_t> bytes);
-[[nodiscard]] std::optional<McapFooter> parse_mcap_footer(std::span<const std::uint8_t> bytes);
-[[nodiscard]] std::optional<McapSchema> parse_mcap_schema(std::span<const std::uint8_t> bytes);
-[[nodiscard]] std::optional<McapChannel> parse_mcap_channel(std::span<const std::uint8_t> bytes);
+
+/// What follows a record's header; nullopt for bytes that cannot be such a record. Times beyond
+/// 2^63 - 1 ns are none. For all records above but messages.
+template <typename Record>
+[[nodiscard]] std::optional<Record> parse_mcap(std::span<const std::uint8_t> bytes);
+
 /// `bytes` may end behind kMcapMessageFields_bytes; `size` is what they are of.
 [[nodiscard]] std::optional<McapMessage> parse_mcap_message(std::span<const std::uint8_t> bytes,
                                                             std::uint64_t size);
-[[nodiscard]] std::optional<McapChunk> parse_mcap_chunk(std::span<const std::uint8_t> bytes);
-[[nodiscard]] std::optional<McapChunkIndex> parse_mcap_chunk_index(
-    std::span<const std::uint8_t> bytes);
-[[nodiscard]] std::optional<McapStatistics> parse_mcap_statistics(
-    std::span<const std::uint8_t> bytes);
+
+/// Writes a record with its header.
+template <typename Record>
+void put_mcap(ByteWriter& out, const Record& record);
+
+/// Likewise; what the message says of its size is not used.
+void put_mcap_message(ByteWriter& out, const McapMessage& message,
+                      std::span<const std::uint8_t> data);
 
 }  // namespace km

@@ -150,6 +150,54 @@ void fields(auto& wire, Is<RosDiagnostics> auto& diagnostics) {
   for (auto& status : diagnostics.status) fields(wire, status);
 }
 
+void fields(auto& wire, Is<RosMarker> auto& marker) {
+  constexpr std::size_t kPoint_bytes = 3 * 8, kColor_bytes = 4 * 4, kTexture_bytes = 2 * 4;
+  std::string blank;  // no texture, no mesh file
+  std::vector<Eigen::Vector2f> none;
+  RosCompressedImage no_image;
+  std::vector<std::uint8_t> no_file;
+  bool no_materials = false;
+  fields(wire, marker.header);
+  wire.text(marker.name_space);
+  wire.i32(marker.id);
+  wire.i32(marker.type);
+  wire.i32(marker.action);
+  fields(wire, marker.pose);
+  fields(wire, marker.scale);
+  wire.f32(std::span(marker.color.data(), 4));
+  for (auto& part : marker.lifetime) wire.u32(part);
+  wire.flag(marker.frame_locked);
+  wire.resize(marker.points, kPoint_bytes);
+  for (auto& point : marker.points) fields(wire, point);
+  wire.resize(marker.colors, kColor_bytes);
+  for (auto& color : marker.colors) wire.f32(std::span(color.data(), 4));
+  wire.text(blank);
+  fields(wire, no_image);
+  wire.resize(none, kTexture_bytes);
+  for (auto& coordinates : none) wire.f32(std::span(coordinates.data(), 2));
+  wire.text(marker.text);
+  wire.text(blank);
+  wire.text(blank);
+  wire.octets(no_file);
+  wire.flag(no_materials);
+}
+
+void fields(auto& wire, Is<RosMarkers> auto& message) {
+  constexpr std::size_t kLeast_bytes = 200;  // of a marker without points
+  wire.resize(message.markers, kLeast_bytes);
+  for (auto& marker : message.markers) fields(wire, marker);
+}
+
+void fields(auto& wire, Is<RosLog> auto& log) {
+  wire.stamp(log.stamp);
+  wire.u8(log.level);
+  wire.text(log.name);
+  wire.text(log.text);
+  wire.text(log.file);
+  wire.text(log.function);
+  wire.u32(log.line);
+}
+
 }  // namespace
 
 bool is_of_type(const BagChannel& channel, std::string_view type) {
@@ -210,5 +258,11 @@ template Decoded<RosPointCloud> decode_ros(std::string_view, std::span<const std
 template std::vector<std::uint8_t> encode_ros(const RosPointCloud&);
 template Decoded<RosDiagnostics> decode_ros(std::string_view, std::span<const std::uint8_t>);
 template std::vector<std::uint8_t> encode_ros(const RosDiagnostics&);
+template Decoded<RosMarker> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosMarker&);
+template Decoded<RosMarkers> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosMarkers&);
+template Decoded<RosLog> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosLog&);
 
 }  // namespace km

@@ -150,6 +150,40 @@ struct RosDiagnostics {
   std::vector<RosDiagnosticStatus> status;
 };
 
+/// visualization_msgs/Marker, as of ROS 2 Humble, without textures and mesh files.
+struct RosMarker {
+  static constexpr std::string_view kType = "visualization_msgs/Marker";
+  static constexpr std::int32_t kLineList = 5, kTriangleList = 11;  ///< Of points: pairs, triples.
+  RosHeader header;
+  std::string name_space;  ///< With the id the name of what is drawn: another of it replaces it.
+  std::int32_t id = 0;
+  std::int32_t type = 0;
+  std::int32_t action = 0;                          ///< 0: add or replace.
+  RosPose pose;                                     ///< Of the points in the header's frame.
+  Eigen::Vector3d scale = Eigen::Vector3d::Ones();  ///< x: width of lines [m].
+  Eigen::Vector4f color = {1, 1, 1, 1};             ///< Red, green, blue, alpha: 0 to 1.
+  std::array<std::uint32_t, 2> lifetime{};          ///< [s], [ns]; 0: for ever.
+  bool frame_locked = false;
+  std::vector<Eigen::Vector3d> points;  ///< [m]
+  std::vector<Eigen::Vector4f> colors;  ///< As many as points, or none.
+  std::string text;
+};
+
+struct RosMarkers {
+  static constexpr std::string_view kType = "visualization_msgs/MarkerArray";
+  std::vector<RosMarker> markers;
+};
+
+/// A line of a log.
+struct RosLog {
+  static constexpr std::string_view kType = "rcl_interfaces/Log";
+  static constexpr std::uint8_t kDebug = 10, kInfo = 20, kWarn = 30, kError = 40;
+  Stamp stamp = 0;
+  std::uint8_t level = kInfo;
+  std::string name, text, file, function;
+  std::uint32_t line = 0;
+};
+
 /// True if the channel's messages are of `type`, a name of ROS 1; ROS 2 writes "/msg/" in it.
 [[nodiscard]] bool is_of_type(const BagChannel& channel, std::string_view type);
 

@@ -32,6 +32,10 @@ std::uint64_t RosWire::number(std::size_t size) {
   return value;
 }
 
+void RosWire::f32(std::span<float> values) {
+  for (float& value : values) value = std::bit_cast<float>(static_cast<std::uint32_t>(number(4)));
+}
+
 void RosWire::f64(std::span<double> values) {
   for (double& value : values) value = std::bit_cast<double>(number(8));
 }
@@ -82,6 +86,10 @@ void RosWriter::number(std::uint64_t value, std::size_t size) {
   while ((bytes_.size() - kEncapsulation_bytes) % size != 0) bytes_.push_back(0);
   for (std::size_t k = 0; k < size; ++k)
     bytes_.push_back(static_cast<std::uint8_t>(value >> (8U * k)));
+}
+
+void RosWriter::f32(std::span<const float> values) {
+  for (const float value : values) number(std::bit_cast<std::uint32_t>(value), 4);
 }
 
 void RosWriter::f64(std::span<const double> values) {

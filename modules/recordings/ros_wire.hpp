@@ -29,6 +29,8 @@ class RosWire {
   void u8(std::uint8_t& value) { value = reader_.u8(); }
   void flag(bool& value) { value = reader_.u8() != 0; }
   void u32(std::uint32_t& value) { value = static_cast<std::uint32_t>(number(4)); }
+  void i32(std::int32_t& value) { value = static_cast<std::int32_t>(number(4)); }
+  void f32(std::span<float> values);
   void f64(std::span<double> values);
   void text(std::string& value);
   /// uint8[].
@@ -69,6 +71,8 @@ class RosWriter {
   void u8(std::uint8_t value) { bytes_.push_back(value); }
   void flag(bool value) { u8(value ? 1 : 0); }
   void u32(std::uint32_t value) { number(value, 4); }
+  void i32(std::int32_t value) { number(static_cast<std::uint32_t>(value), 4); }
+  void f32(std::span<const float> values);
   void f64(std::span<const double> values);
   void text(const std::string& value);
   void octets(const std::vector<std::uint8_t>& values);

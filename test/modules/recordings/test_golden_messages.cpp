@@ -140,6 +140,31 @@ RosDiagnostics diagnostics() {
           {{1, "a: odometry", "late", "a", {{"poses", "12"}, {"", "x"}}}, {0, "b", "", "", {}}}};
 }
 
+RosMarker marker(Doubles& doubles, const std::string& name_space, std::size_t count) {
+  RosMarker marker;
+  marker.header = header("map");
+  marker.name_space = name_space;
+  marker.id = -2;
+  marker.type = RosMarker::kTriangleList;
+  marker.pose = doubles.pose();
+  marker.scale = doubles.vector();
+  marker.color = {0.25F, 0.5F, 0.75F, 1.0F};
+  marker.lifetime = {3, 4};
+  marker.frame_locked = true;
+  for (std::size_t k = 0; k < count; ++k) marker.points.push_back(doubles.vector());
+  marker.colors.assign(count, marker.color);
+  marker.text = "faces";
+  return marker;
+}
+
+RosMarkers markers() {
+  Doubles doubles;
+  RosMarkers message;
+  message.markers.push_back(marker(doubles, "kept", 0));
+  message.markers.push_back(marker(doubles, "a", 2));
+  return message;
+}
+
 RosImage image(bool is_empty) {
   if (is_empty)
     return {.header = header(""),
@@ -163,7 +188,7 @@ RosImage image(bool is_empty) {
 TEST_CASE("Messages are to the byte those of another CDR library, in both directions",
           "[recordings]") {
   const std::vector<Golden> golden = goldens();
-  REQUIRE(golden.size() == 15);
+  REQUIRE(golden.size() == 18);
   std::size_t next = 0;
   const auto check = [&]<typename Message>(const Message& message) {
     const Golden& known = golden[next++];
@@ -196,6 +221,10 @@ TEST_CASE("Messages are to the byte those of another CDR library, in both direct
   check(cloud());
   check(empty_cloud());
   check(diagnostics());
+  Doubles doubles;
+  check(marker(doubles, "mesh", 3));
+  check(markers());
+  check(RosLog{1700000001123456789, RosLog::kWarn, "vio", "slow", "", "f", 7});
 }
 
 }  // namespace km

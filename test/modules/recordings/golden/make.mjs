@@ -44,6 +44,21 @@ const transform = (frame, child_frame_id) => ({
   transform: { translation: vector(), rotation: quaternion() },
 });
 
+const color = () => {
+  const [r, g, b, a] = [0.25, 0.5, 0.75, 1];
+  return { r, g, b, a };
+};
+const marker = (ns, count) => ({
+  header: header("map"), ns, id: -2, type: 11, action: 0, pose: pose(), scale: vector(),
+  color: color(), lifetime: { sec: 3, nanosec: 4 }, frame_locked: true,
+  points: Array.from({ length: count }, vector), colors: Array.from({ length: count }, color),
+  texture_resource: "",
+  texture: { header: { stamp: { sec: 0, nanosec: 0 }, frame_id: "" }, format: "",
+             data: new Uint8Array() },
+  uv_coordinates: [], text: "faces", mesh_resource: "",
+  mesh_file: { filename: "", data: new Uint8Array() }, mesh_use_embedded_materials: false,
+});
+
 const messages = [
   ["sensor_msgs/Image", () => ({
     header: header("left"), height: 2, width: 3, encoding: "mono8", is_bigendian: 0, step: 3,
@@ -90,6 +105,11 @@ const messages = [
       { level: 1, name: "a: odometry", message: "late", hardware_id: "a",
         values: [{ key: "poses", value: "12" }, { key: "", value: "x" }] },
       { level: 0, name: "b", message: "", hardware_id: "", values: [] }] })],
+  ["visualization_msgs/Marker", () => marker("mesh", 3)],
+  ["visualization_msgs/MarkerArray", () => ({ markers: [marker("kept", 0), marker("a", 2)] })],
+  ["rcl_interfaces/Log", () => ({
+    stamp: { sec: 1700000001, nanosec: 123456789 }, level: 30, name: "vio", msg: "slow",
+    file: "", function: "f", line: 7 })],
 ];
 
 for (const [type, make] of messages) {

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "modules/recordings/mcap_records.hpp"
+
+namespace km {
+
+/// Makes the bytes of an MCAP file (mcap.dev/spec), version 0: messages in chunks, each with its
+/// checksum and the definitions that are new in it, and behind it where its messages are; at the
+/// end checksum, definitions, statistics, and where the chunks are. A file that is cut is readable
+/// up to its last whole chunk. Not thread-safe.
+class McapWriter {
+ public:
+  struct Options {
+    std::string profile = "ros2";
+    std::string library = "kimera_multi";
+    std::string compression = "zstd";                ///< Or "lz4", or "": none.
+    std::size_t chunk_bytes = std::size_t{1} << 20;  ///< A chunk ends once it has as many.
+  };
+
+  explicit McapWriter(Options options);
+
+  /// The channel's id, which is not that in `channel`, nor is the schema's. A channel with no
+  /// message is not in the file. At most 65535 of each: throws std::length_error.
+  std::uint16_t add_channel(McapChannel channel, const McapSchema& schema);
+
+  /// Adds a message of a channel of this file; its size is that of `data`.
+  void add(const McapMessage& message, std::span<const std::uint8_t> data);
+
+  /// Ends the chunk; none is empty.
+  void end_chunk();
+
+  /// Ends the file: call once, and nothing but take() after it.
+  void finish();
+
+  /// The bytes that follow those taken before.
+  [[nodiscard]] std::vector<std::uint8_t> take();
+
+ private:
+  struct OpenChunk {
+    ByteWriter records;
+    Stamp start = 0, end = 0;
+    std::size_t messages = 0;
+    std::map<std::uint16_t, McapMessageIndex> indexes;
+  };
+
+  void define(const McapChannel& channel);
+  void count(const McapMessage& message);
+  void put_chunk();
+  void put_message_indexes(McapChunkIndex& chunk);
+  void put_summary();
+  template <typename Record>
+  void put(const Record& record);
+  void append(std::span<const std::uint8_t> bytes);
+
+  const Options options_;
+  std::vector<McapSchema> schemas_;  // id - 1 is the index, as of channels
+  std::vector<McapChannel> channels_;
+  std::set<std::uint16_t> written_schemas_, written_channels_;
+  OpenChunk chunk_;
+  std::vector<McapChunkIndex> chunks_;
+  McapStatistics statistics_;
+  std::map<std::uint16_t, std::uint64_t> counts_;
+  std::vector<std::uint8_t> bytes_;  // to be taken
+  std::uint64_t size_ = 0;           // of the file
+  std::uint32_t crc_ = 0;            // of the file
+};
+
+}  // namespace km
