@@ -29,6 +29,15 @@ inline constexpr const char* kJournal = "run.journal";
 /// The map of such a run.
 inline constexpr const char* kMap = "run.map";
 
+/// What viewers open. A run that is taken up goes on in record_2.mcap, and so on.
+inline constexpr const char* kRecord = "record.mcap";
+
+/// "record_2.mcap" of "record.mcap".
+[[nodiscard]] inline std::filesystem::path numbered(const std::filesystem::path& file, int number) {
+  const std::string name = file.stem().string() + '_' + std::to_string(number);
+  return file.parent_path() / (name + file.extension().string());
+}
+
 /// Folder of the meshes that other robots sent, robot<id>.ply each.
 inline constexpr const char* kPeerMeshes = "peer_meshes";
 
@@ -42,6 +51,9 @@ inline void remove_results(const std::filesystem::path& folder, bool goes_on = f
       std::filesystem::remove(folder / (file + ending));
   }
   std::filesystem::remove_all(folder / kPeerMeshes);
+  if (goes_on) return;
+  std::filesystem::remove(folder / kRecord);
+  for (int number = 2; std::filesystem::remove(numbered(folder / kRecord, number));) ++number;
 }
 
 }  // namespace km

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "runtime/clock.hpp"
+#include "runtime/log_listener.hpp"
 #include "runtime/unblocked_output.hpp"
 
 namespace km {
@@ -37,6 +38,7 @@ constexpr double kLimitedInterval_s = 5.0;
 struct Console {
   std::mutex mutex;  // guards what follows
   std::ostream* log_output = &unblocked_stderr();
+  log::Listener listener;
   RateLimit rate_limit{kLimitedInterval_s};
   std::ostream* status_output = nullptr;
   bool status_in_place = false;
@@ -125,6 +127,12 @@ Line::~Line() {
   *c.log_output << time_of_day() + ' ' + name_of(level_) + ' ' + tag_ + ": " + text_.str() + '\n'
                 << std::flush;
   if (c.status_in_place && !c.drawn.empty()) draw_status(c);
+  if (c.listener) c.listener({level_, tag_, text_.str()});
+}
+
+void set_listener(Listener listener) {
+  const std::lock_guard lock(console().mutex);
+  console().listener = std::move(listener);
 }
 
 void set_level(Level level) {

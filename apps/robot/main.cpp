@@ -39,13 +39,15 @@ Examples
     kimera_multi_robot --robot 0 --dataset recording.bag --rig rig.yaml --output results/a
   On the sensors of this robot, whose drivers run on ROS 2:
     kimera_multi_robot --robot 0 --live rig.yaml --output results/a
+  With a record that Foxglove, Lichtblick, Rerun and PlotJuggler open:
+    kimera_multi_robot --robot 0 --dataset MH_01_easy --output results/a --record
   The back-end alone, on a recorded pose graph:
     kimera_multi_robot --config config/datasets/tunnels.yaml --robot 3 --graph robot3.csv --rate max --output results/3
 
 Files written to --output: odometry.tum, optimized.tum, pose_graph.g2o, keyframes.csv, loop_closures.csv,
 optimizer.csv, traffic.csv, process.csv, timing.csv, config.yaml, summary.json, rig_estimated.yaml (for --rig of
 the next run), run.journal (for --resume and --session); with mapping.mode on also mesh.ply,
-mesh_optimized.ply and label_palette.csv.
+mesh_optimized.ply and label_palette.csv; with --record record.mcap.
 Ctrl-C, SIGTERM and SIGHUP end the run in order with everything written; a second Ctrl-C or SIGTERM ends it at once.
 Exit codes: 0 done; 1 bad input or configuration, or a recording that gave no pose; 2 bad command line;
 3 a module failed while running, or another robot claimed this robot's id; 4 results could not be written: the log
@@ -151,6 +153,13 @@ void add_output(CLI::App& app, RobotOptions& options) {
       "In place of --output: the folder of a run that was killed; goes on where it ended (all "
       "other options as before)");
   group->require_option(1);
+  app.add_option_function<std::vector<std::string>>(
+         "--record", [&options](const std::vector<std::string>& file) { options.record = file[0]; },
+         "Also write what happens to an MCAP file, for Foxglove, Lichtblick, Rerun, PlotJuggler "
+         "(default: record.mcap in the folder of the results)")
+      ->expected(0, 1)
+      ->type_name("[FILE.mcap]");
+  app.add_flag("--record-images", options.record_images, "With --record: the left images, too");
 }
 
 // Exits the process for --help and mistakes, after telling.

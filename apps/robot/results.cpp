@@ -37,17 +37,21 @@ void write_keyframes(std::ostream& out, const RunRecord& record) {
         << record.median_depth_m(keyframe.id.index) << '\n';
 }
 
-// tx,ty,tz,qx,qy,qz,qw of the pose of `to` in the frame of `from`, all empty if it was not
-// measured.
-std::string pose_fields(const RunRecord& record, const ClosureOutcome& outcome) {
+// The pose of `to` in the frame of `from`, if it was measured.
+std::optional<SE3> measured_pose(const RunRecord& record, const ClosureOutcome& outcome) {
   const auto closure = record.closures().find(outcome.id);
   if (outcome.stage < ClosureStage::kVerified || closure == record.closures().end())
-    return ",,,,,,";
+    return std::nullopt;
   const Closure& measured = closure->second;
   const bool same_way = measured.from.id == outcome.id.from;
-  const SE3 T_from_to = same_way ? measured.T_from_to : measured.T_from_to.inverse();
-  const Eigen::Vector3d& t = T_from_to.translation();
-  const Eigen::Quaterniond q(T_from_to.linear());
+  return same_way ? measured.T_from_to : measured.T_from_to.inverse();
+}
+
+// tx,ty,tz,qx,qy,qz,qw, all empty without a pose.
+std::string pose_fields(const std::optional<SE3>& T_from_to) {
+  if (!T_from_to) return ",,,,,,";
+  const Eigen::Vector3d& t = T_from_to->translation();
+  const Eigen::Quaterniond q(T_from_to->linear());
   char text[192];
   std::snprintf(text, sizeof text, "%.6f,%.6f,%.6f,%.8f,%.8f,%.8f,%.8f", t.x(), t.y(), t.z(), q.x(),
                 q.y(), q.z(), q.w());
@@ -60,8 +64,8 @@ void write_closures(std::ostream& out, const RunRecord& record) {
   for (const ClosureOutcome& row : record.outcomes())
     out << row.id.from.robot << ',' << row.id.from.index << ',' << row.id.to.robot << ','
         << row.id.to.index << ',' << row.similarity << ',' << to_string(row.stage) << ','
-        << row.matches << ',' << row.inliers << ',' << pose_fields(record, row) << ",\""
-        << row.reason << "\"\n";
+        << row.matches << ',' << row.inliers << ',' << pose_fields(measured_pose(record, row))
+        << ",\"" << row.reason << "\"\n";
 }
 
 // The robot's own poses with every edge that touches them: odometry, and the inlier closures of
@@ -164,6 +168,16 @@ void write_results(const fs::path& folder, const RunRecord& record, ResultWriter
                 [&](const fs::path& file) { write_g2o(file, graph_of(record)); });
   write("keyframes.csv", write_keyframes, record);
   write("loop_closures.csv", write_closures, record);
+}
+
+std::vector<ToldClosure> told_closures(const RunRecord& record) {
+  std::vector<ToldClosure> told;
+  for (const ClosureOutcome& outcome : record.outcomes())
+    told.push_back({.id = outcome.id,
+                    .stage = outcome.stage,
+                    .rejected = !outcome.reason.empty(),
+                    .T_from_to = measured_pose(record, outcome)});
+  return told;
 }
 
 RunSummary summary_of(const RunRecord& record) {

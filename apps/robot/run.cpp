@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "apps/output_file.hpp"
 #include "apps/result_files.hpp"
 #include "apps/result_writer.hpp"
 #include "apps/robot/growing_file.hpp"
@@ -19,6 +20,7 @@
 #include "apps/robot/rounds_csv.hpp"
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/wiring.hpp"
+#include "modules/core/input_file.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/core/write_file.hpp"
 #include "modules/mesh/ply_file.hpp"
@@ -382,6 +384,20 @@ void write_peer_meshes(const fs::path& folder, const TeamMeshNode& peers, Result
   }
 }
 
+// What viewers open ends with what the other results say, and with those that tell of closures.
+void finish_record(const RobotOptions& options, RosOutputNode& node, const RunRecord& record,
+                   const RunResult& result, ResultWriter& results) {
+  if (result.is_left_behind(node.name()))
+    return results.note(*options.record, "has no end: its module hangs");
+  std::map<std::string, std::string> files;
+  for (const char* name : {"config.yaml", "keyframes.csv", "loop_closures.csv"})
+    if (is_file(options.output / name)) files[name] = read_input_file(options.output / name);
+  node.finish(record.optimized(), told_closures(record), files);
+  if (node.left_out() > 0)
+    log::warn("record") << node.left_out() << " messages and images are missing in "
+                        << options.record->string() << ": they came faster than they were written";
+}
+
 // All but the summary. What a module that hangs was at cannot be read.
 void write_all(const RobotOptions& options, Robot& robot, const RunRecord& record,
                const RunResult& result, ResultWriter& results) {
@@ -392,6 +408,7 @@ void write_all(const RobotOptions& options, Robot& robot, const RunRecord& recor
     robot.mesh_files()->finish(record.trajectory());
   if (robot.peer_meshes() != nullptr && !result.is_left_behind("team_mesh"))
     write_peer_meshes(options.output / kPeerMeshes, *robot.peer_meshes(), results);
+  if (robot.record() != nullptr) finish_record(options, *robot.record(), record, result, results);
   results.write(options.output / "timing.csv",
                 [&robot](const auto& file) { write_file(file, timings(robot)); });
 }
@@ -440,6 +457,19 @@ void write_estimated_rig(const RobotOptions& options, const RigInput& rig, const
   });
 }
 
+// Where the record goes, if there is to be one: a run that goes on does so in a file of its own.
+// Throws std::runtime_error for a file that was asked for and has no folder.
+std::optional<fs::path> record_file(const RobotOptions& options, bool goes_on) {
+  if (!options.record) return std::nullopt;
+  const bool is_named = !options.record->empty();
+  if (is_named) check_output_folder(*options.record);
+  const fs::path file = is_named ? *options.record : options.output / kRecord;
+  if (!goes_on || !fs::exists(file)) return file;
+  int number = 2;
+  while (fs::exists(numbered(file, number))) ++number;
+  return numbered(file, number);
+}
+
 std::optional<ImageSources> sources_of(const RobotOptions& options,
                                        const std::optional<PartialRig>& rig) {
   if (rig) return image_sources(rig->rig.topics, options.rig);
@@ -449,8 +479,9 @@ std::optional<ImageSources> sources_of(const RobotOptions& options,
 
 }  // namespace
 
-int run_robot(const RobotOptions& options, SignalWatch& signals,
+int run_robot(const RobotOptions& asked, SignalWatch& signals,
               const std::function<void(Topics&)>& listen) {
+  RobotOptions options = asked;
   const RobotConfig config = load_robot_config(options);
   const RigInput rig = read_rig_input(options);
   const std::optional<MappingPlan> mapping = plan_mapping(
@@ -461,6 +492,7 @@ int run_robot(const RobotOptions& options, SignalWatch& signals,
     return 0;
   }
   const bool goes_on = options.resume && input->restored;
+  options.record = record_file(options, goes_on);
   ResultWriter results;
   Robot robot(options, config, *std::move(input), mapping, results, signals);
   if (listen) listen(robot.topics());

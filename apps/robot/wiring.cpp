@@ -6,6 +6,7 @@
 
 #include "apps/result_files.hpp"
 #include "apps/robot/diagnostics.hpp"
+#include "apps/robot/results.hpp"
 #include "apps/robot/team_keys_node.hpp"
 #include "modules/dense_sensing/dense_sensing_node.hpp"
 #include "modules/loop_closure/keyframe_features_node.hpp"
@@ -19,7 +20,8 @@
 #include "modules/place_recognition/place_recognition_node.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
 #include "modules/pose_graph/team_node.hpp"
-#include "modules/ros_dds/ros_output_node.hpp"
+#include "modules/ros_dds/live_sink_codec.hpp"
+#include "modules/ros_dds/mcap_sink.hpp"
 #include "modules/semantic_mapping/semantic_mapping_node.hpp"
 #include "modules/vio/outside_odometry_node.hpp"
 #include "modules/vio/vio_node.hpp"
@@ -27,6 +29,8 @@
 
 namespace km {
 namespace {
+
+constexpr std::string_view kRecordNode = "record";
 
 template <typename T>
 void forward(In<T> from, Out<T> to) {
@@ -77,7 +81,9 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   add_network(share_meshes(config.mesh_chunks));
   add_records();
   if (input.ros != nullptr && config.ros.publish.value_or(true))
-    add_ros_output(config.ros, options.name, std::move(input.ros));
+    add_ros_output("ros_output", std::make_unique<LiveSink>(std::move(input.ros)),
+                   {.mesh_points = config.ros.mesh_points}, std::nullopt);
+  if (options.record) add_record(options, config.ros, results);
   if (seal_ != nullptr)
     add<TeamKeysNode>(false, options.security, *seal_, [this] { bridge_->tell_keys(); });
   nodes_.push_back(bridge_);
@@ -387,10 +393,12 @@ void Robot::add_records() {
       RobotStatusTopics{.own = topics_.status.to_peers(), .peers = topics_.status.from_peers()});
 }
 
-void Robot::add_ros_output(const RosConfig& config, const std::string& name,
-                           std::shared_ptr<const RosNetwork> network) {
+void Robot::add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
+                           RosOutputOptions options, std::optional<In<SensorPacket>> images) {
+  options.robot = identity_.name;
+  options.id = identity_.robot;
   auto& output = add<RosOutputNode>(
-      false, std::move(network), name, config.mesh_points,
+      false, node, std::move(sink), std::move(options),
       [this, loads = ModuleLoads(nodes_)]() mutable {
         std::vector<RosDiagnosticStatus> all = {loads.status()};
         if (sensors_ != nullptr)
@@ -398,12 +406,49 @@ void Robot::add_ros_output(const RosConfig& config, const std::string& name,
               sensors_status(sensors_->published(), sensors_->skipped(), sensors_->faults()));
         return all;
       },
+      [this, activity = std::optional<std::uint64_t>()]() mutable {
+        std::optional<std::vector<ToldClosure>> closures;
+        (void)recorder_->try_with_record([&](const RunRecord& record) {
+          if (std::exchange(activity, record.activity()) != record.activity())
+            closures = told_closures(record);
+        });
+        return closures;
+      },
       RosOutputTopics{.odometry = topics_.odometry,
                       .keyframes = topics_.keyframe_odometry,
-                      .trajectory = topics_.trajectory});
+                      .trajectory = topics_.trajectory,
+                      .images = images});
   topics_.optimized_meshes.subscribe([&output](const auto& optimized) {
     output.offer({optimized, &optimized->mesh});
   });
+  if (node == kRecordNode) record_ = &output;
+}
+
+// Files of several robots are put together: each has a map frame of its own, which is the team's as
+// far as its record says so. It has its own node, so that no viewer waits for a disk.
+void Robot::add_record(const RobotOptions& options, const RosConfig& config,
+                       ResultWriter& results) {
+  constexpr double kState_bytes_per_s = 200e3;  // of meshes, paths and closures, not compressed
+  constexpr std::size_t kQueue = 10000;         // a minute of a disk that stands still
+  const std::filesystem::path& file = *options.record;
+  add_ros_output(
+      kRecordNode,
+      std::make_unique<McapSink>(
+          file, [file, &results](const std::string& why) { results.note(file, why); }),
+      {.name_of = [this](RobotId robot) { return name_of(robot); },
+       .mesh_points = config.mesh_points,
+       .draws = true,
+       .logs = true,
+       .state_bytes_per_s = kState_bytes_per_s,
+       .queue = kQueue},
+      options.record_images ? std::optional<In<SensorPacket>>(topics_.packets) : std::nullopt);
+}
+
+std::string Robot::name_of(RobotId robot) const {
+  if (robot == identity_.robot) return identity_.name;
+  for (const Peer& peer : bridge_->peers().list())
+    if (peer.identity.robot == robot) return peer.identity.name;
+  return "robot" + std::to_string(robot);
 }
 
 RobotStatus Robot::own_status() const {

@@ -30,6 +30,7 @@
 #include "modules/pose_graph/graph_playback_node.hpp"
 #include "modules/pose_graph/parcel_codec.hpp"
 #include "modules/relay/relay_node.hpp"
+#include "modules/ros_dds/ros_output_node.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/sensors/sensors_node.hpp"
 #include "runtime/dds/bridge.hpp"
@@ -126,6 +127,8 @@ class Robot {
   [[nodiscard]] const TeamMeshNode* peer_meshes() const { return peer_meshes_; }
   /// True if another living robot had this robot's id first.
   [[nodiscard]] bool id_taken() const { return id_taken_; }
+  /// Null without --record.
+  [[nodiscard]] RosOutputNode* record() { return record_; }
   [[nodiscard]] const NetworkInterface& interface() const { return participant_.interface(); }
   void set_settled(const Departure::Present& told) {
     phase_ = told.phase;
@@ -160,8 +163,10 @@ class Robot {
   void add_relay();
   void add_network(CrossingEnds meshes);
   void add_records();
-  void add_ros_output(const RosConfig& config, const std::string& name,
-                      std::shared_ptr<const RosNetwork> network);
+  void add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
+                      RosOutputOptions options, std::optional<In<SensorPacket>> images);
+  void add_record(const RobotOptions& options, const RosConfig& config, ResultWriter& results);
+  [[nodiscard]] std::string name_of(RobotId robot) const;
   [[nodiscard]] RobotStatus own_status() const;
 
   /// Adds a node to the supervisor; `feeds` marks those that the end of the input drains.
@@ -193,6 +198,7 @@ class Robot {
   TeamMeshNode* peer_meshes_ = nullptr;
   PcmNode* pcm_ = nullptr;
   RobotStatusNode* status_ = nullptr;
+  RosOutputNode* record_ = nullptr;
   DdsBridge* bridge_ = nullptr;
   std::optional<RelayNode> relay_;
   Supervisor supervisor_;  // last member: stops the nodes before what they use

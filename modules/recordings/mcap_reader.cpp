@@ -1,7 +1,5 @@
 #include "modules/recordings/mcap_reader.hpp"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <utility>
 
@@ -18,10 +16,6 @@ constexpr std::uint64_t kFooter_bytes = kMcapRecordHeader_bytes + kMcapFooterFie
 constexpr std::uint64_t kMaxDefinition_bytes = std::uint64_t{64} << 20U;
 // Messages outside of chunks are read together up to so many.
 constexpr std::uint64_t kBarePart_bytes = std::uint64_t{4} << 20U;
-
-std::uint32_t crc_of(std::span<const std::uint8_t> bytes, std::uint32_t before = 0) {
-  return static_cast<std::uint32_t>(crc32_z(before, bytes.data(), bytes.size()));
-}
 
 struct McapRecord {
   McapRecordHeader header;
@@ -101,7 +95,7 @@ void McapReader::read_summary(std::uint64_t begin, std::uint64_t footer, const M
   if (end - begin > kMaxDecompressed_bytes)
     return report_.add(BagFault::kIndex, begin, "a summary of more than 512 MiB");
   const Bytes bytes = file_.read(begin, end - begin);
-  if (fields.summary_crc != 0 && crc_of(bytes) != fields.summary_crc)
+  if (fields.summary_crc != 0 && mcap_crc(bytes) != fields.summary_crc)
     return report_.add(BagFault::kIndex, begin, "a summary with another checksum than it says");
   Summary summary;
   bool is_whole = true;
@@ -243,7 +237,7 @@ void McapReader::check_data_crc(std::uint64_t end, std::uint32_t crc) {
   if (crc == 0) return;
   std::uint32_t actual = 0;
   for (std::uint64_t at = 0; at < end; at += kPart_bytes)
-    actual = crc_of(file_.read(at, std::min(kPart_bytes, end - at)), actual);
+    actual = mcap_crc(file_.read(at, std::min(kPart_bytes, end - at)), actual);
   if (actual != crc)
     report_.add(BagFault::kChecksum, end, "the data section has another checksum than it says");
 }
@@ -293,7 +287,7 @@ Bytes McapReader::records_of(const ChunkPlace& place) {
   if (!records.value)
     return refuse(BagFault::kCompression,
                   "a chunk (compression '" + chunk->compression + "'): " + records.refusal);
-  if (chunk->uncompressed_crc != 0 && crc_of(*records.value) != chunk->uncompressed_crc)
+  if (chunk->uncompressed_crc != 0 && mcap_crc(*records.value) != chunk->uncompressed_crc)
     return refuse(BagFault::kChecksum, "a chunk with another checksum than it says");
   return *std::move(records.value);
 }

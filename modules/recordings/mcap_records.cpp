@@ -1,5 +1,7 @@
 #include "modules/recordings/mcap_records.hpp"
 
+#include <zlib.h>
+
 #include <concepts>
 #include <limits>
 #include <type_traits>
@@ -12,7 +14,7 @@ constexpr auto kLatest = static_cast<std::uint64_t>(std::numeric_limits<Stamp>::
 // Reads fields, one after the other.
 class McapIn {
  public:
-  explicit McapIn(std::span<const std::uint8_t> bytes) : reader_(bytes) {}
+  explicit McapIn(std::span<const std::uint8_t> bytes) : bytes_(bytes), reader_(bytes) {}
 
   void u8(std::uint8_t& value) { value = reader_.u8(); }
   void u16(std::uint16_t& value) { value = reader_.u16(); }
@@ -27,6 +29,12 @@ class McapIn {
     value.assign(bytes.begin(), bytes.end());
   }
   void octets(std::span<const std::uint8_t>& value) { value = reader_.bytes(reader_.u64()); }
+  // Of all before it; 0: none.
+  void crc() {
+    const auto before = bytes_.first(bytes_.size() - reader_.left());
+    const std::uint32_t crc = reader_.u32();
+    if (!reader_.failed() && crc != 0 && crc != mcap_crc(before)) reader_.fail();
+  }
 
   // A map or list of pairs, of which the length in bytes comes first.
   template <typename Key, typename Value>
@@ -56,6 +64,7 @@ class McapIn {
   void number(std::uint16_t& value) { u16(value); }
   void number(std::uint64_t& value) { u64(value); }
 
+  std::span<const std::uint8_t> bytes_;
   ByteReader reader_;
 };
 
@@ -74,6 +83,11 @@ class McapOut {
   void octets(std::span<const std::uint8_t> value) {
     writer_.u64(value.size());
     writer_.bytes(value);
+  }
+  void crc() {
+    const auto bytes = writer_.release();
+    writer_.bytes(bytes);
+    writer_.u32(mcap_crc(bytes));
   }
   template <typename Key, typename Value>
   void pairs(const std::vector<std::pair<Key, Value>>& values) {
@@ -159,6 +173,25 @@ void fields(auto& wire, RecordIs<McapChunkIndex> auto& index) {
   wire.u64(index.uncompressed_size);
 }
 
+void fields(auto& wire, RecordIs<McapAttachment> auto& attachment) {
+  wire.time(attachment.log_time);
+  wire.time(attachment.create_time);
+  wire.text(attachment.name);
+  wire.text(attachment.media_type);
+  wire.octets(attachment.data);
+  wire.crc();
+}
+
+void fields(auto& wire, RecordIs<McapAttachmentIndex> auto& index) {
+  wire.u64(index.start);
+  wire.u64(index.length);
+  wire.time(index.log_time);
+  wire.time(index.create_time);
+  wire.u64(index.data_size);
+  wire.text(index.name);
+  wire.text(index.media_type);
+}
+
 void fields(auto& wire, RecordIs<McapStatistics> auto& statistics) {
   wire.u64(statistics.message_count);
   wire.u16(statistics.schema_count);
@@ -182,6 +215,10 @@ void fields(auto& wire, RecordIs<McapDataEnd> auto& end) {
 }
 
 }  // namespace
+
+std::uint32_t mcap_crc(std::span<const std::uint8_t> bytes, std::uint32_t before) {
+  return static_cast<std::uint32_t>(crc32_z(before, bytes.data(), bytes.size()));
+}
 
 std::optional<McapRecordHeader> parse_mcap_record_header(std::span<const std::uint8_t> bytes) {
   ByteReader reader(bytes);
@@ -254,6 +291,10 @@ template std::optional<McapMessageIndex> parse_mcap(std::span<const std::uint8_t
 template void put_mcap(ByteWriter&, const McapMessageIndex&);
 template std::optional<McapChunkIndex> parse_mcap(std::span<const std::uint8_t>);
 template void put_mcap(ByteWriter&, const McapChunkIndex&);
+template std::optional<McapAttachment> parse_mcap(std::span<const std::uint8_t>);
+template void put_mcap(ByteWriter&, const McapAttachment&);
+template std::optional<McapAttachmentIndex> parse_mcap(std::span<const std::uint8_t>);
+template void put_mcap(ByteWriter&, const McapAttachmentIndex&);
 template std::optional<McapStatistics> parse_mcap(std::span<const std::uint8_t>);
 template void put_mcap(ByteWriter&, const McapStatistics&);
 template std::optional<McapSummaryOffset> parse_mcap(std::span<const std::uint8_t>);

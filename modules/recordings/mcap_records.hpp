@@ -26,6 +26,8 @@ enum class McapOpcode : std::uint8_t {
   kChunk = 0x06,
   kMessageIndex = 0x07,
   kChunkIndex = 0x08,
+  kAttachment = 0x09,
+  kAttachmentIndex = 0x0A,
   kStatistics = 0x0B,
   kSummaryOffset = 0x0E,
   kDataEnd = 0x0F,
@@ -117,6 +119,27 @@ struct McapChunkIndex {
   std::uint64_t uncompressed_size = 0;
 };
 
+/// A file in the file. Behind its fields is the checksum of these.
+struct McapAttachment {
+  static constexpr McapOpcode kOpcode = McapOpcode::kAttachment;
+  Stamp log_time = 0;
+  Stamp create_time = 0;
+  std::string name;
+  std::string media_type;              ///< "text/csv", ...
+  std::span<const std::uint8_t> data;  ///< Into what was parsed, or is to be written.
+};
+
+struct McapAttachmentIndex {
+  static constexpr McapOpcode kOpcode = McapOpcode::kAttachmentIndex;
+  std::uint64_t start = 0;   ///< [bytes from the beginning of the file]
+  std::uint64_t length = 0;  ///< With opcode and length.
+  Stamp log_time = 0;
+  Stamp create_time = 0;
+  std::uint64_t data_size = 0;
+  std::string name;
+  std::string media_type;
+};
+
 struct McapStatistics {
   static constexpr McapOpcode kOpcode = McapOpcode::kStatistics;
   std::uint64_t message_count = 0;
@@ -143,11 +166,15 @@ struct McapDataEnd {
   std::uint32_t data_section_crc = 0;  ///< 0: none.
 };
 
+/// Checksum (CRC-32) of bytes behind those whose checksum is `before`.
+[[nodiscard]] std::uint32_t mcap_crc(std::span<const std::uint8_t> bytes, std::uint32_t before = 0);
+
 [[nodiscard]] std::optional<McapRecordHeader> parse_mcap_record_header(
     std::span<const std::uint8_t> bytes);
 
 /// What follows a record's header; nullopt for bytes that cannot be such a record. Times beyond
-/// 2^63 - 1 ns are none. For all records above but messages.
+/// 2^63 - 1 ns are none, nor are attachments with another checksum than they say. For all records
+/// above but messages.
 template <typename Record>
 [[nodiscard]] std::optional<Record> parse_mcap(std::span<const std::uint8_t> bytes);
 

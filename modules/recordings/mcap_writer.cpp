@@ -1,7 +1,5 @@
 #include "modules/recordings/mcap_writer.hpp"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
@@ -11,10 +9,6 @@
 
 namespace km {
 namespace {
-
-std::uint32_t crc_after(std::uint32_t before, std::span<const std::uint8_t> bytes) {
-  return static_cast<std::uint32_t>(crc32_z(before, bytes.data(), bytes.size()));
-}
 
 std::span<const std::uint8_t> magic() {
   return {reinterpret_cast<const std::uint8_t*>(kMcapMagic.data()), kMcapMagic.size()};
@@ -95,7 +89,7 @@ void McapWriter::put_chunk() {
   put(McapChunk{.message_start_time = chunk_.start,
                 .message_end_time = chunk_.end,
                 .uncompressed_size = records.size(),
-                .uncompressed_crc = crc_after(0, records),
+                .uncompressed_crc = mcap_crc(records),
                 .compression = options_.compression,
                 .records = packed});
   index.chunk_length = size_ - index.chunk_start;
@@ -111,6 +105,19 @@ void McapWriter::put_message_indexes(McapChunkIndex& chunk) {
     put(index);
   }
   chunk.message_index_length = size_ - start;
+}
+
+void McapWriter::attach(const McapAttachment& attachment) {
+  end_chunk();
+  McapAttachmentIndex index{.start = size_,
+                            .log_time = attachment.log_time,
+                            .create_time = attachment.create_time,
+                            .data_size = attachment.data.size(),
+                            .name = attachment.name,
+                            .media_type = attachment.media_type};
+  put(attachment);
+  index.length = size_ - index.start;
+  attachments_.push_back(std::move(index));
 }
 
 void McapWriter::finish() {
@@ -140,9 +147,11 @@ void McapWriter::put_summary() {
   put_group(channels);
   statistics_.schema_count = static_cast<std::uint16_t>(schemas.size());
   statistics_.channel_count = static_cast<std::uint32_t>(channels.size());
+  statistics_.attachment_count = static_cast<std::uint32_t>(attachments_.size());
   statistics_.chunk_count = static_cast<std::uint32_t>(chunks_.size());
   statistics_.channel_message_counts.assign(counts_.begin(), counts_.end());
   put_group(std::vector{statistics_});
+  put_group(attachments_);
   put_group(chunks_);
   footer.summary_offset_start = size_;
   for (const McapSummaryOffset& group : groups) put(group);
@@ -171,7 +180,7 @@ void McapWriter::put(const Record& record) {
 void McapWriter::append(std::span<const std::uint8_t> bytes) {
   bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
   size_ += bytes.size();
-  crc_ = crc_after(crc_, bytes);
+  crc_ = mcap_crc(bytes, crc_);
 }
 
 }  // namespace km

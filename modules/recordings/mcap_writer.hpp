@@ -37,6 +37,9 @@ class McapWriter {
   /// Ends the chunk; none is empty.
   void end_chunk();
 
+  /// Adds a file, behind the chunk, which ends.
+  void attach(const McapAttachment& attachment);
+
   /// Ends the file: call once, and nothing but take() after it.
   void finish();
 
@@ -66,6 +69,7 @@ class McapWriter {
   std::set<std::uint16_t> written_schemas_, written_channels_;
   OpenChunk chunk_;
   std::vector<McapChunkIndex> chunks_;
+  std::vector<McapAttachmentIndex> attachments_;
   McapStatistics statistics_;
   std::map<std::uint16_t, std::uint64_t> counts_;
   std::vector<std::uint8_t> bytes_;  // to be taken

@@ -145,4 +145,18 @@ std::string ros2_name(std::string_view type) {
   return std::string(type.substr(0, slash)) + "/msg" + std::string(type.substr(slash));
 }
 
+std::string ros1_name(std::string_view type) {
+  const std::size_t slash = type.find("/msg/");
+  if (slash == type.npos) return std::string(type);
+  return std::string(type.substr(0, slash)) + std::string(type.substr(slash + 4));
+}
+
+std::string ros_name(std::string name) {
+  for (char& c : name) {
+    const bool is_fine = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    if (!is_fine) c = '_';
+  }
+  return name;
+}
+
 }  // namespace km

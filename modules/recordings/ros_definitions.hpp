@@ -13,4 +13,10 @@ namespace km {
 /// "sensor_msgs/msg/Image" of "sensor_msgs/Image".
 [[nodiscard]] std::string ros2_name(std::string_view type);
 
+/// "sensor_msgs/Image" of "sensor_msgs/msg/Image".
+[[nodiscard]] std::string ros1_name(std::string_view type);
+
+/// A name as topics and frames may have it: what is neither letter, digit nor underscore is one.
+[[nodiscard]] std::string ros_name(std::string name);
+
 }  // namespace km

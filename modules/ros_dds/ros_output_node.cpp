@@ -5,105 +5,241 @@
 #include <utility>
 
 #include "modules/core/text_table.hpp"
+#include "modules/recordings/ros_definitions.hpp"
+#include "modules/ros_dds/jpeg_image.hpp"
 #include "modules/ros_dds/mesh_cloud.hpp"
 #include "runtime/clock.hpp"
 
 namespace km {
 namespace {
 
-constexpr const char* kMap = "map";
-constexpr int kKept = 10;
 constexpr double kLate_s = 2.0;
-constexpr std::size_t kQueue = 1000;  // nobody waits for viewers: the oldest go
+constexpr std::size_t kImages = 8;  // that wait for being compressed
 
 RosPose message_of(const SE3& T) {
   return {T.translation(), Eigen::Quaterniond(T.linear())};
 }
 
-// Names of ROS' topics have letters, digits and underscores.
-std::string topic_name(std::string name) {
-  for (char& c : name) {
-    const bool is_fine = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-    if (!is_fine) c = '_';
+std::uint8_t level_of(log::Level level) {
+  switch (level) {
+    case log::Level::kError:
+      return RosLog::kError;
+    case log::Level::kWarn:
+      return RosLog::kWarn;
+    case log::Level::kInfo:
+      return RosLog::kInfo;
+    case log::Level::kDebug:
+      break;
   }
-  return name;
+  return RosLog::kDebug;
 }
 
 }  // namespace
 
-RosOutputNode::RosOutputNode(std::shared_ptr<const RosNetwork> network, const std::string& name,
-                             int mesh_points, Diagnose diagnose, const RosOutputTopics& topics)
-    : name_(topic_name(name)),
-      odom_(topic_name(name) + "/odom"),
-      base_link_(topic_name(name) + "/base_link"),
-      mesh_points_(static_cast<std::size_t>(mesh_points)),
+RosOutputNode::RosOutputNode(std::string_view name, std::unique_ptr<RosSink> sink,
+                             RosOutputOptions options, Diagnose diagnose, Closures closures,
+                             const RosOutputTopics& topics)
+    : node_name_(name),
+      sink_(std::move(sink)),
+      options_(std::move(options)),
+      name_(ros_name(options_.robot)),
+      odom_(name_ + "/odom"),
+      base_link_(name_ + "/base_link"),
+      map_(map_of(options_.id)),
       diagnose_(std::move(diagnose)),
-      odometry_(network, '/' + topic_name(name) + "/odometry", RosOdometry::kType,
-                RosQos::kReliable, kKept),
-      pose_(network, '/' + topic_name(name) + "/pose", RosPoseStamped::kType, RosQos::kReliable,
-            kKept),
-      tf_(network, "/tf", RosTransforms::kType, RosQos::kReliable, 10 * kKept),
-      path_(network, '/' + topic_name(name) + "/path", RosPath::kType, RosQos::kLatched, 1),
-      mesh_(network, '/' + topic_name(name) + "/mesh", RosPointCloud::kType, RosQos::kLatched, 1),
-      diagnostics_(network, "/diagnostics", RosDiagnostics::kType, RosQos::kReliable, kKept),
+      closures_of_(std::move(closures)),
       worker_(
-          kQueue, Overflow::kDropOldest,
+          options_.queue, Overflow::kDropOldest,
           [this](const Input& input) {
-            std::visit([this](const auto& message) { step(*message); }, input);
+            std::visit([this](const auto& message) { step(message); }, input);
           },
-          "ros_output"),
+          node_name_),
+      encoder_(
+          kImages, Overflow::kDropOldest, [this](const Image& image) { encode(image); },
+          node_name_ + "_jpeg"),
       clock_(
           std::chrono::seconds(1), [this] { worker_.post(std::make_shared<const Tick>()); },
           "ros_tick") {
+  open_topics(topics.images.has_value());
   const auto post = [this](const auto& message) { worker_.post(message); };
   topics.odometry.subscribe(post);
   topics.keyframes.subscribe(post);
   topics.trajectory.subscribe(post);
+  if (topics.images)
+    topics.images->subscribe([this](const auto& packet) { encoder_.post(packet->frame); });
+}
+
+void RosOutputNode::open_topics(bool has_images) {
+  const std::string prefix = '/' + name_ + '/';
+  const auto state = [&](const char* name, std::string_view type) {
+    return State{.topic = sink_->open({prefix + name, type, true, 1})};
+  };
+  constexpr int kManyTransforms = 100;
+  odometry_ = sink_->open({prefix + "odometry", RosOdometry::kType});
+  pose_ = sink_->open({prefix + "pose", RosPoseStamped::kType});
+  tf_ = sink_->open({"/tf", RosTransforms::kType, false, kManyTransforms});
+  path_ = state("path", RosPath::kType);
+  mesh_ = state("mesh", RosPointCloud::kType);
+  diagnostics_ = sink_->open({"/diagnostics", RosDiagnostics::kType});
+  if (options_.draws) {
+    faces_ = sink_->open({prefix + "mesh_faces", RosMarker::kType, true, 1});
+    closures_ = state("closures", RosMarkers::kType);
+  }
+  if (options_.logs) log_ = sink_->open({"/rosout", RosLog::kType});
+  if (has_images)
+    image_ = sink_->open({prefix + "left/image_raw/compressed", RosCompressedImage::kType});
 }
 
 void RosOutputNode::start() {
   worker_.start();
+  encoder_.start();
   clock_.start();
+  if (options_.logs) log::set_listener([this](const log::Entry& entry) { listen(entry); });
 }
 
 void RosOutputNode::stop() noexcept {
+  if (options_.logs) log::set_listener({});
   clock_.stop();
+  encoder_.stop();
   worker_.stop();
 }
 
-void RosOutputNode::step(const OdometryState& state) {
-  frames_.add(state);
+std::exception_ptr RosOutputNode::error() const {
+  return worker_.error() ? worker_.error() : encoder_.error();
+}
+
+std::vector<Heartbeat*> RosOutputNode::heartbeats() {
+  return {&worker_.heartbeat(), &encoder_.heartbeat()};
+}
+
+std::size_t RosOutputNode::left_out() const {
+  return worker_.load().dropped + encoder_.load().dropped;
+}
+
+void RosOutputNode::listen(const log::Entry& entry) {
+  RosLog line;
+  line.level = level_of(entry.level);
+  line.name = name_ + '.' + entry.tag;
+  line.text = entry.text;
+  worker_.post(std::make_shared<const RosLog>(std::move(line)));
+}
+
+void RosOutputNode::encode(const Image& image) {
+  worker_.post(std::make_shared<const RosCompressedImage>(
+      jpeg_of(image->left, {image->stamp, name_ + "/left_camera"})));
+}
+
+std::string RosOutputNode::map_of(RobotId anchor) const {
+  return options_.name_of ? ros_name(options_.name_of(anchor)) + "/map" : "map";
+}
+
+// That of the sensors, and after the last image time goes on.
+std::optional<Stamp> RosOutputNode::time() const {
+  if (!stamp_) return std::nullopt;
+  return *stamp_ + nanoseconds(steady_now_s() - told_s_);
+}
+
+// Its size [bytes].
+template <typename Message>
+std::size_t RosOutputNode::tell(std::size_t topic, const Message& message) {
+  const auto bytes = encode_ros(message);
+  sink_->put(topic, time(), bytes);
+  return bytes.size();
+}
+
+void RosOutputNode::step(const Topic<OdometryState>::Message& state) {
+  frames_.add(*state);
   ++poses_;
-  stamp_ = state.stamp;
-  speed_mps_ = state.v_odom.norm();
+  stamp_ = state->stamp;
+  speed_mps_ = state->v_odom.norm();
   told_s_ = steady_now_s();
   RosOdometry odometry;
-  odometry.header = {state.stamp, odom_};
+  odometry.header = {state->stamp, odom_};
   odometry.child_frame = base_link_;
-  odometry.pose = message_of(state.T_odom_body);
-  odometry.linear_velocity = state.T_odom_body.linear().transpose() * state.v_odom;
+  odometry.pose = message_of(state->T_odom_body);
+  odometry.linear_velocity = state->T_odom_body.linear().transpose() * state->v_odom;
   odometry.angular_velocity = frames_.angular_rate();
-  odometry_.publish(encode_ros(odometry));
-  pose_.publish(encode_ros(
-      RosPoseStamped{{state.stamp, kMap}, message_of(frames_.T_map_odom() * state.T_odom_body)}));
-  tf_.publish(encode_ros(
-      RosTransforms{{{{state.stamp, kMap}, odom_, message_of(frames_.T_map_odom())},
-                     {{state.stamp, odom_}, base_link_, message_of(state.T_odom_body)}}}));
+  tell(odometry_, odometry);
+  tell(pose_,
+       RosPoseStamped{{state->stamp, map_}, message_of(frames_.T_map_odom() * state->T_odom_body)});
+  tell(tf_, RosTransforms{{{{state->stamp, map_}, odom_, message_of(frames_.T_map_odom())},
+                           {{state->stamp, odom_}, base_link_, message_of(state->T_odom_body)}}});
 }
 
-void RosOutputNode::step(const Trajectory& trajectory) {
-  frames_.add(trajectory);
-  RosPath path;
+void RosOutputNode::step(const Topic<KeyframeOdometry>::Message& keyframe) {
+  frames_.add(*keyframe);
+  if (stamp_ && *stamp_ >= keyframe->stamp) return;
+  stamp_ = keyframe->stamp;  // of a pose graph, which has no images
+  told_s_ = steady_now_s();
+}
+
+void RosOutputNode::step(const Topic<Trajectory>::Message& trajectory) {
+  frames_.add(*trajectory);
+  trajectory_ = trajectory;
+  path_.changed = closures_.changed = true;
+  tell_states(false);
+}
+
+void RosOutputNode::step(const std::shared_ptr<const LabelledMesh>& mesh) {
+  newest_mesh_ = mesh;
+  mesh_.changed = options_.mesh_points > 0 && !mesh->empty();
+  tell_states(false);
+}
+
+void RosOutputNode::step(const std::shared_ptr<const RosLog>& line) {
+  RosLog stamped = *line;
+  stamped.stamp = time().value_or(0);
+  tell(log_, stamped);
+}
+
+void RosOutputNode::step(const std::shared_ptr<const RosCompressedImage>& image) {
+  sink_->put(image_, image->header.stamp, encode_ros(*image));
+}
+
+void RosOutputNode::tell_states(bool all) {
+  const auto tell_if_due = [&](State& state, const auto& tell_it) {
+    const double now_s = steady_now_s();
+    if (!state.changed || (!all && now_s < state.due_s)) return;
+    state.changed = false;
+    state.due_s = now_s + static_cast<double>(tell_it()) / options_.state_bytes_per_s;
+  };
+  tell_if_due(path_, [this] { return tell_path(keyframe_poses()); });
+  tell_if_due(mesh_, [this] { return tell_mesh(); });
+  if (!options_.draws) return;
+  tell_if_due(closures_, [this] {
+    return tell(closures_.topic,
+                closure_lines(newest_closures_, *trajectory_, {stamp_.value_or(0), map_}));
+  });
+}
+
+std::vector<StampedPose> RosOutputNode::keyframe_poses() const {
   const auto& stamps = frames_.keyframe_stamps();
-  for (std::size_t k = 0; k < std::min(stamps.size(), trajectory.T_world_kf.size()); ++k)
-    path.poses.push_back({{stamps[k], kMap}, message_of(trajectory.T_world_kf[k])});
-  path.header = {path.poses.empty() ? 0 : path.poses.back().header.stamp, kMap};
-  path_.publish(encode_ros(path));
+  std::vector<StampedPose> poses;
+  for (std::size_t k = 0; k < std::min(stamps.size(), trajectory_->T_world_kf.size()); ++k)
+    poses.push_back({stamps[k], trajectory_->T_world_kf[k]});
+  return poses;
 }
 
-void RosOutputNode::step(const LabelledMesh& mesh) {
-  if (mesh_points_ == 0 || mesh.empty()) return;
-  mesh_.publish(encode_ros(cloud_of(mesh, mesh_points_, {stamp_, kMap})));
+std::size_t RosOutputNode::tell_path(std::span<const StampedPose> poses) {
+  RosPath path{{poses.empty() ? 0 : poses.back().stamp, map_}, {}};
+  for (const StampedPose& pose : poses)
+    path.poses.push_back({{pose.stamp, map_}, message_of(pose.T)});
+  return tell(path_.topic, path);
+}
+
+std::size_t RosOutputNode::tell_mesh() {
+  const RosHeader header{stamp_.value_or(0), map_};
+  std::size_t bytes = tell(
+      mesh_.topic, cloud_of(*newest_mesh_, static_cast<std::size_t>(options_.mesh_points), header));
+  if (options_.draws) bytes += tell(faces_, surface_of(*newest_mesh_, header));
+  return bytes;
+}
+
+// Robots that are not joined have no common frame: nothing says where one's is for the others.
+void RosOutputNode::tell_link() {
+  const std::string team = map_of(trajectory_->anchor);
+  if (trajectory_->T_world_kf.empty() || team == map_) return;
+  tell(tf_, RosTransforms{{{{stamp_.value_or(0), team}, map_, RosPose{}}}});
 }
 
 RosDiagnosticStatus RosOutputNode::odometry_status() const {
@@ -117,19 +253,38 @@ RosDiagnosticStatus RosOutputNode::odometry_status() const {
                                      : "ok";
   status.values = {{"poses", std::to_string(poses_)},
                    {"keyframes", std::to_string(frames_.keyframe_stamps().size())},
-                   {"stamp of the last [ns]", std::to_string(stamp_)},
+                   {"stamp of the last [ns]", std::to_string(stamp_.value_or(0))},
                    {"speed [m/s]", fixed(speed_mps_, 3)}};
   return status;
 }
 
-void RosOutputNode::step(const Tick& /*tick*/) {
-  RosDiagnostics diagnostics{{stamp_, ""}, diagnose_()};
+void RosOutputNode::step(const std::shared_ptr<const Tick>& /*tick*/) {
+  RosDiagnostics diagnostics{{stamp_.value_or(0), ""}, diagnose_()};
   for (RosDiagnosticStatus& status : diagnostics.status) {
     status.name = name_ + ": " + status.name;
     status.hardware_id = name_;
   }
   diagnostics.status.insert(diagnostics.status.begin(), odometry_status());
-  diagnostics_.publish(encode_ros(diagnostics));
+  tell(diagnostics_, diagnostics);
+  if (auto closures = options_.draws ? closures_of_() : std::nullopt) {
+    newest_closures_ = *std::move(closures);
+    closures_.changed = true;
+  }
+  tell_states(false);
+  tell_link();
+  sink_->flush();
+}
+
+void RosOutputNode::finish(std::span<const StampedPose> poses, std::vector<ToldClosure> closures,
+                           const std::map<std::string, std::string>& files) {
+  newest_closures_ = std::move(closures);
+  closures_.changed = options_.draws;
+  path_.changed = path_.changed && poses.empty();
+  tell_states(true);
+  if (!poses.empty()) tell_path(poses);
+  tell_link();
+  for (const auto& [name, text] : files) sink_->attach(name, text);
+  sink_->finish();
 }
 
 }  // namespace km

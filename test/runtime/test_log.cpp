@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "runtime/log.hpp"
+#include "runtime/log_listener.hpp"
 #include "test/support/captured_log.hpp"
 
 namespace km {
@@ -40,6 +41,21 @@ TEST_CASE("Levels below the limit are not written", "[log]") {
   log::set_level(log::Level::kInfo);
   REQUIRE(captured.lines().size() == 1);
   CHECK_THAT(captured.lines()[0], Catch::Matchers::Contains("but this"));
+}
+
+TEST_CASE("Who listens to the log hears the lines that are written, until another does", "[log]") {
+  CapturedLog log;
+  std::vector<log::Entry> heard;
+  log::set_listener([&heard](const log::Entry& entry) { heard.push_back(entry); });
+  log::warn("vio") << "slow: " << 3 << " s";
+  log::debug("vio") << "below the limit";
+  log::set_listener({});
+  log::warn("vio") << "to nobody";
+  REQUIRE(heard.size() == 1);
+  CHECK(heard[0].level == log::Level::kWarn);
+  CHECK(heard[0].tag == "vio");
+  CHECK(heard[0].text == "slow: 3 s");
+  CHECK(log.lines().size() == 2);
 }
 
 TEST_CASE("Lines of several threads are never mixed", "[log]") {

@@ -29,7 +29,7 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"vio", {"images"}},
     {"pose_graph", {"outlier_rejection"}},
     {"relay", {"security"}},
-    {"ros_dds", {"mesh", "recordings"}},
+    {"ros_dds", {"images", "mesh", "recordings"}},
     {"sensors", {"recordings"}},
     {"pgo_study", {"pose_graph", "outlier_rejection"}},
     {"evaluation", {"images", "mesh"}},

@@ -1,11 +1,12 @@
 #include <catch2/catch.hpp>
 
 #include <filesystem>
-#include <set>
+#include <map>
 #include <string>
 #include <vector>
 
 #include "modules/core/input_file.hpp"
+#include "modules/recordings/mcap_attachments.hpp"
 #include "modules/recordings/mcap_reader.hpp"
 #include "modules/recordings/mcap_writer.hpp"
 #include "test/modules/recordings/bag_contents.hpp"
@@ -22,7 +23,7 @@ std::string text_of(const std::vector<std::uint8_t>& bytes) {
 }
 
 // All in one chunk, as the conformance suite has them.
-std::string file_of(const std::vector<McapMessage>& messages) {
+std::string file_of(const std::vector<McapMessage>& messages, bool has_attachment = false) {
   McapWriter writer({.profile = "", .library = "", .compression = ""});
   const auto channel = writer.add_channel(
       {.topic = "example", .message_encoding = "a", .metadata = {{"foo", "bar"}}},
@@ -32,6 +33,12 @@ std::string file_of(const std::vector<McapMessage>& messages) {
     message.channel_id = channel;
     writer.add(message, data);
   }
+  if (has_attachment)
+    writer.attach({.log_time = 2,
+                   .create_time = 1,
+                   .name = "myFile",
+                   .media_type = "application/octet-stream",
+                   .data = data});
   writer.finish();
   return text_of(writer.take());
 }
@@ -100,6 +107,7 @@ TEST_CASE("MCAP files are to the byte those of the conformance suite", "[recordi
       {{"NoData/NoData-st-sum", file_of({})},
        {"OneMessage/OneMessage-ch-chx-mx-rch-rsh-st-sum",
         file_of({{.sequence = 10, .log_time = 2, .publish_time = 1}})},
+       {"OneAttachment/OneAttachment-ax-st-sum", file_of({}, true)},
        {"TenMessages/TenMessages-ch-chx-mx-rch-rsh-st-sum", file_of(ten)}}));
   CAPTURE(name);
   CHECK(bytes == read_input_file(*folder / (name + ".mcap")));
@@ -181,6 +189,19 @@ TEST_CASE("A type is described once for all its channels", "[recordings]") {
        at = file.bytes.find("ros2msg", at + 1))
     ++count;
   CHECK(count == 2 * 2);  // in the data and in the summary
+}
+
+TEST_CASE("Attachments are read as they were written, or refused", "[recordings]") {
+  std::string bytes = file_of({numbered(1, 5)}, true);
+  const TemporaryFolder folder;
+  CHECK(read_mcap_attachments(folder.write("a.mcap", bytes)) ==
+        std::map<std::string, std::string>{{"myFile", "\1\2\3"}});
+  const std::size_t name = bytes.find("myFile");
+  CHECK(read_mcap_attachments(folder.write("a.mcap", bytes.substr(0, name))).empty());
+  bytes[name] = 'M';
+  CHECK_THROWS_WITH(read_mcap_attachments(folder.write("a.mcap", bytes)),
+                    Catch::Contains("an attachment that is damaged"));
+  CHECK_THROWS_AS(read_mcap_attachments(folder.write("a.mcap", "#ROSBAG")), InputFileError);
 }
 
 TEST_CASE("A compression that there is not is refused", "[recordings]") {

@@ -6,6 +6,7 @@
 
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/live_bag_codec.hpp"
+#include "modules/ros_dds/live_sink_codec.hpp"
 #include "modules/ros_dds/ros_output_node.hpp"
 #include "runtime/dds/ros_publisher.hpp"
 #include "runtime/dds/ros_subscription.hpp"
@@ -114,7 +115,9 @@ TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
   const auto diagnose = [] {
     return std::vector<RosDiagnosticStatus>{{1, "sensors", "faulty", "", {{"gaps", "3"}}}};
   };
-  RosOutputNode node(network(), "robot 3", 2, diagnose, {odometry, keyframes, trajectories});
+  RosOutputNode node("ros_output", std::make_unique<LiveSink>(network()),
+                     {.robot = "robot 3", .mesh_points = 2}, diagnose, {},
+                     {odometry, keyframes, trajectories, {}});
   RosSubscription viewer(network(), {{"/robot_3/odometry", "nav_msgs/Odometry", RosQos::kReliable},
                                      {"/robot_3/pose", "geometry_msgs/PoseStamped"},
                                      {"/tf", "tf2_msgs/TFMessage", RosQos::kReliable},

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "modules/ros_dds/ros_sink.hpp"
+#include "runtime/dds/ros_publisher.hpp"
+
+namespace km {
+
+/// Messages to those who listen on ROS 2 now.
+class LiveSink final : public RosSink {
+ public:
+  explicit LiveSink(std::shared_ptr<const RosNetwork> network) : network_(std::move(network)) {}
+
+  /// Throws DdsError, and std::invalid_argument for a type that RosNetwork does not know.
+  std::size_t open(const ToldTopic& topic) override;
+  void put(std::size_t topic, std::optional<Stamp> /*time*/,
+           std::span<const std::uint8_t> message) override {
+    publishers_.at(topic)->publish(message);
+  }
+
+ private:
+  std::shared_ptr<const RosNetwork> network_;
+  std::vector<std::unique_ptr<RosPublisher>> publishers_;
+};
+
+}  // namespace km

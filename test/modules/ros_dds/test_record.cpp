@@ -1,0 +1,214 @@
+#include <catch2/catch.hpp>
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "modules/recordings/mcap_attachments.hpp"
+#include "modules/recordings/mcap_reader.hpp"
+#include "modules/recordings/ros_definitions.hpp"
+#include "modules/ros_dds/mcap_sink.hpp"
+#include "modules/ros_dds/mesh_cloud.hpp"
+#include "modules/ros_dds/ros_output_node.hpp"
+#include "runtime/log.hpp"
+#include "test/modules/recordings/bag_contents.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+SE3 at(double x) {
+  SE3 T = SE3::Identity();
+  T.translation().x() = x;
+  return T;
+}
+
+Trajectory straight(RobotId anchor) {
+  return {.robot = 3, .anchor = anchor, .T_world_kf = {at(0), at(1), at(2)}};
+}
+
+const KeyframeId kOwn0{3, 0}, kOwn2{3, 2}, kOther{7, 5};
+
+std::vector<ToldClosure> closures() {
+  return {{closure_id(kOwn0, kOwn2), ClosureStage::kInlier, false, at(2.5)},
+          {closure_id(kOwn0, kOther), ClosureStage::kVerified, true, at(10)},
+          {closure_id(kOwn2, kOther), ClosureStage::kCandidate, false, std::nullopt},
+          {closure_id(kOwn0, {3, 9}), ClosureStage::kCandidate, false, std::nullopt}};
+}
+
+// The newest message of a topic.
+template <typename Message>
+std::optional<Message> last(const std::vector<ToldMessage>& messages, const std::string& topic) {
+  for (std::size_t k = messages.size(); k-- > 0;)
+    if (messages[k].topic == topic) return decode_ros<Message>("cdr", messages[k].bytes).value;
+  return std::nullopt;
+}
+
+std::size_t count(const std::vector<ToldMessage>& messages, const std::string& topic) {
+  return static_cast<std::size_t>(std::ranges::count(messages, topic, &ToldMessage::topic));
+}
+
+}  // namespace
+
+TEST_CASE("Closures are lines by what has become of them", "[ros_dds]") {
+  const RosMarkers message = closure_lines(closures(), straight(3), {5, "map"});
+  REQUIRE(message.markers.size() == 4);
+  const auto points = [&](std::size_t kind) { return message.markers[kind].points; };
+  using Points = std::vector<Eigen::Vector3d>;
+  CHECK(message.markers[0].name_space == "candidates");
+  CHECK(points(0).empty());  // where the other ends are is not known
+  CHECK(points(1).empty());
+  CHECK(message.markers[2].name_space == "rejected");
+  CHECK(points(2) == Points{{0, 0, 0}, {10, 0, 0}});
+  CHECK(message.markers[3].name_space == "kept");
+  CHECK(points(3) == Points{{0, 0, 0}, {2, 0, 0}});  // as optimised, not as measured
+  for (const RosMarker& marker : message.markers) {
+    CHECK(marker.type == RosMarker::kLineList);
+    CHECK(marker.header.frame == "map");
+  }
+}
+
+TEST_CASE("The faces of a mesh have the colours of their vertices", "[ros_dds]") {
+  LabelledMesh mesh;
+  mesh.vertices = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
+  mesh.colors = {{255, 0, 0}, {0, 255, 0}, {0, 0, 51}};
+  mesh.faces = {{2, 0, 1}};
+  const RosMarker marker = surface_of(mesh, {5, "map"});
+  CHECK(marker.type == RosMarker::kTriangleList);
+  REQUIRE(marker.points.size() == 3);
+  REQUIRE(marker.colors.size() == 3);
+  CHECK(marker.points[0] == Eigen::Vector3d(7, 8, 9));
+  CHECK(marker.colors[0] == Eigen::Vector4f(0, 0, 0.2F, 1));
+  CHECK(marker.colors[1] == Eigen::Vector4f(1, 0, 0, 1));
+  mesh.colors.clear();
+  CHECK(surface_of(mesh, {}).colors.empty());
+}
+
+TEST_CASE("A definition has those of all types in it, each once", "[ros_dds]") {
+  const std::string path = ros_definition(RosPath::kType);
+  CHECK(path.starts_with("std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n====="));
+  std::size_t parts = 0;
+  for (std::size_t at = path.find("MSG: "); at != path.npos; at = path.find("MSG: ", at + 1))
+    ++parts;
+  CHECK(parts == 6);  // Header, PoseStamped, Time, Pose, Point, Quaternion
+  CHECK(ros2_name(RosPath::kType) == "nav_msgs/msg/Path");
+  CHECK_THROWS_AS(ros_definition("a/B"), std::invalid_argument);
+}
+
+TEST_CASE("A robot's record holds what viewers are told, and the states it ended with",
+          "[ros_dds]") {
+  const TemporaryFolder folder;
+  const fs::path file = folder.path() / "a.mcap";
+  Topic<OdometryState> odometry;
+  Topic<KeyframeOdometry> keyframes;
+  Topic<Trajectory> trajectories;
+  Topic<SensorPacket> packets;
+  std::string lost;
+  RosOutputNode node(
+      "record", std::make_unique<McapSink>(file, [&lost](const auto& why) { lost = why; }),
+      {.robot = "bob 3",
+       .id = 3,
+       .name_of = [](RobotId robot) { return robot == 3 ? "bob 3" : "alice"; },
+       .mesh_points = 100,
+       .draws = true,
+       .logs = true,
+       .state_bytes_per_s = 1e-3},
+      [] { return std::vector<RosDiagnosticStatus>(); }, [] { return closures(); },
+      {odometry, keyframes, trajectories, In<SensorPacket>(packets)});
+  node.start();
+  for (Stamp k = 0; k < 30; ++k) {
+    odometry.publish(OdometryState{.stamp = 1000 + k, .T_odom_body = at(0.1 * double(k))});
+    if (k % 10 == 0)
+      keyframes.publish(
+          KeyframeOdometry{.id = {3, static_cast<std::uint32_t>(k / 10)}, .stamp = 1000 + k});
+  }
+  trajectories.publish(straight(3));
+  trajectories.publish(straight(7));  // too soon after the one before to be told
+  LabelledMesh mesh;
+  mesh.vertices = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
+  mesh.faces = {{0, 1, 2}};
+  node.offer(std::make_shared<const LabelledMesh>(mesh));
+  log::info("vio") << "begins";
+  StereoFrame frame{.stamp = 1007, .left = {8, 8, std::vector<std::uint8_t>(64, 9)}, .right = {}};
+  packets.publish(SensorPacket{std::make_shared<const StereoFrame>(frame), {}});
+  node.stop();
+  node.finish(std::vector<StampedPose>{{1000, at(5)}, {1001, at(6)}}, closures(),
+              {{"a.csv", "1,2"}});
+  CHECK(read_mcap_attachments(file) == std::map<std::string, std::string>{{"a.csv", "1,2"}});
+  CHECK(lost.empty());
+  CHECK(node.left_out() == 0);
+
+  McapReader reader(file);
+  const auto messages = told_by(reader);
+  CHECK(to_string(reader.report()) == "");
+  CHECK(count(messages, "/bob_3/odometry") == 30);
+  CHECK(count(messages, "/bob_3/pose") == 30);
+  CHECK(count(messages, "/bob_3/path") == 2);
+  CHECK(count(messages, "/bob_3/mesh") == 1);
+  const auto path = last<RosPath>(messages, "/bob_3/path");
+  REQUIRE(path);
+  REQUIRE(path->poses.size() == 2);
+  CHECK(path->poses[1].header.stamp == 1001);
+  CHECK(path->poses[1].pose.position.x() == 6.0);
+  CHECK(path->header.frame == "bob_3/map");
+  // It has joined alice: where its own frame is for the team.
+  const auto transforms = last<RosTransforms>(messages, "/tf");
+  REQUIRE(transforms);
+  CHECK(transforms->transforms[0].header.frame == "alice/map");
+  CHECK(transforms->transforms[0].child_frame == "bob_3/map");
+  const auto lines = last<RosMarkers>(messages, "/bob_3/closures");
+  REQUIRE(lines);
+  CHECK(lines->markers[3].points.size() == 2);
+  const auto faces = last<RosMarker>(messages, "/bob_3/mesh_faces");
+  REQUIRE(faces);
+  CHECK(faces->points.size() == 3);
+  const auto line = last<RosLog>(messages, "/rosout");
+  REQUIRE(line);
+  CHECK(line->text == "begins");
+  CHECK(line->name == "bob_3.vio");
+  const auto image = last<RosCompressedImage>(messages, "/bob_3/left/image_raw/compressed");
+  REQUIRE(image);
+  CHECK(image->format == "jpeg");
+  CHECK(image->header.stamp == 1007);
+  CHECK(image->data.size() > 100);
+  for (const ToldMessage& message : messages) CHECK(message.log_time >= 1000);
+}
+
+TEST_CASE("A record ends where the disk is full, and says so once", "[ros_dds]") {
+  const TemporaryFolder folder;
+  const fs::path file = folder.path() / "a.mcap";
+  fs::create_symlink("/dev/full", file);
+  std::vector<std::string> lost;
+  McapSink sink(file, [&lost](const auto& why) { lost.push_back(why); });
+  const auto topic = sink.open({"/a/pose", RosPoseStamped::kType});
+  for (Stamp k = 1; k < 5; ++k) {
+    sink.put(topic, k, encode_ros(RosPoseStamped{}));
+    sink.flush();
+  }
+  sink.finish();
+  CHECK(lost == std::vector{file.string() + ": cannot be written: No space left on device"});
+  CHECK(fs::is_symlink(file));
+}
+
+TEST_CASE("Of a process that is killed the record is whole up to the last flush", "[ros_dds]") {
+  const TemporaryFolder folder;
+  const fs::path file = folder.write("a.mcap", "of an earlier run");
+  McapSink sink(file, [](const auto&) {});
+  const auto topic = sink.open({"/a/pose", RosPoseStamped::kType});
+  sink.put(topic, std::nullopt, encode_ros(RosPoseStamped{}));  // before there is a time
+  for (Stamp k = 1; k < 5; ++k) sink.put(topic, k, encode_ros(RosPoseStamped{{k, "map"}, {}}));
+  sink.flush();
+  sink.put(topic, 5, encode_ros(RosPoseStamped{}));
+  McapReader reader(file);
+  const auto messages = told_by(reader);
+  REQUIRE(messages.size() == 4);
+  CHECK(messages[0].log_time == 1);
+  CHECK(messages[0].type == "geometry_msgs/msg/PoseStamped");
+  CHECK(messages[0].encoding == "cdr");
+  CHECK(reader.report().count(BagFault::kTruncated) == 1);
+}
+
+}  // namespace km
