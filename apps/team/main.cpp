@@ -4,11 +4,13 @@
 #include <iostream>
 #include <random>
 
+#include "apps/output_file.hpp"
 #include "apps/program_folder.hpp"
 #include "apps/result_files.hpp"
 #include "apps/result_writer.hpp"
 #include "apps/team/links_file.hpp"
 #include "apps/team/run_team.hpp"
+#include "apps/team/team_record.hpp"
 #include "apps/team/team_report.hpp"
 #include "apps/team/team_results.hpp"
 #include "modules/core/write_file.hpp"
@@ -37,6 +39,7 @@ constexpr const char* kAbout =
     "  kimera_multi_team --config team.yaml -- --set mapping.mode=off   # after --: of every "
     "robot\n"
     "  kimera_multi_team --config team.yaml --links config/links/lossy.yaml\n"
+    "  kimera_multi_team --config team.yaml --record   # for Foxglove, Rerun, ...: team.mcap\n"
     "  kimera_multi_team --config team.yaml --output results --report   # robots ran elsewhere";
 
 struct TeamOptions {
@@ -45,6 +48,7 @@ struct TeamOptions {
   std::optional<std::uint32_t> domain;
   std::optional<double> time_limit_s;
   std::vector<std::string> arguments;
+  std::optional<fs::path> record;  // empty: in the folder of the results
   bool report = false;
 };
 
@@ -77,6 +81,12 @@ void define(CLI::App& app, TeamOptions& options) {
   app.add_option("--json", options.json, "Also write the results to this file, as JSON");
   app.add_option("--robot-binary", options.robot_binary, "Program of a robot")
       ->capture_default_str();
+  app.add_option_function<std::vector<std::string>>(
+         "--record", [&options](const std::vector<std::string>& file) { options.record = file[0]; },
+         "Each robot writes record.mcap, for Foxglove, Lichtblick, Rerun, PlotJuggler, and at the "
+         "end they become one file (default: team.mcap in the folder of the results)")
+      ->expected(0, 1)
+      ->type_name("[FILE.mcap]");
   app.add_flag("--report", options.report,
                "Start nothing: the tables of a run that has ended, from its folders in --output")
       ->excludes("--links");
@@ -96,6 +106,7 @@ km::TeamPlan make_plan(const TeamOptions& options) {
     plan.domain = std::uniform_int_distribution<std::uint32_t>(km::kLastQuietDomain / 2 + 1,
                                                                km::kLastQuietDomain)(device);
   }
+  plan.record = options.record.has_value();
   if (!options.security.empty()) plan.security = options.security;
   if (!options.truth.empty()) plan.notes.clear();  // they are about the truths of the file
   for (km::RobotPlan& robot : plan.robots) {
@@ -146,6 +157,22 @@ void copy_palette(const km::TeamPlan& plan) {
   }
 }
 
+// The robots' records as one; in the frame of those that are joined, where there are some.
+void write_record(const km::TeamPlan& plan, const km::TeamResult& team, const fs::path& file) {
+  std::vector<fs::path> records;
+  std::string root;
+  for (const km::RobotResult& robot : team.robots) {
+    const auto own = km::robot_records(plan.output / robot.plan.name);
+    records.insert(records.end(), own.begin(), own.end());
+    const auto frame = km::frame_of(robot);
+    if (!frame || !robot.in_team_frame) continue;
+    for (const km::RobotPlan& other : plan.robots)
+      if (other.id == *frame) root = other.name;
+  }
+  if (records.empty()) throw std::runtime_error("no robot has left a record");
+  km::merge_records(records, root, file);
+}
+
 // The JSON, the plot and the mesh of the whole team; `told` hears where the latter two are.
 void write_results(const TeamOptions& options, const km::TeamPlan& plan, const km::TeamResult& team,
                    km::ResultWriter& results, std::ostream& told) {
@@ -156,6 +183,12 @@ void write_results(const TeamOptions& options, const km::TeamPlan& plan, const k
       km::write_file(file, team.plot);
       told << "\nSeen from above: " << file.string() << '\n';
     });
+  if (options.record)
+    results.write(options.record->empty() ? plan.output / km::kTeamRecord : *options.record,
+                  [&](const fs::path& file) {
+                    write_record(plan, team, file);
+                    told << "\nThe record of all robots: " << file.string() << '\n';
+                  });
   if (!team.meshes.merged.empty())
     results.write(plan.output / "team_mesh.ply", [&](const fs::path& file) {
       km::write_ply(file, team.meshes.merged);
@@ -167,6 +200,7 @@ void write_results(const TeamOptions& options, const km::TeamPlan& plan, const k
 
 int run(const TeamOptions& options) {
   const km::TeamPlan plan = make_plan(options);
+  if (options.record) km::check_output_folder(*options.record);
   km::ResultWriter results;
   const km::TeamResult team = km::collect_results(
       plan, options.report ? km::finished_runs(plan) : run_robots(options, plan, results));

@@ -29,7 +29,8 @@ void remove_earlier_run(const TeamPlan& plan) {
     remove_results(folder);
     fs::remove(folder / "exit_code");
   }
-  for (const char* file : {"trajectories.svg", "team_mesh.ply", kLinksTable, kLabelPalette})
+  for (const char* file :
+       {"trajectories.svg", "team_mesh.ply", kTeamRecord, kLinksTable, kLabelPalette})
     fs::remove(plan.output / file);
 }
 
@@ -163,6 +164,7 @@ std::vector<std::string> robot_command(const fs::path& binary, const TeamPlan& p
   option("--rate", plan.rate);
   option("--domain", std::to_string(plan.domain.value_or(0)));
   option("--output", (plan.output / robot.name).string());
+  if (plan.record) command.emplace_back("--record");
   command.insert(command.end(), robot.arguments.begin(), robot.arguments.end());
   return command;
 }

@@ -16,6 +16,9 @@ namespace km {
 /// What became of the frames between the robots, in the team's output folder.
 inline constexpr const char* kLinksTable = "links.csv";
 
+/// The records of all robots, likewise.
+inline constexpr const char* kTeamRecord = "team.mcap";
+
 /// How one robot's process ended.
 struct RobotRun {
   ProcessExit exit;

@@ -138,15 +138,13 @@ std::optional<ClosureScores> judge_closures(const TeamPlan& plan,
   return std::nullopt;
 }
 
-// The robot whose odometry frame the optimised poses are in: a robot that solved with no other has
-// its own.
+}  // namespace
+
 std::optional<RobotId> frame_of(const RobotResult& robot) {
   if (!robot.summary) return std::nullopt;
   const OptimizerSummary& pgo = robot.summary->pgo;
   return pgo.members.size() > 1 ? pgo.anchor : robot.plan.id;
 }
-
-}  // namespace
 
 std::optional<TimeWindow> recorded_window(const RobotPlan& plan) {
   if (plan.dataset.empty()) return std::nullopt;

@@ -48,6 +48,10 @@ struct TeamResult {
 /// EurocReader throws.
 [[nodiscard]] std::optional<TimeWindow> recorded_window(const RobotPlan& plan);
 
+/// The robot whose odometry frame a robot's optimised poses are in, itself if it solved with no
+/// other; nullopt if it left no summary.
+[[nodiscard]] std::optional<RobotId> frame_of(const RobotResult& robot);
+
 /// Finds the robots whose optimised poses are not in the frame that most robots ended in (of
 /// equally many, that of the lowest anchor): sets `in_team_frame` of these to false and notes why.
 /// A robot that left no summary is taken to be in it.
