@@ -10,6 +10,7 @@
 #include "apps/output_file.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
+#include "modules/recordings/mcap_attachments.hpp"
 #include "modules/sensors/euroc_rig_codec.hpp"
 
 namespace km {
@@ -19,11 +20,39 @@ namespace fs = std::filesystem;
 
 struct ClosuresCommand {
   std::vector<std::filesystem::path> truths;   // One for all robots, or one for each.
-  std::vector<std::filesystem::path> results;  // A robot's results folder each.
+  std::vector<std::filesystem::path>
+      results;  // A robot's results folder or record each, or a team's.
   std::filesystem::path dataset;               // EuRoC/ASL folder with the robots' left camera.
   ClosureTruthOptions options;
   std::filesystem::path json;  // Not written if empty.
 };
+
+constexpr std::string_view kKeyframes = "keyframes.csv", kClosures = "loop_closures.csv";
+
+// What the robots of one folder of results, or of one record, found.
+struct Found {
+  std::vector<KeyframeRecord> keyframes;
+  std::vector<ClosureRecord> closures;
+};
+
+Found found_in(const fs::path& results) {
+  if (results.extension() != ".mcap")
+    return {read_keyframes(results / kKeyframes), read_closures(results / kClosures)};
+  Found all;
+  const auto add = [](auto& to, const auto& more) {
+    to.insert(to.end(), more.begin(), more.end());
+  };
+  for (const auto& [name, text] : read_mcap_attachments(results)) {
+    const std::string place = results.string() + ':' + name;
+    if (name.ends_with(kKeyframes)) add(all.keyframes, parse_keyframes(text, place));
+    if (name.ends_with(kClosures)) add(all.closures, parse_closures(text, place));
+  }
+  if (all.keyframes.empty())
+    throw std::invalid_argument(results.string() +
+                                ": no keyframes.csv in it, which a robot adds at " +
+                                "the end of its run: give the folder of its results");
+  return all;
+}
 
 void run(const ClosuresCommand& command) {
   if (command.truths.size() != 1 && command.truths.size() != command.results.size())
@@ -32,11 +61,10 @@ void run(const ClosuresCommand& command) {
   std::vector<ClosureRecord> closures;
   for (std::size_t i = 0; i < command.results.size(); ++i) {
     const auto truth = read_trajectory(command.truths[command.truths.size() == 1 ? 0 : i]);
-    const auto placed =
-        place_keyframes(read_keyframes(command.results[i] / "keyframes.csv"), truth);
+    const Found found = found_in(command.results[i]);
+    const auto placed = place_keyframes(found.keyframes, truth);
     keyframes.insert(keyframes.end(), placed.begin(), placed.end());
-    const auto found = read_closures(command.results[i] / "loop_closures.csv");
-    closures.insert(closures.end(), found.begin(), found.end());
+    closures.insert(closures.end(), found.closures.begin(), found.closures.end());
   }
   const SensorRig rig = read_euroc_rig(find_mav0(command.dataset));
   const ClosureScores scores =
@@ -65,7 +93,9 @@ void define(CLI::App& app, ClosuresCommand& command) {
   app.add_option("--truth", command.truths,
                  "True poses in one common world: one file for all robots or one for each")
       ->required();
-  app.add_option("--results", command.results, "Results folders of all robots of the run")
+  app.add_option(
+         "--results", command.results,
+         "Results folders of all robots of the run, or records (MCAP) of robots or of the team")
       ->required();
   app.add_option("--dataset", command.dataset, "EuRoC/ASL folder: its left camera is the robots'")
       ->required();

@@ -3,6 +3,7 @@
 #include <deque>
 #include <stdexcept>
 
+#include "apps/evaluate/recorded_poses.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
@@ -10,6 +11,8 @@
 namespace km {
 
 std::string short_name(const std::filesystem::path& file) {
+  if (const auto recorded = split_record(file))
+    return (recorded->file.stem() / recorded->robot()).string();
   const std::filesystem::path folder = std::filesystem::absolute(file).parent_path().filename();
   return (folder / file.stem()).string();
 }
@@ -23,7 +26,7 @@ SE3 placement_of(const std::vector<std::filesystem::path>& trajectories,
   std::vector<TrajectoryInput> inputs;
   for (std::size_t i = 0; i < count; ++i) {
     const auto& reference = poses.emplace_back(read_trajectory(references[shared ? 0 : i]));
-    const auto& estimate = poses.emplace_back(read_trajectory(trajectories.at(i)));
+    const auto& estimate = poses.emplace_back(read_estimate(trajectories.at(i)));
     inputs.push_back({short_name(trajectories[i]), reference, estimate, std::nullopt});
   }
   return align_surroundings(inputs);

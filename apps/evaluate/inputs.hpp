@@ -11,7 +11,8 @@
 
 namespace km {
 
-/// "robot0/optimized" for ".../robot0/optimized.tum".
+/// "robot0/optimized" for ".../robot0/optimized.tum", "team/robot0" for
+/// ".../team.mcap:/robot0/path".
 [[nodiscard]] std::string short_name(const std::filesystem::path& file);
 
 /// The transform from the frame of the estimated trajectories to that of the reference ones, by

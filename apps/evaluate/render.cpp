@@ -13,6 +13,7 @@
 
 #include "apps/evaluate/commands.hpp"
 #include "apps/evaluate/inputs.hpp"
+#include "apps/evaluate/recorded_poses.hpp"
 #include "apps/output_file.hpp"
 #include "modules/evaluation/mesh/mesh_error.hpp"
 #include "modules/evaluation/picture/mesh_picture.hpp"
@@ -70,7 +71,7 @@ PictureColor color_of(const std::string& name, const std::vector<LabelledMesh>& 
 
 PictureLine line_of(const fs::path& file, const SE3& T_picture_mesh) {
   PictureLine line{short_name(file), {}};
-  for (const StampedPose& pose : read_trajectory(file))
+  for (const StampedPose& pose : read_estimate(file))
     line.points.emplace_back(T_picture_mesh * pose.T.translation());
   return line;
 }
@@ -117,7 +118,7 @@ void run(const RenderCommand& command) {
   for (std::size_t i = 0; i < meshes.size(); ++i)
     inputs.push_back({command.meshes[i].string(), meshes[i]});
   scene.palette = read_palette(command.palette, command.meshes.front(), inputs);
-  for (const fs::path& file : command.trajectories)
+  for (const fs::path& file : expand_records(command.trajectories))
     for (const Eigen::Vector3d& point :
          scene.lines.emplace_back(line_of(file, T_picture_mesh)).points)
       extent.extend(point);
@@ -157,7 +158,8 @@ void define(CLI::App& app, RenderCommand& command) {
       ->required();
   app.add_option("--view", command.views, "Where from, see above; several: a picture each")
       ->capture_default_str();
-  app.add_option("--trajectory", command.trajectories, "Poses drawn on top (TUM or EuRoC CSV)");
+  app.add_option("--trajectory", command.trajectories,
+                 "Poses drawn on top (TUM, EuRoC CSV, or a record: see trajectory)");
   app.add_option("--reference", command.references,
                  "Poses of the first trajectories in the frame to draw in: the truth puts the map "
                  "into the world, the first robot's odometry.tum stands it upright");

@@ -11,6 +11,7 @@
 
 #include "apps/evaluate/commands.hpp"
 #include "apps/evaluate/inputs.hpp"
+#include "apps/evaluate/recorded_poses.hpp"
 #include "apps/output_file.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
@@ -21,7 +22,7 @@ namespace {
 
 struct TrajectoryCommand {
   std::vector<std::filesystem::path> truths;     // One for all estimates, or one for each.
-  std::vector<std::filesystem::path> estimates;  // TUM or EuRoC CSV.
+  std::vector<std::filesystem::path> estimates;  // TUM, EuRoC CSV, or records.
   double from_s = -std::numeric_limits<double>::infinity();
   double to_s = std::numeric_limits<double>::infinity();
   TrajectoryErrorOptions options;
@@ -44,7 +45,8 @@ TimeWindow window_of(const TrajectoryCommand& command, const std::vector<Stamped
   return window;
 }
 
-void run(const TrajectoryCommand& command) {
+void run(TrajectoryCommand command) {
+  command.estimates = expand_records(command.estimates);
   if (command.truths.size() != 1 && command.truths.size() != command.estimates.size())
     throw std::invalid_argument("give one --truth, or as many as there are --estimate");
   std::vector<std::vector<StampedPose>> truths;
@@ -53,7 +55,7 @@ void run(const TrajectoryCommand& command) {
   std::vector<TrajectoryInput> inputs;
   for (std::size_t i = 0; i < command.estimates.size(); ++i) {
     const auto& truth = truths[truths.size() == 1 ? 0 : i];
-    estimates.push_back(read_trajectory(command.estimates[i]));
+    estimates.push_back(read_estimate(command.estimates[i]));
     inputs.push_back(
         {short_name(command.estimates[i]), truth, estimates.back(), window_of(command, truth)});
   }
@@ -69,7 +71,11 @@ constexpr const char* kTrajectoryDetails =
     "Errors of estimated trajectories against the truth\n\n"
     "All estimates are moved by ONE rigid transform (Umeyama) to fit the truth, so several robots\n"
     "are judged in their common frame. Files are TUM text (t[s] p q x y z w) or EuRoC CSV\n"
-    "(t[ns], p, q w x y z); the denser of truth and estimate is interpolated at the stamps of the\n"
+    "(t[ns], p, q w x y z); or MCAP records of robots and teams: FILE.mcap stands for the last\n"
+    "/NAME/path of every robot in it, the optimised poses, and FILE.mcap:/NAME/odometry for one "
+    "topic\n"
+    "(nav_msgs/Path, nav_msgs/Odometry, geometry_msgs/PoseStamped). The denser of truth and "
+    "estimate is interpolated at the stamps of the\n"
     "other. Printed per estimate and for the team:\n"
     "  position error  distance to the truth at each pair [m]: the absolute trajectory error\n"
     "  rotation        angle to the truth after the same alignment [deg]\n"
@@ -79,13 +85,15 @@ constexpr const char* kTrajectoryDetails =
     "  kimera_multi_evaluate trajectory --truth groundtruth_tum.txt --estimate odometry.tum\n"
     "  kimera_multi_evaluate trajectory --truth data.csv \\\n"
     "      --estimate robot0/optimized.tum robot1/optimized.tum --json team.json --plot team.svg\n"
-    "  kimera_multi_evaluate trajectory --truth a.csv --truth b.csv --estimate a.tum b.tum";
+    "  kimera_multi_evaluate trajectory --truth a.csv --truth b.csv --estimate a.tum b.tum\n"
+    "  kimera_multi_evaluate trajectory --truth data.csv --estimate team.mcap";
 
 void define(CLI::App& app, TrajectoryCommand& command) {
   app.add_option("--truth", command.truths,
                  "True poses: one file for all estimates or one for each")
       ->required();
-  app.add_option("--estimate", command.estimates, "Estimated poses, one file per robot")
+  app.add_option("--estimate", command.estimates,
+                 "Estimated poses, one file per robot, or a record")
       ->required();
   app.add_flag("--sim3", command.options.with_scale, "Align by a similarity: the scale is free");
   app.add_option("--from", command.from_s,

@@ -241,14 +241,14 @@ std::string quoted(std::string_view text) {
 // The fields of one row, by number.
 class Fields {
  public:
-  Fields(const fs::path& file, const TextRow& row, std::size_t expected) : file_(file), row_(row) {
+  Fields(const std::string& file, const TextRow& row, std::size_t expected)
+      : file_(file), row_(row) {
     if (row.fields.size() < expected)
       fail(std::to_string(row.fields.size()) + " fields, expected " + std::to_string(expected));
   }
 
   [[noreturn]] void fail(const std::string& why) const {
-    throw ClosureFileError(file_.string() + " line " + std::to_string(row_.line) + ": " +
-                           readable(why));
+    throw ClosureFileError(file_ + " line " + std::to_string(row_.line) + ": " + readable(why));
   }
 
   [[nodiscard]] std::string_view text(std::size_t i) const { return row_.fields[i]; }
@@ -280,14 +280,14 @@ class Fields {
   }
 
  private:
-  const fs::path& file_;
+  const std::string& file_;
   const TextRow& row_;
 };
 
 // Calls use(fields) for every row below the header.
 template <typename Use>
-void for_each_row(const fs::path& file, std::size_t expected, const Use& use) {
-  const std::string text = content_of(file);
+void for_each_row(std::string_view text, const std::string& file, std::size_t expected,
+                  const Use& use) {
   bool header = true;
   for (const TextRow& row : split_rows(text)) {
     if (!std::exchange(header, false)) use(Fields(file, row, expected));
@@ -302,18 +302,18 @@ ClosureStage stage_of(const Fields& fields, std::size_t i) {
 
 }  // namespace
 
-std::vector<KeyframeRecord> read_keyframes(const fs::path& file) {
+std::vector<KeyframeRecord> parse_keyframes(std::string_view text, const std::string& name) {
   std::vector<KeyframeRecord> keyframes;
-  for_each_row(file, 4, [&](const Fields& fields) {
+  for_each_row(text, name, 4, [&](const Fields& fields) {
     keyframes.push_back(
         {fields.keyframe(0), fields.integer(2, kMaxKeyframeStamp), fields.number(3)});
   });
   return keyframes;
 }
 
-std::vector<ClosureRecord> read_closures(const fs::path& file) {
+std::vector<ClosureRecord> parse_closures(std::string_view text, const std::string& name) {
   std::vector<ClosureRecord> closures;
-  for_each_row(file, kPoseColumn + 7, [&](const Fields& fields) {
+  for_each_row(text, name, kPoseColumn + 7, [&](const Fields& fields) {
     ClosureRecord closure;
     closure.id = {fields.keyframe(0), fields.keyframe(2)};
     closure.stage = stage_of(fields, 5);
@@ -324,6 +324,14 @@ std::vector<ClosureRecord> read_closures(const fs::path& file) {
     closures.push_back(std::move(closure));
   });
   return closures;
+}
+
+std::vector<KeyframeRecord> read_keyframes(const fs::path& file) {
+  return parse_keyframes(content_of(file), file.string());
+}
+
+std::vector<ClosureRecord> read_closures(const fs::path& file) {
+  return parse_closures(content_of(file), file.string());
 }
 
 std::vector<TrueKeyframe> place_keyframes(std::span<const KeyframeRecord> keyframes,

@@ -124,6 +124,12 @@ struct KeyframeRecord {
 /// but has none.
 [[nodiscard]] std::vector<ClosureRecord> read_closures(const std::filesystem::path& file);
 
+/// The same of the text of a file; `name` stands for it in messages.
+[[nodiscard]] std::vector<KeyframeRecord> parse_keyframes(std::string_view text,
+                                                          const std::string& name);
+[[nodiscard]] std::vector<ClosureRecord> parse_closures(std::string_view text,
+                                                        const std::string& name);
+
 /// The keyframes whose stamps lie within the true poses `truth` (ascending), with their pose there.
 [[nodiscard]] std::vector<TrueKeyframe> place_keyframes(std::span<const KeyframeRecord> keyframes,
                                                         std::span<const StampedPose> truth);

@@ -1,0 +1,106 @@
+#include "apps/evaluate/recorded_poses.hpp"
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "modules/core/input_file.hpp"
+#include "modules/evaluation/trajectory_file.hpp"
+#include "modules/recordings/mcap_reader.hpp"
+#include "modules/recordings/ros_messages.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+StampedPose pose_of(Stamp stamp, const RosPose& pose) {
+  return {stamp, make_pose(pose.orientation.normalized().toRotationMatrix(), pose.position)};
+}
+
+// What a message says, in place of the poses before or behind them.
+void take(const BagChannel& channel, const BagMessage& message, std::vector<StampedPose>& poses) {
+  const auto decode = [&]<typename Message>(const Message&) {
+    auto read = decode_ros<Message>(channel.encoding, message.bytes);
+    if (!read.value) throw InputFileError(channel.topic + ": " + read.refusal);
+    return *std::move(read.value);
+  };
+  if (is_of_type(channel, RosPath::kType)) {
+    poses.clear();
+    for (const RosPoseStamped& pose : decode(RosPath()).poses)
+      poses.push_back(pose_of(pose.header.stamp, pose.pose));
+  } else if (is_of_type(channel, RosOdometry::kType)) {
+    const RosOdometry odometry = decode(RosOdometry());
+    poses.push_back(pose_of(odometry.header.stamp, odometry.pose));
+  } else if (is_of_type(channel, RosPoseStamped::kType)) {
+    const RosPoseStamped pose = decode(RosPoseStamped());
+    poses.push_back(pose_of(pose.header.stamp, pose.pose));
+  } else {
+    throw InputFileError(channel.topic + ": " + channel.type + " has no poses");
+  }
+}
+
+std::vector<StampedPose> read_topic(const RecordTopic& record) {
+  McapReader reader(record.file);
+  std::vector<StampedPose> poses;
+  while (const auto message = reader.next()) {
+    const BagChannel& channel = reader.channels()[message->channel];
+    if (channel.topic == record.topic) take(channel, *message, poses);
+  }
+  if (poses.empty())
+    throw InputFileError(record.file.string() + ": no pose on the topic " + record.topic);
+  std::ranges::stable_sort(poses, {}, &StampedPose::stamp);
+  const auto repeated = std::ranges::unique(poses, {}, &StampedPose::stamp);
+  poses.erase(repeated.begin(), repeated.end());
+  return poses;
+}
+
+std::vector<fs::path> trajectories_in(const fs::path& file) {
+  const McapReader reader(file);
+  const auto name = [&file](const std::string& topic) {
+    return fs::path(file.string() + ':' + topic);
+  };
+  std::vector<fs::path> found;
+  for (const auto& [ending, type] :
+       {std::pair("/path", RosPath::kType), std::pair("/odometry", RosOdometry::kType)}) {
+    for (const BagChannel& channel : reader.channels())
+      if (channel.topic.ends_with(ending) && is_of_type(channel, type))
+        found.push_back(name(channel.topic));
+    std::ranges::sort(found);
+    if (!found.empty()) return found;
+  }
+  throw InputFileError(file.string() + ": neither /NAME/path nor /NAME/odometry in it");
+}
+
+}  // namespace
+
+std::optional<RecordTopic> split_record(const fs::path& input) {
+  constexpr std::string_view kEnding = ".mcap";
+  const std::string text = input.string();
+  const std::size_t at = text.find(std::string(kEnding) + ":/");
+  if (at == text.npos) return std::nullopt;
+  const std::size_t end = at + kEnding.size();
+  return RecordTopic{text.substr(0, end), text.substr(end + 1)};
+}
+
+std::vector<fs::path> expand_records(const std::vector<fs::path>& inputs) {
+  std::vector<fs::path> all;
+  for (const fs::path& input : inputs) {
+    const bool is_record = input.extension() == ".mcap" && !split_record(input);
+    const std::vector<fs::path> found =
+        is_record ? trajectories_in(input) : std::vector<fs::path>{input};
+    all.insert(all.end(), found.begin(), found.end());
+  }
+  return all;
+}
+
+std::vector<StampedPose> read_estimate(const fs::path& input) {
+  const std::vector<fs::path> found = expand_records({input});
+  if (found.size() > 1)
+    throw InputFileError(input.string() + ": has trajectories of " + std::to_string(found.size()) +
+                         " robots: name one, as in " + found.front().string());
+  if (const auto record = split_record(found.front())) return read_topic(*record);
+  return read_trajectory(found.front());
+}
+
+}  // namespace km

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "modules/core/stamped_pose.hpp"
+
+namespace km {
+
+/// A topic of a record, "team.mcap:/alice/path" on the command line.
+struct RecordTopic {
+  std::filesystem::path file;
+  std::string topic;
+
+  /// "alice"
+  [[nodiscard]] std::string robot() const { return topic.substr(1, topic.find('/', 1) - 1); }
+};
+
+/// nullopt for what is not of that form.
+[[nodiscard]] std::optional<RecordTopic> split_record(const std::filesystem::path& input);
+
+/// Inputs with each MCAP file replaced by the trajectories in it, FILE:/NAME/path of every robot,
+/// or else FILE:/NAME/odometry. Throws InputFileError for a record that cannot be read or has none.
+[[nodiscard]] std::vector<std::filesystem::path> expand_records(
+    const std::vector<std::filesystem::path>& inputs);
+
+/// Poses in order of time, from a topic of a record, from the only trajectory of a record, or as
+/// read_trajectory() reads them. Of a nav_msgs/Path the last one counts; nav_msgs/Odometry and
+/// geometry_msgs/PoseStamped give one pose each. Throws InputFileError and TrajectoryFileError, in
+/// one line.
+[[nodiscard]] std::vector<StampedPose> read_estimate(const std::filesystem::path& input);
+
+}  // namespace km
