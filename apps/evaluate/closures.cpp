@@ -19,10 +19,10 @@ namespace {
 namespace fs = std::filesystem;
 
 struct ClosuresCommand {
-  std::vector<std::filesystem::path> truths;   // One for all robots, or one for each.
+  std::vector<std::filesystem::path> truths;  // One for all robots, or one for each.
   std::vector<std::filesystem::path>
-      results;  // A robot's results folder or record each, or a team's.
-  std::filesystem::path dataset;               // EuRoC/ASL folder with the robots' left camera.
+      results;                    // A robot's results folder or record each, or a team's.
+  std::filesystem::path dataset;  // EuRoC/ASL folder with the robots' left camera.
   ClosureTruthOptions options;
   std::filesystem::path json;  // Not written if empty.
 };

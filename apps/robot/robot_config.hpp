@@ -53,7 +53,7 @@ struct RobotOptions {
   std::filesystem::path security;  ///< Folder of this robot's keys; messages are sealed if given.
 
   std::filesystem::path output;
-  bool resume = false;           ///< Go on with the run whose results are in `output`.
+  bool resume = false;  ///< Go on with the run whose results are in `output`.
   std::optional<std::filesystem::path> record;  ///< MCAP file for viewers; empty: in `output`.
   bool record_images = false;                   ///< The left ones, too.
   double serve_limit_s = 120.0;  ///< Longest time to serve peers after the input has ended.
