@@ -19,10 +19,11 @@ StampedPose pose_of(Stamp stamp, const RosPose& pose) {
 }
 
 // What a message says, in place of the poses before or behind them.
-void take(const BagChannel& channel, const BagMessage& message, std::vector<StampedPose>& poses) {
+void take(const BagChannel& channel, const BagMessage& message, const std::string& place,
+          std::vector<StampedPose>& poses) {
   const auto decode = [&]<typename Message>(const Message&) {
     auto read = decode_ros<Message>(channel.encoding, message.bytes);
-    if (!read.value) throw InputFileError(channel.topic + ": " + read.refusal);
+    if (!read.value) throw InputFileError(place + ": " + read.refusal);
     return *std::move(read.value);
   };
   if (is_of_type(channel, RosPath::kType)) {
@@ -36,19 +37,19 @@ void take(const BagChannel& channel, const BagMessage& message, std::vector<Stam
     const RosPoseStamped pose = decode(RosPoseStamped());
     poses.push_back(pose_of(pose.header.stamp, pose.pose));
   } else {
-    throw InputFileError(channel.topic + ": " + channel.type + " has no poses");
+    throw InputFileError(place + ": " + channel.type + " has no poses");
   }
 }
 
 std::vector<StampedPose> read_topic(const RecordTopic& record) {
   McapReader reader(record.file);
+  const std::string place = record.file.string() + ':' + record.topic;
   std::vector<StampedPose> poses;
   while (const auto message = reader.next()) {
     const BagChannel& channel = reader.channels()[message->channel];
-    if (channel.topic == record.topic) take(channel, *message, poses);
+    if (channel.topic == record.topic) take(channel, *message, place, poses);
   }
-  if (poses.empty())
-    throw InputFileError(record.file.string() + ": no pose on the topic " + record.topic);
+  if (poses.empty()) throw InputFileError(place + ": no pose on this topic");
   std::ranges::stable_sort(poses, {}, &StampedPose::stamp);
   const auto repeated = std::ranges::unique(poses, {}, &StampedPose::stamp);
   poses.erase(repeated.begin(), repeated.end());
