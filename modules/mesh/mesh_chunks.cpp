@@ -18,6 +18,7 @@ using Face = LabelledMesh::Face;
 constexpr double kFarthest_steps = 1U << 30U;  // so that the sum of three fits 64 bits by far
 constexpr std::int64_t kMaxOffset = std::numeric_limits<std::uint16_t>::max();
 constexpr std::int64_t kThirdOfMaxOffset = kMaxOffset / 3;
+constexpr double kFarthest_m = 1e7;  // no robot is farther from the origin of a frame
 
 std::vector<GridPoint> quantise(const std::vector<Eigen::Vector3f>& vertices, double step_m) {
   std::vector<GridPoint> points;
@@ -196,11 +197,33 @@ struct SharedVertexHash {
   }
 };
 
+// Steps that split_mesh() makes, at a place where a robot may be.
+bool are_positions_usable(const MeshChunk& chunk) {
+  if (!(chunk.step_m > 0.0F)) return false;
+  return std::ranges::all_of(chunk.origin, [&](std::int32_t c) {
+    const double steps = std::abs(static_cast<double>(c));
+    return steps <= kFarthest_steps &&
+           (steps + kMaxOffset) * static_cast<double>(chunk.step_m) <= kFarthest_m;
+  });
+}
+
 std::int64_t position(const MeshChunk& chunk, std::size_t vertex, std::size_t axis) {
   return std::int64_t{chunk.origin[axis]} + chunk.offsets[vertex][axis];
 }
 
 }  // namespace
+
+const char* fault_of(const MeshChunk& chunk) {
+  const std::size_t vertices = chunk.offsets.size();
+  if (!chunk.labels.empty() && chunk.labels.size() != vertices)
+    return "labels do not fit the vertices";
+  if (wire_bytes(chunk) > kMaxChunkBytes) return "a chunk that is too large";
+  for (const MeshChunk::Triple& face : chunk.faces)
+    if (std::ranges::max(face) >= vertices) return "a face names a vertex which does not exist";
+  if (chunk.faces.empty() != chunk.offsets.empty()) return "vertices without faces";
+  if (!are_positions_usable(chunk)) return "positions are not finite or too far away";
+  return nullptr;
+}
 
 MeshPieces split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor,
                       const ChunkGrid& grid) {

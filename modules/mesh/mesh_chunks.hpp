@@ -55,6 +55,10 @@ inline constexpr std::size_t kMaxChunkBytes = 32000;
   return wire_bytes(chunk.offsets.size(), chunk.faces.size(), !chunk.labels.empty());
 }
 
+/// Why this cannot be a chunk that split_mesh() makes (a string literal), or null: what has come
+/// from somewhere else is used only after this.
+[[nodiscard]] const char* fault_of(const MeshChunk& chunk);
+
 /// The grid that a mesh is cut along, and the one its positions are rounded to.
 struct ChunkGrid {
   double cell_m = 2.0;

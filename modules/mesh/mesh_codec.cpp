@@ -1,22 +1,13 @@
 #include "modules/mesh/mesh_codec.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cstdlib>
-#include <limits>
 #include <utility>
 
 #include "runtime/dds/codec.hpp"
-#include "runtime/dds/wire_pose.hpp"
 
 namespace km {
 namespace {
 
 using Triple = MeshChunk::Triple;
-
-// Steps that a position can be away: more than split_mesh() makes, less than would overflow.
-constexpr std::int64_t kMaxOffset = std::numeric_limits<std::uint16_t>::max();
-constexpr std::int64_t kFarthest_steps = (std::int64_t{1} << 30U) + kMaxOffset;
 
 std::vector<std::uint16_t> flat(const std::vector<Triple>& triples) {
   std::vector<std::uint16_t> numbers;
@@ -32,15 +23,6 @@ std::vector<Triple> triples(std::span<const std::uint16_t> numbers) {
   for (std::size_t i = 0; i < numbers.size(); i += 3)
     result.push_back({numbers[i], numbers[i + 1], numbers[i + 2]});
   return result;
-}
-
-bool are_positions_usable(float step_m, const km_wire_MeshCell& origin) {
-  if (!(step_m > 0.0F)) return false;
-  return std::ranges::all_of(std::array{origin.x, origin.y, origin.z}, [&](std::int32_t c) {
-    const std::int64_t farthest = std::abs(std::int64_t{c}) + kMaxOffset;
-    return farthest <= kFarthest_steps &&
-           static_cast<double>(farthest) * static_cast<double>(step_m) <= kMaxWireTranslation_m;
-  });
 }
 
 }  // namespace
@@ -74,26 +56,18 @@ Decoded<MeshChunk> Codec<MeshChunk>::decode(const Wire& wire, const TeamPeer& wr
   const auto labels = elements_of(wire.labels, kMaxChunkBytes);
   const auto faces = elements_of(wire.faces, kMaxChunkBytes);
   if (!offsets || !labels || !faces) return Result::refuse("elements are missing or too many");
-  const std::size_t vertices = offsets->size() / 3;
   if (offsets->size() % 3 != 0 || faces->size() % 3 != 0)
     return Result::refuse("offsets or faces are not triples");
-  if (!labels->empty() && labels->size() != vertices)
-    return Result::refuse("labels do not fit the vertices");
-  if (wire_bytes(vertices, faces->size() / 3, !labels->empty()) > kMaxChunkBytes)
-    return Result::refuse("a chunk that is too large");
-  if (!std::ranges::all_of(*faces, [&](std::uint16_t corner) { return corner < vertices; }))
-    return Result::refuse("a face names a vertex which does not exist");
-  if (faces->empty() != offsets->empty()) return Result::refuse("vertices without faces");
-  if (!are_positions_usable(wire.step_m, wire.origin))
-    return Result::refuse("positions are not finite or too far away");
-  return Result::accept({.key = {writer.robot, {wire.cell.x, wire.cell.y, wire.cell.z}, wire.part},
-                         .boot = writer.boot,
-                         .anchor = wire.anchor,
-                         .step_m = wire.step_m,
-                         .origin = {wire.origin.x, wire.origin.y, wire.origin.z},
-                         .offsets = triples(*offsets),
-                         .labels = {labels->begin(), labels->end()},
-                         .faces = triples(*faces)});
+  MeshChunk chunk{.key = {writer.robot, {wire.cell.x, wire.cell.y, wire.cell.z}, wire.part},
+                  .boot = writer.boot,
+                  .anchor = wire.anchor,
+                  .step_m = wire.step_m,
+                  .origin = {wire.origin.x, wire.origin.y, wire.origin.z},
+                  .offsets = triples(*offsets),
+                  .labels = {labels->begin(), labels->end()},
+                  .faces = triples(*faces)};
+  if (const char* fault = fault_of(chunk)) return Result::refuse(fault);
+  return Result::accept(std::move(chunk));
 }
 
 }  // namespace km

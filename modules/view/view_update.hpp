@@ -86,8 +86,9 @@ struct ViewImage {
 using ViewContent =
     std::variant<ViewState, ViewPose, ViewKeyframes, ViewClosures, MeshChunk, ViewImage>;
 
-/// What a robot tells those who watch; they tell it nothing. Updates of one process arrive in the
-/// order in which they were told, and together say all: who comes late is told the past first.
+/// What a robot tells those who watch; they tell it nothing. Updates of one process and kind arrive
+/// in the order in which they were told, and together say all: when somebody comes late, the past
+/// is told again to all, so that what is known already comes a second time.
 struct ViewUpdate {
   RobotId robot = 0;
   std::uint64_t boot = 0;  ///< Of the process: with another one, what is known of the robot goes.
@@ -98,8 +99,10 @@ struct ViewUpdate {
 /// No content is longer; images are made to fit, and lists are cut in several.
 inline constexpr std::size_t kMaxViewBytes = 60000;
 
-/// Little-endian, poses as float32: position [m] and quaternion. Throws std::length_error for what
-/// is longer than kMaxViewBytes.
+/// Little-endian, poses as float32: position [m] and quaternion. Texts are of printable ASCII: what
+/// is none becomes '?'. The robot and boot of a mesh chunk are the update's, and not written again.
+/// Precondition: numbers are finite, closures as closure_id() has them. Throws std::length_error
+/// for what is longer than kMaxViewBytes.
 [[nodiscard]] std::vector<std::uint8_t> encode_view(const ViewContent& content);
 
 /// nullopt for bytes that encode_view() does not give: cut, too long, of an unknown kind, with

@@ -36,6 +36,7 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"simulation", {"images", "mesh"}},
     {"semantic_mapping", {"mesh"}},
     {"mesh_deformation", {"mesh"}},
+    {"view", {"images", "mesh"}},
 };
 
 std::vector<std::string> includes_of(const fs::path& file) {

@@ -1,0 +1,257 @@
+#include <catch2/catch.hpp>
+#include <limits>
+#include <random>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "modules/view/view_update.hpp"
+#include "test/support/random_pose.hpp"
+#include "test/support/spoilt_input.hpp"
+
+namespace km {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+// Float32 at 10 m: half a unit in the last place, and as much from the quaternion.
+constexpr double kPoseTolerance = 2e-6;
+
+ViewState some_state() {
+  return {.name = "alpha",
+          .phase = "running",
+          .dataset_time_s = 12.5,
+          .keyframes = 300,
+          .skipped_frames = 2,
+          .anchor = 3,
+          .round = 70000,
+          .cost = 1234.5,
+          .gradient_norm = 1e-3,
+          .cpu_s = 7.25,
+          .resident_MB = 180.0,
+          .links = {{3, 0.25F}, {65535, 12.0F}},
+          .sent_bytes = {{"pgo", 123456.0}, {"other", 1.0}},
+          .loads = {{"vio", 0.75}}};
+}
+
+ViewKeyframes some_keyframes(std::size_t count) {
+  std::mt19937 rng(7);
+  ViewKeyframes keyframes{.optimized = true, .anchor = 2, .first = 1000, .T_world_kf = {}};
+  for (std::size_t k = 0; k < count; ++k) keyframes.T_world_kf.push_back(random_pose(rng));
+  return keyframes;
+}
+
+ViewClosures some_closures() {
+  return {{{{{1, 5}, {2, 900}}, ViewVerdict::kCandidate, 0, 0, ""},
+           {{{1, 5}, {2, 901}}, ViewVerdict::kRejected, 65535, 12, "too few inliers"},
+           {{{1, 70000}, {1, 70001}}, ViewVerdict::kKept, 120, 80, ""}}};
+}
+
+MeshChunk some_chunk() {
+  return {.key = {0, {1, -2, 3}, 4},
+          .anchor = 3,
+          .step_m = 0.002F,
+          .origin = {-(1 << 30), 7, 1000},
+          .offsets = {{0, 0, 0}, {9, 0, 0}, {0, 65535, 0}, {0, 0, 9}},
+          .labels = {1, 2, 3, 4},
+          .faces = {{0, 1, 2}, {0, 2, 3}}};
+}
+
+ViewImage some_image() {
+  return {.stamp = -5, .jpeg = {0xFF, 0xD8, 0, 1, 2}, .features = {{0.5F, 479.5F}, {3.0F, 4.0F}}};
+}
+
+std::vector<ViewContent> all_kinds() {
+  std::mt19937 rng(3);
+  return {some_state(),      ViewPose{1'400'000'000'123'456'789, random_pose(rng)},
+          some_keyframes(5), some_closures(),
+          some_chunk(),      some_image()};
+}
+
+std::vector<Bytes> samples() {
+  std::vector<Bytes> all;
+  for (const ViewContent& content : all_kinds()) all.push_back(encode_view(content));
+  return all;
+}
+
+template <typename T>
+T round_trip(const T& content) {
+  const auto decoded = decode_view(encode_view(content));
+  REQUIRE(decoded);
+  REQUIRE(std::holds_alternative<T>(*decoded));
+  return std::get<T>(*decoded);
+}
+
+bool is_understood(const ViewContent& content) {
+  return decode_view(encode_view(content)).has_value();
+}
+
+TEST_CASE("A state survives the wire", "[view]") {
+  const ViewState sent = some_state();
+  const ViewState got = round_trip(sent);
+  CHECK(got.name == sent.name);
+  CHECK(got.phase == sent.phase);
+  CHECK(got.dataset_time_s == sent.dataset_time_s);
+  CHECK(got.keyframes == sent.keyframes);
+  CHECK(got.skipped_frames == sent.skipped_frames);
+  CHECK(got.anchor == sent.anchor);
+  CHECK(got.round == sent.round);
+  CHECK(got.cost == sent.cost);
+  CHECK(got.gradient_norm == sent.gradient_norm);
+  CHECK(got.cpu_s == sent.cpu_s);
+  CHECK(got.resident_MB == sent.resident_MB);
+  REQUIRE(got.links.size() == 2);
+  CHECK(got.links[1].robot == 65535);
+  CHECK(got.links[1].silent_s == 12.0F);
+  REQUIRE(got.sent_bytes.size() == 2);
+  CHECK(got.sent_bytes[0].name == "pgo");
+  CHECK(got.sent_bytes[0].value == 123456.0);
+  REQUIRE(got.loads.size() == 1);
+  CHECK(got.loads[0].name == "vio");
+}
+
+TEST_CASE("Poses survive the wire as float32", "[view]") {
+  std::mt19937 rng(GENERATE(1U, 2U, 3U));
+  const ViewPose sent{123, random_pose(rng)};
+  const ViewPose got = round_trip(sent);
+  CHECK(got.stamp == sent.stamp);
+  CHECK((got.T_odom_body.matrix() - sent.T_odom_body.matrix()).norm() < kPoseTolerance);
+
+  const ViewKeyframes keyframes = round_trip(some_keyframes(20));
+  CHECK(keyframes.optimized);
+  CHECK(keyframes.anchor == 2);
+  CHECK(keyframes.first == 1000);
+  REQUIRE(keyframes.T_world_kf.size() == 20);
+  for (std::size_t k = 0; k < 20; ++k)
+    CHECK((keyframes.T_world_kf[k].matrix() - some_keyframes(20).T_world_kf[k].matrix()).norm() <
+          kPoseTolerance);
+  CHECK_FALSE(round_trip(ViewKeyframes{}).optimized);
+}
+
+TEST_CASE("Closures survive the wire", "[view]") {
+  const auto sent = some_closures().closures;
+  const auto got = round_trip(some_closures()).closures;
+  REQUIRE(got.size() == sent.size());
+  for (std::size_t k = 0; k < sent.size(); ++k) {
+    CAPTURE(k);
+    CHECK(got[k].id == sent[k].id);
+    CHECK(got[k].verdict == sent[k].verdict);
+    CHECK(got[k].matches == sent[k].matches);
+    CHECK(got[k].inliers == sent[k].inliers);
+    CHECK(got[k].reason == sent[k].reason);
+  }
+}
+
+TEST_CASE("Pieces of the mesh and images survive the wire", "[view]") {
+  CHECK(round_trip(some_chunk()) == some_chunk());
+  const MeshChunk gone{.key = some_chunk().key};
+  CHECK(round_trip(gone) == gone);
+  const ViewImage got = round_trip(some_image());
+  CHECK(got.stamp == some_image().stamp);
+  CHECK(got.jpeg == some_image().jpeg);
+  CHECK(got.features == some_image().features);
+}
+
+TEST_CASE("Texts are told in printable ASCII", "[view]") {
+  ViewState state;
+  state.name = "a\nb\xC3\xA9";
+  CHECK(round_trip(state).name == "a?b??");
+}
+
+TEST_CASE("Views end where they end", "[view]") {
+  for (const Bytes& sample : samples()) {
+    CAPTURE(int{sample[0]});
+    REQUIRE(decode_view(sample));
+    for (std::size_t size = 0; size < sample.size(); ++size)
+      CHECK_FALSE(decode_view(std::span(sample).first(size)));
+    Bytes longer = sample;
+    longer.push_back(0);
+    CHECK_FALSE(decode_view(longer));
+  }
+  CHECK_FALSE(decode_view(Bytes{6}));
+  CHECK_FALSE(decode_view(Bytes{255, 0, 0}));
+}
+
+TEST_CASE("Views with numbers that cannot be are refused", "[view]") {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const float infinity = std::numeric_limits<float>::infinity();
+  ViewState state;
+  SECTION("a cost") {
+    state.cost = nan;
+    CHECK_FALSE(is_understood(state));
+  }
+  SECTION("a load") {
+    state.loads = {{"vio", nan}};
+    CHECK_FALSE(is_understood(state));
+  }
+  SECTION("a silence") {
+    state.links = {{1, infinity}};
+    CHECK_FALSE(is_understood(state));
+  }
+  SECTION("a position") {
+    ViewPose pose;
+    pose.T_odom_body.translation().y() = nan;
+    CHECK_FALSE(is_understood(pose));
+    pose.T_odom_body.translation().y() = 2e7;
+    CHECK_FALSE(is_understood(pose));
+  }
+  SECTION("a rotation") {
+    ViewKeyframes keyframes = some_keyframes(2);
+    keyframes.T_world_kf[1].linear() *= 1.1;  // its quaternion is none
+    CHECK_FALSE(is_understood(keyframes));
+  }
+  SECTION("a feature") {
+    ViewImage image = some_image();
+    image.features[1][0] = infinity;
+    CHECK_FALSE(is_understood(image));
+  }
+  SECTION("a closure with its ends exchanged") {
+    ViewClosures closures = some_closures();
+    std::swap(closures.closures[0].id.from, closures.closures[0].id.to);
+    CHECK_FALSE(is_understood(closures));
+  }
+  SECTION("a verdict") {
+    ViewClosures closures = some_closures();
+    closures.closures[0].verdict = static_cast<ViewVerdict>(4);
+    CHECK_FALSE(is_understood(closures));
+  }
+  SECTION("a face outside") {
+    MeshChunk chunk = some_chunk();
+    chunk.faces[0][2] = 4;
+    CHECK_FALSE(is_understood(chunk));
+  }
+}
+
+TEST_CASE("Views have a bound", "[view]") {
+  CHECK(is_understood(some_keyframes(2000)));
+  CHECK_THROWS_AS(encode_view(some_keyframes(2200)), std::length_error);
+  ViewImage image;
+  image.jpeg.resize(kMaxViewBytes - 20);
+  CHECK(is_understood(image));
+  image.jpeg.resize(kMaxViewBytes);
+  CHECK_THROWS_AS(encode_view(image), std::length_error);
+  Bytes bytes = encode_view(ViewKeyframes{});
+  bytes.back() = 0x7F;  // poses that are not there
+  CHECK_FALSE(decode_view(bytes));
+}
+
+// What is accepted can be shown: it is told as it was understood.
+TEST_CASE("Spoilt views harm nobody", "[view]") {
+  const std::vector<Bytes> good = samples();
+  InputSpoiler spoiler(GENERATE(1U, 2U));
+  int accepted = 0;
+  constexpr int kCount = 20'000;
+  for (int k = 0; k < kCount; ++k) {
+    const auto content = decode_view(spoiler(good));
+    if (!content) continue;
+    ++accepted;
+    REQUIRE(is_understood(*content));
+  }
+  CHECK(accepted > 0);
+  CHECK(accepted < kCount / 2);
+}
+
+}  // namespace
+}  // namespace km
