@@ -1,0 +1,156 @@
+#include <view.h>
+
+#include <array>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <thread>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "modules/view/view_channel_codec.hpp"
+#include "modules/view/view_listener_node.hpp"
+#include "runtime/clock.hpp"
+#include "test/runtime/dds/dds_fixture.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kPatience_s = static_cast<double>(kPatience.count());
+constexpr std::array kChannels = {ViewChannel::kView, ViewChannel::kMesh, ViewChannel::kImages};
+
+// The telling half of a robot.
+struct Teller {
+  Teller(const std::shared_ptr<const DdsDomain>& domain, RobotId robot)
+      : participant(domain, {.robot = robot, .name = robot_name(robot), .boot = 50U + robot}) {
+    for (const ViewChannel channel : kChannels)
+      writers.emplace_back(participant.handle(), channel, TeamPeer{robot, 50U + robot});
+  }
+  ViewWriter& on(ViewChannel channel) { return writers[static_cast<std::size_t>(channel)]; }
+  void tell(const ViewContent& content) { on(channel_of(content)).write(content); }
+
+  DdsParticipant participant;
+  std::vector<ViewWriter> writers;
+};
+
+MeshChunk chunk(std::int32_t x) {
+  return {
+      .key = {0, {x, 0, 0}, 0}, .offsets = {{0, 0, 0}, {9, 0, 0}, {0, 9, 0}}, .faces = {{0, 1, 2}}};
+}
+
+struct Watching {
+  std::shared_ptr<const DdsDomain> domain = std::make_shared<DdsDomain>(loopback_config());
+  Teller teller{domain, 7};
+  ViewListener listener{domain};
+
+  [[nodiscard]] bool is_read(ViewChannel channel, std::size_t readers = 1) {
+    return eventually([&] { return teller.on(channel).readers() == readers; });
+  }
+  [[nodiscard]] ViewUpdate heard() {
+    auto update = listener.next(kPatience_s);
+    REQUIRE(update);
+    return *std::move(update);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("Who watches hears what robots tell, in order", "[view]") {
+  Watching w;
+  REQUIRE(w.is_read(ViewChannel::kView));
+  REQUIRE(w.is_read(ViewChannel::kMesh));
+  constexpr std::uint32_t kCount = 500;
+  for (std::uint32_t k = 0; k < kCount; ++k)
+    w.teller.tell(ViewKeyframes{.first = k, .T_world_kf = {}});
+  for (std::uint32_t k = 0; k < kCount; ++k) {
+    const ViewUpdate update = w.heard();
+    CHECK(update.robot == 7);
+    CHECK(update.boot == 57);
+    CHECK(std::abs(seconds_between(update.told, nanoseconds(wall_now_s()))) < kPatience_s);
+    REQUIRE(std::holds_alternative<ViewKeyframes>(update.content));
+    CHECK(std::get<ViewKeyframes>(update.content).first == k);
+  }
+  // As many cells as there is no room for in a queue of one: each has its own.
+  for (std::int32_t x = 0; x < 100; ++x) w.teller.tell(chunk(x));
+  for (std::int32_t x = 0; x < 100; ++x) {
+    const ViewUpdate update = w.heard();
+    REQUIRE(std::holds_alternative<MeshChunk>(update.content));
+    const auto& piece = std::get<MeshChunk>(update.content);
+    CHECK(piece.key.robot == 7);
+    CHECK(piece.boot == 57);
+    CHECK(piece.faces == chunk(x).faces);
+  }
+  CHECK(w.teller.on(ViewChannel::kView).await_readers(kPatience_s));
+  CHECK(w.listener.refused() == 0);
+}
+
+TEST_CASE("A robot knows who has come to watch", "[view]") {
+  Watching w;
+  REQUIRE(w.is_read(ViewChannel::kView));
+  ViewWriter& writer = w.teller.on(ViewChannel::kView);
+  CHECK(writer.newcomers() == 1);
+  CHECK(writer.newcomers() == 0);
+  {
+    const ViewListener other(w.domain);
+    REQUIRE(w.is_read(ViewChannel::kView, 2));
+    CHECK(writer.newcomers() == 1);
+  }
+  REQUIRE(w.is_read(ViewChannel::kView, 1));
+  CHECK(writer.newcomers() == 0);
+}
+
+TEST_CASE("Images come of the robots that are asked", "[view]") {
+  Watching w;
+  Teller other(w.domain, 8);
+  REQUIRE(w.is_read(ViewChannel::kView));
+  CHECK(w.teller.on(ViewChannel::kImages).readers() == 0);
+  w.listener.ask_for_images({7});
+  CHECK_FALSE(w.listener.next(0.0));
+  REQUIRE(w.is_read(ViewChannel::kImages));
+  CHECK(other.on(ViewChannel::kImages).readers() == 0);
+  w.teller.tell(ViewImage{.stamp = 5, .jpeg = {1, 2, 3}, .features = {}});
+  CHECK(std::get<ViewImage>(w.heard().content).stamp == 5);
+
+  w.listener.ask_for_images({8});
+  CHECK_FALSE(w.listener.next(0.0));
+  REQUIRE(w.is_read(ViewChannel::kImages, 0));
+  CHECK(eventually([&] { return other.on(ViewChannel::kImages).readers() == 1; }));
+}
+
+TEST_CASE("What robots do not write is counted and not handed on", "[view]") {
+  Watching w;
+  const DdsEntity topic = create_view_topic(w.teller.participant.handle(), ViewChannel::kView);
+  const DdsEntity stranger(
+      dds_create_writer(w.teller.participant.handle(), topic.handle(), nullptr, nullptr), "writer");
+  REQUIRE(eventually([&] {
+    dds_publication_matched_status_t status{};
+    dds_get_publication_matched_status(stranger.handle(), &status);
+    return status.current_count == 1;
+  }));
+  const auto write = [&](std::vector<std::uint8_t> bytes) {
+    km_wire_ViewUpdate wire{};
+    borrow(wire.content, bytes);
+    check_dds(dds_write(stranger.handle(), &wire), "write");
+  };
+  write({});
+  write({77, 1, 2});
+  write(encode_view(chunk(1)));  // not here
+  write(std::vector<std::uint8_t>(kMaxViewBytes + 1));
+  CHECK(eventually([&] {
+    CHECK_FALSE(w.listener.next(0.0));
+    return w.listener.refused() == 4;
+  }));
+}
+
+TEST_CASE("Watching can be stopped", "[view]") {
+  Watching w;
+  std::thread stopper([&] { w.listener.stop(); });
+  CHECK_FALSE(w.listener.next(1000.0 * kPatience_s));
+  stopper.join();
+  CHECK_FALSE(w.listener.next(1000.0 * kPatience_s));
+}
+
+}  // namespace km
