@@ -253,6 +253,14 @@ class Fields {
 
   [[nodiscard]] std::string_view text(std::size_t i) const { return row_.fields[i]; }
 
+  // The text of field `i` and those behind it, which its commas have made, without its quotes.
+  [[nodiscard]] std::string rest(std::size_t i) const {
+    std::string all;
+    for (; i < row_.fields.size(); ++i) all.append(all.empty() ? "" : ", ").append(row_.fields[i]);
+    std::erase(all, '"');
+    return all;
+  }
+
   [[nodiscard]] double number(std::size_t i) const {
     const auto value = parse_double(text(i));
     if (!value || !(std::abs(*value) <= kMaxNumber))
@@ -317,6 +325,9 @@ std::vector<ClosureRecord> parse_closures(std::string_view text, const std::stri
     ClosureRecord closure;
     closure.id = {fields.keyframe(0), fields.keyframe(2)};
     closure.stage = stage_of(fields, 5);
+    closure.matches = static_cast<int>(fields.integer(6, std::numeric_limits<int>::max()));
+    closure.inliers = static_cast<int>(fields.integer(7, std::numeric_limits<int>::max()));
+    closure.reason = fields.rest(kPoseColumn + 7);
     if (!fields.text(kPoseColumn).empty())
       closure.T_from_to = fields.pose(kPoseColumn);
     else if (closure.stage >= ClosureStage::kVerified)

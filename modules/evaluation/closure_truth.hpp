@@ -30,6 +30,9 @@ struct ClosureRecord {
   ClosureId id;
   ClosureStage stage = ClosureStage::kCandidate;
   std::optional<SE3> T_from_to;  ///< Measured pose of body `to` in body `from`; from kVerified on.
+  int matches = 0;               ///< Descriptor matches.
+  int inliers = 0;               ///< Correspondences that support the pose.
+  std::string reason = {};       ///< Why it went no further; empty if it is not over.
 };
 
 /// When a closure counts as true.
@@ -119,9 +122,9 @@ struct KeyframeRecord {
 [[nodiscard]] std::vector<KeyframeRecord> read_keyframes(const std::filesystem::path& file);
 
 /// Reads a robot's loop_closures.csv: `from_robot, from_keyframe, to_robot, to_keyframe,
-/// similarity, stage, matches, inliers, tx, ty, tz, qx, qy, qz, qw, ...` below a header; the pose
-/// [m] is empty where there is none. Throws ClosureFileError, also for a closure that is verified
-/// but has none.
+/// similarity, stage, matches, inliers, tx, ty, tz, qx, qy, qz, qw, reason` below a header; the
+/// pose [m] is empty where there is none, and the reason may be. Throws ClosureFileError, also for
+/// a closure that is verified but has none.
 [[nodiscard]] std::vector<ClosureRecord> read_closures(const std::filesystem::path& file);
 
 /// The same of the text of a file; `name` stands for it in messages.

@@ -195,6 +195,10 @@ TEST_CASE("Closures are read with their stages and poses", "[closure_files]") {
   CHECK(angle_of(closures[0].T_from_to->linear()) == Approx(2.0 * std::acos(0.8)));
   CHECK(closures[1].stage == ClosureStage::kCandidate);
   CHECK_FALSE(closures[1].T_from_to);
+  CHECK(closures[0].matches == 80);
+  CHECK(closures[0].inliers == 60);
+  CHECK(closures[0].reason.empty());
+  CHECK(closures[1].reason == "too few matches, 3 of 20");
 }
 
 TEST_CASE("Keyframes take their true poses from the time they were made", "[closure_files]") {
