@@ -1,0 +1,184 @@
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <filesystem>
+#include <iostream>
+#include <optional>
+#include <set>
+#include <thread>
+
+#include "apps/viewer/page_message.hpp"
+#include "apps/viewer/page_server.hpp"
+#include "apps/viewer/run_playback.hpp"
+#include "apps/viewer/view_store.hpp"
+#include "modules/core/input_file.hpp"
+#include "modules/view/view_listener_node.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/dds/dds_config.hpp"
+#include "runtime/log.hpp"
+#include "runtime/supervisor.hpp"
+
+namespace km {
+namespace {
+
+constexpr int kBadInput = 1;
+
+constexpr const char* kAbout =
+    "Shows a team in a browser, while it runs or afterwards. It prints the address to open.\n\n"
+    "The page has the map, trajectories and loop closures in 3D, and what the robots say of "
+    "themselves:\nwho hears whom, cost, bytes, loads, memory. Its time slider goes back to any "
+    "moment while the run goes\non.";
+
+constexpr const char* kFooter = R"(
+With --domain it joins the team's DDS domain and listens; it says nothing there, and robots neither wait
+for it nor count it. They send what a page needs: about 2 kB/s, the map's pieces as they change, and small
+camera images of a robot while a page shows them.
+
+RESULTS is the folder of kimera_multi_team, or of one robot. Results do not say when all was known:
+a piece of the mesh is shown from when the robot came nearest to it, and robots join with the first
+closure of theirs that was kept: before it, the page has what odometry made, then what came of it.
+
+In the page: drag to turn, right button to move, wheel to come near; double click on a robot's name to
+follow it; measure: two clicks on the map. Keys: space plays and stops, T from above, F all in view.
+
+Without --listen only this host can open the page. With it, who knows the address can, so the address
+has a random token that is another one every time; what is sent is not encrypted.
+
+Examples
+  kimera_multi_viewer --domain 7                     # a team that runs
+  kimera_multi_viewer --domain 7 --peers 10.0.0.2,10.0.0.3   # where multicast is off
+  kimera_multi_viewer results/demo                   # a run that has ended
+  kimera_multi_viewer results/demo --rate 2          # as if it were live, twice as fast
+  kimera_multi_viewer results/demo --listen 0.0.0.0  # for other hosts
+
+Exit codes: 0 ended by Ctrl-C; 1 for input that cannot be used and an address that cannot be had.)";
+
+struct ViewerOptions {
+  std::filesystem::path results, palette;
+  DdsConfig dds;
+  PageServerOptions server;
+  double memory_MB = 1000.0;
+  std::optional<double> rate;
+};
+
+void define(CLI::App& app, ViewerOptions& options) {
+  app.footer(kFooter);
+  auto* const results = app.add_option("RESULTS", options.results, "Results of a run");
+  auto* const rate =
+      app.add_option("--rate", options.rate, "Play as if live: 1 as it was, 2 twice as fast");
+  rate->check(CLI::Range(1e-3, 1e3))->needs(results);
+  auto* const domain = app.add_option("--domain", options.dds.domain, "DDS domain of the team");
+  domain->check(CLI::Range(0, 230))->excludes(results);
+  app.add_option("--team", options.dds.team, "Its dds.team")->needs(domain)->capture_default_str();
+  app.add_option("--interface", options.dds.interface, "Network interface, e.g. lo")->needs(domain);
+  app.add_option("--peers", options.dds.peers, "Addresses of its hosts, where multicast is off")
+      ->delimiter(',')
+      ->needs(domain);
+  app.add_option(
+         "--palette", options.palette,
+         "label_palette.csv with names and colours of the labels (default: that of RESULTS)")
+      ->check(CLI::ExistingFile);
+  app.add_option("--port", options.server.port, "Of the page; 0: any that is free")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
+  app.add_option("--listen", options.server.address,
+                 "Address of this host to listen on, 0.0.0.0 for all; other than loopback, the "
+                 "URL has a token")
+      ->capture_default_str();
+  app.add_option("--memory", options.memory_MB,
+                 "What is kept at most [MB]: beyond, images, then meshes that newer ones have "
+                 "replaced go, the oldest first")
+      ->check(CLI::Range(10.0, 1e6))
+      ->capture_default_str();
+  app.add_option("--page", options.server.page_folder,
+                 "Serve the page's files from this folder, for work on them")
+      ->check(CLI::ExistingDirectory);
+  app.callback([results, domain] {
+    if (results->empty() && domain->empty())
+      throw CLI::RequiredError("--domain of a team that runs, or RESULTS of one that has ended");
+  });
+}
+
+// Tells the store, at `rate` or at once; false after a signal.
+bool play(const std::vector<ViewUpdate>& updates, std::optional<double> rate, ViewStore& store,
+          SignalWatch& signals) {
+  const double start_s = steady_now_s();
+  for (ViewUpdate update : updates) {
+    if (rate) {
+      const double due_s = start_s + seconds_between(updates.front().told, update.told) / *rate;
+      for (double left_s = 0.0; (left_s = due_s - steady_now_s()) > 0.0;)
+        if (signals.wait(std::min(left_s, 0.2))) return false;
+      update.told = nanoseconds(wall_now_s());
+    }
+    store.add(std::move(update));
+  }
+  return true;
+}
+
+void wait_for_end(SignalWatch& signals) {
+  while (!signals.wait(1.0)) {
+  }
+}
+
+LabelPalette palette_of(const ViewerOptions& options) {
+  if (options.palette.empty()) return {};
+  return parse_label_palette(read_input_file(options.palette), options.palette.string());
+}
+
+void tell_address(const PageServer& server) {
+  std::cout << "Open " << server.url() << "   (Ctrl-C ends)" << std::endl;
+}
+
+void show_run(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
+  RunPlayback run = read_run(options.results, nanoseconds(wall_now_s()));
+  for (const std::string& note : run.notes) log::warn("viewer") << note;
+  const std::string title = std::filesystem::canonical(options.results).filename().string();
+  options.server.greeting = page_greeting(
+      options.rate.has_value(), title, options.palette.empty() ? run.palette : palette_of(options));
+  const PageServer server(store, options.server);
+  tell_address(server);
+  if (!play(run.updates, options.rate, store, signals)) return;
+  run = {};
+  wait_for_end(signals);
+}
+
+void show_team(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
+  if (!options.dds.peers.empty()) options.dds.discovery = Discovery::kPeers;
+  ViewListener listener(options.dds);
+  std::jthread teller([&](const std::stop_token& stop) {
+    while (!stop.stop_requested())
+      if (auto update = listener.next(1.0)) store.add(*std::move(update));
+  });
+  const std::string title = "domain " + std::to_string(options.dds.domain);
+  options.server.greeting = page_greeting(true, title, palette_of(options));
+  options.server.on_images = [&](const std::set<RobotId>& robots) {
+    listener.ask_for_images(robots);
+  };
+  const PageServer server(store, options.server);
+  log::info("viewer") << title << " on " << listener.interface().name << " ("
+                      << listener.interface().address << ")";
+  tell_address(server);
+  wait_for_end(signals);
+  teller.request_stop();
+  listener.stop();
+}
+
+}  // namespace
+}  // namespace km
+
+int main(int argc, char** argv) try {
+  CLI::App app(km::kAbout);
+  km::ViewerOptions options;
+  km::define(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : km::kBadInput;
+  }
+  km::SignalWatch signals;  // before any thread: they inherit the blocked signals
+  km::ViewStore store(static_cast<std::size_t>(options.memory_MB * 1e6));
+  (options.results.empty() ? km::show_team : km::show_run)(options, store, signals);
+  return 0;
+} catch (const std::exception& error) {
+  std::cerr << "kimera_multi_viewer: " << error.what() << '\n';
+  return km::kBadInput;
+}

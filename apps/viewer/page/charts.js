@@ -1,0 +1,402 @@
+// Charts as SVG in a page: lines over time, bars, trajectories from above. Stands for itself, needs
+// no other file. A chart fills the width of the element it is given and is drawn anew by set().
+//
+//   const chart = lineChart(element, {title: 'Memory', unit: 'MB', x: duration});
+//   chart.set([{name: 'robot0', color: robotColor(0), points: [[0, 80], [1, 82]]}]);
+//
+// Colours of text and grid are those of the page: --chart-ink, --chart-muted, --chart-grid,
+// --chart-paper.
+
+const ROBOT_COLORS =
+    ['#1f77b4', '#ff7f0e', '#d62728', '#2ca02c', '#9467bd', '#17becf', '#8c564b', '#e377c2'];
+
+/** The colour of a robot, everywhere. */
+export const robotColor = (id) => ROBOT_COLORS[id % ROBOT_COLORS.length];
+
+const KIND_COLORS =
+    ['#4c9be8', '#e8a34c', '#b07cd8', '#5fb77c', '#d8746c', '#8b93a1', '#d6c25a', '#56b6c2'];
+/** A colour for the n-th thing that is no robot. */
+export const kindColor = (n) => KIND_COLORS[n % KIND_COLORS.length];
+
+// ---- texts of numbers
+
+const trimmed = (value, digits) => String(Number(value.toPrecision(digits)));
+
+/** "0.012", "1.2 k", "3.4 M"; with a unit behind it. */
+export function quantity(value, unit = '') {
+  if (!Number.isFinite(value)) return '–';
+  const size = Math.abs(value);
+  if (unit === '%') return `${trimmed(value, size < 10 ? 2 : 3)} %`;
+  const steps = [[1e9, 'G'], [1e6, 'M'], [1e3, 'k']];
+  for (const [step, prefix] of steps)
+    if (size >= step) return `${trimmed(value / step, 3)} ${prefix}${unit}`;
+  if (size > 0 && size < 1e-3) return `${value.toExponential(0)}${unit && ` ${unit}`}`;
+  return `${trimmed(value, 3)}${unit && ` ${unit}`}`;
+}
+
+/** Seconds as "0:07" or "1:02:03". */
+export function duration(seconds) {
+  const whole = Math.max(0, Math.floor(seconds + 1e-6));
+  const two = (n) => String(n).padStart(2, '0');
+  const hours = Math.floor(whole / 3600), minutes = Math.floor(whole / 60) % 60;
+  return hours ? `${hours}:${two(minutes)}:${two(whole % 60)}` : `${minutes}:${two(whole % 60)}`;
+}
+
+// ---- axes
+
+// Round numbers that cover [low, high], about `count` of them.
+function ticks(low, high, count, steps = [1, 2, 5, 10]) {
+  const rough = (high - low) / Math.max(1, count);
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = power * steps.find((s) => s * power >= rough * 0.999);
+  const all = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k)
+    all.push(k * step);
+  return all;
+}
+
+// Of time: minutes are divided by 60, not by 10.
+function timeTicks(low, high, count) {
+  const rough = (high - low) / Math.max(1, count);
+  const step =
+      [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200].find((s) => s >= rough) ||
+      14400;
+  return ticks(low, high, (high - low) / step, [1, 10]).length ? range(low, high, step) : [low];
+}
+function range(low, high, step) {
+  const all = [];
+  for (let x = Math.ceil(low / step) * step; x <= high + 1e-9; x += step) all.push(x);
+  return all;
+}
+
+// Powers of ten, every k-th where they are many.
+function powerTicks(low, high, count) {
+  const from = Math.ceil(Math.log10(low) - 1e-9), to = Math.floor(Math.log10(high) + 1e-9);
+  const every = Math.max(1, Math.ceil((to - from + 1) / count));
+  const all = [];
+  for (let k = from; k <= to; ++k)
+    if ((k - from) % every === 0) all.push(10 ** k);
+  return all;
+}
+
+function extent(series, axis, accepts = Number.isFinite) {
+  let low = Infinity, high = -Infinity;
+  for (const one of series)
+    for (const point of one.points)
+      if (accepts(point[axis])) {
+        low = Math.min(low, point[axis]);
+        high = Math.max(high, point[axis]);
+      }
+  return low <= high ? [low, high] : null;
+}
+
+// ---- drawing
+
+const escaped = (text) => String(text).replace(
+    /[&<>"]/g, (c) => ({'&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;'})[c]);
+const px = (x) => Math.round(x * 10) / 10;
+
+function element(tag, className, parent, text) {
+  const made = document.createElement(tag);
+  made.className = className;
+  if (text !== undefined) made.textContent = text;
+  parent?.append(made);
+  return made;
+}
+
+const STYLE = `
+.chart { position: relative; color: var(--chart-ink, #222); font-size: 11px; font-variant-numeric: tabular-nums; }
+.chart-head { display: flex; align-items: baseline; flex-wrap: wrap; gap: 2px 10px; margin-bottom: 3px; }
+.chart-title { font-weight: 600; font-size: 12px; margin-right: auto; }
+.chart-unit { font-weight: 400; color: var(--chart-muted, #666); margin-left: 6px; }
+.chart-key { display: inline-flex; align-items: center; gap: 5px; color: var(--chart-muted, #666); cursor: pointer;
+  background: none; border: 0; padding: 0; font: inherit; }
+.chart-key i { width: 10px; height: 3px; border-radius: 2px; }
+.chart-key.off { opacity: 0.35; }
+.chart svg { display: block; width: 100%; }
+.chart svg text { fill: var(--chart-muted, #666); font-size: 10px; }
+.chart-grid { stroke: var(--chart-grid, #e3e5e8); shape-rendering: crispEdges; }
+.chart-cursor { stroke: var(--chart-muted, #666); shape-rendering: crispEdges; }
+.chart-tip { position: absolute; pointer-events: none; z-index: 5; padding: 5px 8px; border-radius: 5px; white-space: nowrap;
+  background: var(--chart-paper, #fff); border: 1px solid var(--chart-grid, #ccc); box-shadow: 0 2px 10px #0004; }
+.chart-tip div { display: flex; align-items: center; gap: 6px; }
+.chart-tip i { width: 7px; height: 7px; border-radius: 50%; }
+.chart-tip b { margin-left: auto; padding-left: 10px; font-weight: 600; }`;
+
+function ensureStyle() {
+  if (document.getElementById('chart-style')) return;
+  const style = element('style', '', document.head, STYLE);
+  style.id = 'chart-style';
+}
+
+// What all charts share: head with title and legend, a canvas that follows the width, hidden
+// series.
+function frame(host, options, draw) {
+  ensureStyle();
+  const root = element('div', 'chart', host);
+  const head = element('div', 'chart-head', root);
+  const title = element('span', 'chart-title', head, options.title ?? '');
+  if (options.unit) element('span', 'chart-unit', title, options.unit);
+  const keys = element('span', 'chart-head', head);
+  keys.style.marginBottom = 0;
+  const canvas = element('div', '', root);
+  const tip = element('div', 'chart-tip', root);
+  tip.hidden = true;
+  const chart = {root, canvas, tip, series: [], hidden: new Set(), width: 0};
+  let legend = '';
+  const drawLegend = () => {
+    const now = chart.series.map((s) => `${s.name}${s.color}${chart.hidden.has(s.name)}`).join();
+    if (now === legend) return;
+    legend = now;
+    keys.replaceChildren();
+    for (const one of chart.series) {
+      if (!one.name || chart.series.length < 2) continue;
+      const key = element('button', `chart-key${chart.hidden.has(one.name) ? ' off' : ''}`, keys);
+      element('i', '', key).style.background = one.color;
+      key.append(one.name);
+      key.title = 'Show or hide';
+      key.onclick = () => {
+        if (!chart.hidden.delete(one.name)) chart.hidden.add(one.name);
+        redraw();
+      };
+    }
+  };
+  const redraw = () => {
+    chart.width = canvas.clientWidth;
+    drawLegend();
+    if (chart.width > 60) draw(chart, chart.series.filter((s) => !chart.hidden.has(s.name)));
+  };
+  new ResizeObserver(() => canvas.clientWidth !== chart.width && redraw()).observe(canvas);
+  chart.set = (series) => {
+    chart.series = series;
+    redraw();
+  };
+  return chart;
+}
+
+// Of more points than pixels, the lowest and the highest in each column.
+function thinned(points, toX) {
+  if (points.length < 2000) return points;
+  const kept = [];
+  let column = NaN, low = null, high = null;
+  const flush = () => low &&
+      kept.push(
+          ...(low === high         ? [low] :
+                  low[0] < high[0] ? [low, high] :
+                                     [high, low]));
+  for (const point of points) {
+    if (Math.floor(toX(point[0])) !== column) {
+      flush();
+      column = Math.floor(toX(point[0]));
+      low = high = point;
+    }
+    if (point[1] < low[1]) low = point;
+    if (point[1] > high[1]) high = point;
+  }
+  flush();
+  return kept;
+}
+
+function path(points, toX, toY) {
+  let d = '', pen = 'M';
+  for (const [x, y] of points) {
+    const at = toY(y);
+    if (!Number.isFinite(at)) {
+      pen = 'M';
+      continue;
+    }
+    d += `${pen}${px(toX(x))} ${px(at)}`;
+    pen = 'L';
+  }
+  return d;
+}
+
+function lineSvg(one, d) {
+  const dash = one.dashed ? ' stroke-dasharray="4 3"' : '';
+  return `<path fill="none" stroke="${one.color}" stroke-width="${
+      one.width ?? 1.5}" stroke-linejoin="round"${dash} d="${d}"/>`;
+}
+
+/**
+ * Lines over a common x. Options: title, unit of y, height [px], logY, x: text of an x (default: as
+ * it is), from0 (y begins at 0; default true without logY), cursor: x of a vertical line.
+ */
+export function lineChart(host, options = {}) {
+  const {unit = '', height = 120, logY = false, from0 = !logY, x: textOfX = (x) => quantity(x)} =
+      options;
+  const time = textOfX === duration;
+  let scale = null;
+  const chart = frame(host, options, (self, series) => {
+    const positive = (y) => Number.isFinite(y) && (!logY || y > 0);
+    const [x0, x1] = options.range ?? extent(series, 0) ?? [0, 1];
+    let [y0, y1] = extent(series, 1, positive) ?? [logY ? 1 : 0, logY ? 10 : 1];
+    // What is six powers of ten below the largest is as good as nothing.
+    if (logY)
+      [y0, y1] = [
+        10 ** Math.floor(Math.log10(Math.max(y0, y1 * 1e-6))),
+        10 ** Math.ceil(Math.log10(y1) + 1e-9)
+      ];
+    else if (from0)
+      [y0, y1] = [Math.min(0, y0), y1 > 0 ? y1 * 1.06 : 1];
+    if (!(y1 > y0)) [y0, y1] = [y0 - 0.5, y0 + 0.5];
+    const marks = logY ? powerTicks(y0, y1, 4) : ticks(y0, y1, height / 36);
+    const labels = marks.map((y) => (logY ? y.toExponential(0).replace('e+', 'e') : quantity(y)));
+    const left = 12 + 6 * Math.max(...labels.map((l) => l.length), 2), right = 8, top = 6,
+          bottom = 18;
+    const width = self.width, span = Math.max(x1 - x0, 1e-9);
+    const toX = (x) => left + ((x - x0) / span) * (width - left - right);
+    const f = logY ? (y) => (y > 0 ? Math.log10(Math.max(y, y0)) : NaN) : (y) => y;
+    const toY = (y) =>
+        height - bottom - ((f(y) - f(y0)) / (f(y1) - f(y0))) * (height - top - bottom);
+    let svg = `<svg viewBox="0 0 ${width} ${height}" height="${height}" role="img" aria-label="${
+        escaped(options.title ?? '')}">`;
+    marks.forEach((y, i) => {
+      svg += `<line class="chart-grid" x1="${left}" x2="${width - right}" y1="${px(toY(y))}" y2="${
+          px(toY(y))}"/>`;
+      svg += `<text x="${left - 6}" y="${px(toY(y)) + 3}" text-anchor="end">${labels[i]}</text>`;
+    });
+    for (const x of (time ? timeTicks : ticks)(x0, x0 + span, width / 90))
+      svg += `<text x="${px(toX(x))}" y="${height - 4}" text-anchor="middle">${
+          escaped(textOfX(x))}</text>`;
+    for (const one of series) svg += lineSvg(one, path(thinned(one.points, toX), toX, toY));
+    if (Number.isFinite(options.cursor))
+      svg += `<line class="chart-cursor" x1="${px(toX(options.cursor))}" x2="${
+          px(toX(options.cursor))}" y1="${top}" y2="${height - bottom}"/>`;
+    self.canvas.innerHTML = `${svg}<g class="chart-hover"></g></svg>`;
+    scale = {toX, toY, series, left, right, top, bottom, height, x0, span, width};
+  });
+  hover(chart, () => scale, textOfX, unit, height);
+  chart.options = options;
+  return chart;
+}
+
+// The point of `points` (ascending in x) nearest to x.
+function nearest(points, x) {
+  let low = 0, high = points.length - 1;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (points[middle][0] <= x)
+      low = middle;
+    else
+      high = middle;
+  }
+  if (high < 0) return null;
+  return Math.abs(points[low][0] - x) <= Math.abs(points[high][0] - x) ? points[low] : points[high];
+}
+
+// Under the pointer: a line, a dot on each series, and their values.
+function hover(chart, scaleOf, textOfX, unit, height) {
+  chart.canvas.onpointerleave = () => {
+    chart.tip.hidden = true;
+    const group = chart.canvas.querySelector('.chart-hover');
+    if (group) group.innerHTML = '';
+  };
+  chart.canvas.onpointermove = (event) => {
+    const s = scaleOf();
+    const group = chart.canvas.querySelector('.chart-hover');
+    if (!s || !group) return;
+    const at = event.clientX - chart.canvas.getBoundingClientRect().left;
+    const x = s.x0 + ((at - s.left) / (s.width - s.left - s.right)) * s.span;
+    const found = s.series.map((one) => [one, nearest(one.points, x)]).filter(([, p]) => p);
+    if (!found.length) return;
+    const shown =
+        found.reduce((a, b) => (Math.abs(a[1][0] - x) <= Math.abs(b[1][0] - x) ? a : b))[1][0];
+    const line = px(s.toX(shown));
+    group.innerHTML = `<line class="chart-cursor" x1="${line}" x2="${line}" y1="${s.top}" y2="${
+                          height - s.bottom}"/>` +
+        found.filter(([, p]) => Number.isFinite(s.toY(p[1])))
+            .map(
+                ([one, p]) => `<circle r="3" fill="${one.color}" cx="${px(s.toX(p[0]))}" cy="${
+                    px(s.toY(p[1]))}"/>`)
+            .join('');
+    showTip(
+        chart, at, escaped(textOfX(shown)), found.map(([one, p]) => [one, quantity(p[1], unit)]));
+  };
+}
+
+function showTip(chart, at, head, rows) {
+  chart.tip.innerHTML = `<div>${head}</div>` +
+      rows.map(
+              ([one, text]) => `<div><i style="background:${one.color}"></i>${
+                  escaped(one.name ?? '')}<b>${escaped(text)}</b></div>`)
+          .join('');
+  chart.tip.hidden = false;
+  const width = chart.tip.offsetWidth;
+  chart.tip.style.left = `${Math.max(0, Math.min(at + 12, chart.width - width))}px`;
+  if (at + 12 + width > chart.width) chart.tip.style.left = `${Math.max(0, at - width - 12)}px`;
+  chart.tip.style.top = '24px';
+}
+
+/**
+ * Groups of horizontal bars, a bar per series in each: set() takes {name, color, values: {group:
+ * value}}. Options: title, unit, most: groups shown, the largest first; full: value of a bar over
+ * the whole width.
+ */
+export function barChart(host, options = {}) {
+  const {unit = '', most = 8} = options;
+  return frame(host, options, (self, series) => {
+    const groups = [...new Set(series.flatMap((s) => Object.keys(s.values)))];
+    const largest = (g) => Math.max(...series.map((s) => s.values[g] ?? 0));
+    groups.sort((a, b) => largest(b) - largest(a) || (a < b ? -1 : 1)).splice(most);
+    const bar = 5, gap = 2, row = Math.max(18, series.length * (bar + gap) + 8);
+    const left = 10 + 6.3 * Math.max(...groups.map((g) => g.length), 4), right = 44;
+    const full = options.full ?? Math.max(1e-12, ...groups.map(largest));
+    const height = Math.max(20, row * groups.length + 2);
+    let svg = `<svg viewBox="0 0 ${self.width} ${height}" height="${
+        height}" role="img" aria-label="${escaped(options.title ?? '')}">`;
+    groups.forEach((group, g) => {
+      const middle = g * row + row / 2;
+      svg += `<text x="${px(left - 8)}" y="${middle + 3}" text-anchor="end">${
+          escaped(group.replaceAll('_', ' '))}</text>`;
+      series.forEach((one, i) => {
+        const value = one.values[group] ?? 0;
+        const y = middle + (i - series.length / 2) * (bar + gap) + gap / 2;
+        const length = Math.max(1, Math.min(1, value / full) * (self.width - left - right));
+        svg += `<rect x="${px(left)}" y="${px(y)}" width="${px(length)}" height="${
+                   bar}" rx="1.5" fill="${one.color}">` +
+            `<title>${escaped(`${one.name}: ${quantity(value, unit)}`)}</title></rect>`;
+      });
+      svg += `<text x="${self.width}" y="${middle + 3}" text-anchor="end">${
+          escaped(quantity(largest(group), unit))}</text>`;
+    });
+    self.canvas.innerHTML = `${svg}</svg>`;
+  });
+}
+
+/**
+ * Trajectories seen from above, both axes to one scale: set() takes {name, color, points, dashed,
+ * dots}. Options: title, height [px].
+ */
+export function mapChart(host, options = {}) {
+  const {height = 360} = options;
+  return frame(host, options, (self, series) => {
+    const [x0, x1] = extent(series, 0) ?? [0, 1], [y0, y1] = extent(series, 1) ?? [0, 1];
+    const left = 40, right = 10, top = 8, bottom = 22;
+    const wide = self.width - left - right, high = height - top - bottom;
+    const scale = Math.min(wide / Math.max(x1 - x0, 1e-3), high / Math.max(y1 - y0, 1e-3)) * 0.94;
+    const toX = (x) => left + wide / 2 + (x - (x0 + x1) / 2) * scale;
+    const toY = (y) => top + high / 2 - (y - (y0 + y1) / 2) * scale;
+    const atX = (p) => (x0 + x1) / 2 + (p - left - wide / 2) / scale;
+    const atY = (p) => (y0 + y1) / 2 - (p - top - high / 2) / scale;
+    let svg = `<svg viewBox="0 0 ${self.width} ${height}" height="${
+        height}" role="img" aria-label="${escaped(options.title ?? '')}">`;
+    for (const x of ticks(atX(left), atX(self.width - right), wide / 80))
+      svg += `<line class="chart-grid" x1="${px(toX(x))}" x2="${px(toX(x))}" y1="${top}" y2="${
+                 top + high}"/>` +
+          `<text x="${px(toX(x))}" y="${height - 6}" text-anchor="middle">${quantity(x)}</text>`;
+    for (const y of ticks(atY(top + high), atY(top), high / 60))
+      svg += `<line class="chart-grid" x1="${left}" x2="${self.width - right}" y1="${
+                 px(toY(y))}" y2="${px(toY(y))}"/>` +
+          `<text x="${left - 6}" y="${px(toY(y)) + 3}" text-anchor="end">${quantity(y)}</text>`;
+    svg += `<text x="${self.width - right}" y="${height - 6}" text-anchor="end">m</text>`;
+    for (const one of series)
+      svg += one.dots ?
+          one.points
+              .map(
+                  ([x, y]) =>
+                      `<circle r="2" fill="${one.color}" cx="${px(toX(x))}" cy="${px(toY(y))}"/>`)
+              .join('') :
+          lineSvg(one, path(one.points, toX, toY));
+    self.canvas.innerHTML = `${svg}</svg>`;
+  });
+}

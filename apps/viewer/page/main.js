@@ -1,0 +1,328 @@
+// Joins the page: messages to the model, the model at the time of the slider to scene and panels.
+import {Connection} from './connection.js';
+import {Model} from './model.js';
+import {Panels} from './panels.js';
+import {Scene, VERDICTS} from './scene.js';
+import {Timeline} from './timeline.js';
+
+const SHOW_MS = 100;  // between updates of the scene
+const CHARTS_MS = 1000;
+
+const $ = (id) => document.getElementById(id);
+const model = new Model();
+const scene = new Scene($('canvas'), $('overlay'));
+const panels = new Panels(
+    {totals: $('totals'), robots: $('robots'), matrix: $('matrix'), charts: $('right')},
+    {follow: toggleFollow, camera: toggleCamera});
+const timeline = new Timeline(
+    {slider: $('slider'), play: $('play'), live: $('live'), clock: $('clock'), speed: $('speed')},
+    () => {
+      changed = true;
+    });
+
+let changed = true, chartsChanged = true, caughtUp = false, live = false;
+let pointed = null;  // where the pointer is in the scene
+let camera = null;   // robot whose images are shown
+const waiting = [];  // when what came was told, until it is shown [ms since 1970]
+const delays = [];   // from told to shown [ms]
+
+// ---- what comes
+
+const connection = new Connection({
+  opened() {
+    model.clear();
+    caughtUp = false;
+    setLink('loading', 'warn');
+  },
+  closed() { setLink('viewer gone', 'bad'); },
+  message(message) {
+    if (message.kind === 'hello') return greet(message);
+    if (message.kind === 'forgotten') return model.forgetNumbers(message.numbers);
+    if (message.kind === 'caught_up') {
+      caughtUp = true;
+      if (camera !== null) connection.wantImages(camera, true);
+      setLink(live ? 'live' : 'finished run', live ? 'good' : '');
+    } else {
+      model.add(message);
+      if (caughtUp && waiting.length < 10000) waiting.push(message.told);
+    }
+    changed = chartsChanged = true;
+  },
+});
+
+function greet({live: isLive, title, labels}) {
+  live = isLive;
+  $('title').textContent = title;
+  $('live').textContent = live ? 'Live' : 'End';
+  document.title = `${title} – kimera_multi`;
+  scene.meshes.setPalette(labels);
+}
+
+function setLink(text, className) {
+  $('link').textContent = text;
+  $('link').className = `badge ${className}`;
+}
+
+// ---- what is shown
+
+function countClosures() {
+  const counts = {kept: 0, verified: 0, candidate: 0, rejected: 0};
+  for (const closure of model.closures().values()) ++counts[closure.verdict];
+  return counts;
+}
+
+function show() {
+  timeline.end = model.end;
+  if (timeline.follows) timeline.time = model.end;
+  model.seek(timeline.time);
+  scene.update(model);
+  const counts = countClosures();
+  for (const robot of model.robots.values()) panels.updateCard(robot, model);
+  panels.mark(scene.follows, camera);
+  panels.updateMatrix(model);
+  panels.updateTotals(model, counts);
+  for (const verdict of Object.keys(VERDICTS))
+    layerButtons[verdict].querySelector('b').textContent = counts[verdict];
+  $('empty').hidden = model.robots.size > 0;
+  if (pointed) showClosure(scene.closureAt(...pointed), ...pointed);
+  drawCamera();
+}
+
+let shownAt = 0, chartsAt = 0, lastTick = performance.now();
+function tick(now) {
+  requestAnimationFrame(tick);
+  if (timeline.step((now - lastTick) / 1000)) changed = true;
+  lastTick = now;
+  // All of the past comes in one go: it is shown when it is there.
+  if (changed && now - shownAt >= SHOW_MS && (caughtUp || now - shownAt >= 1000)) {
+    changed = false;
+    shownAt = now;
+    show();
+    timeline.draw();
+    chartsChanged = true;
+  }
+  if (chartsChanged && now - chartsAt >= (timeline.playing ? 250 : CHARTS_MS)) {
+    chartsChanged = false;
+    chartsAt = now;
+    panels.updateCharts(model);
+    timeline.survey(model);
+    timeline.draw();
+  }
+}
+requestAnimationFrame(tick);
+// What was told is shown once the scene is drawn with it.
+scene.onDrawn = () => {
+  if (scene.building) return;
+  drawLegend();
+  if (changed) return;
+  const now = Date.now();
+  for (const told of waiting.splice(0)) delays.push(now - told);
+  if (delays.length > 20000) delays.splice(0, 10000);
+};
+
+function drawLegend() {
+  const {meshes} = scene;
+  const known = meshes.mode === 'labels' ? [...meshes.labels].sort((a, b) => a - b) : [];
+  const html = known
+                   .map((id) => {
+                     const name = meshes.palette.get(id)?.name ?? `label ${id}`;
+                     const item = document.createElement('span');
+                     item.textContent = name.replaceAll('_', ' ');
+                     return `<span><i style="background:rgb(${
+                         meshes.colorOf(id).map(Math.round)})"></i>${item.innerHTML}</span>`;
+                   })
+                   .join('');
+  if ($('legend').innerHTML !== html) $('legend').innerHTML = html;
+}
+
+// ---- camera image
+
+function toggleCamera(robot) {
+  if (camera !== null) connection.wantImages(camera, false);
+  camera = camera === robot ? null : robot;
+  if (camera !== null) connection.wantImages(camera, true);
+  drawnImage = undefined;
+  changed = true;
+}
+$('camera').querySelector('button').onclick = () => toggleCamera(camera);
+
+let drawnImage;
+async function drawCamera() {
+  $('camera').hidden = camera === null;
+  if (camera === null) return;
+  const image = model.robots.get(camera)?.image ?? null;
+  if (image === drawnImage) return;
+  drawnImage = image;
+  const caption = $('camera').querySelector('span');
+  caption.textContent = image ? `${model.name(camera)}: ${image.features} features` :
+                                `${model.name(camera)}: ${live ? 'no image yet' : 'results keep no images'}`;
+  if (!image?.jpeg) return;
+  const bitmap = await createImageBitmap(new Blob([image.jpeg], {type: 'image/jpeg'}));
+  const canvas = $('camera').querySelector('canvas');
+  canvas.width = 2 * bitmap.width;
+  canvas.height = 2 * bitmap.height;
+  const c = canvas.getContext('2d');
+  c.scale(2, 2);
+  c.drawImage(bitmap, 0, 0);
+  c.strokeStyle = '#6fdc8c';
+  for (let i = 0; i < image.pixels.length; i += 2) {
+    c.beginPath();
+    c.arc(image.pixels[i] + 0.5, image.pixels[i + 1] + 0.5, 2.5, 0, 7);
+    c.stroke();
+  }
+}
+
+// ---- tools
+
+function toggleFollow(robot) {
+  scene.follow(scene.follows === robot ? null : robot);
+  changed = true;
+}
+scene.onFollow = toggleFollow;
+
+function viewAll(above) {
+  scene.follow(null);
+  scene.touched = false;
+  scene.fit(above);
+  scene.touched = above;
+  changed = true;
+}
+$('view-all').onclick = () => viewAll(false);
+$('view-top').onclick = () => viewAll(true);
+$('measure').onclick = () => {
+  scene.measure(scene.measured === null);
+  $('measure').classList.toggle('on', scene.measured !== null);
+};
+
+const meshModes = {
+  labels: 'Labels',
+  robots: 'Robots',
+  normals: 'Normals',
+  off: 'Off'
+};
+for (const [mode, text] of Object.entries(meshModes)) {
+  const button = document.createElement('button');
+  button.textContent = text;
+  button.className = mode === scene.meshes.mode ? 'on' : '';
+  button.onclick = () => {
+    scene.meshes.setMode(mode);
+    for (const other of $('mesh-modes').querySelectorAll('button'))
+      other.classList.toggle('on', other === button);
+    scene.dirty = changed = true;
+  };
+  $('mesh-modes').append(button);
+}
+
+const layerButtons = {};
+function addLayer(name, text, color) {
+  const button = document.createElement('button');
+  if (color)
+    button.append(Object.assign(document.createElement('i'), {style: `background:${color}`}));
+  button.append(text);
+  if (color) button.append(document.createElement('b'));
+  button.classList.toggle('on', scene.layers[name]);
+  button.onclick = () => button.classList.toggle(
+      'on', (scene.setLayer(name, !scene.layers[name]), scene.layers[name]));
+  layerButtons[name] = button;
+  $('layers').append(button);
+}
+addLayer('optimized', 'Optimised');
+addLayer('odometry', 'Odometry');
+addLayer('keyframes', 'Keyframes');
+for (const [verdict, {color, text}] of Object.entries(VERDICTS)) addLayer(verdict, text, color);
+
+// ---- pointer and keys
+
+const pointer = (event) => {
+  const box = $('canvas').getBoundingClientRect();
+  return [event.clientX - box.left, event.clientY - box.top];
+};
+$('canvas').addEventListener('pointermove', (event) => {
+  if (event.buttons) return;
+  pointed = pointer(event);
+  showClosure(scene.closureAt(...pointed), ...pointed);
+});
+$('canvas').addEventListener('pointerleave', () => {
+  pointed = null;
+  showClosure(null);
+});
+
+function showClosure(found, x, y) {
+  scene.setHovered(found);
+  const tip = $('closure-tip');
+  tip.hidden = !found;
+  if (!found) return;
+  const {closure} = found;
+  const of = ([robot, keyframe]) => `${model.name(robot)} keyframe ${keyframe}`;
+  const lines = [
+    ['b', closure.verdict, ''], ['p', `${of(closure.from)} – ${of(closure.to)}`, ''],
+    ['p', `${closure.matches} matches, ${closure.inliers} inliers`, '']
+  ];
+  if (closure.reason) lines.push(['p', closure.reason, 'reason']);
+  tip.replaceChildren(...lines.map(
+      ([tag, text, className]) =>
+          Object.assign(document.createElement(tag), {textContent: text, className})));
+  tip.firstChild.style.color = VERDICTS[closure.verdict].color;
+  const room = $('canvas').clientWidth - tip.offsetWidth - 8;
+  tip.style.left = `${Math.min(x + 14, room)}px`;
+  tip.style.top = `${Math.min(y + 14, $('canvas').clientHeight - tip.offsetHeight - 8)}px`;
+}
+
+let pressed = null;
+$('canvas').addEventListener('pointerdown', (event) => {
+  pressed = pointer(event);
+});
+$('canvas').addEventListener('click', (event) => {
+  const [x, y] = pointer(event);
+  if (!scene.measured || !pressed || Math.hypot(x - pressed[0], y - pressed[1]) > 4) return;
+  scene.addMeasured(scene.pick(x, y));
+});
+addEventListener('keydown', (event) => {
+  if (event.target.closest('button, select') || event.ctrlKey || event.metaKey) return;
+  const action = {
+    ' ': () => timeline.togglePlay(),
+    t: () => viewAll(true),
+    f: () => viewAll(false),
+    Escape: () => scene.follow(null)
+  }[event.key];
+  if (!action) return;
+  event.preventDefault();
+  action();
+});
+
+// ---- for tests and for who asks in the console
+
+window.kimera = {
+  get ready() { return caughtUp && !changed && !scene.building && model.robots.size > 0; },
+  get live() { return live; },
+  get time() { return model.time; },
+  get end() { return model.end; },
+  get robots() {
+    return [...model.robots.values()]
+        .filter((r) => r.heard !== null)
+        .map((r) => ({
+               id: r.id,
+               name: model.name(r.id),
+               phase: r.state?.phase,
+               anchor: r.optimized.length ? r.anchor : r.id,
+               keyframes: Math.max(r.odometry.length, r.optimized.length),
+               links: r.state?.links ?? []
+             }));
+  },
+  get frames() { return model.frames().map((f) => f.robots.map((r) => r.id)); },
+  get closures() { return countClosures(); },
+  get faces() { return model.faces(); },
+  get drawnFaces() {
+    return [...scene.meshes.shown.keys()].reduce((sum, message) => sum + message.faces, 0);
+  },
+  get bytes() { return model.bytes; },
+  get delays() { return [...delays]; },
+  get frameTimes() {
+    return scene.frameTimes.map(([, ms]) => ms);
+  },
+  seek(time) { timeline.go(time); },
+  goLive() { timeline.goLive(); },
+  viewAll,
+  scene,
+  model,
+};

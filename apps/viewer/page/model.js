@@ -1,0 +1,182 @@
+// What robots told, and what was known at any time of it.
+
+/** What one robot told: everything in order, and what that comes to at the time last asked for. */
+export class Robot {
+  constructor(id) {
+    this.id = id;
+    this.log = [];     // {n, t, ...}, t [s] since the start, ascending
+    this.states = [];  // those in the log, for charts
+    this.forget();
+  }
+
+  forget() {
+    this.applied = 0;  // so many of the log are in what follows
+    this.renew(null);
+    this.statesShown = 0;
+  }
+
+  // A process begins: what another one of this robot told goes.
+  renew(boot) {
+    this.boot = boot;
+    this.state = null;
+    this.pose = null;
+    this.trail = [];        // poses in odom
+    this.odometry = [];     // T_odom_kf by keyframe
+    this.optimized = [];    // T_world_kf by keyframe
+    this.anchor = this.id;  // whose frame those are in
+    this.closures = new Map();
+    this.meshes = new Map();
+    this.image = null;
+    this.heard = null;  // when it last told something [s]
+  }
+
+  add(message) {
+    const last = this.log[this.log.length - 1];
+    if (last && message.t < last.t) message.t = last.t;  // a clock that was set back
+    this.log.push(message);
+    if (message.kind === 'state') this.states.push(message);
+  }
+
+  seek(time) {
+    if (this.applied > 0 && this.log[this.applied - 1].t > time) this.forget();
+    while (this.applied < this.log.length && this.log[this.applied].t <= time)
+      this.apply(this.log[this.applied++]);
+  }
+
+  apply(message) {
+    if (message.boot !== this.boot) this.renew(message.boot);
+    if (message.kind === 'state') ++this.statesShown;
+    if (message.gone) return;
+    this.heard = message.t;
+    this[`apply_${message.kind}`]?.(message);
+  }
+
+  apply_state(message) { this.state = message; }
+
+  apply_pose(message) {
+    this.pose = message.T_odom_body;
+    this.trail.push(this.pose);
+  }
+
+  apply_keyframes({optimized, anchor, first, T_world_kf}) {
+    if (optimized && anchor !== this.anchor) {
+      this.optimized = [];  // those of another frame
+      this.anchor = anchor;
+    }
+    const poses = optimized ? this.optimized : this.odometry;
+    T_world_kf.forEach((T, i) => {
+      poses[first + i] = T;
+    });
+  }
+
+  apply_closures(message) {
+    for (const [r0, k0, r1, k1, verdict, matches, inliers, reason] of message.closures)
+      this.closures.set(`${r0}:${k0} ${r1}:${k1}`, {
+        from: [r0, k0],
+        to: [r1, k1],
+        verdict,
+        matches,
+        inliers,
+        reason,
+        t: message.t,
+        told: message.told
+      });
+  }
+
+  apply_mesh(message) {
+    const key = `${message.of} ${message.cell} ${message.part}`;
+    if (message.faces)
+      this.meshes.set(key, message);
+    else
+      this.meshes.delete(key);
+  }
+
+  apply_image(message) { this.image = message; }
+}
+
+/** All robots, all of the time. */
+export class Model {
+  constructor() { this.clear(); }
+
+  clear() {
+    this.robots = new Map();  // by id, ascending
+    this.byNumber = new Map();
+    this.start_ms = null;
+    this.end = 0;  // [s] since the start
+    this.time = 0;
+    this.bytes = 0;
+  }
+
+  robot(id) {
+    if (!this.robots.has(id)) {
+      this.robots.set(id, new Robot(id));
+      this.robots = new Map([...this.robots].sort((a, b) => a[0] - b[0]));
+    }
+    return this.robots.get(id);
+  }
+
+  add(message) {
+    this.start_ms ??= message.t;
+    message.told = message.t;  // [ms since 1970]
+    message.t = (message.t - this.start_ms) / 1000;
+    this.robot(message.robot).add(message);
+    this.end = Math.max(this.end, message.t);
+    this.bytes += message.bytes ?? 0;
+    if (message.bytes || message.kind !== 'closures') this.byNumber.set(message.n, message);
+  }
+
+  /** Lets go of messages that the viewer has let go of. */
+  forgetNumbers(numbers) {
+    for (const n of numbers) {
+      const message = this.byNumber.get(n);
+      if (!message) continue;
+      this.byNumber.delete(n);
+      this.bytes -= message.bytes ?? 0;
+      for (const bulk
+               of ['positions', 'triangles', 'labels', 'jpeg', 'pixels', 'T_world_kf',
+                   'T_odom_body'])
+        delete message[bulk];
+      message.gone = true;
+    }
+  }
+
+  /** What was known at `time` [s since the start]. */
+  seek(time) {
+    this.time = time;
+    for (const robot of this.robots.values()) robot.seek(time);
+  }
+
+  /** Every pair of keyframes once, the newest word on it. */
+  closures() {
+    const all = new Map();
+    for (const robot of this.robots.values())
+      for (const [id, closure] of robot.closures) {
+        const known = all.get(id);
+        if (!known || known.t <= closure.t) all.set(id, closure);
+      }
+    return all;
+  }
+
+  /** The frames that there are: anchor and the robots in it, the largest first. */
+  frames() {
+    const frames = new Map();
+    for (const robot of this.robots.values()) {
+      if (robot.heard === null) continue;
+      const anchor = robot.optimized.length ? robot.anchor : robot.id;
+      if (!frames.has(anchor)) frames.set(anchor, []);
+      frames.get(anchor).push(robot);
+    }
+    return [...frames]
+        .map(([anchor, robots]) => ({anchor, robots}))
+        .sort((a, b) => b.robots.length - a.robots.length || a.anchor - b.anchor);
+  }
+
+  faces() {
+    let faces = 0;
+    for (const robot of this.robots.values())
+      for (const chunk of robot.meshes.values()) faces += chunk.faces;
+    return faces;
+  }
+
+  name(id) { return this.robots.get(id)?.state?.name ?? `robot${id}`; }
+}

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <span>
+#include <string_view>
+
+namespace km {
+
+/// A file of the page, as it is in the program.
+struct PageFile {
+  std::string_view path;  ///< Below the page's address: "main.js".
+  std::string_view bytes;
+};
+
+/// All of them: those in apps/viewer/page, and three.js where its modules look for each other.
+[[nodiscard]] std::span<const PageFile> page_files();
+
+}  // namespace km

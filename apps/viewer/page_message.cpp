@@ -1,0 +1,157 @@
+#include "apps/viewer/page_message.hpp"
+
+#include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "modules/core/json.hpp"
+
+namespace km {
+namespace {
+
+// To 1 / `scale`: JSON writes no more digits than it takes.
+double rounded_to(double value, double scale) {
+  return std::round(value * scale) / scale;
+}
+
+Json json_of(const SE3& T) {
+  const Eigen::Quaterniond q(T.linear());
+  Json json = Json::array();
+  for (const double x : {T.translation().x(), T.translation().y(), T.translation().z()})
+    json.push_back(rounded_to(x, 1e4));
+  for (const double x : {q.x(), q.y(), q.z(), q.w()}) json.push_back(rounded_to(x, 1e5));
+  return json;
+}
+
+Json json_of(const std::vector<ViewNumber>& numbers) {
+  Json json = Json::object();
+  for (const ViewNumber& number : numbers) json[number.name] = number.value;
+  return json;
+}
+
+const char* name_of(ViewVerdict verdict) {
+  switch (verdict) {
+    case ViewVerdict::kCandidate:
+      return "candidate";
+    case ViewVerdict::kVerified:
+      return "verified";
+    case ViewVerdict::kKept:
+      return "kept";
+    case ViewVerdict::kRejected:
+      return "rejected";
+  }
+  return "candidate";
+}
+
+// Adds the members of a content to the object, and of some the bytes that go behind it.
+struct Writer {
+  Json& json;
+  std::string& data;
+
+  void operator()(const ViewState& state) const {
+    json["kind"] = "state";
+    json["name"] = state.name;
+    json["phase"] = state.phase;
+    json["dataset_time_s"] = rounded_to(state.dataset_time_s, 1e3);
+    json["keyframes"] = state.keyframes;
+    json["skipped_frames"] = state.skipped_frames;
+    json["anchor"] = state.anchor;
+    json["round"] = state.round;
+    json["cost"] = state.cost;
+    json["gradient_norm"] = state.gradient_norm;
+    json["cpu_s"] = rounded_to(state.cpu_s, 1e3);
+    json["resident_MB"] = rounded_to(state.resident_MB, 10);
+    json["links"] = Json::array();
+    for (const ViewLink& link : state.links)
+      json["links"].push_back({link.robot, rounded_to(link.silent_s, 100)});
+    json["sent_bytes"] = json_of(state.sent_bytes);
+    json["loads"] = json_of(state.loads);
+  }
+
+  void operator()(const ViewPose& pose) const {
+    json["kind"] = "pose";
+    json["T_odom_body"] = json_of(pose.T_odom_body);
+  }
+
+  void operator()(const ViewKeyframes& keyframes) const {
+    json["kind"] = "keyframes";
+    json["optimized"] = keyframes.optimized;
+    json["anchor"] = keyframes.anchor;
+    json["first"] = keyframes.first;
+    json["T_world_kf"] = Json::array();
+    for (const SE3& T : keyframes.T_world_kf) json["T_world_kf"].push_back(json_of(T));
+  }
+
+  // Each [robot, keyframe, robot, keyframe, verdict, matches, inliers, reason].
+  void operator()(const ViewClosures& closures) const {
+    json["kind"] = "closures";
+    json["closures"] = Json::array();
+    for (const ViewClosure& one : closures.closures)
+      json["closures"].push_back({one.id.from.robot, one.id.from.index, one.id.to.robot,
+                                  one.id.to.index, name_of(one.verdict), one.matches, one.inliers,
+                                  one.reason});
+  }
+
+  void operator()(const MeshChunk& chunk) const {
+    json["kind"] = "mesh";
+    json["of"] = chunk.key.robot;
+    json["cell"] = chunk.key.cell;
+    json["part"] = chunk.key.part;
+    json["anchor"] = chunk.anchor;
+    json["step_m"] = chunk.step_m;
+    json["origin"] = chunk.origin;
+    json["vertices"] = chunk.offsets.size();
+    json["faces"] = chunk.faces.size();
+    json["labelled"] = !chunk.labels.empty();
+    append(chunk.offsets);
+    append(chunk.faces);
+    append(chunk.labels);
+  }
+
+  void operator()(const ViewImage& image) const {
+    json["kind"] = "image";
+    json["features"] = image.features.size();
+    append(image.features);
+    append(image.jpeg);
+  }
+
+  template <typename T>
+  void append(const std::vector<T>& values) const {
+    const std::size_t begin = data.size();
+    data.resize(begin + values.size() * sizeof(T));
+    if (!values.empty()) std::memcpy(data.data() + begin, values.data(), values.size() * sizeof(T));
+  }
+};
+
+}  // namespace
+
+PageMessage page_message(const ViewUpdate& update, std::uint64_t number) {
+  std::ostringstream boot;
+  boot << std::hex << update.boot;
+  Json json = {{"n", number},
+               {"t", static_cast<double>(update.told / 1000) * 1e-3},
+               {"robot", update.robot},
+               {"boot", boot.str()}};
+  std::string data;
+  std::visit(Writer{json, data}, update.content);
+  // What is not UTF-8 in a robot's name or reason must not end the viewer.
+  std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  const bool binary = std::holds_alternative<MeshChunk>(update.content) ||
+                      std::holds_alternative<ViewImage>(update.content);
+  if (!binary) return {false, std::move(text)};
+  while ((text.size() + sizeof(std::uint32_t)) % 4 != 0) text += ' ';
+  const auto length = static_cast<std::uint32_t>(text.size());
+  std::string bytes(sizeof(length), '\0');
+  std::memcpy(bytes.data(), &length, sizeof(length));
+  return {true, bytes + text + data};
+}
+
+std::string page_greeting(bool live, const std::string& title, const LabelPalette& palette) {
+  Json json = {{"kind", "hello"}, {"live", live}, {"title", title}, {"labels", Json::array()}};
+  for (const LabelClass& one : palette.classes())
+    json["labels"].push_back({{"id", one.id}, {"name", one.name}, {"color", one.color}});
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace km

@@ -1,0 +1,317 @@
+#include "apps/viewer/page_server.hpp"
+
+#include <civetweb.h>
+#include <sodium.h>
+
+#include <array>
+#include <atomic>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+#include <string_view>
+#include <thread>
+
+#include "apps/viewer/page_files.hpp"
+#include "modules/core/json.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kBatchBytes = 1 << 18;
+constexpr double kWait_s = 0.2;
+
+bool is_loopback(const std::string& address) {
+  return address.starts_with("127.") || address == "localhost" || address == "::1";
+}
+
+// 128 bits as letters and digits.
+std::string random_token() {
+  if (sodium_init() < 0) throw std::runtime_error("no random numbers for a token");
+  std::array<unsigned char, 16> bytes{};
+  randombytes_buf(bytes.data(), bytes.size());
+  std::array<char, 33> text{};
+  sodium_bin2hex(text.data(), text.size(), bytes.data(), bytes.size());
+  return text.data();
+}
+
+const char* type_of(std::string_view path) {
+  if (path.ends_with(".js")) return "text/javascript; charset=utf-8";
+  if (path.ends_with(".css")) return "text/css; charset=utf-8";
+  if (path.ends_with(".svg")) return "image/svg+xml";
+  return "text/html; charset=utf-8";
+}
+
+// "localhost" of "localhost:8777", "[::1]" of "[::1]:8777".
+std::string host_of(std::string_view authority) {
+  const std::size_t colon = authority.rfind(':');
+  const bool has_port =
+      colon != std::string_view::npos && authority.find(']', colon) == std::string_view::npos;
+  return std::string(authority.substr(0, has_port ? colon : authority.size()));
+}
+
+std::string_view header(const mg_connection* connection, const char* name) {
+  const char* const value = mg_get_header(connection, name);
+  return value != nullptr ? value : "";
+}
+
+bool send(mg_connection* connection, int kind, std::string_view bytes) {
+  return mg_websocket_write(connection, kind, bytes.data(), bytes.size()) > 0;
+}
+
+// What a page wants: {"images": robot, "on": true}; anything else is none.
+struct Wish {
+  RobotId robot = 0;
+  bool on = false;
+};
+std::optional<Wish> parse_wish(std::string_view text) {
+  const Json json = Json::parse(text, nullptr, false);
+  if (!json.is_object() || !json.contains("images") || !json.contains("on")) return std::nullopt;
+  if (!json["images"].is_number_unsigned() || !json["on"].is_boolean()) return std::nullopt;
+  const auto robot = json["images"].get<std::uint64_t>();
+  if (robot > std::numeric_limits<RobotId>::max()) return std::nullopt;
+  return Wish{static_cast<RobotId>(robot), json["on"].get<bool>()};
+}
+
+}  // namespace
+
+class PageServer::Impl {
+ public:
+  Impl(ViewStore& store, PageServerOptions options)
+      : store_(store),
+        options_(std::move(options)),
+        token_(is_loopback(options_.address) ? "" : random_token()) {
+    start();
+  }
+
+  ~Impl() {
+    stopping_ = true;
+    mg_stop(context_);  // closes all connections, whose pages end
+    mg_exit_library();
+  }
+
+  std::string url() const {
+    std::array<mg_server_port, 4> ports{};
+    const int count = mg_get_server_ports(context_, static_cast<int>(ports.size()), ports.data());
+    const int port = count > 0 ? ports[0].port : options_.port;
+    const bool any = options_.address == "0.0.0.0" || options_.address == "::";
+    const std::string host = any ? "HOST" : options_.address;
+    return "http://" + (host.find(':') != std::string::npos ? '[' + host + ']' : host) + ':' +
+           std::to_string(port) + prefix();
+  }
+
+ private:
+  // A page that is open: its thread sends what it does not have yet.
+  struct Page {
+    std::atomic<bool> closed = false;
+    std::set<RobotId> images;  // of whom it wants some
+    std::thread sender;
+  };
+
+  std::string prefix() const { return token_.empty() ? "/" : '/' + token_ + '/'; }
+
+  void start() {
+    mg_init_library(0);
+    const std::string host = options_.address.find(':') != std::string::npos
+                                 ? '[' + options_.address + ']'
+                                 : options_.address;
+    const std::string port = host + ':' + std::to_string(options_.port);
+    const std::array<const char*, 13> settings = {"listening_ports",
+                                                  port.c_str(),
+                                                  "num_threads",
+                                                  "24",
+                                                  "websocket_timeout_ms",
+                                                  "10000",
+                                                  "enable_websocket_ping_pong",
+                                                  "yes",
+                                                  "tcp_nodelay",
+                                                  "1",
+                                                  "enable_directory_listing",
+                                                  "no",
+                                                  nullptr};
+    mg_init_data init{};
+    mg_callbacks callbacks{};
+    callbacks.log_message = [](const mg_connection*, const char*) { return 1; };
+    init.callbacks = &callbacks;
+    init.user_data = this;
+    init.configuration_options = const_cast<const char**>(settings.data());
+    std::array<char, 256> text{};
+    mg_error_data error{};
+    error.text = text.data();
+    error.text_buffer_size = text.size();
+    context_ = mg_start2(&init, &error);
+    if (context_ == nullptr) {
+      mg_exit_library();
+      throw std::runtime_error("cannot listen on " + port +
+                               ": is the address one of this host, the port free? (--port)");
+    }
+    mg_set_request_handler(
+        context_, "/",
+        [](mg_connection* connection, void* self) {
+          return static_cast<Impl*>(self)->serve(connection);
+        },
+        this);
+    mg_set_websocket_handler(
+        context_, (prefix() + "updates").c_str(),
+        [](const mg_connection* connection, void* self) {
+          return static_cast<Impl*>(self)->is_welcome(connection) ? 0 : 1;
+        },
+        [](mg_connection* connection, void* self) { static_cast<Impl*>(self)->open(connection); },
+        [](mg_connection* connection, int bits, char* data, size_t size, void* self) {
+          static_cast<Impl*>(self)->hear(connection, bits, {data, size});
+          return (bits & 0xf) == MG_WEBSOCKET_OPCODE_CONNECTION_CLOSE ? 0 : 1;
+        },
+        [](const mg_connection* connection, void* self) {
+          static_cast<Impl*>(self)->close(connection);
+        },
+        this);
+  }
+
+  // Neither a page of another site, nor one that reached this by a name of its own.
+  bool is_welcome(const mg_connection* connection) const {
+    const std::string_view host = header(connection, "Host"), origin = header(connection, "Origin");
+    if (!origin.empty() && origin != "http://" + std::string(host)) return false;
+    const std::string name = host_of(host);
+    return !token_.empty() || name == "[::1]" || is_loopback(name);
+  }
+
+  int serve(mg_connection* connection) const {
+    const std::string uri = mg_get_request_info(connection)->local_uri;
+    if (!is_welcome(connection) || !uri.starts_with(prefix())) return refuse(connection);
+    std::string path = uri.substr(prefix().size());
+    if (path.empty()) path = "index.html";
+    for (const PageFile& file : page_files()) {
+      if (file.path != path) continue;
+      if (options_.page_folder.empty() || path.starts_with("three/"))
+        return answer(connection, type_of(path), file.bytes);
+      std::ifstream stream(options_.page_folder + '/' + path, std::ios::binary);
+      const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+      return answer(connection, type_of(path), bytes);
+    }
+    return refuse(connection);
+  }
+
+  static int refuse(mg_connection* connection) {
+    mg_send_http_error(connection, 404, "%s", "Nothing is here. The viewer prints its address.");
+    return 404;
+  }
+
+  static int answer(mg_connection* connection, const char* type, std::string_view bytes) {
+    mg_printf(connection,
+              "HTTP/1.1 200 OK\r\nContent-Type: %s\r\nContent-Length: %zu\r\n"
+              "Cache-Control: no-cache\r\nX-Content-Type-Options: nosniff\r\n"
+              "Content-Security-Policy: default-src 'self'; style-src 'self' 'unsafe-inline'; "
+              "img-src 'self' blob: data:\r\nReferrer-Policy: no-referrer\r\n"
+              "Connection: close\r\n\r\n",
+              type, bytes.size());
+    mg_write(connection, bytes.data(), bytes.size());
+    return 200;
+  }
+
+  void open(mg_connection* connection) {
+    const std::lock_guard lock(mutex_);
+    const auto page = std::make_shared<Page>();
+    pages_[connection] = page;
+    page->sender = std::thread([this, connection, page] { tell(connection, *page); });
+  }
+
+  // Frames of text hold an array of messages, or the greeting.
+  void tell(mg_connection* connection, const Page& page) {
+    if (!send(connection, MG_WEBSOCKET_OPCODE_TEXT, '[' + options_.greeting + ']')) return;
+    ViewStore::Cursor cursor;
+    bool caught_up = false;
+    while (!page.closed && !stopping_) {
+      const ViewStore::Batch batch = store_.take(cursor, kBatchBytes, kWait_s);
+      if (!tell(connection, batch)) return;
+      if (batch.caught_up && !caught_up)
+        send(connection, MG_WEBSOCKET_OPCODE_TEXT, R"([{"kind":"caught_up"}])");
+      caught_up = caught_up || batch.caught_up;
+    }
+  }
+
+  static bool tell(mg_connection* connection, const ViewStore::Batch& batch) {
+    std::string text;
+    const auto flush = [&] {
+      const bool ok = text.empty() || send(connection, MG_WEBSOCKET_OPCODE_TEXT, text + ']');
+      text.clear();
+      return ok;
+    };
+    const auto add = [&](const std::string& one) { (text += text.empty() ? '[' : ',') += one; };
+    for (const auto& message : batch.messages) {
+      if (!message->binary) {
+        add(message->bytes);
+      } else if (!flush() || !send(connection, MG_WEBSOCKET_OPCODE_BINARY, message->bytes)) {
+        return false;
+      }
+    }
+    if (!batch.forgotten.empty())
+      add(Json{{"kind", "forgotten"}, {"numbers", batch.forgotten}}.dump());
+    return flush();
+  }
+
+  void hear(mg_connection* connection, int bits, std::string_view text) {
+    if ((bits & 0xf) != MG_WEBSOCKET_OPCODE_TEXT) return;
+    const auto wish = parse_wish(text);
+    if (!wish) return;
+    const std::lock_guard lock(mutex_);
+    const auto page = pages_.find(connection);
+    if (page == pages_.end()) return;
+    std::set<RobotId>& images = page->second->images;
+    ask([&] {
+      if (wish->on)
+        images.insert(wish->robot);
+      else
+        images.erase(wish->robot);
+    });
+  }
+
+  // Tells of whom images are wanted, if that is another set of robots now. Under the lock: the last
+  // word must be that of the last change.
+  void ask(const std::function<void()>& change) {
+    const std::set<RobotId> before = wanted();
+    change();
+    if (const std::set<RobotId> now = wanted(); options_.on_images && now != before)
+      options_.on_images(now);
+  }
+
+  std::set<RobotId> wanted() const {
+    std::set<RobotId> robots;
+    for (const auto& [connection, page] : pages_)
+      robots.insert(page->images.begin(), page->images.end());
+    return robots;
+  }
+
+  void close(const mg_connection* connection) {
+    std::shared_ptr<Page> page;
+    {
+      const std::lock_guard lock(mutex_);
+      const auto known = pages_.find(connection);
+      if (known == pages_.end()) return;
+      page = known->second;
+      ask([&] { pages_.erase(known); });
+    }
+    page->closed = true;
+    page->sender.join();
+  }
+
+  ViewStore& store_;
+  const PageServerOptions options_;
+  const std::string token_;
+  std::atomic<bool> stopping_ = false;
+  mg_context* context_ = nullptr;
+  std::mutex mutex_;  // guards what follows
+  std::map<const mg_connection*, std::shared_ptr<Page>> pages_;
+};
+
+PageServer::PageServer(ViewStore& store, PageServerOptions options)
+    : impl_(std::make_unique<Impl>(store, std::move(options))), url_(impl_->url()) {}
+
+PageServer::~PageServer() = default;
+
+}  // namespace km

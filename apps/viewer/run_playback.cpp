@@ -1,0 +1,494 @@
+#include "apps/viewer/run_playback.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <functional>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <optional>
+#include <stdexcept>
+#include <tuple>
+
+#include "apps/result_files.hpp"
+#include "apps/robot/run_summary.hpp"
+#include "modules/core/input_file.hpp"
+#include "modules/core/text_rows.hpp"
+#include "modules/evaluation/association.hpp"
+#include "modules/evaluation/closure_truth.hpp"
+#include "modules/evaluation/trajectory_file.hpp"
+#include "modules/mesh/ply_file.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kPoseInterval_s = 0.2;
+constexpr double kMaxPoseGap_s = 0.5;                             // of the estimate, at a keyframe
+constexpr std::size_t kMostClosures = 200, kMostKeyframes = 500;  // of one update
+
+// A row of process.csv or optimizer.csv as numbers.
+using Row = std::vector<double>;
+
+// Bytes sent and messages heard until a time of the run.
+struct TrafficRow {
+  double time_s = 0.0;
+  bool out = false;
+  std::string topic, category, peer;
+  double messages = 0.0, bytes = 0.0;
+};
+
+// What a robot left; times are since its start [s].
+struct RobotFiles {
+  RobotId id = 0;
+  RunSummary summary;
+  std::vector<StampedPose> odometry, optimized;
+  std::vector<KeyframeRecord> keyframes;
+  std::vector<ClosureRecord> closures;
+  std::vector<Row> process, rounds;
+  std::vector<TrafficRow> traffic;
+  std::vector<ViewNumber> loads;
+  LabelledMesh mesh, optimized_mesh;
+};
+
+std::vector<TextRow> rows_below_header(std::string_view text) {
+  std::vector<TextRow> rows = split_rows(text);
+  if (!rows.empty()) rows.erase(rows.begin());
+  return rows;
+}
+
+double number(const TextRow& row, std::size_t i, const fs::path& file) {
+  const auto value = number_in(row, i);
+  if (!value || !std::isfinite(*value))
+    throw std::runtime_error(file.string() + " line " + std::to_string(row.line) + ": field " +
+                             std::to_string(i + 1) + " is not a number");
+  return *value;
+}
+
+std::vector<Row> read_numbers(const fs::path& file, std::size_t columns) {
+  const std::string text = read_input_file(file);
+  std::vector<Row> rows;
+  for (const TextRow& row : rows_below_header(text)) {
+    Row& values = rows.emplace_back();
+    for (std::size_t i = 0; i < columns; ++i) values.push_back(number(row, i, file));
+  }
+  return rows;
+}
+
+std::vector<TrafficRow> read_traffic(const fs::path& file) {
+  const std::string text = read_input_file(file);
+  std::vector<TrafficRow> rows;
+  for (const TextRow& row : rows_below_header(text)) {
+    if (row.fields.size() < 7)
+      throw std::runtime_error(file.string() + " line " + std::to_string(row.line) +
+                               ": fewer than 7 fields");
+    rows.push_back({number(row, 0, file), row.fields[1] == "out", std::string(row.fields[2]),
+                    std::string(row.fields[3]), std::string(row.fields[4]), number(row, 5, file),
+                    number(row, 6, file)});
+  }
+  return rows;
+}
+
+std::vector<ViewNumber> read_loads(const fs::path& file, double seconds) {
+  const std::string text = read_input_file(file);
+  std::vector<ViewNumber> loads;
+  for (const TextRow& row : rows_below_header(text))
+    loads.push_back({std::string(row.fields[0]), number(row, 5, file) / std::max(seconds, 1e-3)});
+  return loads;
+}
+
+// Reads what there is; what cannot be read is noted.
+RobotFiles read_robot(const fs::path& folder, std::vector<std::string>& notes) {
+  RobotFiles robot;
+  robot.summary = read_summary(folder / "summary.json");
+  robot.id = robot.summary.robot;
+  const auto attempt = [&](auto& value, const char* name, const auto& read) {
+    try {
+      value = read(folder / name);
+    } catch (const std::exception& error) {
+      notes.emplace_back(error.what());
+    }
+  };
+  attempt(robot.odometry, "odometry.tum", [](const fs::path& f) { return read_trajectory(f); });
+  attempt(robot.optimized, "optimized.tum", [](const fs::path& f) { return read_trajectory(f); });
+  attempt(robot.keyframes, "keyframes.csv", read_keyframes);
+  attempt(robot.closures, "loop_closures.csv", read_closures);
+  attempt(robot.process, "process.csv", [](const fs::path& f) { return read_numbers(f, 3); });
+  attempt(robot.rounds, "optimizer.csv", [](const fs::path& f) { return read_numbers(f, 5); });
+  attempt(robot.traffic, "traffic.csv", read_traffic);
+  attempt(robot.loads, "timing.csv",
+          [&](const fs::path& f) { return read_loads(f, robot.summary.seconds); });
+  for (const auto& [mesh, name] :
+       {std::pair{&robot.mesh, "mesh.ply"}, std::pair{&robot.optimized_mesh, "mesh_optimized.ply"}})
+    if (is_there(folder / name)) attempt(*mesh, name, read_ply);
+  return robot;
+}
+
+// One robot's time: that of its images runs as that of its process does, unless the recording was
+// played faster.
+class RobotTimes {
+ public:
+  RobotTimes(const RobotFiles& robot, Stamp begin) : begin_(begin) {
+    if (robot.odometry.empty()) return;
+    first_ = robot.odometry.front().stamp;
+    const double recorded_s = seconds_between(first_, robot.odometry.back().stamp);
+    const double run_s = robot.process.empty() ? robot.summary.seconds : robot.process.back()[0];
+    if (run_s > 0.0 && recorded_s > run_s) pace_ = run_s / recorded_s;
+    end_of_data_s_ = recorded_s * pace_;
+  }
+
+  [[nodiscard]] double run_s(Stamp image) const { return pace_ * seconds_between(first_, image); }
+  [[nodiscard]] Stamp told(double run_s) const { return begin_ + nanoseconds(run_s); }
+  [[nodiscard]] double dataset_s(double run_s) const {
+    return std::min(run_s, end_of_data_s_) / pace_;
+  }
+  [[nodiscard]] double end_of_data_s() const { return end_of_data_s_; }
+
+ private:
+  Stamp begin_;
+  Stamp first_ = 0;
+  double pace_ = 1.0;
+  double end_of_data_s_ = 0.0;
+};
+
+// A robot's traffic, gone through in time.
+class TrafficUntil {
+ public:
+  explicit TrafficUntil(const std::vector<TrafficRow>& rows) : rows_(rows) {}
+
+  void advance(double time_s) {
+    for (; next_ < rows_.size() && rows_[next_].time_s <= time_s; ++next_) {
+      const TrafficRow& row = rows_[next_];
+      if (row.peer == "*") continue;  // what DDS sent again, to all
+      auto& known = sums_[{row.out, row.topic, row.peer}];
+      if (row.out) sent_[row.category] += row.bytes - known.bytes;
+      if (const auto peer = parse_int64(row.peer);
+          !row.out && peer && row.messages > known.messages)
+        heard_[static_cast<RobotId>(*peer)] = row.time_s;
+      known = row;
+    }
+    time_s_ = time_s;
+  }
+
+  [[nodiscard]] std::vector<ViewNumber> sent() const {
+    std::vector<ViewNumber> numbers;
+    for (const auto& [category, bytes] : sent_) numbers.push_back({category, bytes});
+    return numbers;
+  }
+  [[nodiscard]] double sent(const std::string& category) const {
+    const auto known = sent_.find(category);
+    return known != sent_.end() ? known->second : 0.0;
+  }
+  [[nodiscard]] std::vector<ViewLink> links() const {
+    std::vector<ViewLink> links;
+    for (const auto& [robot, time_s] : heard_)
+      links.push_back({robot, static_cast<float>(time_s_ - time_s)});
+    return links;
+  }
+
+ private:
+  const std::vector<TrafficRow>& rows_;
+  std::size_t next_ = 0;
+  double time_s_ = 0.0;
+  std::map<std::tuple<bool, std::string, std::string>, TrafficRow> sums_;
+  std::map<std::string, double> sent_;
+  std::map<RobotId, double> heard_;
+};
+
+constexpr double kNever_s = std::numeric_limits<double>::infinity();
+constexpr double kAnswer_s = 0.5;  // from a candidate to what becomes of it
+
+// When each row of optimizer.csv was: those of the robot alone evenly until it joined, those with
+// others by the share of the bytes that were sent for them from then on.
+std::vector<double> times_of_rounds(const RobotFiles& robot, double joined_s, double end_s) {
+  const auto alone = static_cast<std::size_t>(std::count_if(
+      robot.rounds.begin(), robot.rounds.end(), [](const Row& r) { return r[2] < 2.0; }));
+  std::vector<double> times_s;
+  for (std::size_t i = 0; i < alone; ++i)
+    times_s.push_back(std::min(joined_s, end_s) * static_cast<double>(i + 1) /
+                      static_cast<double>(alone + 1));
+  TrafficUntil until(robot.traffic);
+  until.advance(joined_s);
+  const double before = until.sent("pgo");
+  TrafficUntil all(robot.traffic);
+  all.advance(kNever_s);
+  const double total = std::max(1.0, all.sent("pgo") - before);
+  const auto rows = static_cast<double>(robot.rounds.size() - alone);
+  for (const Row& process : robot.process) {
+    until.advance(process[0]);
+    const double due = 1.0 + (until.sent("pgo") - before) / total * (rows - 1.0);
+    while (process[0] >= joined_s && times_s.size() < robot.rounds.size() &&
+           static_cast<double>(times_s.size() - alone + 1) <= due)
+      times_s.push_back(process[0]);
+  }
+  times_s.resize(robot.rounds.size(), end_s);
+  return times_s;
+}
+
+// Tells what one robot told.
+class RobotPlayback {
+ public:
+  RobotPlayback(const RobotFiles& robot, Stamp begin, std::vector<ViewUpdate>& updates)
+      : robot_(robot), times_(robot, begin), updates_(updates) {
+    end_s_ = robot.process.empty() ? std::max(robot.summary.seconds, times_.end_of_data_s())
+                                   : robot.process.back()[0];
+  }
+
+  // `kept_s`: when the first closure with another robot that was kept was found; in the end, if no
+  // robot tells of one.
+  void join(double kept_s) {
+    const bool joined = std::any_of(robot_.rounds.begin(), robot_.rounds.end(),
+                                    [](const Row& round) { return round[2] > 1.0; });
+    if (joined) joined_s_ = std::min(kept_s, end_s_);
+    round_times_s_ = times_of_rounds(robot_, joined_s_, end_s_);
+  }
+
+  [[nodiscard]] std::optional<double> seen_s(KeyframeIndex keyframe) const {
+    if (keyframe >= robot_.keyframes.size()) return std::nullopt;
+    return times_.run_s(robot_.keyframes[keyframe].stamp);
+  }
+
+  void tell_states() {
+    TrafficUntil traffic(robot_.traffic);
+    std::size_t round = 0;
+    for (const Row& process : robot_.process) {
+      const double time_s = process[0];
+      traffic.advance(time_s);
+      while (round < round_times_s_.size() && round_times_s_[round] <= time_s) ++round;
+      ViewState state = {.name = robot_.summary.name,
+                         .phase = phase_at(time_s),
+                         .dataset_time_s = times_.dataset_s(time_s),
+                         .keyframes = keyframes_until(time_s),
+                         .anchor = anchor_at(time_s),
+                         .cpu_s = process[1],
+                         .resident_MB = process[2] * 1e-6,
+                         .links = traffic.links(),
+                         .sent_bytes = traffic.sent(),
+                         .loads = robot_.loads};
+      if (time_s >= times_.end_of_data_s())
+        state.skipped_frames = static_cast<std::uint32_t>(robot_.summary.frames_skipped);
+      if (round > 0) {
+        state.round = static_cast<std::uint32_t>(robot_.rounds[round - 1][1]);
+        state.cost = robot_.rounds[round - 1][3];
+        state.gradient_norm = robot_.rounds[round - 1][4];
+      }
+      tell(time_s, std::move(state));
+    }
+  }
+
+  void tell_poses() {
+    double next_s = 0.0;
+    for (const StampedPose& pose : robot_.odometry) {
+      const double time_s = times_.run_s(pose.stamp);
+      if (time_s < next_s) continue;
+      next_s = time_s + kPoseInterval_s;
+      tell(time_s, ViewPose{pose.stamp, pose.T});
+    }
+  }
+
+  void tell_keyframes() {
+    for (std::size_t i = 0; i < robot_.keyframes.size(); ++i) {
+      const auto pose = pose_at_keyframe(robot_.odometry, i);
+      if (!pose) break;  // an index stands for those before it
+      tell(*seen_s(static_cast<KeyframeIndex>(i)),
+           ViewKeyframes{false, robot_.id, static_cast<std::uint32_t>(i), {*pose}});
+    }
+    if (joined_s_ == kNever_s) return;
+    ViewKeyframes before{true, anchor_at(joined_s_), 0, {}};
+    for (std::size_t i = 0; i < robot_.keyframes.size(); ++i) {
+      const auto pose = pose_at_keyframe(robot_.optimized, i);
+      if (!pose) break;
+      const double time_s = *seen_s(static_cast<KeyframeIndex>(i));
+      before.T_world_kf.push_back(*pose);
+      const bool next_is_later = i + 1 == robot_.keyframes.size() ||
+                                 *seen_s(static_cast<KeyframeIndex>(i + 1)) > joined_s_;
+      const bool flush = next_is_later || before.T_world_kf.size() == kMostKeyframes;
+      if (!flush) continue;
+      tell(std::max(time_s, joined_s_), before);
+      before.first = static_cast<std::uint32_t>(i + 1);
+      before.T_world_kf.clear();
+    }
+  }
+
+  // `seen_s`: when a robot made a keyframe, of all.
+  void tell_closures(const std::function<std::optional<double>(const KeyframeId&)>& seen_s) {
+    std::map<double, ViewClosures> at;
+    for (const ClosureRecord& record : robot_.closures) {
+      const auto from_s = seen_s(record.id.from), to_s = seen_s(record.id.to);
+      ViewClosure closure{record.id, ViewVerdict::kCandidate,
+                          static_cast<std::uint16_t>(std::clamp(record.matches, 0, 65535)),
+                          static_cast<std::uint16_t>(std::clamp(record.inliers, 0, 65535)),
+                          record.reason};
+      const double time_s = std::max(from_s.value_or(0.0), to_s.value_or(0.0));
+      at[time_s].closures.push_back(closure);
+      if (record.stage == ClosureStage::kCandidate) continue;
+      at[time_s].closures.back().reason.clear();
+      closure.verdict = verdict_of(record);
+      at[time_s + kAnswer_s].closures.push_back(std::move(closure));
+    }
+    for (auto& [time_s, closures] : at) tell_in_parts(std::min(time_s, end_s_), closures);
+  }
+
+  void tell_meshes() {
+    const std::size_t before = updates_.size();
+    if (joined_s_ == kNever_s) {
+      tell_mesh(robot_.optimized_mesh.empty() ? robot_.mesh : robot_.optimized_mesh, robot_.id,
+                robot_.odometry, 0.0);
+      return;
+    }
+    tell_mesh(robot_.mesh, robot_.id, robot_.odometry, 0.0);
+    // From its joining on nothing is in the robot's own frame.
+    std::vector<MeshChunk> ended;
+    for (std::size_t i = before; i < updates_.size(); ++i)
+      if (updates_[i].told <= times_.told(joined_s_))
+        ended.push_back({.key = std::get<MeshChunk>(updates_[i].content).key});
+    updates_.erase(
+        std::remove_if(
+            updates_.begin() + static_cast<std::ptrdiff_t>(before), updates_.end(),
+            [&](const ViewUpdate& update) { return update.told > times_.told(joined_s_); }),
+        updates_.end());
+    for (MeshChunk& chunk : ended) tell(joined_s_, std::move(chunk));
+    tell_mesh(robot_.optimized_mesh, anchor_at(joined_s_), robot_.optimized, joined_s_);
+  }
+
+ private:
+  void tell(double time_s, ViewContent content) {
+    updates_.push_back({robot_.id, 1, times_.told(time_s), std::move(content)});
+  }
+
+  void tell_in_parts(double time_s, const ViewClosures& all) {
+    for (std::size_t i = 0; i < all.closures.size(); i += kMostClosures) {
+      const auto begin = all.closures.begin() + static_cast<std::ptrdiff_t>(i);
+      const auto count = std::min(kMostClosures, all.closures.size() - i);
+      tell(time_s, ViewClosures{{begin, begin + static_cast<std::ptrdiff_t>(count)}});
+    }
+  }
+
+  // Each piece when the robot was nearest to it, not before `from_s`.
+  void tell_mesh(const LabelledMesh& mesh, RobotId anchor, const std::vector<StampedPose>& way,
+                 double from_s) {
+    constexpr std::size_t kMostPlaces = 500;
+    const std::size_t stride = way.size() / kMostPlaces + 1;
+    for (MeshChunk& chunk : split_mesh(mesh, robot_.id, anchor, ChunkGrid{}).chunks) {
+      Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+      for (const MeshChunk::Triple& offset : chunk.offsets)
+        centre += Eigen::Vector3d(offset[0], offset[1], offset[2]);
+      centre /= static_cast<double>(std::max<std::size_t>(chunk.offsets.size(), 1));
+      centre += Eigen::Vector3d(chunk.origin[0], chunk.origin[1], chunk.origin[2]);
+      centre *= static_cast<double>(chunk.step_m);
+      double nearest_m = kNever_s, time_s = end_s_;
+      for (std::size_t i = 0; i < way.size(); i += stride) {
+        const double distance_m = (way[i].T.translation() - centre).norm();
+        if (distance_m >= nearest_m) continue;
+        nearest_m = distance_m;
+        time_s = times_.run_s(way[i].stamp);
+      }
+      tell(std::max(time_s, from_s), std::move(chunk));
+    }
+  }
+
+  static ViewVerdict verdict_of(const ClosureRecord& record) {
+    if (record.stage == ClosureStage::kInlier) return ViewVerdict::kKept;
+    if (record.stage == ClosureStage::kRequested) return ViewVerdict::kCandidate;
+    if (!record.reason.empty()) return ViewVerdict::kRejected;
+    return record.stage == ClosureStage::kVerified ? ViewVerdict::kVerified
+                                                   : ViewVerdict::kCandidate;
+  }
+
+  std::optional<SE3> pose_at_keyframe(const std::vector<StampedPose>& poses, std::size_t i) const {
+    return pose_at(poses, robot_.keyframes[i].stamp, kMaxPoseGap_s, kMaxPoseGap_s);
+  }
+
+  RobotId anchor_at(double time_s) const {
+    return time_s < joined_s_ ? robot_.id : robot_.summary.pgo.anchor.value_or(robot_.id);
+  }
+
+  std::string phase_at(double time_s) const {
+    if (time_s < times_.end_of_data_s()) return "running";
+    return time_s >= end_s_ && robot_.summary.pgo.settled ? "settled" : "finished";
+  }
+
+  std::uint32_t keyframes_until(double time_s) const {
+    std::uint32_t count = 0;
+    while (count < robot_.keyframes.size() && *seen_s(count) <= time_s) ++count;
+    return count;
+  }
+
+  const RobotFiles& robot_;
+  RobotTimes times_;
+  std::vector<ViewUpdate>& updates_;
+  double end_s_ = 0.0;
+  double joined_s_ = kNever_s;  // its first round with others
+  std::vector<double> round_times_s_;
+};
+
+// The folders below `folder`, or itself, that robots wrote to.
+std::vector<fs::path> robot_folders(const fs::path& folder) {
+  std::vector<fs::path> folders;
+  if (!is_folder(folder)) throw std::runtime_error(folder.string() + ": no such folder");
+  if (is_there(folder / "summary.json")) return {folder};
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (is_there(entry.path() / "summary.json")) folders.push_back(entry.path());
+  if (folders.empty())
+    throw std::runtime_error(folder.string() +
+                             ": no results in it: no summary.json, nor folders that have one; "
+                             "give the --output of kimera_multi_team or of a robot");
+  std::sort(folders.begin(), folders.end());
+  return folders;
+}
+
+LabelPalette palette_in(const fs::path& folder, std::vector<std::string>& notes) try {
+  const fs::path file = folder / kLabelPalette;
+  return is_there(file) ? parse_label_palette(read_input_file(file), file.string())
+                        : LabelPalette{};
+} catch (const std::exception& error) {
+  notes.emplace_back(error.what());
+  return {};
+}
+
+}  // namespace
+
+RunPlayback read_run(const fs::path& folder, Stamp begin) {
+  RunPlayback run;
+  std::vector<RobotFiles> robots;
+  for (const fs::path& one : robot_folders(folder)) {
+    robots.push_back(read_robot(one, run.notes));
+    if (run.palette.classes().empty()) run.palette = palette_in(one, run.notes);
+  }
+  std::map<RobotId, RobotPlayback> playbacks;
+  for (const RobotFiles& robot : robots)
+    if (!playbacks.try_emplace(robot.id, robot, begin, run.updates).second)
+      throw std::runtime_error(folder.string() + ": two folders are of robot " +
+                               std::to_string(robot.id) + ": give one run");
+  const auto seen_s = [&](const KeyframeId& id) -> std::optional<double> {
+    const auto robot = playbacks.find(id.robot);
+    return robot != playbacks.end() ? robot->second.seen_s(id.index) : std::nullopt;
+  };
+  std::map<RobotId, double> kept_s;
+  for (const RobotFiles& robot : robots)
+    for (const ClosureRecord& record : robot.closures) {
+      if (record.stage != ClosureStage::kInlier || record.id.from.robot == record.id.to.robot)
+        continue;
+      const double time_s = kAnswer_s + std::max(seen_s(record.id.from).value_or(0.0),
+                                                 seen_s(record.id.to).value_or(0.0));
+      for (const RobotId id : {record.id.from.robot, record.id.to.robot}) {
+        const auto known = kept_s.try_emplace(id, time_s).first;
+        known->second = std::min(known->second, time_s);
+      }
+    }
+  for (auto& [id, robot] : playbacks) {
+    robot.join(kept_s.contains(id) ? kept_s.at(id) : kNever_s);
+    robot.tell_states();
+    robot.tell_poses();
+    robot.tell_keyframes();
+    robot.tell_closures(seen_s);
+    robot.tell_meshes();
+  }
+  std::stable_sort(run.updates.begin(), run.updates.end(),
+                   [](const ViewUpdate& a, const ViewUpdate& b) { return a.told < b.told; });
+  return run;
+}
+
+}  // namespace km

@@ -1,0 +1,149 @@
+#include "apps/viewer/view_store.hpp"
+
+#include <chrono>
+#include <functional>
+#include <string>
+#include <utility>
+
+namespace km {
+namespace {
+
+// Ranks of what may go, the first first; the second number of a key.
+constexpr std::int64_t kImage = 0, kMesh = 1, kKeyframes = 2, kPose = 3, kState = 4;
+
+// Whether what has a key is told again as it was: poses, states and images never are.
+bool is_state_of_things(const auto& key) {
+  return key && ((*key)[1] == kMesh || (*key)[1] == kKeyframes);
+}
+
+// Of what it says, whenever it is told.
+std::size_t hash_of(ViewUpdate update) {
+  update.told = 0;
+  return std::hash<std::string>{}(page_message(update, 0).bytes);
+}
+
+bool same(const ViewClosure& a, const ViewClosure& b) {
+  return a.verdict == b.verdict && a.matches == b.matches && a.inliers == b.inliers &&
+         a.reason == b.reason;
+}
+
+}  // namespace
+
+std::optional<ViewStore::Key> ViewStore::key_of(const ViewUpdate& update) {
+  const std::int64_t robot = update.robot;
+  if (std::holds_alternative<ViewImage>(update.content)) return Key{robot, kImage};
+  if (std::holds_alternative<ViewPose>(update.content)) return Key{robot, kPose};
+  if (std::holds_alternative<ViewState>(update.content)) return Key{robot, kState};
+  if (const auto* const chunk = std::get_if<MeshChunk>(&update.content))
+    return Key{robot,
+               kMesh,
+               chunk->key.robot,
+               chunk->key.cell[0],
+               chunk->key.cell[1],
+               chunk->key.cell[2],
+               chunk->key.part};
+  if (const auto* const keyframes = std::get_if<ViewKeyframes>(&update.content))
+    return Key{robot, kKeyframes, keyframes->optimized ? 1 : 0, keyframes->first,
+               static_cast<std::int64_t>(keyframes->T_world_kf.size())};
+  return std::nullopt;
+}
+
+void ViewStore::add(ViewUpdate update) {
+  const auto key = key_of(update);
+  const std::size_t hash = is_state_of_things(key) ? hash_of(update) : 0;
+  const std::lock_guard lock(mutex_);
+  note_boot(update);
+  if (is_known(key, hash)) return;
+  if (auto* const closures = std::get_if<ViewClosures>(&update.content))
+    if (!leave_new_closures(update.robot, *closures)) return;
+  const std::uint64_t number = messages_.size();
+  messages_.push_back(std::make_shared<const PageMessage>(page_message(update, number)));
+  bytes_ += messages_.back()->bytes.size();
+  if (key) supersede(*key, {number, hash});
+  forget_until_it_fits();
+  added_.notify_all();
+}
+
+// Nothing that an ended process of the robot told counts any more.
+void ViewStore::note_boot(const ViewUpdate& update) {
+  const auto [known, is_new] = boots_.emplace(update.robot, update.boot);
+  if (is_new || known->second == update.boot) return;
+  known->second = update.boot;
+  closures_.erase(update.robot);
+  const Key first{update.robot};
+  auto one = newest_.lower_bound(first);
+  while (one != newest_.end() && one->first[0] == update.robot) {
+    superseded_[static_cast<std::size_t>(one->first[1])].push_back(one->second.number);
+    one = newest_.erase(one);
+  }
+}
+
+bool ViewStore::is_known(const std::optional<Key>& key, std::size_t hash) const {
+  if (!is_state_of_things(key)) return false;
+  const auto known = newest_.find(*key);
+  return known != newest_.end() && known->second.hash == hash && messages_[known->second.number];
+}
+
+// Takes out those that have been told just so; false if none is left.
+bool ViewStore::leave_new_closures(RobotId robot, ViewClosures& all) {
+  auto& known = closures_[robot];
+  std::erase_if(all.closures, [&](const ViewClosure& closure) {
+    const auto [last, is_new] = known.try_emplace(closure.id, closure);
+    if (!is_new && same(last->second, closure)) return true;
+    last->second = closure;
+    return false;
+  });
+  return !all.closures.empty();
+}
+
+void ViewStore::supersede(const Key& key, const Newest& newest) {
+  const auto [known, is_new] = newest_.emplace(key, newest);
+  if (is_new) return;
+  superseded_[static_cast<std::size_t>(key[1])].push_back(known->second.number);
+  known->second = newest;
+}
+
+void ViewStore::forget_until_it_fits() {
+  for (auto& queue : superseded_)
+    while (bytes_ > max_bytes_ && !queue.empty()) {
+      if (messages_[queue.front()]) {  // else refused when it came
+        drop(queue.front());
+        forgotten_.push_back(queue.front());
+      }
+      queue.pop_front();
+    }
+  if (bytes_ <= max_bytes_) return;
+  drop(messages_.size() - 1);
+  ++refused_;
+}
+
+void ViewStore::drop(std::uint64_t number) {
+  bytes_ -= messages_[number]->bytes.size();
+  messages_[number].reset();
+}
+
+ViewStore::Batch ViewStore::take(Cursor& cursor, std::size_t max_bytes, double wait_s) {
+  std::unique_lock lock(mutex_);
+  if (!cursor.forgotten) cursor.forgotten = forgotten_.size();
+  added_.wait_for(lock, std::chrono::duration<double>(wait_s), [&] {
+    return cursor.next < messages_.size() || *cursor.forgotten < forgotten_.size();
+  });
+  Batch batch;
+  for (; *cursor.forgotten < forgotten_.size(); ++*cursor.forgotten)
+    if (const std::uint64_t number = forgotten_[*cursor.forgotten]; number < cursor.next)
+      batch.forgotten.push_back(number);
+  for (std::size_t bytes = 0; cursor.next < messages_.size() && bytes < max_bytes; ++cursor.next)
+    if (const auto& message = messages_[cursor.next]) {
+      batch.messages.push_back(message);
+      bytes += message->bytes.size();
+    }
+  batch.caught_up = cursor.next == messages_.size();
+  return batch;
+}
+
+ViewStore::Size ViewStore::size() const {
+  const std::lock_guard lock(mutex_);
+  return {messages_.size() - forgotten_.size() - refused_, bytes_, forgotten_.size(), refused_};
+}
+
+}  // namespace km

@@ -1,0 +1,93 @@
+#include <catch2/catch.hpp>
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "apps/viewer/page_message.hpp"
+
+namespace km {
+namespace {
+
+using nlohmann::json;
+
+json text_of(const ViewUpdate& update) {
+  const PageMessage message = page_message(update, 42);
+  REQUIRE_FALSE(message.binary);
+  return json::parse(message.bytes);
+}
+
+// The object of a binary message, and what is behind it.
+std::pair<json, std::string> parts_of(const PageMessage& message) {
+  REQUIRE(message.binary);
+  std::uint32_t length = 0;
+  std::memcpy(&length, message.bytes.data(), 4);
+  CHECK((4 + length) % 4 == 0);
+  return {json::parse(message.bytes.substr(4, length)), message.bytes.substr(4 + length)};
+}
+
+TEST_CASE("A state is told under its members' names", "[page_message]") {
+  ViewState state;
+  state.name =
+      "ro\xff"
+      "bot";
+  state.phase = "running";
+  state.keyframes = 7;
+  state.links = {{3, 1.25F}};
+  state.sent_bytes = {{"pgo", 1234.0}};
+  const json told = text_of({5, 0xfedcba9876543210U, 1'500'000'000, state});
+  CHECK(told["n"] == 42);
+  CHECK(told["t"] == 1500.0);
+  CHECK(told["robot"] == 5);
+  CHECK(told["boot"] == "fedcba9876543210");  // JSON's numbers end at 2^53
+  CHECK(told["kind"] == "state");
+  CHECK(told["name"] ==
+        "ro\xEF\xBF\xBD"
+        "bot");  // no UTF-8 is replaced, not fatal
+  CHECK(told["keyframes"] == 7);
+  CHECK(told["links"] == json::parse("[[3, 1.25]]"));
+  CHECK(told["sent_bytes"] == json::parse(R"({"pgo": 1234.0})"));
+}
+
+TEST_CASE("Poses are position and quaternion, x first", "[page_message]") {
+  const Eigen::Quaterniond turn(0.8, 0.0, 0.0, 0.6);
+  const json told = text_of(
+      {0, 1, 0, ViewKeyframes{true, 2, 9, {make_pose(turn.toRotationMatrix(), {1.00004, 2, -3})}}});
+  CHECK(told["optimized"] == true);
+  CHECK(told["anchor"] == 2);
+  CHECK(told["first"] == 9);
+  CHECK(told["T_world_kf"] == json::parse("[[1, 2, -3, 0, 0, 0.6, 0.8]]"));
+}
+
+TEST_CASE("A closure is told with its verdict and why", "[page_message]") {
+  const ViewClosure closure{closure_id({1, 2}, {0, 4}), ViewVerdict::kRejected, 30, 8, "too far"};
+  CHECK(text_of({0, 1, 0, ViewClosures{{closure}}})["closures"] ==
+        json::parse(R"([[0, 4, 1, 2, "rejected", 30, 8, "too far"]])"));
+}
+
+TEST_CASE("A mesh goes as its arrays, one behind the other", "[page_message]") {
+  MeshChunk chunk{.key = {3, {-1, 0, 7}, 2}, .anchor = 1};
+  chunk.offsets = {{1, 2, 3}, {4, 5, 6}, {7, 8, 65535}};
+  chunk.labels = {9, 8, 7};
+  chunk.faces = {{0, 1, 2}};
+  const auto [object, data] = parts_of(page_message({3, 1, 0, chunk}, 1));
+  CHECK(object["cell"] == json::parse("[-1, 0, 7]"));
+  CHECK(object["vertices"] == 3);
+  CHECK(object["faces"] == 1);
+  CHECK(object["anchor"] == 1);
+  std::array<std::uint16_t, 12> numbers{};
+  REQUIRE(data.size() == sizeof(numbers) + 3);
+  std::memcpy(numbers.data(), data.data(), sizeof(numbers));
+  CHECK(numbers == std::array<std::uint16_t, 12>{1, 2, 3, 4, 5, 6, 7, 8, 65535, 0, 1, 2});
+  CHECK(data.substr(sizeof(numbers)) == "\x09\x08\x07");
+}
+
+TEST_CASE("An image goes behind its features", "[page_message]") {
+  const ViewImage image{0, {0xff, 0xd8}, {{1.5F, 2.5F}}};
+  const auto [object, data] = parts_of(page_message({0, 1, 0, image}, 1));
+  CHECK(object["features"] == 1);
+  CHECK(data.size() == 8 + 2);
+  CHECK(data.substr(8) == "\xff\xd8");
+}
+
+}  // namespace
+}  // namespace km

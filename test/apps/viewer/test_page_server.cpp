@@ -1,0 +1,206 @@
+#include <catch2/catch.hpp>
+
+#include <civetweb.h>
+
+#include <array>
+#include <condition_variable>
+#include <mutex>
+#include <regex>
+#include <set>
+
+#include "apps/viewer/page_files.hpp"
+#include "apps/viewer/page_server.hpp"
+#include "test/support/patience.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+struct Answer {
+  int status = 0;  // 0: the connection was closed without any
+  std::string body;
+};
+
+int port_of(const PageServer& server) {
+  std::smatch found;
+  REQUIRE(std::regex_search(server.url(), found, std::regex(":([0-9]+)/")));
+  return std::stoi(found[1]);
+}
+
+// What is below the address of a server.
+std::string path_of(const PageServer& server) {
+  return server.url().substr(server.url().find('/', std::string("http://").size()));
+}
+
+Answer get(int port, const std::string& path, const std::string& headers = {}) {
+  std::array<char, 256> error{};
+  const std::string host = headers.find("Host:") == std::string::npos
+                               ? "Host: 127.0.0.1:" + std::to_string(port) + "\r\n"
+                               : "";
+  mg_connection* const connection =
+      mg_download("127.0.0.1", port, 0, error.data(), error.size(), "GET %s HTTP/1.1\r\n%s%s\r\n",
+                  path.c_str(), host.c_str(), headers.c_str());
+  if (connection == nullptr) return {};
+  Answer answer{mg_get_response_info(connection)->status_code, {}};
+  std::array<char, 4096> buffer{};
+  for (int n = 0;
+       answer.status == 200 && (n = mg_read(connection, buffer.data(), buffer.size())) > 0;)
+    answer.body.append(buffer.data(), static_cast<std::size_t>(n));
+  mg_close_connection(connection);
+  return answer;
+}
+
+// A page without a browser: collects the frames it is sent.
+class Listener {
+ public:
+  Listener(int port, const std::string& path) {
+    std::array<char, 256> error{};
+    connection_ = mg_connect_websocket_client(
+        "127.0.0.1", port, 0, error.data(), error.size(), path.c_str(), nullptr,
+        [](mg_connection*, int, char* data, size_t size, void* self) {
+          static_cast<Listener*>(self)->hear({data, size});
+          return 1;
+        },
+        [](const mg_connection*, void*) {}, this);
+    INFO(error.data());
+    REQUIRE(connection_ != nullptr);
+  }
+  ~Listener() { mg_close_connection(connection_); }
+
+  void say(const std::string& text) {
+    mg_websocket_client_write(connection_, MG_WEBSOCKET_OPCODE_TEXT, text.data(), text.size());
+  }
+
+  bool hears(const std::string& text) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, kPatience, [&] { return all_.find(text) != std::string::npos; });
+  }
+
+ private:
+  void hear(std::string_view frame) {
+    const std::lock_guard lock(mutex_);
+    all_.append(frame);
+    changed_.notify_all();
+  }
+
+  mg_connection* connection_ = nullptr;
+  std::mutex mutex_;  // guards all_
+  std::condition_variable changed_;
+  std::string all_;
+};
+
+PageServerOptions any_port() {
+  PageServerOptions options;
+  options.port = 0;
+  options.greeting = R"({"kind":"hello"})";
+  return options;
+}
+
+TEST_CASE("The page and all its parts are served from the program", "[page_server]") {
+  ViewStore store(1'000'000);
+  const PageServer server(store, any_port());
+  const int port = port_of(server);
+  CHECK(server.url() == "http://127.0.0.1:" + std::to_string(port) + '/');
+  CHECK_THAT(get(port, "/").body, Catch::StartsWith("<!doctype html>"));
+  CHECK(page_files().size() > 10);
+  for (const PageFile& file : page_files())
+    CHECK(get(port, '/' + std::string(file.path)).body == file.bytes);
+  CHECK(get(port, "/none.js").status == 404);
+  CHECK(get(port, "/../apps/viewer/main.cpp").status >= 400);
+}
+
+TEST_CASE("Pages of other sites get nothing", "[page_server]") {
+  ViewStore store(1'000'000);
+  const PageServer server(store, any_port());
+  const int port = port_of(server);
+  const std::string own = "127.0.0.1:" + std::to_string(port);
+  CHECK(get(port, "/", "Origin: http://" + own + "\r\n").status == 200);
+  CHECK(get(port, "/", "Origin: http://evil.example\r\n").status == 404);
+  CHECK(get(port, "/", "Host: evil.example:" + std::to_string(port) + "\r\n").status == 404);
+  const std::string upgrade =
+      "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+      "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+  CHECK(get(port, "/updates", upgrade + "Origin: http://" + own + "\r\n").status == 101);
+  CHECK(get(port, "/updates", upgrade + "Origin: http://evil.example\r\n").status == 0);
+}
+
+TEST_CASE("Beyond this host nothing is served without the token", "[page_server]") {
+  ViewStore store(1'000'000);
+  PageServerOptions options = any_port();
+  options.address = "0.0.0.0";
+  const PageServer server(store, options), another(store, options);
+  const int port = port_of(server);
+  const std::string path = path_of(server);
+  CHECK(std::regex_match(path, std::regex("/[0-9a-f]{32}/")));
+  CHECK(path != path_of(another));
+  CHECK_THAT(get(port, path, "Host: robot.example:80\r\n").body,
+             Catch::StartsWith("<!doctype html>"));
+  CHECK(get(port, "/").status == 404);
+  CHECK(get(port, "/main.js").status == 404);
+  CHECK(get(port, "/00000000000000000000000000000000/").status == 404);
+}
+
+ViewUpdate state_of(const std::string& name) {
+  ViewState state;
+  state.name = name;
+  return {3, 1, 0, state};
+}
+
+TEST_CASE("A page hears the greeting, the past, and what comes", "[page_server]") {
+  ViewStore store(1'000'000);
+  store.add(state_of("early"));
+  const PageServer server(store, any_port());
+  Listener page(port_of(server), "/updates");
+  CHECK(page.hears(R"([{"kind":"hello"}])"));
+  CHECK(page.hears(R"("name":"early")"));
+  CHECK(page.hears(R"([{"kind":"caught_up"}])"));
+  store.add(state_of("later"));
+  CHECK(page.hears(R"("name":"later")"));
+}
+
+TEST_CASE("A robot is asked for images as long as any page wants them", "[page_server]") {
+  ViewStore store(1'000'000);
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<std::set<RobotId>> asked;
+  PageServerOptions options = any_port();
+  options.on_images = [&](const std::set<RobotId>& robots) {
+    const std::lock_guard lock(mutex);
+    asked.push_back(robots);
+    changed.notify_all();
+  };
+  const auto wait_for = [&](std::size_t count) {
+    std::unique_lock lock(mutex);
+    return changed.wait_for(lock, kPatience, [&] { return asked.size() >= count; });
+  };
+  const PageServer server(store, options);
+  {
+    Listener one(port_of(server), "/updates");
+    one.say("no JSON");
+    one.say(R"({"images":-1,"on":true})");
+    one.say(R"({"images":70000,"on":true})");
+    one.say(R"({"images":3,"on":true})");
+    REQUIRE(wait_for(1));
+    {
+      Listener other(port_of(server), "/updates");
+      other.say(R"({"images":3,"on":true})");
+      other.say(R"({"images":4,"on":true})");
+      REQUIRE(wait_for(2));
+    }
+    REQUIRE(wait_for(3));  // the other page has gone
+  }
+  REQUIRE(wait_for(4));
+  CHECK(asked == std::vector<std::set<RobotId>>{{3}, {3, 4}, {3}, {}});
+}
+
+TEST_CASE("A port that is taken is named", "[page_server]") {
+  ViewStore store(1000);
+  PageServerOptions options = any_port();
+  const PageServer server(store, options);
+  options.port = port_of(server);
+  CHECK_THROWS_WITH(PageServer(store, options),
+                    Catch::Contains(std::to_string(options.port)) && Catch::Contains("--port"));
+}
+
+}  // namespace
+}  // namespace km
