@@ -20,7 +20,7 @@
 namespace km {
 namespace {
 
-constexpr int kBadInput = 1;
+constexpr int kBadInput = 1, kBadCommandLine = 2;
 
 constexpr const char* kAbout =
     "Shows a team in a browser, while it runs or afterwards. It prints the address to open.\n\n"
@@ -50,13 +50,14 @@ Examples
   kimera_multi_viewer results/demo --rate 2          # as if it were live, twice as fast
   kimera_multi_viewer results/demo --listen 0.0.0.0  # for other hosts
 
-Exit codes: 0 ended by Ctrl-C; 1 for input that cannot be used and an address that cannot be had.)";
+Exit codes: 0 ended by Ctrl-C; 1 for input that cannot be used and an address that cannot be had; 2 for
+a command line that cannot be used.)";
 
 struct ViewerOptions {
   std::filesystem::path results, palette;
   DdsConfig dds;
   PageServerOptions server;
-  double memory_MB = 1000.0;
+  double memory_MB = 500.0;
   std::optional<double> rate;
 };
 
@@ -172,7 +173,7 @@ int main(int argc, char** argv) try {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : km::kBadInput;
+    return app.exit(error) == 0 ? 0 : km::kBadCommandLine;
   }
   km::SignalWatch signals;  // before any thread: they inherit the blocked signals
   km::ViewStore store(static_cast<std::size_t>(options.memory_MB * 1e6));

@@ -11,7 +11,11 @@ struct PageFile {
   std::string_view bytes;
 };
 
-/// All of them: those in apps/viewer/page, and three.js where its modules look for each other.
+/// All of the page: those in apps/viewer/page, and three.js where its modules look for each other.
 [[nodiscard]] std::span<const PageFile> page_files();
+
+/// What draws charts alone, for pages of other programs: a module that needs no other file. In the
+/// library km_charts.
+[[nodiscard]] std::span<const PageFile> chart_files();
 
 }  // namespace km

@@ -20,6 +20,7 @@
 
 #include "apps/viewer/page_files.hpp"
 #include "modules/core/json.hpp"
+#include "runtime/dds/participant.hpp"
 
 namespace km {
 namespace {
@@ -101,7 +102,8 @@ class PageServer::Impl {
     const int count = mg_get_server_ports(context_, static_cast<int>(ports.size()), ports.data());
     const int port = count > 0 ? ports[0].port : options_.port;
     const bool any = options_.address == "0.0.0.0" || options_.address == "::";
-    const std::string host = any ? "HOST" : options_.address;
+    const std::string host =
+        any ? select_interface(network_interfaces(), {}).address : options_.address;
     return "http://" + (host.find(':') != std::string::npos ? '[' + host + ']' : host) + ':' +
            std::to_string(port) + prefix();
   }

@@ -77,7 +77,7 @@ function show() {
   model.seek(timeline.time);
   scene.update(model);
   const counts = countClosures();
-  for (const robot of model.robots.values()) panels.updateCard(robot, model);
+  panels.updateCards(model);
   panels.mark(scene.follows, camera);
   panels.updateMatrix(model);
   panels.updateTotals(model, counts);
@@ -154,8 +154,9 @@ async function drawCamera() {
   if (image === drawnImage) return;
   drawnImage = image;
   const caption = $('camera').querySelector('span');
-  caption.textContent = image ? `${model.name(camera)}: ${image.features} features` :
-                                `${model.name(camera)}: ${live ? 'no image yet' : 'results keep no images'}`;
+  caption.textContent = image ?
+      `${model.name(camera)}: ${image.features} features` :
+      `${model.name(camera)}: ${live ? 'no image yet' : 'results keep no images'}`;
   if (!image?.jpeg) return;
   const bitmap = await createImageBitmap(new Blob([image.jpeg], {type: 'image/jpeg'}));
   const canvas = $('camera').querySelector('canvas');
@@ -312,9 +313,7 @@ window.kimera = {
   get frames() { return model.frames().map((f) => f.robots.map((r) => r.id)); },
   get closures() { return countClosures(); },
   get faces() { return model.faces(); },
-  get drawnFaces() {
-    return [...scene.meshes.shown.keys()].reduce((sum, message) => sum + message.faces, 0);
-  },
+  get drawnFaces() { return scene.meshes.faces; },
   get bytes() { return model.bytes; },
   get delays() { return [...delays]; },
   get frameTimes() {

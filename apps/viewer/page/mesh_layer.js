@@ -1,8 +1,10 @@
-// The meshes: one object per chunk, whose arrays are those that came over the network.
+// The meshes: chunks of a robot that are near each other are drawn as one.
 import {robotColor} from './charts.js';
 import * as THREE from './three/build/three.module.js';
 
-const BUILD_MS = 25;  // of a frame, for chunks that are new
+const BUILD_MS = 25;      // of a frame, for what is new
+const BATCH_CELLS = 4;    // cells that are drawn as one, along an axis
+const MAX_INDEX = 65535;  // of a vertex and, in steps, of a position
 
 // Smooth normals, -127 to 127, four bytes a vertex: WebGL likes them aligned.
 function normalsOf(positions, triangles) {
@@ -36,9 +38,18 @@ function anyColor(label) {
   return [color.r * 255, color.g * 255, color.b * 255];
 }
 
+// The largest of its coordinates, in steps.
+function reachOf({positions, origin}) {
+  const most = [0, 0, 0];
+  for (let i = 0; i < positions.length; ++i)
+    if (positions[i] > most[i % 3]) most[i % 3] = positions[i];
+  return most.map((x, axis) => x + origin[axis]);
+}
+
 export class MeshLayer {
   constructor() {
-    this.shown = new Map();  // message -> THREE.Mesh
+    this.batches = new Map();  // by key: {messages, objects, faces, stale, anchor, of}
+    this.shown = new Map();    // message -> its batch
     this.mode = 'labels';
     this.palette = new Map();  // label -> {name, color}
     this.labels = new Set();   // that have been seen
@@ -46,7 +57,7 @@ export class MeshLayer {
     this.materials = {
       labels: lit({vertexColors: THREE.VertexColors}),
       normals: new THREE.MeshNormalMaterial(),
-      robots: new Map()
+      robots: new Map(),
     };
     this.lit = lit;
   }
@@ -69,73 +80,151 @@ export class MeshLayer {
     return robots.get(message.of);
   }
 
+  /** Faces that are drawn. */
+  get faces() {
+    let faces = 0;
+    for (const batch of this.batches.values()) faces += batch.faces;
+    return faces;
+  }
+
+  material(of, labelled) {
+    if (this.mode === 'normals') return this.materials.normals;
+    if (this.mode === 'labels' && labelled) return this.materials.labels;
+    const {robots} = this.materials;
+    if (!robots.has(of)) {
+      const color = new THREE.Color(robotColor(of)).lerp(new THREE.Color('#c8ccd2'), 0.35);
+      robots.set(of, this.lit({color}));
+    }
+    return robots.get(of);
+  }
+
+  objects() { return [...this.batches.values()].flatMap((batch) => batch.objects); }
+
   setMode(mode) {
     this.mode = mode;
-    for (const [message, mesh] of this.shown) {
-      mesh.visible = mode !== 'off';
-      if (mesh.visible) mesh.material = this.material(message);
-    }
+    for (const batch of this.batches.values())
+      for (const object of batch.objects) this.dress(object, batch.of);
   }
 
-  build(message) {
-    const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute('position', new THREE.BufferAttribute(message.positions, 3));
-    geometry.setAttribute(
-        'normal',
-        new THREE.BufferAttribute(normalsOf(message.positions, message.triangles), 4, true));
-    if (message.labels) {
-      const colors = new Uint8Array(4 * message.labels.length);
-      message.labels.forEach((label, i) => {
-        colors.set(this.colors[label], 4 * i);
+  dress(object, of) {
+    object.visible = this.mode !== 'off';
+    if (object.visible) object.material = this.material(of, !!object.geometry.attributes.color);
+  }
+
+  // One object of chunks that have at most MAX_INDEX + 1 vertices in all.
+  build(messages, of) {
+    const sum = (valueOf) => messages.reduce((all, message) => all + valueOf(message), 0);
+    const vertices = sum((m) => m.vertices), labelled = messages.some((m) => m.labels);
+    const base = [0, 1, 2].map((axis) => Math.min(...messages.map((m) => m.origin[axis])));
+    const fits = messages.every((m) => m.reach.every((x, axis) => x - base[axis] <= MAX_INDEX));
+    const positions = new (fits ? Uint16Array : Float32Array)(3 * vertices);
+    const normals = new Int8Array(4 * vertices);
+    const colors = labelled ? new Uint8Array(4 * vertices) : null;
+    const triangles = new Uint16Array(3 * sum((m) => m.faces));
+    let first = 0, at = 0;
+    for (const message of messages) {
+      const [x, y, z] = message.origin.map((o, axis) => o - base[axis]);
+      const {positions: own} = message;
+      for (let i = 0, k = 3 * first; i < own.length; i += 3, k += 3) {
+        positions[k] = own[i] + x;
+        positions[k + 1] = own[i + 1] + y;
+        positions[k + 2] = own[i + 2] + z;
+      }
+      normals.set(normalsOf(own, message.triangles), 4 * first);
+      message.labels?.forEach((label, i) => {
+        colors.set(this.colors[label], 4 * (first + i));
         this.labels.add(label);
       });
-      geometry.setAttribute('color', new THREE.BufferAttribute(colors, 4, true));
+      for (const index of message.triangles) triangles[at++] = first + index;
+      first += message.vertices;
     }
-    geometry.setIndex(new THREE.BufferAttribute(message.triangles, 1));
-    const mesh = new THREE.Mesh(geometry, this.material(message));
-    mesh.visible = this.mode !== 'off';
-    mesh.matrixAutoUpdate = false;
-    return mesh;
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
+    geometry.setAttribute('normal', new THREE.BufferAttribute(normals, 4, true));
+    if (colors) geometry.setAttribute('color', new THREE.BufferAttribute(colors, 4, true));
+    geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
+    const object = new THREE.Mesh(geometry);
+    object.matrixAutoUpdate = false;
+    const s = messages[0].step_m;
+    object.userData.own =
+        new THREE.Matrix4().makeScale(s, s, s).setPosition(...base.map((x) => s * x));
+    this.dress(object, of);
+    return object;
   }
 
-  /**
-   * Shows what robots know now; groupOf(message) says where. True if there is more to build in a
-   * next call.
-   */
-  sync(model, groupOf) {
+  rebuild(batch) {
+    for (const object of batch.objects) {
+      object.parent?.remove(object);
+      object.geometry.dispose();
+    }
+    batch.objects = [];
+    batch.faces = 0;
+    batch.stale = false;
+    let part = [], vertices = 0;
+    const finish = () => part.length && batch.objects.push(this.build(part, batch.of));
+    for (const message of batch.messages) {
+      if (vertices + message.vertices > MAX_INDEX + 1) {
+        finish();
+        part = [];
+        vertices = 0;
+      }
+      part.push(message);
+      vertices += message.vertices;
+      batch.faces += message.faces;
+    }
+    finish();
+  }
+
+  batchOf({of, anchor, step_m, cell}) {
+    const key = [of, anchor, step_m, ...cell.map((c) => Math.floor(c / BATCH_CELLS))].join();
+    if (!this.batches.has(key))
+      this.batches.set(key, {messages: new Set(), objects: [], faces: 0, stale: true, anchor, of});
+    return this.batches.get(key);
+  }
+
+  // Chunks that have come and gone, into their batches.
+  sort(model) {
     const wanted = new Set();
     for (const robot of model.robots.values())
       for (const message of robot.meshes.values()) wanted.add(message);
-    for (const [message, mesh] of this.shown)
-      if (!wanted.has(message)) {
-        mesh.parent?.remove(mesh);
-        mesh.geometry.dispose();
-        this.shown.delete(message);
-      }
+    for (const [message, batch] of this.shown) {
+      if (wanted.has(message)) continue;
+      batch.messages.delete(message);
+      batch.stale = true;
+      this.shown.delete(message);
+    }
+    for (const message of wanted) {
+      if (this.shown.has(message)) continue;
+      message.reach ??= reachOf(message);
+      const batch = this.batchOf(message);
+      batch.messages.add(message);
+      batch.stale = true;
+      this.shown.set(message, batch);
+    }
+  }
+
+  /** Shows what robots know now, groupOf(anchor, robot) says where; true if more is to be built. */
+  sync(model, groupOf) {
+    this.sort(model);
     const until = performance.now() + BUILD_MS;
     let more = false;
-    for (const message of wanted) {
-      let mesh = this.shown.get(message);
-      if (!mesh) {
-        if (performance.now() > until) {
-          more = true;
-          continue;
-        }
-        mesh = this.build(message);
-        this.shown.set(message, mesh);
+    for (const [key, batch] of this.batches) {
+      if (batch.stale && performance.now() < until) this.rebuild(batch);
+      more ||= batch.stale;
+      if (!batch.stale && !batch.messages.size) this.batches.delete(key);
+      const {group, T} = groupOf(batch.anchor, batch.of);
+      for (const object of batch.objects) {
+        if (object.parent !== group) group.add(object);
+        object.matrix.copy(object.userData.own);
+        if (T) object.matrix.premultiply(T);
       }
-      const {group, T} = groupOf(message.anchor, message.of);
-      if (mesh.parent !== group) group.add(mesh);
-      const s = message.step_m, [x, y, z] = message.origin;
-      mesh.matrix.makeScale(s, s, s).setPosition(s * x, s * y, s * z);
-      if (T) mesh.matrix.premultiply(T);
     }
     return more;
   }
 
   /** Where the ray first meets a mesh, or null. */
   pick(raycaster) {
-    const hits = this.mode === 'off' ? [] : raycaster.intersectObjects([...this.shown.values()]);
+    const hits = this.mode === 'off' ? [] : raycaster.intersectObjects(this.objects());
     return hits.length ? hits[0].point : null;
   }
 }

@@ -1,5 +1,8 @@
 // What robots told, and what was known at any time of it.
 
+// Of a piece of mesh: the newest with a key counts.
+const keyOf = ({of, cell, part}) => `${of} ${cell} ${part}`;
+
 /** What one robot told: everything in order, and what that comes to at the time last asked for. */
 export class Robot {
   constructor(id) {
@@ -84,11 +87,10 @@ export class Robot {
   }
 
   apply_mesh(message) {
-    const key = `${message.of} ${message.cell} ${message.part}`;
     if (message.faces)
-      this.meshes.set(key, message);
+      this.meshes.set(keyOf(message), message);
     else
-      this.meshes.delete(key);
+      this.meshes.delete(keyOf(message));
   }
 
   apply_image(message) { this.image = message; }
@@ -137,6 +139,8 @@ export class Model {
                    'T_odom_body'])
         delete message[bulk];
       message.gone = true;
+      const {meshes} = this.robots.get(message.robot);
+      if (meshes.get(keyOf(message)) === message) meshes.delete(keyOf(message));
     }
   }
 

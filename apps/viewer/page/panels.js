@@ -114,6 +114,15 @@ export class Panels {
     card.facts.set('Memory', shown ? quantity(shown.resident_MB, 'MB') : '–');
   }
 
+  updateCards(model) {
+    for (const [id, card] of this.cards)
+      if (!model.robots.has(id)) {
+        card.root.remove();
+        this.cards.delete(id);
+      }
+    for (const robot of model.robots.values()) this.updateCard(robot, model);
+  }
+
   /** Marks what is followed, and whose images are shown. */
   mark(followed, camera) {
     for (const [id, card] of this.cards) {

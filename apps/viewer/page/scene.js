@@ -28,6 +28,7 @@ function matrixOf([x, y, z, qx, qy, qz, qw], matrix = new THREE.Matrix4()) {
 class WideLine {
   constructor(settings, segments = false) {
     this.material = new LineMaterial(settings);
+    this.material.uniforms.opacity.value = settings.opacity ?? 1;
     this.segments = segments;
     this.object = segments ? new LineSegments2(undefined, this.material) :
                              new Line2(undefined, this.material);
@@ -110,7 +111,7 @@ export class Scene {
             linewidth: 1.2,
             resolution: this.resolution,
             transparent: true,
-            opacity: {kept: 0.65, verified: 0.65}[verdict] ?? 0.35
+            opacity: {kept: 0.7, verified: 0.7}[verdict] ?? 0.3
           },
           true);
       this.scene.add(this.lines[verdict].object);
@@ -170,6 +171,8 @@ export class Scene {
   update(model) {
     this.model = model;
     this.updateFrames(model);
+    for (const [id, figure] of this.figures)
+      if (!model.robots.has(id)) figure.here = figure.group.visible = false;
     for (const robot of model.robots.values()) this.updateRobot(robot);
     this.building = this.meshes.sync(model, (anchor, of) => this.place(anchor, of));
     this.updateClosures(model);

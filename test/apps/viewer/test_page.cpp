@@ -1,8 +1,8 @@
 #include <catch2/catch.hpp>
 
-#include <filesystem>
 #include <iostream>
 
+#include "test/apps/viewer/page_programs.hpp"
 #include "test/apps/viewer/small_run.hpp"
 #include "test/support/command.hpp"
 
@@ -11,16 +11,8 @@ namespace {
 
 const std::string kViewer = KM_BIN_DIR "/kimera_multi_viewer";
 
-// Why the page cannot be opened here; empty if it can.
-std::string missing() {
-  if (run_command("node --version").exit_code != 0) return "no node (apt-get install nodejs)";
-  for (const char* program : {"/usr/bin/chromium", "/usr/bin/chromium-browser"})
-    if (std::filesystem::exists(program)) return {};
-  return "no chromium (apt-get install chromium)";
-}
-
 TEST_CASE("The page knows what the files of a run say, at any time of it", "[page]") {
-  if (const std::string why = missing(); !why.empty()) {
+  if (const std::string why = missing_page_program(); !why.empty()) {
     std::cout << "SKIPPED: " << why << '\n';
     return;
   }
@@ -31,12 +23,24 @@ TEST_CASE("The page knows what the files of a run say, at any time of it", "[pag
   CHECK(result.exit_code == 0);
 }
 
+TEST_CASE("The page's model keeps all that was told, by its time", "[page]") {
+  if (run_command("node --version").exit_code != 0) {
+    std::cout << "SKIPPED: no node (apt-get install nodejs)\n";
+    return;
+  }
+  const CommandResult result = run_command("node test/apps/viewer/model_test.mjs");
+  INFO(result.output);
+  CHECK(result.exit_code == 0);
+}
+
 TEST_CASE("The viewer refuses what it cannot use", "[viewer]") {
   const TemporaryFolder empty;
   const auto result = run_command(kViewer + ' ' + empty.path().string());
   CHECK(result.exit_code == 1);
   CHECK_THAT(result.output, Catch::Contains("no results in it"));
-  CHECK(run_command(kViewer + " --rate 0 x").exit_code == 1);
+  CHECK(run_command(kViewer + " --rate 0 x").exit_code == 2);
+  CHECK_THAT(run_command(kViewer).output, Catch::Contains("--domain of a team that runs"));
+  CHECK(run_command(kViewer + " --domain 7 x").exit_code == 2);
   CHECK(run_command(kViewer + " --help").exit_code == 0);
 }
 

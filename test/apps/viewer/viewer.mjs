@@ -6,7 +6,8 @@ export class Viewer {
   /** Started with these arguments, on a port that is free; its address is `url`. */
   static async start(program, args) {
     const viewer = new Viewer();
-    viewer.process = spawn(program, [...args, '--port', '0'], {stdio: ['ignore', 'pipe', 'inherit']});
+    viewer.process =
+        spawn(program, [...args, '--port', '0'], {stdio: ['ignore', 'pipe', 'inherit']});
     viewer.ended = new Promise((done) => viewer.process.on('exit', (code) => done(code)));
     for await (const line of createInterface({input: viewer.process.stdout})) {
       viewer.url = /http:\S+/.exec(line)?.[0];

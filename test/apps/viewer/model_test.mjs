@@ -1,0 +1,104 @@
+// What the page makes of what it is told, without a browser.
+import assert from 'node:assert/strict';
+import {readFileSync} from 'node:fs';
+
+const text = readFileSync('apps/viewer/page/model.js', 'utf8');
+const {Model} = await import(`data:text/javascript,${encodeURIComponent(text)}`);
+
+const at = (x) => [x, 0, 0, 0, 0, 0, 1];
+let number = 0;
+const tell = (model, robot, t, content, boot = 'a') =>
+    model.add({n: number++, t: 1000 * (100 + t), robot, boot, ...content});
+const keyframes = (first, xs, anchor = null) => ({
+  kind: 'keyframes',
+  optimized: anchor !== null,
+  anchor,
+  first,
+  T_world_kf: xs.map(at),
+});
+const mesh = (cell, faces) =>
+    ({kind: 'mesh', of: 0, cell, part: 0, anchor: 0, faces, bytes: 6 * faces});
+const closures = (...list) => ({kind: 'closures', closures: list});
+
+function test(name, body) {
+  try {
+    body(new Model());
+  } catch (error) {
+    error.message = `${name}: ${error.message}`;
+    throw error;
+  }
+}
+
+test('any time can be gone to, forth and back', (model) => {
+  tell(model, 0, 0, keyframes(0, [0]));
+  tell(model, 0, 1, mesh([0, 0, 0], 10));
+  tell(model, 0, 2, keyframes(1, [1]));
+  tell(model, 0, 3, mesh([0, 0, 0], 20));
+  tell(model, 0, 4, mesh([0, 0, 0], 0));
+  const facesAt = (t) => (model.seek(t), model.faces());
+  assert.deepEqual([0.5, 1, 3.5, 4, 2.9, 0].map(facesAt), [0, 10, 20, 0, 10, 0]);
+  model.seek(1.9);
+  assert.equal(model.robots.get(0).odometry.length, 1);
+  model.seek(2);
+  assert.equal(model.robots.get(0).odometry.length, 2);
+});
+
+test('robots are in the frame of their optimised keyframes, else in their own', (model) => {
+  tell(model, 1, 0, keyframes(0, [0]));
+  tell(model, 0, 0, keyframes(0, [0]));
+  tell(model, 1, 1, keyframes(0, [5], 0));
+  const frames = (t) =>
+      (model.seek(t), model.frames().map((f) => [f.anchor, f.robots.map((r) => r.id)]));
+  assert.deepEqual(frames(0.5), [[0, [0]], [1, [1]]]);
+  assert.deepEqual(frames(1), [[0, [0, 1]]]);
+});
+
+test('keyframes of a former frame go with it', (model) => {
+  tell(model, 1, 0, keyframes(0, [0, 1, 2], 1));
+  tell(model, 1, 1, keyframes(0, [7], 0));
+  model.seek(1);
+  assert.deepEqual(model.robots.get(1).optimized, [at(7)]);
+});
+
+test('with another process goes what the former told', (model) => {
+  tell(model, 0, 0, keyframes(0, [0, 1]));
+  tell(model, 0, 0, mesh([0, 0, 0], 10));
+  tell(model, 0, 0, closures([0, 0, 1, 0, 'kept', 9, 9, '']));
+  tell(model, 0, 2, keyframes(0, [3]), 'b');
+  model.seek(2);
+  assert.equal(model.faces(), 0);
+  assert.equal(model.closures().size, 0);
+  assert.deepEqual(model.robots.get(0).odometry, [at(3)]);
+  model.seek(1);
+  assert.equal(model.faces(), 10);
+});
+
+test('of a closure the newest word counts, whoever says it', (model) => {
+  tell(model, 0, 0, closures([0, 0, 1, 0, 'candidate', 0, 0, '']));
+  tell(model, 1, 1, closures([0, 0, 1, 0, 'verified', 30, 20, '']));
+  tell(model, 0, 2, closures([0, 0, 1, 0, 'rejected', 30, 20, 'too far']));
+  const verdicts =
+      [0, 1, 2].map((t) => (model.seek(t), [...model.closures().values()].map((c) => c.verdict)));
+  assert.deepEqual(verdicts, [['candidate'], ['verified'], ['rejected']]);
+});
+
+test('what the viewer let go of is let go of', (model) => {
+  const first = number;
+  tell(model, 0, 0, mesh([0, 0, 0], 10));
+  tell(model, 0, 1, mesh([0, 0, 0], 20));
+  model.seek(0);
+  assert.equal(model.faces(), 10);
+  assert.equal(model.bytes, 180);
+  model.forgetNumbers([first, 12345]);
+  assert.equal(model.bytes, 120);
+  assert.equal(model.faces(), 0);
+  model.seek(1);
+  assert.equal(model.faces(), 20);
+});
+
+test('a clock that was set back does not turn the order', (model) => {
+  tell(model, 0, 5, mesh([0, 0, 0], 10));
+  tell(model, 0, 3, mesh([0, 0, 0], 20));
+  model.seek(model.end);
+  assert.equal(model.faces(), 20);
+});

@@ -1,0 +1,31 @@
+// What robots left in a folder of results.
+import {existsSync, readdirSync, readFileSync} from 'node:fs';
+import {join} from 'node:path';
+
+export const sum = (numbers) => numbers.reduce((a, b) => a + b, 0);
+
+/** The summaries of the robots, by id. */
+export function readSummaries(folder) {
+  return readdirSync(folder)
+      .map((name) => join(folder, name, 'summary.json'))
+      .filter((file) => existsSync(file))
+      .map((file) => JSON.parse(readFileSync(file)))
+      .sort((a, b) => a.robot - b.robot);
+}
+
+/** How far each pair of keyframes in any robot's loop_closures.csv came: a stage for each. */
+export function readStages(folder, robots) {
+  const stages = new Map();
+  for (const {name} of robots) {
+    const lines = readFileSync(join(folder, name, 'loop_closures.csv'), 'utf8').trim().split('\n');
+    for (const line of lines.slice(1)) {
+      const [r0, k0, r1, k1, , stage] = line.split(',');
+      const pair = [`${r0}:${k0}`, `${r1}:${k1}`].sort().join();
+      if (stages.get(pair) !== 'inlier') stages.set(pair, stage);
+    }
+  }
+  return [...stages.values()];
+}
+
+/** Faces of all robots' meshes. */
+export const facesOf = (robots) => sum(robots.map((robot) => robot.mapping?.faces ?? 0));
