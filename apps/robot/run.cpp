@@ -19,6 +19,7 @@
 #include "apps/robot/results.hpp"
 #include "apps/robot/rounds_csv.hpp"
 #include "apps/robot/run_end.hpp"
+#include "apps/robot/run_findings.hpp"
 #include "apps/robot/wiring.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_table.hpp"
@@ -413,8 +414,21 @@ void write_all(const RobotOptions& options, Robot& robot, const RunRecord& recor
                 [&robot](const auto& file) { write_file(file, timings(robot)); });
 }
 
+std::map<RobotId, std::string> peer_names(Robot& robot) {
+  std::map<RobotId, std::string> names;
+  for (const Peer& peer : robot.bridge().peers().list())
+    names[peer.identity.robot] = peer.identity.name;
+  return names;
+}
+
+std::vector<Finding> what_stands_out(const RunFacts& facts, const Verdict& verdict) {
+  std::vector<Finding> findings = findings_of({&facts, 1});
+  if (verdict.exit_code != 0) findings.insert(findings.begin(), failed_run(verdict.reason));
+  return findings;
+}
+
 // Writes what the run leaves; the exit code.
-int conclude(const RobotOptions& options, bool has_budget, Robot& robot,
+int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robot,
              std::optional<Watch>& watch, const RunResult& result, const RunRecord& record,
              ResultWriter& results) {
   watch->finish(record);
@@ -425,16 +439,22 @@ int conclude(const RobotOptions& options, bool has_budget, Robot& robot,
   summary.frames = end.images.value_or(ImageCounts{}).read;
   summary.frames_skipped = end.images.value_or(ImageCounts{}).skipped;
   summary.traffic = sent_bytes(robot);
-  if (has_budget) summary.held_back = held_back(robot);
+  if (config.budget.is_limited()) summary.held_back = held_back(robot);
   summary.process = watch->process();
   summary.seconds = watch->seconds();
   for (const MissedPeer& peer : end.missed)
     (peer.why == Absence::kSilent ? summary.lost_peers : summary.apart_peers)[peer.name] =
         peer.missed_s;
+  const std::map<RobotId, std::string> names = peer_names(robot);
+  for (const auto& [peer, keyframes] : record.other_vocabulary())
+    summary.other_vocabulary[names.contains(peer) ? names.at(peer) : std::to_string(peer)] =
+        keyframes;
   watch.reset();  // the status line ends before the last log lines
   write_all(options, robot, record, result, results);
   end.lost_results = results.lost();
   summary.exit_reason = verdict_of(end).reason;
+  summary.findings =
+      what_stands_out({summary, record.closure_tallies(), names, config.pcm}, verdict_of(end));
   results.write(options.output / "summary.json",  // last: it tells what was lost before
                 [&summary](const auto& file) { write_summary(file, summary); });
   end.lost_results = results.lost();
@@ -514,7 +534,7 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
   const RunResult result = robot.run([&watch] { return watch->poll(); });
   const auto end = [&](const RunRecord& record) {
     write_estimated_rig(options, rig, record, results);
-    return conclude(options, config.budget.is_limited(), robot, watch, result, record, results);
+    return conclude(options, config, robot, watch, result, record, results);
   };
   if (result.is_left_behind("recorder"))
     results.note(options.output, "what was recorded is lost with the recorder, which hangs");

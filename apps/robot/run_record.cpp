@@ -62,6 +62,10 @@ void RunRecord::add(const ClosureOutcome& outcome) {
   (outcomes_[id] = outcome).id = id;
 }
 
+void RunRecord::add(const PlaceQuery& query) {
+  if (query.status == PlaceQueryStatus::kOtherVocabulary) ++other_vocabulary_[query.query.robot];
+}
+
 void RunRecord::add(const OptimizerProgress& progress) {
   if (progress.round != progress_.round) {
     ++activity_;
@@ -92,6 +96,7 @@ void RunRecord::add(const PeerEvent& event) {
   std::erase_if(outcomes_, of_peer);
   std::erase_if(rejected_, [&](const ClosureId& id) { return touches(id, peer); });
   inlier_sets_.erase(std::minmax(robot_, peer));
+  other_vocabulary_.erase(peer);
 }
 
 void RunRecord::add(const OptimizedMesh& mesh) {
@@ -126,7 +131,7 @@ std::vector<ClosureOutcome> RunRecord::outcomes() const {
       if (is_inlier(id))
         outcome.stage = ClosureStage::kInlier;
       else if (rejected_.contains(id))
-        outcome.reason = "rejected: the other closures contradict it";
+        outcome.reason = kRejectedByOptimiser;
       else if (outcome.reason.empty())
         outcome.reason = "inconsistent with the other closures of the robot pair";
     } else if (outcome.reason.empty()) {
@@ -152,6 +157,16 @@ std::map<RobotId, ClosureCounts> RunRecord::closures_per_peer() const {
     ++counts.candidates;
     counts.verified += outcome.stage >= ClosureStage::kVerified ? 1 : 0;
     counts.inliers += is_inlier(id) ? 1 : 0;
+  }
+  return result;
+}
+
+std::map<RobotId, ClosureTally> RunRecord::closure_tallies() const {
+  std::map<RobotId, ClosureTally> result;
+  for (const ClosureOutcome& outcome : outcomes()) {
+    const ClosureId& id = outcome.id;
+    result[id.from.robot == robot_ ? id.to.robot : id.from.robot].add(outcome.stage,
+                                                                      outcome.reason);
   }
   return result;
 }

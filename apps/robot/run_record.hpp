@@ -12,13 +12,14 @@
 #include <string_view>
 #include <vector>
 
-#include "apps/robot/run_summary.hpp"
+#include "apps/robot/run_findings.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/core/stamped_pose.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
+#include "modules/place_recognition/candidate_filter.hpp"
 #include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/vio/camera_calibration.hpp"
@@ -44,6 +45,7 @@ class RunRecord {
   void add(const Closure& closure);
   void add(const InlierSet& set);  ///< Kept if newer than the pair's last.
   void add(const ClosureOutcome& outcome);
+  void add(const PlaceQuery& query);       ///< Of which those count that are not compared.
   void add(const Trajectory& trajectory);  ///< Of this robot.
   void add(const PeerEvent& event);        ///< Of a robot that restarts all closures are dropped.
   void add(const OptimizerProgress& progress);
@@ -116,6 +118,14 @@ class RunRecord {
   /// Closures with each other robot (or inside this one) that this robot found.
   [[nodiscard]] std::map<RobotId, ClosureCounts> closures_per_peer() const;
 
+  /// Likewise, by the stage they reached and why they went no further.
+  [[nodiscard]] std::map<RobotId, ClosureTally> closure_tallies() const;
+
+  /// Keyframes of each other robot that its vocabulary kept from being compared.
+  [[nodiscard]] const std::map<RobotId, std::uint64_t>& other_vocabulary() const {
+    return other_vocabulary_;
+  }
+
  private:
   [[nodiscard]] bool is_inlier(const ClosureId& id) const;
 
@@ -131,6 +141,7 @@ class RunRecord {
   std::map<std::pair<RobotId, RobotId>, InlierSet> inlier_sets_;
   std::set<ClosureId> rejected_;  // by the optimiser, of the inlier sets
   std::map<ClosureId, ClosureOutcome> outcomes_;
+  std::map<RobotId, std::uint64_t> other_vocabulary_;
   std::optional<Trajectory> trajectory_;
   std::optional<DenseSensingProgress> dense_sensing_;
   std::optional<MappingProgress> mapping_;

@@ -9,6 +9,7 @@
 
 #include "modules/core/ids.hpp"
 #include "modules/core/json.hpp"
+#include "modules/diagnosis/finding.hpp"
 
 namespace km {
 
@@ -192,7 +193,10 @@ struct RunSummary {
   std::map<std::string, double> lost_peers;
   /// Robots that were heard, and for how long they had not been in one frame with this one [s].
   std::map<std::string, double> apart_peers;
+  /// Robots of another vocabulary, and how many of their keyframes could not be compared for it.
+  std::map<std::string, std::uint64_t> other_vocabulary;
   std::string exit_reason;
+  std::vector<Finding> findings;  ///< What stands out, the gravest first: see findings_of().
 
   void visit_fields(auto& visitor) {
     visitor.field("robot", robot);
@@ -212,7 +216,9 @@ struct RunSummary {
     visitor.field("seconds", seconds);
     visitor.field("lost_peers", lost_peers);
     visitor.field("apart_peers", apart_peers);
+    visitor.field("other_vocabulary", other_vocabulary);
     visitor.field("exit_reason", exit_reason);
+    visitor.field("findings", findings);
   }
   bool operator==(const RunSummary&) const = default;
 };

@@ -372,6 +372,7 @@ void Robot::add_records() {
   recorder_->record(topics_.closures);
   recorder_->record(topics_.outcomes);
   recorder_->record(topics_.restored_outcomes);
+  recorder_->record(topics_.place_queries);
   recorder_->record(topics_.own_inlier_sets);
   recorder_->record(topics_.peer_inlier_sets);
   recorder_->record(topics_.trajectory);

@@ -21,7 +21,10 @@ struct Filler {
   template <typename T>
   void field(const char* /*name*/, T& value) {
     const int number = next++;
-    if constexpr (requires { value.visit_fields(*this); })
+    if constexpr (std::is_same_v<T, std::vector<Finding>>)
+      value = {{"a.b", Severity::kWarning, "7 of 9", "x", "y"},
+               {"c.d", Severity::kNote, "8", "", ""}};
+    else if constexpr (requires { value.visit_fields(*this); })
       value.visit_fields(*this);
     else if constexpr (std::is_arithmetic_v<T>)
       value = static_cast<T>(std::is_floating_point_v<T> ? number / 7.0 : number);
@@ -77,7 +80,10 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/held_back/dropped/messages/x /held_back/dropped/bytes/x /process/cpu_s "
         "/process/peak_memory_bytes /process/memory_at_start_bytes "
         "/process/memory_at_end_bytes /process/memory_growth_bytes_per_minute "
-        "/seconds /lost_peers/x /apart_peers/x /exit_reason ");
+        "/seconds /lost_peers/x /apart_peers/x /other_vocabulary/x /exit_reason "
+        "/findings/0/id /findings/0/severity /findings/0/what /findings/0/means /findings/0/to_do "
+        "/findings/1/id /findings/1/severity /findings/1/what /findings/1/means "
+        "/findings/1/to_do ");
   const Json least = RunSummary{};
   CHECK_FALSE(least.contains("mapping"));  // what is absent has no key
   CHECK_FALSE(least.contains("cameras"));
@@ -104,6 +110,8 @@ TEST_CASE("A summary that is missing or broken is named, with the key", "[robot]
         {"7", "y.json: not a JSON object"},
         {R"({"closures": {"verified": "many"}})", "y.json: closures: verified: "},
         {R"({"pgo": []})", "y.json: pgo: not a JSON object"},
+        {R"({"findings": [{"severity": "bad"}]})", "findings: severity: bad"},
+        {R"({"findings": [7]})", "findings: "},
         {R"({"pgo": {"members": [1, "a"]}})", "members"}}) {
     CAPTURE(text);
     CHECK_THROWS_WITH(read_summary(folder.write("y.json", text)), Contains(words));

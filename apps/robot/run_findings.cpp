@@ -1,0 +1,294 @@
+#include "apps/robot/run_findings.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "modules/core/geometry.hpp"
+#include "modules/core/text_table.hpp"
+
+namespace km {
+namespace {
+
+using Names = std::map<RobotId, std::string>;
+using Tallies = std::map<std::pair<RobotId, RobotId>, ClosureTally>;
+
+std::string name_of(const Names& names, RobotId robot) {
+  const auto found = names.find(robot);
+  return found != names.end() && !found->second.empty() ? found->second
+                                                        : "robot " + std::to_string(robot);
+}
+
+std::string percent(double share) {
+  return fixed(100.0 * share, share < 0.1 ? 1 : 0) + " %";
+}
+
+// "matches do not agree on a pose" (300 of 412)
+std::string commonest(const std::map<std::string, std::uint64_t>& reasons, std::uint64_t of) {
+  const auto most = std::ranges::max_element(reasons, {}, [](const auto& r) { return r.second; });
+  return '"' + most->first + "\" (" + std::to_string(most->second) + " of " + std::to_string(of) +
+         ')';
+}
+
+// Why closures did not join two robots, and what follows.
+Finding why_apart(const ClosureTally& tally, const PcmConfig& pcm) {
+  Finding finding{.id = "team.not_joined", .severity = Severity::kWarning};
+  const std::string candidates = std::to_string(tally.candidates) + " candidates, ";
+  const std::string verified =
+      candidates + std::to_string(tally.verified) + " verified (see loop_closures.csv), ";
+  if (tally.candidates == 0) {
+    finding.what = "0 candidates: no place of one looks like a place of the other";
+    finding.means = "they were at different places, or the vocabulary does not tell these places";
+    finding.to_do = "let both see one place from about the same side";
+  } else if (tally.received == 0) {
+    finding.what = candidates + "of which no keyframe came for verification";
+    finding.means = "place recognition works, but the link or its budget did not carry keyframes";
+    finding.to_do = "see held_back in summary.json and dds in config.yaml, or run longer";
+  } else if (tally.verified == 0) {
+    finding.what = candidates + std::to_string(tally.received) +
+                   " compared, 0 verified (see loop_closures.csv)";
+    if (!tally.unmatched.empty())
+      finding.what += ", most of them: " + commonest(tally.unmatched, tally.received);
+    finding.means = "places look alike but are not the same, or are seen from too far apart";
+    finding.to_do = "let both see one place from about the same side, or check stereo calibration";
+  } else if (tally.rejected > 0 && tally.inliers == 0) {
+    finding.what = verified + std::to_string(tally.rejected) + " rejected by the optimiser, 0 kept";
+    finding.means = "closures contradict each other: of places that look alike, or by odometry";
+    finding.to_do = "check odometry of both, or pose_graph.barc";
+  } else if (pcm.selection == ClosureSelection::kPcm &&
+             tally.inliers < static_cast<std::uint64_t>(pcm.min_inliers)) {
+    finding.what = verified + std::to_string(tally.inliers) + " kept: below pcm.min_inliers " +
+                   std::to_string(pcm.min_inliers);
+    finding.means = "too few closures agree to trust them";
+    finding.to_do = "meet for longer, or lower pcm.min_inliers where places do not look alike";
+  } else if (tally.inliers == 0) {
+    finding.what = verified + "0 kept: no pcm.min_witnesses " + std::to_string(pcm.min_witnesses) +
+                   " that agree at different places";
+    finding.means = "too few closures agree to trust them";
+    finding.to_do = "meet at a second place, or run longer than pcm.witness_wait_s";
+  } else {
+    finding.what = verified + std::to_string(tally.inliers) + " kept: enough";
+    finding.means = "the run ended, or the link, before their pose graphs were one";
+    finding.to_do = "let the robots stay within reach after their input has ended (--serve-limit)";
+  }
+  return finding;
+}
+
+Finding not_joined(const std::string& a, const std::string& b, const ClosureTally& tally,
+                   const PcmConfig& pcm) {
+  Finding finding = why_apart(tally, pcm);
+  finding.what = a + " and " + b + " did not join: " + finding.what;
+  return finding;
+}
+
+// By pairs, whichever of both found them.
+Tallies tallies_of(std::span<const RunFacts> runs) {
+  Tallies tallies;
+  for (const RunFacts& run : runs)
+    for (const auto& [other, tally] : run.closures)
+      tallies[std::minmax(run.summary.robot, other)] += tally;
+  return tallies;
+}
+
+void add_apart(std::span<const RunFacts> runs, const Names& names, std::vector<Finding>& findings) {
+  const Tallies tallies = tallies_of(runs);
+  std::set<std::pair<RobotId, RobotId>> told;
+  for (const RunFacts& run : runs) {
+    const RobotId self = run.summary.robot;
+    const std::vector<RobotId>& members = run.summary.pgo.members;
+    for (const auto& [other, name] : names) {
+      if (other == self || std::ranges::find(members, other) != members.end()) continue;
+      const auto pair = std::minmax(self, other);
+      if (!told.insert(pair).second) continue;
+      const auto tally = tallies.find(pair);
+      findings.push_back(not_joined(name_of(names, pair.first), name_of(names, pair.second),
+                                    tally == tallies.end() ? ClosureTally{} : tally->second,
+                                    run.pcm));
+    }
+  }
+}
+
+void add_skipped(const RunSummary& run, std::vector<Finding>& findings) {
+  if (run.frames_skipped == 0) return;
+  const auto skipped = static_cast<double>(run.frames_skipped);
+  const double share = skipped / (skipped + static_cast<double>(run.frames));
+  constexpr double kFew = 0.01;
+  findings.push_back({.id = "frames.skipped",
+                      .severity = share < kFew ? Severity::kNote : Severity::kWarning,
+                      .what = run.name + ": " + std::to_string(run.frames_skipped) +
+                              " frames skipped, " + percent(share),
+                      .means = "odometry was too slow for the rate of the images",
+                      .to_do = "a lower --rate (max waits), tracker.max_features or "
+                               "vio.window_keyframes, or a faster computer"});
+}
+
+void add_rejected(const RunFacts& run, std::vector<Finding>& findings) {
+  ClosureTally all;
+  for (const auto& [other, tally] : run.closures) all += tally;
+  if (all.rejected == 0) return;
+  const double share = static_cast<double>(all.rejected) / static_cast<double>(all.verified);
+  constexpr double kMany = 0.3;
+  findings.push_back({.id = "closures.rejected",
+                      .severity = share < kMany ? Severity::kNote : Severity::kWarning,
+                      .what = run.summary.name + ": " + std::to_string(all.rejected) + " of " +
+                              std::to_string(all.verified) +
+                              " verified closures were rejected by the optimiser",
+                      .means = "the others contradict them: places that look alike, or odometry "
+                               "worse than its covariances say",
+                      .to_do = share < kMany ? "" : "check odometry; see loop_closures.csv"});
+}
+
+void add_cameras(const RunSummary& run, std::vector<Finding>& findings) {
+  if (!run.cameras) return;
+  const CamerasSummary& found = *run.cameras;
+  constexpr double kSure = 3.0;  // standard deviations
+  constexpr double kOffset_s = 2e-3, kLargeOffset_s = 1e-2, kRotation_rad = 8.7e-3;
+  if (std::abs(found.offset_s) > std::max(kOffset_s, kSure * found.offset_sigma_s))
+    findings.push_back({.id = "cameras.offset",
+                        .severity = std::abs(found.offset_s) < kLargeOffset_s ? Severity::kNote
+                                                                              : Severity::kWarning,
+                        .what = run.name + ": stamps of images are " +
+                                fixed(1e3 * found.offset_s, 1) + " ms (+- " +
+                                fixed(1e3 * found.offset_sigma_s, 1) +
+                                ") off those of the inertial sensor",
+                        .means = "it was estimated and made good, but for the start of the run",
+                        .to_do = "camera_time_offset_s in the rig file"});
+  const double rotation_rad =
+      Eigen::Vector3d(found.rotation_x_rad, found.rotation_y_rad, found.rotation_z_rad).norm();
+  if (rotation_rad > std::max(kRotation_rad, kSure * found.rotation_sigma_rad))
+    findings.push_back({.id = "cameras.turned",
+                        .severity = Severity::kWarning,
+                        .what = run.name + ": the cameras are turned by " +
+                                fixed(kDegrees * rotation_rad, 2) + " degrees (+- " +
+                                fixed(kDegrees * found.rotation_sigma_rad, 2) +
+                                ") against their calibration",
+                        .means = "it was estimated and made good, but not for the map",
+                        .to_do = "calibrate cameras and inertial sensor anew"});
+}
+
+void add_lost(const RunSummary& run, std::vector<Finding>& findings) {
+  for (const auto& [name, seconds] : run.lost_peers)
+    findings.push_back({.id = "link.lost",
+                        .severity = Severity::kWarning,
+                        .what = run.name + ": " + name + " had not been heard for " +
+                                fixed(seconds, 1) + " s at the end",
+                        .means = "it went out of reach or died: its last closures are missing",
+                        .to_do = "see its log; kimera_multi_doctor --network tells of the link"});
+}
+
+void add_vocabularies(const RunSummary& run, std::vector<Finding>& findings) {
+  for (const auto& [name, keyframes] : run.other_vocabulary)
+    findings.push_back({.id = "vocabulary.other",
+                        .severity = Severity::kError,
+                        .what = run.name + ": " + std::to_string(keyframes) + " keyframes of " +
+                                name + " are described by another vocabulary",
+                        .means = "none of them can be compared: these robots never join",
+                        .to_do = "the same run.vocabulary on all robots"});
+}
+
+void add_budget(const RunSummary& run, std::vector<Finding>& findings) {
+  if (!run.held_back) return;
+  const auto sum = [](const std::map<std::string, std::uint64_t>& by_category) {
+    std::uint64_t total = 0;
+    for (const auto& [category, count] : by_category) total += count;
+    return total;
+  };
+  const std::uint64_t delayed = sum(run.held_back->delayed.messages);
+  const std::uint64_t dropped = sum(run.held_back->dropped.messages);
+  if (delayed + dropped == 0) return;
+  findings.push_back(
+      {.id = "budget.held_back",
+       .severity = dropped == 0 ? Severity::kNote : Severity::kWarning,
+       .what = run.name + ": the budget delayed " + std::to_string(delayed) + " messages (" +
+               bytes_text(static_cast<double>(sum(run.held_back->delayed.bytes))) +
+               ") and dropped " + std::to_string(dropped) + " (" +
+               bytes_text(static_cast<double>(sum(run.held_back->dropped.bytes))) + ')',
+       .means = dropped == 0 ? "the others learned later" : "the others never learned of these",
+       .to_do = dropped == 0 ? "" : "raise budget.bytes_per_s or budget.bytes_per_run"});
+}
+
+void add_memory(const RunSummary& run, std::vector<Finding>& findings) {
+  const double growth = run.process.memory_growth_bytes_per_minute.value_or(0.0);
+  constexpr double kMuch = 20e6;
+  if (growth > kMuch)
+    findings.push_back(
+        {.id = "memory.grows",
+         .severity = Severity::kWarning,
+         .what = run.name + ": memory grows by " + bytes_text(growth) + " a minute, " +
+                 bytes_text(static_cast<double>(run.process.peak_memory_bytes)) + " at most so far",
+         .means = "a longer run may not fit",
+         .to_do = "semantic_mapping.max_blocks and window_m, or a map without "
+                  "labels (mapping.mode)"});
+}
+
+void add_map(const RunSummary& run, std::vector<Finding>& findings) {
+  if (!run.mapping) return;
+  if (run.mapping->blocks_refused > 0)
+    findings.push_back({.id = "map.full",
+                        .severity = Severity::kWarning,
+                        .what = run.name + ": " + std::to_string(run.mapping->blocks_refused) +
+                                " blocks did not fit into the map",
+                        .means = "the mesh has holes where they would be",
+                        .to_do = "raise semantic_mapping.max_blocks"});
+  const std::uint64_t skipped = run.mapping->skipped_too_late;
+  if (skipped > run.mapping->frames)
+    findings.push_back({.id = "map.frames_late",
+                        .severity = Severity::kWarning,
+                        .what = run.name + ": " + std::to_string(skipped) +
+                                " frames came too late for the map, " +
+                                std::to_string(run.mapping->frames) + " are in it",
+                        .means = "the map is sparser than mapping.rate_hz says",
+                        .to_do = "a lower mapping.rate_hz"});
+}
+
+}  // namespace
+
+void ClosureTally::add(ClosureStage stage, const std::string& reason) {
+  ++candidates;
+  received += stage >= ClosureStage::kReceived ? 1 : 0;
+  verified += stage >= ClosureStage::kVerified ? 1 : 0;
+  inliers += stage == ClosureStage::kInlier ? 1 : 0;
+  rejected += stage == ClosureStage::kVerified && reason == kRejectedByOptimiser ? 1 : 0;
+  if (stage == ClosureStage::kReceived) ++unmatched[reason];
+}
+
+ClosureTally& ClosureTally::operator+=(const ClosureTally& other) {
+  candidates += other.candidates;
+  received += other.received;
+  verified += other.verified;
+  inliers += other.inliers;
+  rejected += other.rejected;
+  for (const auto& [reason, count] : other.unmatched) unmatched[reason] += count;
+  return *this;
+}
+
+std::vector<Finding> findings_of(std::span<const RunFacts> runs) {
+  Names names;
+  for (const RunFacts& run : runs) names.insert(run.names.begin(), run.names.end());
+  for (const RunFacts& run : runs) names[run.summary.robot] = run.summary.name;
+  std::vector<Finding> findings;
+  add_apart(runs, names, findings);
+  for (const RunFacts& run : runs) {
+    add_vocabularies(run.summary, findings);
+    add_lost(run.summary, findings);
+    add_skipped(run.summary, findings);
+    add_rejected(run, findings);
+    add_cameras(run.summary, findings);
+    add_budget(run.summary, findings);
+    add_memory(run.summary, findings);
+    add_map(run.summary, findings);
+  }
+  sort_by_severity(findings);
+  return findings;
+}
+
+Finding failed_run(const std::string& reason) {
+  return {.id = kFailedRun,
+          .severity = Severity::kError,
+          .what = reason,
+          .means = "the results are incomplete or of no use",
+          .to_do = "see the log of the robot, and the exit codes in apps/robot/README.md"};
+}
+
+}  // namespace km

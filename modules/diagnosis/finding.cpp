@@ -1,0 +1,68 @@
+#include "modules/diagnosis/finding.hpp"
+
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+namespace km {
+namespace {
+
+constexpr std::array kSeverities = {Severity::kNote, Severity::kWarning, Severity::kError};
+
+Severity severity_of(const std::string& word) {
+  for (const Severity severity : kSeverities)
+    if (word == to_string(severity)) return severity;
+  throw std::runtime_error("severity: " + word + " is neither note, warning nor error");
+}
+
+}  // namespace
+
+const char* to_string(Severity severity) {
+  switch (severity) {
+    case Severity::kNote:
+      return "note";
+    case Severity::kWarning:
+      return "warning";
+    case Severity::kError:
+      return "error";
+  }
+  return "";
+}
+
+int exit_code_of(std::span<const Finding> findings) {
+  const auto gravest = std::ranges::max_element(findings, {}, &Finding::severity);
+  return gravest == findings.end() ? 0 : static_cast<int>(gravest->severity);
+}
+
+void sort_by_severity(std::vector<Finding>& findings) {
+  std::ranges::stable_sort(findings, std::ranges::greater{}, &Finding::severity);
+}
+
+std::string to_text(std::span<const Finding> findings) {
+  std::string text;
+  for (const Finding& finding : findings) {
+    text += std::string(to_string(finding.severity)) + ' ' + finding.id + ": " + finding.what;
+    text += "\n  means: " + finding.means + '\n';
+    if (!finding.to_do.empty()) text += "  to do: " + finding.to_do + '\n';
+  }
+  return text;
+}
+
+void to_json(Json& json, const Finding& finding) {
+  json = {{"id", finding.id},
+          {"severity", to_string(finding.severity)},
+          {"what", finding.what},
+          {"means", finding.means},
+          {"to_do", finding.to_do}};
+}
+
+void from_json(const Json& json, Finding& finding) {
+  finding.id = json.value("id", "");
+  finding.severity = severity_of(json.value("severity", to_string(Severity::kNote)));
+  finding.what = json.value("what", "");
+  finding.means = json.value("means", "");
+  finding.to_do = json.value("to_do", "");
+}
+
+}  // namespace km

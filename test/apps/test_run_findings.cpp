@@ -1,0 +1,161 @@
+#include <catch2/catch.hpp>
+
+#include "apps/robot/run_findings.hpp"
+
+namespace km {
+namespace {
+
+ClosureTally tally_of(std::uint64_t candidates, std::uint64_t received, std::uint64_t verified,
+                      std::uint64_t inliers) {
+  ClosureTally tally{.candidates = candidates,
+                     .received = received,
+                     .verified = verified,
+                     .inliers = inliers,
+                     .rejected = 0,
+                     .unmatched = {}};
+  if (received > verified) tally.unmatched["matches do not agree on a pose"] = received - verified;
+  return tally;
+}
+
+// A sound run of `robot`, whose team is robots 0 and 2; in one frame if `joined`.
+RunFacts run_of(RobotId robot, bool joined, const ClosureTally& with_other) {
+  RunFacts run;
+  run.summary.robot = robot;
+  run.summary.name = robot == 0 ? "alice" : "bob";
+  run.summary.frames = 500;
+  run.summary.pgo.members = joined ? std::vector<RobotId>{0, 2} : std::vector<RobotId>{robot};
+  run.closures[static_cast<RobotId>(2 - robot)] = with_other;
+  run.names = {{robot == 0 ? RobotId{2} : RobotId{0}, robot == 0 ? "bob" : "alice"}};
+  return run;
+}
+
+std::vector<Finding> findings_of_one(const RunFacts& run) {
+  return findings_of(std::span(&run, 1));
+}
+
+// The only finding of a run.
+Finding the_finding_of(const RunFacts& run) {
+  const std::vector<Finding> findings = findings_of_one(run);
+  REQUIRE(findings.size() == 1);
+  return findings.front();
+}
+
+}  // namespace
+
+TEST_CASE("Nothing stands out of runs of robots that joined", "[robot][findings]") {
+  const std::vector<RunFacts> team = {run_of(0, true, tally_of(400, 30, 10, 10)),
+                                      run_of(2, true, tally_of(300, 20, 5, 5))};
+  CHECK(findings_of(team).empty());
+}
+
+TEST_CASE("Why two robots did not join is one sentence with the counts of both",
+          "[robot][findings]") {
+  using Catch::Equals;
+  std::vector<RunFacts> team = {run_of(0, false, tally_of(400, 100, 30, 2)),
+                                run_of(2, false, tally_of(12, 5, 1, 0))};
+  for (RunFacts& run : team) run.pcm.selection = ClosureSelection::kPcm;
+  const auto findings = findings_of(team);
+  REQUIRE(findings.size() == 1);
+  CHECK(findings[0].id == "team.not_joined");
+  CHECK(findings[0].severity == Severity::kWarning);
+  CHECK_THAT(findings[0].what,
+             Equals("alice and bob did not join: 412 candidates, 31 verified (see "
+                    "loop_closures.csv), 2 kept: below pcm.min_inliers 3"));
+}
+
+TEST_CASE("Two robots did not join for the first stage that stopped their closures",
+          "[robot][findings]") {
+  const auto why = [](const ClosureTally& tally) {
+    const auto findings = findings_of_one(run_of(0, false, tally));
+    REQUIRE_FALSE(findings.empty());
+    CHECK(findings.front().id == "team.not_joined");
+    return findings.front().what;
+  };
+  using Catch::Contains;
+  CHECK_THAT(why({}), Contains("did not join: 0 candidates: no place of one looks like"));
+  CHECK_THAT(why(tally_of(9, 0, 0, 0)), Contains("9 candidates, of which no keyframe came"));
+  CHECK_THAT(why(tally_of(9, 7, 0, 0)),
+             Contains("9 candidates, 7 compared, 0 verified (see loop_closures.csv), most of them: "
+                      "\"matches do not agree on a pose\" (7 of 7)"));
+  CHECK_THAT(why(tally_of(9, 7, 1, 0)), Contains("1 verified (see loop_closures.csv), 0 kept: no "
+                                                 "pcm.min_witnesses 2 that agree"));
+  ClosureTally rejected = tally_of(9, 7, 3, 0);
+  rejected.rejected = 3;
+  CHECK_THAT(why(rejected), Contains("3 rejected by the optimiser, 0 kept"));
+  CHECK_THAT(why(tally_of(9, 7, 3, 3)), Contains("3 kept: enough"));
+}
+
+TEST_CASE("A tally counts the stages that a closure came through, and why it stopped",
+          "[robot][findings]") {
+  ClosureTally tally;
+  tally.add(ClosureStage::kCandidate, "not asked for");
+  tally.add(ClosureStage::kReceived, "too few inliers");
+  tally.add(ClosureStage::kVerified, kRejectedByOptimiser);
+  tally.add(ClosureStage::kVerified, "inconsistent with the other closures of the robot pair");
+  tally.add(ClosureStage::kInlier, "");
+  CHECK(tally.candidates == 5);
+  CHECK(tally.received == 4);
+  CHECK(tally.verified == 3);
+  CHECK(tally.inliers == 1);
+  CHECK(tally.rejected == 1);
+  CHECK(tally.unmatched == std::map<std::string, std::uint64_t>{{"too few inliers", 1}});
+}
+
+TEST_CASE("What stands out of a run is told with its number", "[robot][findings]") {
+  RunFacts run = run_of(0, true, tally_of(40, 30, 10, 10));
+  RunSummary& summary = run.summary;
+  const auto told = [&](const char* id, Severity severity, const char* number) {
+    const Finding finding = the_finding_of(run);
+    CHECK(finding.id == id);
+    CHECK(finding.severity == severity);
+    CHECK_THAT(finding.what, Catch::Contains(number));
+  };
+  SECTION("frames skipped") {
+    summary.frames_skipped = 500;
+    told("frames.skipped", Severity::kWarning, "500 frames skipped, 50 %");
+    summary.frames_skipped = 1;
+    told("frames.skipped", Severity::kNote, "1 frames skipped, 0.2 %");
+  }
+  SECTION("closures rejected") {
+    run.closures[2].rejected = 2;
+    told("closures.rejected", Severity::kNote, "2 of 10 verified");
+    run.closures[2].rejected = 5;
+    told("closures.rejected", Severity::kWarning, "5 of 10 verified");
+  }
+  SECTION("offset of the cameras") {
+    summary.cameras = CamerasSummary{.offset_s = 0.02, .offset_sigma_s = 0.001};
+    told("cameras.offset", Severity::kWarning, "20.0 ms (+- 1.0)");
+    summary.cameras->offset_s = -0.004;
+    told("cameras.offset", Severity::kNote, "-4.0 ms");
+    summary.cameras->offset_sigma_s = 0.002;  // it may be none
+    CHECK(findings_of_one(run).empty());
+  }
+  SECTION("cameras turned") {
+    summary.cameras = CamerasSummary{.rotation_y_rad = 0.0349, .rotation_sigma_rad = 0.001};
+    told("cameras.turned", Severity::kWarning, "2.00 degrees");
+  }
+  SECTION("a link lost") {
+    summary.lost_peers["bob"] = 31.25;
+    told("link.lost", Severity::kWarning, "bob had not been heard for 31.2 s");
+  }
+  SECTION("another vocabulary") {
+    summary.other_vocabulary["bob"] = 77;
+    told("vocabulary.other", Severity::kError, "77 keyframes of bob");
+  }
+  SECTION("held back") {
+    summary.held_back.emplace().delayed.messages["pgo"] = 12;
+    told("budget.held_back", Severity::kNote, "delayed 12 messages");
+    summary.held_back->dropped.messages["mesh"] = 3;
+    told("budget.held_back", Severity::kWarning, "dropped 3");
+  }
+  SECTION("memory") {
+    summary.process.memory_growth_bytes_per_minute = 30e6;
+    told("memory.grows", Severity::kWarning, "30.0 MB a minute");
+  }
+  SECTION("the map") {
+    summary.mapping.emplace().blocks_refused = 5;
+    told("map.full", Severity::kWarning, "5 blocks");
+  }
+}
+
+}  // namespace km

@@ -1,0 +1,54 @@
+#include <catch2/catch.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include "modules/diagnosis/finding.hpp"
+
+namespace km {
+namespace {
+
+Finding finding_of(const char* id, Severity severity) {
+  return {.id = id, .severity = severity, .what = "7 of 9", .means = "m", .to_do = "t"};
+}
+
+}  // namespace
+
+TEST_CASE("The exit code is that of the gravest finding", "[diagnosis]") {
+  std::vector<Finding> findings;
+  CHECK(exit_code_of(findings) == 0);
+  findings.push_back(finding_of("a", Severity::kNote));
+  CHECK(exit_code_of(findings) == 0);
+  findings.push_back(finding_of("b", Severity::kError));
+  findings.push_back(finding_of("c", Severity::kWarning));
+  CHECK(exit_code_of(findings) == 2);
+  CHECK(exit_code_of(std::span(findings).last(1)) == 1);
+}
+
+TEST_CASE("Findings are sorted by how grave they are, and keep their order", "[diagnosis]") {
+  std::vector<Finding> findings = {
+      finding_of("a", Severity::kNote), finding_of("b", Severity::kError),
+      finding_of("c", Severity::kNote), finding_of("d", Severity::kWarning),
+      finding_of("e", Severity::kError)};
+  sort_by_severity(findings);
+  std::string order;
+  for (const Finding& finding : findings) order += finding.id;
+  CHECK(order == "bedac");
+}
+
+TEST_CASE("A finding is three lines for people", "[diagnosis]") {
+  Finding finding = finding_of("stereo.swapped", Severity::kWarning);
+  CHECK(to_text({&finding, 1}) == "warning stereo.swapped: 7 of 9\n  means: m\n  to do: t\n");
+  finding.to_do.clear();
+  CHECK(to_text({&finding, 1}) == "warning stereo.swapped: 7 of 9\n  means: m\n");
+  CHECK(to_text({}).empty());
+}
+
+TEST_CASE("A finding is read from JSON as it was written", "[diagnosis]") {
+  const Finding finding = finding_of("a.b", Severity::kError);
+  CHECK(Json(finding).get<Finding>() == finding);
+  CHECK(Json(finding).dump() ==
+        R"({"id":"a.b","severity":"error","what":"7 of 9","means":"m","to_do":"t"})");
+  CHECK_THROWS_WITH((Json{{"severity", "fatal"}}.get<Finding>()), Catch::Contains("fatal"));
+}
+
+}  // namespace km
