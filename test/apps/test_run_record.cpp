@@ -37,6 +37,10 @@ TEST_CASE("what the optimiser rejects is no inlier, until it takes it back", "[r
   CHECK(outcomes[2].reason == "inconsistent with the other closures of the robot pair");
   CHECK(record.inlier_closures().size() == 1);
   CHECK(record.closures_per_peer().at(2).inliers == 1);
+  const ClosureTally tally = record.closure_tallies().at(2);
+  CHECK(tally.candidates == 3);
+  CHECK(tally.inliers == 1);
+  CHECK(tally.rejected == 1);
   CHECK(summary_of(record).closures == ClosureCounts{3, 3, 1});
 
   record.add(ClosureVerdicts{{{doubted, true}}});
@@ -44,6 +48,19 @@ TEST_CASE("what the optimiser rejects is no inlier, until it takes it back", "[r
   CHECK(outcomes[1].stage == ClosureStage::kInlier);
   CHECK(outcomes[1].reason.empty());
   CHECK(record.inlier_closures().size() == 2);
+}
+
+TEST_CASE("keyframes that another vocabulary keeps from being compared are counted", "[robot]") {
+  RunRecord record(1);
+  for (KeyframeIndex i = 0; i < 3; ++i)
+    record.add(PlaceQuery{{2, i}, PlaceQueryStatus::kOtherVocabulary, {}});
+  record.add(PlaceQuery{{2, 3}, PlaceQueryStatus::kSearched, {}});
+  record.add(PlaceQuery{{3, 0}, PlaceQueryStatus::kRepeated, {}});
+  CHECK(record.other_vocabulary() == std::map<RobotId, std::uint64_t>{{2, 3}});
+  PeerEvent event{PeerEventKind::kRestarted, {}, {}};
+  event.identity.robot = 2;
+  record.add(event);
+  CHECK(record.other_vocabulary().empty());
 }
 
 TEST_CASE("closures to one robot are recorded up to a bound", "[robot]") {

@@ -25,6 +25,7 @@ namespace fs = std::filesystem;
 // Modules an algorithm may use beside core and itself.
 const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"dense_sensing", {"images"}},
+    {"diagnosis", {"evaluation", "images", "place_recognition", "recordings", "sensors", "vio"}},
     {"loop_closure", {"images", "place_recognition"}},
     {"vio", {"images"}},
     {"pose_graph", {"outlier_rejection"}},

@@ -1,0 +1,32 @@
+#pragma once
+
+#include "modules/core/camera.hpp"
+#include "modules/diagnosis/examination.hpp"
+#include "modules/diagnosis/sensor_sample.hpp"
+#include "modules/sensors/dataset_reader.hpp"
+
+namespace km {
+
+// What a recording says of its sensors against what it shows. Each finding has a bound that sound
+// recordings keep by a wide margin; what the motion or the images do not tell gives no finding but
+// a figure that says so.
+
+/// Rates, gaps and what the reader had to skip. Ids: frames.rate, frames.gap, imu.rate, imu.gap,
+/// recording.no_frames, recording.<fault>.
+[[nodiscard]] Examination examine_streams(const SensorSample& sample, const ReaderReport& report);
+
+/// Exposure, blur, corners. Ids: images.dark, images.bright, images.blurred, images.few_corners.
+[[nodiscard]] Examination examine_images(const SensorSample& sample);
+
+/// Points in both images against the calibration of the pair (see StereoFit), and its baseline.
+/// Ids: stereo.swapped, stereo.inverted, stereo.inverted_cameras, stereo.inverted_left,
+/// stereo.inverted_right, stereo.exchanged_lenses, stereo.focal, stereo.epipolar, stereo.baseline.
+[[nodiscard]] Examination examine_stereo(const SensorSample& sample, const StereoRig& rig);
+
+/// Rotations of the gyroscope against those that images show (see InertialFit), and gravity. Ids:
+/// imu.gyro_in_degrees, imu.gyro_scale, imu.unrelated, imu.mirrored, imu.time_offset,
+/// extrinsics.inverted, extrinsics.rotation, camera.focal, imu.accel_in_g, imu.no_gravity,
+/// imu.gravity.
+[[nodiscard]] Examination examine_inertial(const SensorSample& sample, const StereoRig& rig);
+
+}  // namespace km

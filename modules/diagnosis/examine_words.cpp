@@ -1,0 +1,44 @@
+#include "modules/diagnosis/examine_words.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "modules/core/text_table.hpp"
+
+namespace km {
+
+Examination examine_words(std::span<const std::vector<OrbDescriptor>> images,
+                          const Vocabulary& vocabulary) {
+  std::map<std::uint32_t, double> counts;
+  double features = 0.0;
+  for (const std::vector<OrbDescriptor>& image : images)
+    for (const std::uint32_t word : vocabulary.words(image)) {
+      ++counts[word];
+      ++features;
+    }
+  constexpr double kEnough = 1000.0;
+  if (features < kEnough)
+    return {.figures = {{"vocabulary", "not told: " + fixed(features, 0) + " features"}},
+            .findings = {}};
+  double entropy = 0.0;
+  for (const auto& [word, count] : counts) entropy -= count / features * std::log(count / features);
+  const double words = std::exp(entropy);
+  const double most = std::min(features, static_cast<double>(vocabulary.size()));
+  Examination result;
+  result.figures.push_back({"vocabulary", fixed(words, 0) + " words tell " + fixed(features, 0) +
+                                              " features apart, of " +
+                                              std::to_string(vocabulary.size())});
+  constexpr double kLeastWords = 200.0, kLeastShare = 0.05;
+  if (words < kLeastWords || words < kLeastShare * most)
+    result.findings.push_back({.id = "vocabulary.coverage",
+                               .severity = Severity::kWarning,
+                               .what = "the vocabulary tells " + fixed(features, 0) +
+                                       " features apart by " + fixed(words, 0) + " words only",
+                               .means = "different places look alike: few or false candidates",
+                               .to_do = "train one on images like these "
+                                        "(kimera_multi_vocabulary train)"});
+  return result;
+}
+
+}  // namespace km

@@ -1,0 +1,145 @@
+#include "modules/diagnosis/image_rotation.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "modules/core/lie.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kMinBearings = 20;
+constexpr double kMinShare = 0.5;
+constexpr double kGate = 3.0;         // sigmas of an inlier
+constexpr double kFirstScale = 20.0;  // of the robust weight, in sigmas
+constexpr int kIterations = 15;
+
+using Vector5 = Eigen::Matrix<double, 5, 1>;
+using Matrix5 = Eigen::Matrix<double, 5, 5>;
+
+struct EpipolarState {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d t = Eigen::Vector3d::UnitX();
+};
+
+double weight_of(double residual, double scale) {
+  const double ratio = residual / scale;
+  const double w = 1.0 / (1.0 + ratio * ratio);
+  return w * w;
+}
+
+// Sampson distance [bearings] and what the constraint is divided by for it.
+struct Sampson {
+  double distance = 0.0, gradient = 1.0;
+};
+
+Sampson sampson(const EpipolarState& state, const BearingStep& step) {
+  const Eigen::Matrix3d E = skew(state.t) * state.R;
+  const Eigen::Vector3d line_from = E * step.to.homogeneous();
+  const Eigen::Vector3d line_to = E.transpose() * step.from.homogeneous();
+  const double gradient =
+      std::sqrt(line_from.head<2>().squaredNorm() + line_to.head<2>().squaredNorm());
+  if (gradient < 1e-9) return {};
+  return {step.from.homogeneous().dot(line_from) / gradient, gradient};
+}
+
+// Rotation that brings `to` onto `from` without any translation.
+Eigen::Matrix3d rotation_alone(std::span<const BearingStep> steps, double sigma) {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  double scale = kFirstScale * sigma;
+  for (int k = 0; k < kIterations; ++k, scale = std::max(scale * 0.8, kGate * sigma)) {
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d g = Eigen::Vector3d::Zero();
+    for (const BearingStep& step : steps) {
+      const Eigen::Vector3d from = step.from.homogeneous().normalized();
+      const Eigen::Vector3d turned = R * step.to.homogeneous().normalized();
+      const Eigen::Vector3d residual = turned - from;
+      const Eigen::Matrix3d J = -skew(turned);  // of R <- exp(x) R
+      const double w = weight_of(residual.norm(), scale);
+      H += w * J.transpose() * J;
+      g += w * J.transpose() * residual;
+    }
+    R = so3_exp(-H.ldlt().solve(g)) * R;
+  }
+  return R;
+}
+
+// t . (R to x from) = 0 for all points: the direction that fits best.
+Eigen::Vector3d best_direction(std::span<const BearingStep> steps, const Eigen::Matrix3d& R) {
+  Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
+  for (const BearingStep& step : steps) {
+    const Eigen::Vector3d normal =
+        (R * step.to.homogeneous().normalized()).cross(step.from.homogeneous().normalized());
+    M += normal * normal.transpose();
+  }
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(M).eigenvectors().col(0);
+}
+
+// Two directions that are orthogonal to t.
+Eigen::Matrix<double, 3, 2> tangents(const Eigen::Vector3d& t) {
+  const Eigen::Vector3d a = t.unitOrthogonal();
+  Eigen::Matrix<double, 3, 2> basis;
+  basis << a, t.cross(a);
+  return basis;
+}
+
+EpipolarState refined(std::span<const BearingStep> steps, EpipolarState state, double sigma) {
+  double scale = kFirstScale * sigma;
+  for (int k = 0; k < kIterations; ++k, scale = std::max(scale * 0.7, kGate * sigma)) {
+    Matrix5 H = Matrix5::Identity() * 1e-9;
+    Vector5 g = Vector5::Zero();
+    const Eigen::Matrix<double, 3, 2> basis = tangents(state.t);
+    for (const BearingStep& step : steps) {
+      const Sampson found = sampson(state, step);
+      const Eigen::Vector3d from = step.from.homogeneous();
+      const Eigen::Vector3d turned = state.R * step.to.homogeneous();
+      // from . (t x exp(x) turned), by x and by t.
+      Vector5 J;
+      J << turned.cross(from.cross(state.t)), basis.transpose() * turned.cross(from);
+      J /= found.gradient;
+      const double w = weight_of(found.distance, scale);
+      H += w * J * J.transpose();
+      g += w * J * found.distance;
+    }
+    const Vector5 x = -H.ldlt().solve(g);
+    state.R = so3_exp(x.head<3>()) * state.R;
+    state.t = (state.t + basis * x.tail<2>()).normalized();
+  }
+  return state;
+}
+
+double robust_cost(std::span<const BearingStep> steps, const EpipolarState& state, double sigma) {
+  double cost = 0.0;
+  for (const BearingStep& step : steps) {
+    const double ratio = sampson(state, step).distance / (kGate * sigma);
+    cost += ratio * ratio / (1.0 + ratio * ratio);
+  }
+  return cost;
+}
+
+}  // namespace
+
+std::optional<ImageRotation> rotation_between(std::span<const BearingStep> steps, double sigma) {
+  if (steps.size() < kMinBearings) return std::nullopt;
+  EpipolarState best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Eigen::Matrix3d& R :
+       {rotation_alone(steps, sigma), Eigen::Matrix3d(Eigen::Matrix3d::Identity())}) {
+    const EpipolarState state = refined(steps, {R, best_direction(steps, R)}, sigma);
+    const double cost = robust_cost(steps, state, sigma);
+    if (cost < least) best = state;
+    least = std::min(least, cost);
+  }
+  const auto inliers = std::ranges::count_if(steps, [&](const BearingStep& step) {
+    return std::abs(sampson(best, step).distance) < kGate * sigma;
+  });
+  const double share = static_cast<double>(inliers) / static_cast<double>(steps.size());
+  if (share < kMinShare || !best.R.allFinite()) return std::nullopt;
+  return ImageRotation{so3_log(best.R), share};
+}
+
+}  // namespace km

@@ -1,0 +1,164 @@
+#include "modules/diagnosis/sensor_sample.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "modules/evaluation/images/level_statistics.hpp"
+#include "modules/images/image_view.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kStereoPeriod_s = 0.5, kMinStep_s = 0.09, kMaxStep_s = 0.25;
+constexpr int kOrbFeatures = 800, kFastThreshold = 12;
+constexpr float kRatio = 0.8F;
+constexpr std::size_t kCorners = 200;
+constexpr double kReturns_px = 1.0;
+constexpr double kSaturatedLevel = 250.0, kStrongest = 0.99;
+
+struct OrbImage {
+  std::vector<cv::KeyPoint> keypoints;
+  cv::Mat descriptors;
+};
+
+OrbImage orb_of(const cv::Mat& image) {
+  OrbImage orb;
+  cv::ORB::create(kOrbFeatures)->detectAndCompute(image, {}, orb.keypoints, orb.descriptors);
+  return orb;
+}
+
+std::vector<OrbDescriptor> descriptors_of(const OrbImage& orb) {
+  std::vector<OrbDescriptor> descriptors(static_cast<std::size_t>(orb.descriptors.rows));
+  for (std::size_t i = 0; i < descriptors.size(); ++i)
+    std::memcpy(descriptors[i].data(), orb.descriptors.ptr(static_cast<int>(i)),
+                descriptors[i].size());
+  return descriptors;
+}
+
+// The best match of each row of `a`, where it is clearly better than the second; -1: none.
+std::vector<int> best_matches(const cv::Mat& a, const cv::Mat& b) {
+  std::vector<int> best(static_cast<std::size_t>(a.rows), -1);
+  if (a.rows == 0 || b.rows < 2) return best;
+  std::vector<std::vector<cv::DMatch>> nearest;
+  cv::BFMatcher(cv::NORM_HAMMING).knnMatch(a, b, nearest, 2);
+  for (std::size_t i = 0; i < nearest.size(); ++i)
+    if (nearest[i][0].distance < kRatio * nearest[i][1].distance) best[i] = nearest[i][0].trainIdx;
+  return best;
+}
+
+Eigen::Vector2d vector_of(const cv::Point2f& p) {
+  return {static_cast<double>(p.x), static_cast<double>(p.y)};
+}
+
+StereoMatches match(const OrbImage& left, const OrbImage& right) {
+  const std::vector<int> there = best_matches(left.descriptors, right.descriptors);
+  const std::vector<int> back = best_matches(right.descriptors, left.descriptors);
+  StereoMatches matches;
+  for (std::size_t i = 0; i < there.size(); ++i) {
+    const int j = there[i];
+    if (j < 0 || back[static_cast<std::size_t>(j)] != static_cast<int>(i)) continue;
+    matches.pairs.push_back({vector_of(left.keypoints[i].pt),
+                             vector_of(right.keypoints[static_cast<std::size_t>(j)].pt)});
+  }
+  return matches;
+}
+
+// Where the match that begins nearest went.
+cv::Point2f shift_near(const StereoMatches& matches, const cv::Point2f& point) {
+  const Eigen::Vector2d here = vector_of(point);
+  const auto nearest = std::ranges::min_element(
+      matches.pairs, {}, [&](const PixelPair& pair) { return (pair.a - here).squaredNorm(); });
+  const Eigen::Vector2f shift = (nearest->b - nearest->a).cast<float>();
+  return {shift.x(), shift.y()};
+}
+
+double strong_gradient(const cv::Mat& image) {
+  cv::Mat gradients = gradient_magnitude(image).reshape(0, 1).clone();
+  const auto at = static_cast<std::ptrdiff_t>(kStrongest * static_cast<double>(gradients.cols - 1));
+  auto* const first = gradients.ptr<float>();
+  std::nth_element(first, first + at, first + gradients.cols);
+  return static_cast<double>(first[at]);
+}
+
+ImageLook look_of(const cv::Mat& image) {
+  cv::Mat half;
+  cv::resize(image, half, {}, 0.5, 0.5, cv::INTER_AREA);
+  const double coarse = strong_gradient(half);
+  std::vector<cv::KeyPoint> corners;
+  cv::FAST(image, corners, kFastThreshold);
+  return {.mean_level = cv::mean(image)[0],
+          .saturated_share = cv::countNonZero(image >= kSaturatedLevel) /
+                             static_cast<double>(std::max<std::size_t>(image.total(), 1)),
+          .sharpness = coarse > 0.0 ? strong_gradient(image) / coarse
+                                    : std::numeric_limits<double>::quiet_NaN(),
+          .corners = corners.size()};
+}
+
+ImageSize size_of(const GrayImage& image) {
+  return {static_cast<std::uint32_t>(image.width), static_cast<std::uint32_t>(image.height)};
+}
+
+}  // namespace
+
+void SensorSampler::add(const SensorPacket& packet) {
+  for (const ImuSample& sample : packet.imu)
+    if (sample_.imu.empty() || sample.stamp > sample_.imu.back().stamp)
+      sample_.imu.push_back(sample);
+  const StereoFrame& frame = *packet.frame;
+  if (sample_.frames.empty()) {
+    sample_.left_size = size_of(frame.left);
+    sample_.right_size = size_of(frame.right);
+  }
+  sample_.frames.push_back(frame.stamp);
+  const cv::Mat left = view(frame.left);
+  add_stereo(frame, left);
+  add_step(frame, left);
+}
+
+void SensorSampler::add_step(const StereoFrame& frame, const cv::Mat& left) {
+  const double step_s = seconds_between(last_stamp_, frame.stamp);
+  const bool is_first = last_.image.empty();
+  if (!is_first && step_s < kMinStep_s) return;
+  KltImage image = make_klt_image(left);
+  if (!is_first && step_s <= kMaxStep_s) {
+    TrackedStep step{.from = last_stamp_, .to = frame.stamp, .points = {}};
+    const std::vector<RoundTrip> trips = round_trip(last_, image, corners_);
+    for (std::size_t i = 0; i < trips.size(); ++i)
+      if (trips[i].error_px < kReturns_px)
+        step.points.push_back({vector_of(corners_[i]), vector_of(trips[i].to), right_[i]});
+    sample_.steps.push_back(std::move(step));
+  }
+  begin_step(frame, std::move(image));
+}
+
+void SensorSampler::begin_step(const StereoFrame& frame, KltImage image) {
+  last_ = std::move(image);
+  last_stamp_ = frame.stamp;
+  corners_ = corners_of(last_.image);  // the strongest first
+  corners_.resize(std::min(corners_.size(), kCorners));
+  right_.assign(corners_.size(), std::nullopt);
+  if (sample_.stereo.empty() || sample_.stereo.back().pairs.empty()) return;
+  std::vector<cv::Point2f> starts;
+  for (const cv::Point2f& corner : corners_)
+    starts.push_back(corner + shift_near(sample_.stereo.back(), corner));
+  const std::vector<RoundTrip> trips =
+      round_trip(last_, make_klt_image(view(frame.right)), corners_, std::move(starts));
+  for (std::size_t i = 0; i < trips.size(); ++i)
+    if (trips[i].error_px < kReturns_px) right_[i] = vector_of(trips[i].to);
+}
+
+void SensorSampler::add_stereo(const StereoFrame& frame, const cv::Mat& left) {
+  const bool is_first = sample_.looks.empty();
+  if (!is_first && seconds_between(last_stereo_, frame.stamp) < kStereoPeriod_s) return;
+  last_stereo_ = frame.stamp;
+  if (sample_.looks.size() >= kMaxStereo) return;
+  sample_.looks.push_back(look_of(left));
+  const OrbImage orb = orb_of(left);
+  sample_.descriptors.push_back(descriptors_of(orb));
+  if (frame.right.width > 0) sample_.stereo.push_back(match(orb, orb_of(view(frame.right))));
+}
+
+}  // namespace km

@@ -1,0 +1,144 @@
+#include "modules/diagnosis/stereo_fit.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "modules/core/lie.hpp"
+#include "modules/evaluation/statistics.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kMinParallax_px = 1.5;  // less may have any sign
+constexpr double kClearGain = 0.15;      // of the share on_line
+constexpr double kFair = 0.5;            // share on_line of a calibration that may be right
+
+Camera with_pose_of(Camera camera, const SE3& T_body_cam) {
+  camera.T_body_cam = T_body_cam;
+  return camera;
+}
+
+StereoRig with_focal_ratio(StereoRig rig, double ratio) {
+  rig.cameras[1].fx *= ratio;
+  rig.cameras[1].fy *= ratio;
+  return rig;
+}
+
+std::vector<StereoMatches> swapped(std::span<const StereoMatches> images) {
+  std::vector<StereoMatches> result(images.begin(), images.end());
+  for (StereoMatches& matches : result)
+    for (PixelPair& pair : matches.pairs) std::swap(pair.a, pair.b);
+  return result;
+}
+
+// The ratio that fits best, of those within 20 %.
+StereoAlternative best_focal_ratio(std::span<const StereoMatches> images, const StereoRig& rig) {
+  constexpr int kSteps = 40;
+  constexpr double kStep = 0.005;
+  StereoAlternative best{.fault = StereoFault::kFocalLength, .focal_ratio = 1.0, .fit = {}};
+  for (int k = -kSteps; k <= kSteps; ++k) {
+    const double ratio = 1.0 + kStep * k;
+    const StereoFit fit = fit_of(images, with_focal_ratio(rig, ratio));
+    if (fit.on_line > best.fit.on_line) best = {StereoFault::kFocalLength, ratio, fit};
+  }
+  return best;
+}
+
+}  // namespace
+
+std::optional<StereoPoint> stereo_point(const StereoRig& rig, const SE3& T_right_left,
+                                        const PixelPair& pair) {
+  const auto left = rig.cameras[0].unproject(pair.a);
+  const auto right = rig.cameras[1].unproject(pair.b);
+  if (!left || !right) return std::nullopt;
+  const Eigen::Vector3d& t = T_right_left.translation();
+  const Eigen::Vector3d turned = T_right_left.linear() * left->homogeneous();
+  const Eigen::Vector3d seen = right->homogeneous();
+  if (turned.z() <= 0.0) return std::nullopt;
+  const Eigen::Vector3d line = skew(t) * turned;  // of the right image, on z = 1
+  const double length = line.head<2>().norm();
+  if (length < 1e-12) return std::nullopt;
+  const double focal_px = rig.cameras[1].fx;
+  // z_right * seen = z_left * turned + t, with the least squared distance.
+  Eigen::Matrix<double, 3, 2> A;
+  A << turned, -seen;
+  return StereoPoint{.left = *left,
+                     .error_px = focal_px * std::abs(line.dot(seen)) / length,
+                     .parallax_px = focal_px * (seen.head<2>() - turned.hnormalized()).norm(),
+                     .depth_m = A.colPivHouseholderQr().solve(-t).x()};
+}
+
+StereoFit fit_of(std::span<const StereoMatches> images, const StereoRig& rig) {
+  const SE3 T_right_left = rig.T_left_right().inverse();
+  StereoFit fit;
+  std::vector<double> errors_px, depths_m;
+  std::size_t on_line = 0, behind = 0;
+  for (const StereoMatches& image : images)
+    for (const PixelPair& pair : image.pairs) {
+      ++fit.points;
+      const auto point = stereo_point(rig, T_right_left, pair);
+      errors_px.push_back(point ? point->error_px : std::numeric_limits<double>::infinity());
+      if (!point || point->error_px > kOnLine_px) continue;
+      const bool is_behind = point->depth_m < 0.0 && point->parallax_px > kMinParallax_px;
+      ++(is_behind ? behind : on_line);
+      if (!is_behind && point->depth_m > 0.0) depths_m.push_back(point->depth_m);
+    }
+  const auto n = static_cast<double>(std::max<std::size_t>(fit.points, 1));
+  fit.on_line = static_cast<double>(on_line) / n;
+  fit.behind = static_cast<double>(behind) / n;
+  fit.error_px = quantile(std::move(errors_px), 0.5);
+  fit.depth_m = quantile(std::move(depths_m), 0.5);
+  return fit;
+}
+
+StereoRig undone(const StereoRig& rig, StereoFault fault) {
+  StereoRig result = rig;
+  Camera &left = result.cameras[0], &right = result.cameras[1];
+  switch (fault) {
+    case StereoFault::kInvertedPair:
+      right.T_body_cam = left.T_body_cam * rig.T_left_right().inverse();
+      break;
+    case StereoFault::kInvertedCameras:
+      left.T_body_cam = left.T_body_cam.inverse();
+      right.T_body_cam = right.T_body_cam.inverse();
+      break;
+    case StereoFault::kInvertedLeft:
+      left.T_body_cam = left.T_body_cam.inverse();
+      break;
+    case StereoFault::kInvertedRight:
+      right.T_body_cam = right.T_body_cam.inverse();
+      break;
+    case StereoFault::kExchangedLenses:
+      left = with_pose_of(rig.cameras[1], rig.cameras[0].T_body_cam);
+      right = with_pose_of(rig.cameras[0], rig.cameras[1].T_body_cam);
+      break;
+    case StereoFault::kNone:
+    case StereoFault::kSwappedImages:
+    case StereoFault::kFocalLength:
+      break;
+  }
+  return result;
+}
+
+StereoAlternative best_alternative(std::span<const StereoMatches> images, const StereoRig& rig) {
+  const StereoAlternative given{.fit = fit_of(images, rig)};
+  StereoAlternative best = given;
+  const auto consider = [&best](const StereoAlternative& alternative) {
+    if (alternative.fit.on_line > best.fit.on_line) best = alternative;
+  };
+  consider({.fault = StereoFault::kSwappedImages, .fit = fit_of(swapped(images), rig)});
+  for (const StereoFault fault :
+       {StereoFault::kInvertedPair, StereoFault::kInvertedCameras, StereoFault::kInvertedLeft,
+        StereoFault::kInvertedRight, StereoFault::kExchangedLenses})
+    consider({.fault = fault, .fit = fit_of(images, undone(rig, fault))});
+  // Of a calibration that is wrong altogether the focal length would make good some of it.
+  if (best.fit.on_line < given.fit.on_line + kClearGain) consider(best_focal_ratio(images, rig));
+  const bool is_clear =
+      best.fit.on_line > given.fit.on_line + kClearGain && best.fit.on_line > kFair;
+  return is_clear ? best : given;
+}
+
+}  // namespace km
