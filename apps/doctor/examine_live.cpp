@@ -1,0 +1,151 @@
+#include "apps/doctor/examine_live.hpp"
+
+#include <algorithm>
+#include <array>
+#include <memory>
+
+#include "modules/core/text_table.hpp"
+#include "modules/recordings/ros_messages.hpp"
+#include "modules/sensors/ros_image.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/dds/ros_subscription.hpp"
+
+namespace km {
+namespace {
+
+// "sensor_msgs::msg::dds_::Imu_" -> "sensor_msgs/msg/Imu"
+std::string ros_type(std::string name) {
+  const auto replace = [&name](const std::string& from, const std::string& to) {
+    for (std::size_t at = name.find(from); at != name.npos; at = name.find(from, at + to.size()))
+      name.replace(at, from.size(), to);
+  };
+  replace("::dds_::", "/");
+  replace("::", "/");
+  if (name.ends_with('_')) name.pop_back();
+  return name;
+}
+
+std::string last_name(const std::string& topic) {
+  return topic.substr(topic.rfind('/') + 1);
+}
+
+// Those of ROS that DDS has discovered so far.
+class PublisherList {
+ public:
+  explicit PublisherList(const RosNetwork& network)
+      : reader_(dds_create_reader(network.participant(), DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr,
+                                  nullptr),
+                "reader of the publications") {}
+
+  void take(std::vector<TopicPublisher>& publishers) {
+    std::array<void*, 1> sample{};
+    std::array<dds_sample_info_t, 1> info{};
+    while (dds_take(reader_.handle(), sample.data(), info.data(), 1, 1) == 1) {
+      const auto& found = *static_cast<const dds_builtintopic_endpoint_t*>(sample[0]);
+      const std::string topic = found.topic_name;
+      if (info[0].valid_data && topic.starts_with("rt/")) {
+        dds_reliability_kind_t reliability{};
+        dds_duration_t blocking{};
+        dds_qget_reliability(found.qos, &reliability, &blocking);
+        publishers.push_back(
+            {topic.substr(2), ros_type(found.type_name), reliability == DDS_RELIABILITY_RELIABLE});
+      }
+      dds_return_loan(reader_.handle(), sample.data(), 1);
+      sample = {};
+    }
+  }
+
+ private:
+  DdsEntity reader_;
+};
+
+std::vector<RosTopic> topics_of(const SensorTopicNames& names) {
+  constexpr int kDepth = 1000;
+  std::vector<RosTopic> topics;
+  for (const std::string& topic : {names.left, names.right, names.depth})
+    if (!topic.empty())
+      topics.push_back(
+          {topic, std::string(type_of_images(topic)), RosQos::kSensorData, kDepth / 100});
+  for (const std::string& topic : {names.imu, names.gyro, names.accel})
+    if (!topic.empty())
+      topics.push_back({topic, std::string(RosImu::kType), RosQos::kSensorData, kDepth});
+  if (!names.odometry.empty())
+    topics.push_back(
+        {names.odometry, std::string(RosOdometry::kType), RosQos::kSensorData, kDepth});
+  return topics;
+}
+
+// "sensor_msgs/Imu" and "sensor_msgs/msg/Imu" are one.
+std::string plain(const std::string& type) {
+  return type.substr(0, type.find('/')) + '/' + last_name(type);
+}
+
+Finding silent(const ListenedTopic& wanted, const std::vector<TopicPublisher>& publishers) {
+  Finding finding{.id = "live.silent", .severity = Severity::kError};
+  const auto same = std::ranges::find(publishers, wanted.topic, &TopicPublisher::topic);
+  const auto similar = std::ranges::find_if(publishers, [&](const TopicPublisher& other) {
+    return plain(other.type) == plain(wanted.type);
+  });
+  finding.what = "nothing on " + wanted.topic + " (" + wanted.type + ')';
+  finding.means = "the robot waits for it";
+  if (same != publishers.end() && plain(same->type) != plain(wanted.type)) {
+    finding.id = "live.other_type";
+    finding.what += ": its publisher sends " + same->type;
+    finding.to_do = "a topic of " + wanted.type + ": compressed images have /compressed at the end";
+  } else if (same != publishers.end()) {
+    finding.what += ", though somebody publishes it";
+    finding.to_do =
+        "see whether the driver has data; large images need net.core.rmem_max of "
+        "megabytes";
+  } else if (similar != publishers.end()) {
+    finding.id = "live.similar_name";
+    finding.what += ": nobody publishes it, but " + similar->topic + " is of that type";
+    finding.to_do = "name the topic in the rig file as the driver does";
+  } else {
+    finding.what += ": nobody publishes it";
+    finding.to_do = "start the driver; see ROS_DOMAIN_ID (ros.domain) and ros.interface";
+  }
+  return finding;
+}
+
+}  // namespace
+
+Examination examine_topics(const std::vector<ListenedTopic>& topics,
+                           const std::vector<TopicPublisher>& publishers, double listened_s,
+                           int domain) {
+  Examination result;
+  for (const ListenedTopic& topic : topics) {
+    result.figures.push_back({topic.topic, std::to_string(topic.messages) + " messages of " +
+                                               topic.type + " in " + fixed(listened_s, 1) + " s"});
+    if (topic.messages == 0) result.findings.push_back(silent(topic, publishers));
+  }
+  if (publishers.empty())
+    result.findings.insert(
+        result.findings.begin(),
+        {.id = "live.nobody",
+         .severity = Severity::kError,
+         .what = "nobody publishes anything on domain " + std::to_string(domain) + " of ROS",
+         .means = "drivers do not run, or on another domain or interface",
+         .to_do = "ROS_DOMAIN_ID of the drivers is ros.domain here; ros.interface, ros.peers"});
+  return result;
+}
+
+Examination examine_live_topics(const SensorTopicNames& names, const RosConfig& config,
+                                double listen_s, const TellProgress& tell) {
+  const auto network = std::make_shared<const RosNetwork>(config);
+  PublisherList list(*network);
+  RosSubscription subscription(network, topics_of(names));
+  std::vector<ListenedTopic> topics;
+  for (const RosTopic& topic : subscription.topics()) topics.push_back({topic.topic, topic.type});
+  const double start_s = steady_now_s();
+  subscription.give_up_after(listen_s);
+  while (const auto message = subscription.next()) {
+    tell("listening", (steady_now_s() - start_s) / listen_s);
+    ++topics[message->topic].messages;
+  }
+  std::vector<TopicPublisher> publishers;
+  list.take(publishers);
+  return examine_topics(topics, publishers, listen_s, config.domain);
+}
+
+}  // namespace km

@@ -1,0 +1,96 @@
+#include "apps/doctor/examine_recording.hpp"
+
+#include <atomic>
+#include <condition_variable>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <variant>
+
+#include "apps/robot/robot_input.hpp"
+#include "modules/core/input_file.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/diagnosis/examine_sensors.hpp"
+#include "modules/diagnosis/examine_words.hpp"
+#include "modules/place_recognition/vocabulary_file.hpp"
+#include "modules/sensors/rig_file_codec.hpp"
+#include "runtime/clock.hpp"
+
+namespace km {
+namespace {
+
+Examination refused(const std::string& why) {
+  return {.figures = {},
+          .findings = {{.id = "recording.refused",
+                        .severity = Severity::kError,
+                        .what = why,
+                        .means = "no robot can play it",
+                        .to_do = "as the line says; kimera_multi_robot --inspect shows what is in "
+                                 "it"}}};
+}
+
+// Ends a live reader in time, also while it waits for sensors that are silent.
+class Stopper {
+ public:
+  Stopper(DatasetReader& reader, double seconds)
+      : thread_([this, &reader, seconds](const std::stop_token& stop) {
+          std::unique_lock lock(mutex_);
+          ended_.wait_for(lock, stop, steady_duration(seconds), [] { return false; });
+          reader.stop();
+        }) {}
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable_any ended_;
+  std::jthread thread_;  // last member: stops first
+};
+
+SensorSample sample_of(DatasetReader& reader, double live_s, const TellProgress& tell) {
+  std::optional<Stopper> stopper;
+  if (live_s > 0.0) stopper.emplace(reader, live_s);
+  SensorSampler sampler;
+  const auto total = static_cast<double>(reader.pair_count());
+  for (double done = 0.0; const auto packet = reader.next(); ++done) {
+    tell("looking at images", total > 0.0 ? done / total : 0.0);
+    sampler.add(*packet);
+  }
+  return sampler.sample();
+}
+
+}  // namespace
+
+Examination examine_packets(DatasetReader& reader, const RobotConfig& config, double live_s,
+                            const TellProgress& tell) {
+  const SensorSample sample = sample_of(reader, live_s, tell);
+  tell("comparing", 0.0);
+  Examination result = examine_streams(sample, reader.report());
+  for (const std::string& remark : reader.remarks()) result.figures.push_back({"remark", remark});
+  if (sample.frames.empty()) return result;
+  const StereoRig& rig = reader.rig().stereo;
+  result.add(examine_images(sample));
+  result.add(examine_stereo(sample, rig));
+  result.add(examine_inertial(sample, rig));
+  result.add(
+      examine_words(sample.descriptors, load_vocabulary(find_shipped_file(config.run.vocabulary))));
+  sort_by_severity(result.findings);
+  return result;
+}
+
+Examination examine_recording(const RobotOptions& options, const RobotConfig& config, double live_s,
+                              const TellProgress& tell) try {
+  const std::optional<PartialRig> rig =
+      options.rig.empty() ? std::nullopt : std::optional(read_rig_file(options.rig));
+  const RobotInput input = open_robot_input(options, config, std::nullopt, rig);
+  return examine_packets(*std::get<std::unique_ptr<DatasetReader>>(input.source), config,
+                         options.is_live ? live_s : 0.0, tell);
+} catch (const DatasetError& error) {
+  return refused(error.what());
+} catch (const ConfigError& error) {
+  return refused(error.what());
+} catch (const InputFileError& error) {
+  return refused(error.what());
+}
+
+}  // namespace km

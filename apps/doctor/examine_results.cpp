@@ -1,0 +1,102 @@
+#include "apps/doctor/examine_results.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "apps/robot/robot_config.hpp"
+#include "apps/robot/run_findings.hpp"
+#include "modules/core/input_file.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/evaluation/closure_truth.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kSummary = "summary.json";
+
+std::vector<fs::path> robot_folders(const fs::path& folder) {
+  if (is_file(folder / kSummary)) return {folder};
+  std::vector<fs::path> found;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error))
+    if (is_file(entry->path() / kSummary)) found.push_back(entry->path());
+  std::ranges::sort(found);
+  return found;
+}
+
+// What another program may have left out, or a run that was cut short.
+Finding missing(const char* file, const std::string& why) {
+  return {.id = std::string("results.") + file,
+          .severity = Severity::kNote,
+          .what = why,
+          .means = "what it would tell is not looked at"};
+}
+
+std::map<RobotId, ClosureTally> tallies_in(const fs::path& folder, RobotId self) {
+  std::map<RobotId, ClosureTally> tallies;
+  for (const ClosureRecord& closure : read_closures(folder / "loop_closures.csv"))
+    tallies[closure.id.from.robot == self ? closure.id.to.robot : closure.id.from.robot].add(
+        closure.stage, closure.reason);
+  return tallies;
+}
+
+RunFacts facts_in(const fs::path& folder, std::vector<Finding>& findings) {
+  RunFacts facts{
+      .summary = read_summary(folder / kSummary), .closures = {}, .names = {}, .pcm = {}};
+  try {
+    facts.closures = tallies_in(folder, facts.summary.robot);
+  } catch (const ClosureFileError& error) {
+    findings.push_back(missing("loop_closures", error.what()));
+  }
+  try {
+    RobotOptions options;
+    options.configs = {folder / "config.yaml"};
+    facts.pcm = load_robot_config(options).pcm;
+  } catch (const ConfigError& error) {
+    findings.push_back(missing("config", error.what()));
+  }
+  for (const auto& [robot, tally] : facts.closures)
+    if (robot != facts.summary.robot) facts.names.emplace(robot, "");
+  return facts;
+}
+
+std::vector<Figure> figures_of(const RunFacts& facts) {
+  ClosureTally all;
+  for (const auto& [robot, tally] : facts.closures) all += tally;
+  const RunSummary& run = facts.summary;
+  return {{run.name, std::to_string(run.frames) + " frames, " + std::to_string(run.keyframes) +
+                         " keyframes, closures " + std::to_string(all.candidates) + " > " +
+                         std::to_string(all.verified) + " > " + std::to_string(all.inliers) +
+                         ", in one frame with " +
+                         std::to_string(run.pgo.members.empty() ? 0 : run.pgo.members.size() - 1) +
+                         ", " + fixed(run.seconds, 1) + " s: " + run.exit_reason}};
+}
+
+}  // namespace
+
+bool are_results(const fs::path& folder) {
+  return is_folder(folder) && !robot_folders(folder).empty();
+}
+
+Examination examine_results(const fs::path& folder) {
+  Examination result;
+  std::vector<RunFacts> runs;
+  for (const fs::path& robot : robot_folders(folder)) {
+    runs.push_back(facts_in(robot, result.findings));
+    for (const Figure& figure : figures_of(runs.back())) result.figures.push_back(figure);
+    for (const Finding& finding : runs.back().summary.findings)
+      if (finding.id == kFailedRun) result.findings.push_back(finding);
+  }
+  // A robot alone knew at its end whom it had heard; of a team all are known.
+  const bool is_alone = runs.size() == 1 && !runs.front().summary.findings.empty();
+  const std::vector<Finding> found = is_alone ? runs.front().summary.findings : findings_of(runs);
+  for (const Finding& finding : found)
+    if (!is_alone || finding.id != kFailedRun) result.findings.push_back(finding);
+  sort_by_severity(result.findings);
+  return result;
+}
+
+}  // namespace km

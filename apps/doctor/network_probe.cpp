@@ -1,0 +1,322 @@
+#include "apps/doctor/network_probe.hpp"
+
+#include <envelope.h>
+#include <net/if.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <random>
+#include <span>
+
+#include "apps/doctor/udp_socket.hpp"
+#include "modules/core/input_file.hpp"
+#include "modules/core/text_rows.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/dds/qos.hpp"
+#include "runtime/dds/robot_status.hpp"
+
+namespace km {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr const char* kGroup = "239.255.0.1";  // of DDS discovery (RTPS 2.5, Sec. 9.6.1.4)
+constexpr milliseconds kPatience{500};
+
+std::uint16_t discovery_port(int domain) {
+  return static_cast<std::uint16_t>(7400 + 250 * domain);
+}
+
+std::optional<int> mtu_of(const std::string& interface) {
+  ifreq request{};
+  std::strncpy(request.ifr_name, interface.c_str(), IFNAMSIZ - 1);
+  const DatagramSocket any = DatagramSocket::udp(0);
+  if (ioctl(any.handle(), SIOCGIFMTU, &request) != 0) return std::nullopt;
+  return request.ifr_mtu;
+}
+
+std::optional<long> largest_receive_buffer() {
+  try {
+    const std::string text = read_input_file("/proc/sys/net/core/rmem_max");
+    const auto bytes = parse_int64(std::string_view(text).substr(0, text.find('\n')));
+    return bytes ? std::optional(static_cast<long>(*bytes)) : std::nullopt;
+  } catch (const InputFileError&) {  // hidden in a container
+    return std::nullopt;
+  }
+}
+
+// Bytes that nobody else sends, and that DDS drops as none of its own.
+std::vector<std::uint8_t> own_bytes() {
+  std::vector<std::uint8_t> bytes = {'K', 'M', 'D', 'R'};
+  std::random_device device;
+  for (int k = 0; k < 12; ++k) bytes.push_back(static_cast<std::uint8_t>(device()));
+  return bytes;
+}
+
+// Why a datagram to `address` did not come back; it may be among others.
+std::optional<std::string> echo_to(DatagramSocket& socket, const std::string& address) {
+  const std::vector<std::uint8_t> bytes = own_bytes();
+  if (const auto problem = socket.send(address, socket.port(), bytes)) return problem;
+  const double end_s = steady_now_s() + 1e-3 * static_cast<double>(kPatience.count());
+  while (steady_now_s() < end_s)
+    if (const auto datagram = socket.receive(milliseconds(50));
+        datagram && datagram->bytes == bytes)
+      return std::nullopt;
+  return "an own datagram did not come back in " + std::to_string(kPatience.count()) + " ms";
+}
+
+std::optional<std::string> try_multicast(const DdsConfig& config, const NetworkInterface& chosen) {
+  if (!chosen.multicast && !chosen.loopback) return chosen.name + " is not capable of multicast";
+  DatagramSocket socket = DatagramSocket::udp(discovery_port(config.domain));
+  if (const auto problem = socket.join(kGroup, chosen.address)) return problem;
+  return echo_to(socket, kGroup);
+}
+
+std::optional<std::string> try_unicast(const NetworkInterface& chosen) {
+  DatagramSocket socket = DatagramSocket::udp(0);
+  return echo_to(socket, chosen.address);
+}
+
+// One announcement of each process.
+void keep(std::vector<Announced>& all, const Announced& one) {
+  const auto is_same = [&one](const Announced& other) {
+    return other.domain == one.domain && other.team == one.team && other.from == one.from &&
+           other.user_data == one.user_data;
+  };
+  if (std::ranges::none_of(all, is_same)) all.push_back(one);
+}
+
+// Hears what participants announce to all, whatever their domain and team.
+class DiscoveryListener {
+ public:
+  DiscoveryListener(const DdsConfig& config, const NetworkInterface& chosen) {
+    for (int domain = 0; domain <= std::max(config.domain, static_cast<int>(kLastQuietDomain));
+         ++domain) {
+      if (domain > static_cast<int>(kLastQuietDomain) && domain != config.domain) continue;
+      try {
+        DatagramSocket socket = DatagramSocket::udp(discovery_port(domain));
+        if (socket.join(kGroup, chosen.address)) continue;
+        sockets_.push_back(std::move(socket));
+        domains_.push_back(domain);
+      } catch (const std::system_error&) {  // another program's port: nothing of it can be heard
+      }
+    }
+  }
+
+  // All but `self`.
+  void listen(milliseconds patience, const Guid& self, std::vector<Announced>& heard) {
+    std::vector<pollfd> waiting;
+    for (const DatagramSocket& socket : sockets_)
+      waiting.push_back({.fd = socket.handle(), .events = POLLIN, .revents = 0});
+    if (poll(waiting.data(), waiting.size(), static_cast<int>(patience.count())) <= 0) return;
+    for (std::size_t k = 0; k < sockets_.size(); ++k) {
+      if (waiting[k].revents == 0) continue;
+      const auto datagram = sockets_[k].receive(milliseconds(0));
+      if (!datagram) continue;
+      const auto one = parse_announcement(datagram->bytes, domains_[k], datagram->from);
+      if (one && !std::ranges::equal(one->guid_prefix, std::span(self).first<12>()))
+        keep(heard, *one);
+    }
+  }
+
+ private:
+  std::vector<DatagramSocket> sockets_;
+  std::vector<int> domains_;
+};
+
+std::string user_data_of(const dds_qos_t* qos) {
+  void* data = nullptr;
+  std::size_t size = 0;
+  if (!dds_qget_userdata(qos, &data, &size) || data == nullptr) return {};
+  std::string result(static_cast<const char*>(data), size);
+  dds_free(data);
+  return result;
+}
+
+// Takes part in DDS discovery as any program may that is no robot: robots do not mind it.
+class Bystander {
+ public:
+  explicit Bystander(const DdsConfig& config)
+      : domain_(config),
+        participant_(
+            dds_create_participant(static_cast<dds_domainid_t>(config.domain), nullptr, nullptr),
+            "DDS participant"),
+        participants_(dds_create_reader(participant_.handle(), DDS_BUILTIN_TOPIC_DCPSPARTICIPANT,
+                                        nullptr, nullptr),
+                      "reader of the participants"),
+        topic_(dds_create_topic(participant_.handle(), &km_wire_Envelope_desc,
+                                Codec<RobotStatus>::kTopic, nullptr, nullptr),
+               "topic of statuses"),
+        statuses_(dds_create_reader(participant_.handle(), topic_.handle(),
+                                    make_reader_qos(TopicKind::kStatus, config).get(), nullptr),
+                  "reader of statuses") {}
+
+  [[nodiscard]] Guid guid() const {
+    dds_guid_t guid{};
+    check_dds(dds_get_guid(participant_.handle(), &guid), "cannot read the own identity");
+    return to_guid(guid);
+  }
+
+  // What DDS has heard so far.
+  void take(std::vector<Announced>& heard) {
+    for_each(participants_, [&](const dds_sample_info_t& info, const void* sample) {
+      const auto& found = *static_cast<const dds_builtintopic_participant_t*>(sample);
+      if (!info.valid_data) return;
+      Announced one{.guid_prefix = {},
+                    .domain = domain_.config().domain,
+                    .team = domain_.config().team,  // others are not heard
+                    .from = {},
+                    .user_data = user_data_of(found.qos),
+                    .identity = {}};
+      if (!claims_to_be_a_robot(one.user_data)) return;  // this one is among them
+      if (const auto announcement = parse_user_data(one.user_data).value) {
+        one.identity = announcement->identity;
+        of_participant_[info.instance_handle] = to_string(*one.identity);
+      }
+      keep(heard, one);
+    });
+  }
+
+  // Of each writer of statuses, the least that its stamps were ahead of the clock here.
+  void take_clocks() {
+    const double now_s = wall_now_s();
+    for_each(statuses_, [&](const dds_sample_info_t& info, const void* /*sample*/) {
+      if (!info.valid_data) return;
+      const double ahead_s = 1e-9 * static_cast<double>(info.source_timestamp) - now_s;
+      const auto [known, is_new] = ahead_s_.try_emplace(info.publication_handle, ahead_s);
+      if (!is_new) known->second = std::max(known->second, ahead_s);
+    });
+  }
+
+  [[nodiscard]] std::vector<ClockDifference> clocks() const {
+    std::vector<ClockDifference> clocks;
+    for (const auto& [writer, ahead_s] : ahead_s_) clocks.push_back({name_of(writer), ahead_s});
+    return clocks;
+  }
+
+ private:
+  static void for_each(const DdsEntity& reader, const auto& use) {
+    constexpr std::size_t kAtOnce = 16;
+    std::array<void*, kAtOnce> samples{};
+    std::array<dds_sample_info_t, kAtOnce> infos{};
+    for (std::size_t count = kAtOnce; count == kAtOnce;) {
+      count = static_cast<std::size_t>(
+          check_dds(dds_take(reader.handle(), samples.data(), infos.data(), kAtOnce, kAtOnce),
+                    "cannot take messages"));
+      for (std::size_t k = 0; k < count; ++k) use(infos[k], samples[k]);
+      dds_return_loan(reader.handle(), samples.data(), static_cast<std::int32_t>(count));
+      samples = {};
+    }
+  }
+
+  [[nodiscard]] std::string name_of(dds_instance_handle_t writer) const {
+    dds_builtintopic_endpoint_t* const endpoint =
+        dds_get_matched_publication_data(statuses_.handle(), writer);
+    if (endpoint == nullptr) return "a robot that is gone";
+    const auto participant = of_participant_.find(endpoint->participant_instance_handle);
+    dds_builtintopic_free_endpoint(endpoint);
+    return participant != of_participant_.end() ? participant->second : "a robot";
+  }
+
+  DdsDomain domain_;
+  DdsEntity participant_, participants_, topic_, statuses_;
+  std::map<dds_instance_handle_t, std::string> of_participant_;
+  std::map<dds_instance_handle_t, double> ahead_s_;
+};
+
+constexpr std::size_t kEchoes = 20;
+
+std::uint16_t checksum(const std::vector<std::uint8_t>& bytes) {
+  std::uint32_t sum = 0;
+  for (std::size_t k = 0; k + 1 < bytes.size(); k += 2)
+    sum += static_cast<std::uint32_t>(bytes[k] << 8U | bytes[k + 1]);
+  while (sum >> 16U != 0) sum = (sum & 0xffffU) + (sum >> 16U);
+  return static_cast<std::uint16_t>(~sum);
+}
+
+// RFC 792: type 8, code 0, checksum, identifier (the kernel's), sequence number.
+std::vector<std::uint8_t> echo_request(std::uint8_t number) {
+  std::vector<std::uint8_t> bytes(64, 0);
+  bytes[0] = 8;
+  bytes[7] = number;
+  const std::uint16_t sum = checksum(bytes);
+  bytes[2] = static_cast<std::uint8_t>(sum >> 8U);
+  bytes[3] = static_cast<std::uint8_t>(sum & 0xffU);
+  return bytes;
+}
+
+// One after the other, each waited for.
+PeerEcho ask(const std::string& host) {
+  PeerEcho echo{.host = host,
+                .median_s = std::numeric_limits<double>::quiet_NaN(),
+                .worst_s = std::numeric_limits<double>::quiet_NaN()};
+  const auto address = address_of(host);
+  auto socket = DatagramSocket::icmp();
+  echo.may_ask = socket.has_value();
+  if (!socket || !address) return echo;
+  std::vector<double> times_s;
+  for (; echo.sent < kEchoes; ++echo.sent) {
+    const double start_s = steady_now_s();
+    if (socket->send(*address, 0, echo_request(static_cast<std::uint8_t>(echo.sent)))) continue;
+    while (steady_now_s() - start_s < 0.5) {
+      const auto answer = socket->receive(milliseconds(100));
+      if (!answer || answer->bytes.size() < 8 || answer->bytes[0] != 0 ||
+          answer->bytes[7] != echo.sent)
+        continue;
+      times_s.push_back(steady_now_s() - start_s);
+      break;
+    }
+    if (times_s.empty() && echo.sent >= 3) return echo;  // nobody there: no need to wait on
+  }
+  echo.received = times_s.size();
+  if (times_s.empty()) return echo;
+  std::ranges::sort(times_s);
+  echo.median_s = times_s[times_s.size() / 2];
+  echo.worst_s = times_s.back();
+  return echo;
+}
+
+void listen(const DdsConfig& config, double listen_s, const TellProgress& tell,
+            NetworkFacts& facts) {
+  DiscoveryListener listener(config, *facts.chosen);
+  Bystander bystander(config);
+  const double start_s = steady_now_s();
+  while (steady_now_s() - start_s < listen_s) {
+    tell("listening", (steady_now_s() - start_s) / listen_s);
+    listener.listen(milliseconds(20), bystander.guid(), facts.announced);
+    bystander.take(facts.heard);
+    bystander.take_clocks();
+  }
+  facts.listened_s = listen_s;
+  facts.clocks = bystander.clocks();
+}
+
+}  // namespace
+
+NetworkFacts probe_network(const DdsConfig& config, double listen_s, const TellProgress& tell) {
+  NetworkFacts facts{.config = checked(config), .interfaces = network_interfaces()};
+  try {
+    facts.chosen = select_interface(facts.interfaces, config.interface);
+  } catch (const ConfigError& error) {
+    facts.no_interface = error.what();
+    return facts;
+  }
+  facts.mtu = mtu_of(facts.chosen->name);
+  facts.largest_receive_buffer = largest_receive_buffer();
+  facts.no_multicast = try_multicast(config, *facts.chosen);
+  facts.no_unicast = try_unicast(*facts.chosen);
+  for (const std::string& peer : config.peers) {
+    tell("asking " + peer, 0.0);
+    facts.echoes.push_back(ask(peer));
+  }
+  listen(config, listen_s, tell, facts);
+  return facts;
+}
+
+}  // namespace km

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace km {
+
+/// What a socket received.
+struct Datagram {
+  std::string from;  ///< Address, dotted.
+  std::vector<std::uint8_t> bytes;
+};
+
+/// An IPv4 socket for datagrams: UDP, or ICMP echoes. Not thread-safe.
+class DatagramSocket {
+ public:
+  /// UDP on `port` (0: any) of all addresses, shared with whoever listens there. Throws
+  /// std::system_error.
+  [[nodiscard]] static DatagramSocket udp(std::uint16_t port);
+  /// For ICMP echoes; nullopt if this user may not.
+  [[nodiscard]] static std::optional<DatagramSocket> icmp();
+  ~DatagramSocket();
+  DatagramSocket(DatagramSocket&& other) noexcept;
+  DatagramSocket& operator=(DatagramSocket&&) = delete;
+
+  [[nodiscard]] int handle() const { return socket_; }
+  [[nodiscard]] std::uint16_t port() const;
+
+  /// Receives what is sent to `group` on the interface with this address, and sends there through
+  /// it, itself included. Why not, if that fails.
+  [[nodiscard]] std::optional<std::string> join(const std::string& group,
+                                                const std::string& interface_address);
+
+  /// Why it could not be sent, if so.
+  [[nodiscard]] std::optional<std::string> send(const std::string& address, std::uint16_t port,
+                                                const std::vector<std::uint8_t>& bytes);
+
+  /// The next datagram, waited for as long; nullopt without one.
+  [[nodiscard]] std::optional<Datagram> receive(std::chrono::milliseconds patience);
+
+ private:
+  explicit DatagramSocket(int socket) : socket_(socket) {}
+  int socket_;
+};
+
+/// Address of a host, dotted, by its name or address, with or without ":port"; nullopt if unknown.
+[[nodiscard]] std::optional<std::string> address_of(const std::string& host);
+
+}  // namespace km

@@ -1,0 +1,155 @@
+#include <catch2/catch.hpp>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <string>
+
+#include "modules/core/json.hpp"
+#include "test/support/command.hpp"
+#include "test/support/network.hpp"
+#include "test/support/process.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kDoctor = KM_BIN_DIR "/kimera_multi_doctor";
+
+// The first seconds of MH_01 with files of their own, the images but links.
+class SmallHall {
+ public:
+  explicit SmallHall(const fs::path& recording) : mav0_(folder.path() / "mav0") {
+    const fs::path source = fs::absolute(recording) / "mav0";
+    for (const std::string sensor : {"cam0", "cam1", "imu0"}) {
+      fs::create_directories(mav0_ / sensor);
+      for (const char* file : {"sensor.yaml", "data.csv"})
+        fs::copy_file(source / sensor / file, mav0_ / sensor / file);
+      if (sensor != "imu0")
+        fs::create_directory_symlink(source / sensor / "data", mav0_ / sensor / "data");
+    }
+  }
+  // The doctor on it; "id id " in the order of its JSON.
+  [[nodiscard]] std::string ids(int expected_exit_code) const {
+    const CommandResult run =
+        run_command(kDoctor + ' ' + folder.path().string() + " --to 5 --json " +
+                    (folder.path() / "out.json").string());
+    INFO(run.output);
+    CHECK(run.exit_code == expected_exit_code);
+    const Json told = read_json(folder.path() / "out.json");
+    std::string ids;
+    for (const auto& finding : told["findings"]) ids += finding["id"].get<std::string>() + ' ';
+    return ids;
+  }
+
+  TemporaryFolder folder;
+  fs::path mav0_;
+};
+
+}  // namespace
+
+TEST_CASE("The doctor finds a recording sound, or names its fault", "[doctor]") {
+  const auto data = shared_data("euroc/MH_01_easy");
+  if (!data) return;
+  const SmallHall hall(*data);
+  SECTION("sound") {
+    CHECK(hall.ids(0).empty());
+  }
+  SECTION("the cameras' images swapped") {
+    for (const char* file : {"data", "data.csv"}) {
+      fs::rename(hall.mav0_ / "cam0" / file, hall.mav0_ / "aside");
+      fs::rename(hall.mav0_ / "cam1" / file, hall.mav0_ / "cam0" / file);
+      fs::rename(hall.mav0_ / "aside", hall.mav0_ / "cam1" / file);
+    }
+    CHECK(hall.ids(2) == "stereo.swapped ");
+  }
+  SECTION("every tenth right image missing") {
+    std::ifstream all(hall.mav0_ / "cam1/data.csv");
+    std::string rows, row;
+    for (int k = 0; std::getline(all, row); ++k)
+      if (k % 10 != 5) rows += row + '\n';
+    std::ofstream(hall.mav0_ / "cam1/data.csv") << rows;
+    CHECK(hall.ids(1) == "recording.left_images_without_a_right_one ");
+  }
+  SECTION("no right image at all") {
+    fs::remove(hall.mav0_ / "cam1/data");
+    fs::create_directories(hall.mav0_ / "cam1/data");
+    CHECK_THAT(hall.ids(2), Catch::StartsWith("recording."));
+  }
+}
+
+TEST_CASE("The doctor's exit code is 2 for what it cannot use, with a line that says why",
+          "[doctor]") {
+  const TemporaryFolder folder;
+  const CommandResult empty = run_command(kDoctor + ' ' + folder.path().string());
+  CHECK(empty.exit_code == 2);
+  CHECK_THAT(empty.output, Catch::Contains("recording.refused"));
+  for (const char* options :
+       {"", "--live x.yaml", ". --network", "/nowhere", ". --from 5 --to 2"}) {
+    CAPTURE(options);
+    CHECK(run_command(kDoctor + ' ' + options).exit_code == 2);
+  }
+  CHECK(run_command(kDoctor + " --help").exit_code == 0);
+}
+
+TEST_CASE("The doctor listens to the topics of a rig file, and looks at what they show",
+          "[doctor]") {
+  const auto data = shared_data("euroc/MH_01_easy");
+  if (!data) return;
+  const TemporaryFolder folder;
+  const std::string domain = std::to_string(std::random_device()() % 90);
+  const Process driver({KM_BIN_DIR "/kimera_multi_publish", data->string(), "--domain", domain,
+                        "--interface", "lo"});
+  const auto ids = [&](const std::string& left) {
+    const fs::path rig = folder.write(
+        "rig.yaml", "left: {topic: " + left + "}\nright: {topic: /cam1/image_raw}\n" +
+                        "imu: {topic: /imu0}\ncalibration: " + fs::absolute(*data).string() + "\n");
+    const fs::path out = folder.path() / "out.json";
+    const CommandResult run =
+        run_command(kDoctor + " --live " + rig.string() + " --seconds 4 --set ros.interface=lo" +
+                    " --set ros.domain=" + domain + " --json " + out.string());
+    INFO(run.output);
+    REQUIRE(fs::exists(out));
+    const Json told = read_json(out);
+    std::string found;
+    for (const auto& finding : told["findings"]) found += finding["id"].get<std::string>() + ' ';
+    return found;
+  };
+  CHECK(ids("/left/image_raw") == "live.similar_name ");
+  // A host that is busy loses images: frames.* and recording.* may be there.
+  const std::string sound = ids("/cam0/image_raw");
+  for (const char* part : {"live.", "stereo.", "extrinsics.", "imu."}) {
+    CAPTURE(sound, part);
+    CHECK(sound.find(part) == sound.npos);
+  }
+}
+
+TEST_CASE("The doctor finds that multicast does not pass", "[doctor]") {
+  if (!VirtualNetwork::available()) return;
+  const VirtualNetwork network(1);
+  const auto look = [&](const std::string& out) {
+    Process doctor({kDoctor, "--network", "--domain", "17", "--seconds", "1", "--json", out},
+                   network.host(1));
+    return doctor.wait();
+  };
+  const TemporaryFolder folder;
+  const std::string out = (folder.path() / "out.json").string();
+  const auto ids = [&] {
+    const Json told = read_json(out);
+    std::string found;
+    for (const auto& finding : told["findings"])
+      if (finding["severity"] != "note") found += finding["id"].get<std::string>() + ' ';
+    return found;
+  };
+  CHECK(look(out) == 0);
+  CHECK(ids().empty());
+  REQUIRE(Process({"ip", "link", "set", "eth0", "multicast", "off"}, network.host(1)).wait() == 0);
+  CHECK(look(out) == 2);
+  CHECK(ids() == "network.multicast ");
+}
+
+}  // namespace km

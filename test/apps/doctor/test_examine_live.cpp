@@ -1,0 +1,48 @@
+#include <catch2/catch.hpp>
+
+#include "apps/doctor/examine_live.hpp"
+
+namespace km {
+namespace {
+
+constexpr const char* kImage = "sensor_msgs/msg/Image";
+constexpr const char* kImu = "sensor_msgs/msg/Imu";
+
+Finding the_finding(const Examination& result) {
+  REQUIRE(result.findings.size() == 1);
+  return result.findings[0];
+}
+
+}  // namespace
+
+TEST_CASE("Live topics that are heard are sound", "[doctor]") {
+  const std::vector<TopicPublisher> publishers = {{"/left", kImage, true}, {"/imu", kImu, false}};
+  const auto result =
+      examine_topics({{"/left", kImage, 60}, {"/imu", kImu, 600}}, publishers, 3.0, 0);
+  CHECK(result.findings.empty());
+  CHECK_THAT(to_text(result.figures),
+             Catch::Contains("60 messages of sensor_msgs/msg/Image in 3.0"));
+}
+
+TEST_CASE("Why a live topic is silent is told from who publishes", "[doctor]") {
+  using Catch::Contains;
+  const std::vector<ListenedTopic> wanted = {{"/left", kImage, 0}};
+  const auto why = [&](const std::vector<TopicPublisher>& publishers) {
+    return the_finding(examine_topics(wanted, publishers, 3.0, 0));
+  };
+  CHECK(why({{"/imu", kImu, false}}).id == "live.silent");
+  CHECK_THAT(why({{"/imu", kImu, false}}).what, Contains("nobody publishes it"));
+  CHECK_THAT(why({{"/left", kImage, true}}).what, Contains("though somebody publishes it"));
+  CHECK(why({{"/left", "sensor_msgs/msg/CompressedImage", true}}).id == "live.other_type");
+  CHECK(why({{"/cam/left", "sensor_msgs/Image", true}}).id == "live.similar_name");
+  CHECK_THAT(why({{"/cam/left", kImage, true}}).what, Contains("/cam/left is of that type"));
+}
+
+TEST_CASE("That nobody publishes at all is said once, first", "[doctor]") {
+  const auto result = examine_topics({{"/left", kImage, 0}, {"/imu", kImu, 0}}, {}, 3.0, 7);
+  REQUIRE(result.findings.size() == 3);
+  CHECK(result.findings[0].id == "live.nobody");
+  CHECK_THAT(result.findings[0].what, Catch::Contains("domain 7"));
+}
+
+}  // namespace km
