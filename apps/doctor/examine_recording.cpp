@@ -66,7 +66,11 @@ Examination examine_packets(DatasetReader& reader, const RobotConfig& config, do
   const SensorSample sample = sample_of(reader, live_s, tell);
   tell("comparing", 0.0);
   Examination result = examine_streams(sample, reader.report());
-  for (const std::string& remark : reader.remarks()) result.figures.push_back({"remark", remark});
+  for (const std::string& remark : reader.remarks())
+    result.findings.push_back({.id = "recording.remark",
+                               .severity = Severity::kNote,
+                               .what = remark,
+                               .means = "it is read like this"});
   if (sample.frames.empty()) return result;
   const StereoRig& rig = reader.rig().stereo;
   result.add(examine_images(sample));

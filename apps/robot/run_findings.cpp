@@ -32,12 +32,16 @@ std::string commonest(const std::map<std::string, std::uint64_t>& reasons, std::
 }
 
 // Why closures did not join two robots, and what follows.
-Finding why_apart(const ClosureTally& tally, const PcmConfig& pcm) {
+Finding why_apart(const ClosureTally& tally, const PcmConfig& pcm, bool has_one_vocabulary) {
   Finding finding{.id = "team.not_joined", .severity = Severity::kWarning};
   const std::string candidates = std::to_string(tally.candidates) + " candidates, ";
   const std::string verified =
       candidates + std::to_string(tally.verified) + " verified (see loop_closures.csv), ";
-  if (tally.candidates == 0) {
+  if (tally.candidates == 0 && !has_one_vocabulary) {
+    finding.what = "0 candidates: their keyframes are described by different vocabularies";
+    finding.means = "none of them can be compared";
+    finding.to_do = "the same run.vocabulary on all robots";
+  } else if (tally.candidates == 0) {
     finding.what = "0 candidates: no place of one looks like a place of the other";
     finding.means = "they were at different places, or the vocabulary does not tell these places";
     finding.to_do = "let both see one place from about the same side";
@@ -76,8 +80,8 @@ Finding why_apart(const ClosureTally& tally, const PcmConfig& pcm) {
 }
 
 Finding not_joined(const std::string& a, const std::string& b, const ClosureTally& tally,
-                   const PcmConfig& pcm) {
-  Finding finding = why_apart(tally, pcm);
+                   const PcmConfig& pcm, bool has_one_vocabulary) {
+  Finding finding = why_apart(tally, pcm, has_one_vocabulary);
   finding.what = a + " and " + b + " did not join: " + finding.what;
   return finding;
 }
@@ -104,7 +108,7 @@ void add_apart(std::span<const RunFacts> runs, const Names& names, std::vector<F
       const auto tally = tallies.find(pair);
       findings.push_back(not_joined(name_of(names, pair.first), name_of(names, pair.second),
                                     tally == tallies.end() ? ClosureTally{} : tally->second,
-                                    run.pcm));
+                                    run.pcm, !run.summary.other_vocabulary.contains(name)));
     }
   }
 }

@@ -149,7 +149,7 @@ void examine_pair(const StereoAlternative& found, const StereoFit& given, Examin
   if (!is_named && is_sound(given)) return;
   const FaultWords words = words_of(found.fault);
   std::string what = std::string(words.what) + ": " + fit_text(given);
-  if (is_named) what += "; otherwise " + percent(found.fit.on_line);
+  if (is_named) what += "; with that undone " + percent(found.fit.on_line);
   if (found.fault == StereoFault::kFocalLength)
     what += " with the right one times " + fixed(found.focal_ratio, 3);
   result.findings.push_back({.id = words.id,
@@ -163,16 +163,17 @@ void examine_pair(const StereoAlternative& found, const StereoFit& given, Examin
 void examine_baseline(const StereoRig& rig, const StereoFit& fit, Examination& result) {
   constexpr double kLeast_m = 0.02, kMost_m = 1.5;
   const double baseline_m = rig.baseline_m();
-  result.figures.push_back({"baseline", fixed(baseline_m, 3) + " m, points at a median of " +
-                                            fixed(fit.depth_m, 1) +
-                                            " m by it (images do not tell its length)"});
+  const std::string depth = std::isfinite(fit.depth_m)
+                                ? "points at a median of " + fixed(fit.depth_m, 1) + " m by it"
+                                : "no depth by it";
+  result.figures.push_back(
+      {"baseline", fixed(baseline_m, 3) + " m, " + depth + " (images do not tell its length)"});
   if (baseline_m < kLeast_m || baseline_m > kMost_m)
     result.findings.push_back({.id = "stereo.baseline",
                                .severity = Severity::kWarning,
-                               .what = "a baseline of " + fixed(baseline_m, 4) +
+                               .what = "a baseline of " + rounded(baseline_m, 4) +
                                        " m, where robots have " + fixed(kLeast_m, 2) + " to " +
-                                       fixed(kMost_m, 1) + " m; points are at a median of " +
-                                       fixed(fit.depth_m, 2) + " m by it",
+                                       fixed(kMost_m, 1) + " m; " + depth,
                                .means = "all lengths are wrong by the same factor if its unit is",
                                .to_do = "metres, not millimetres or inches"});
 }

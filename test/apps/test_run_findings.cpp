@@ -73,6 +73,11 @@ TEST_CASE("Two robots did not join for the first stage that stopped their closur
   };
   using Catch::Contains;
   CHECK_THAT(why({}), Contains("did not join: 0 candidates: no place of one looks like"));
+  RunFacts other = run_of(0, false, {});
+  other.summary.other_vocabulary["bob"] = 77;
+  const auto findings = findings_of_one(other);
+  REQUIRE(findings.size() == 2);
+  CHECK_THAT(findings[1].what, Contains("0 candidates: their keyframes are described by diff"));
   CHECK_THAT(why(tally_of(9, 0, 0, 0)), Contains("9 candidates, of which no keyframe came"));
   CHECK_THAT(why(tally_of(9, 7, 0, 0)),
              Contains("9 candidates, 7 compared, 0 verified (see loop_closures.csv), most of them: "

@@ -68,6 +68,15 @@ TEST_CASE("Robots that saw different places are said to have no candidate", "[do
   CHECK_THAT(result.findings[0].what, Catch::Contains("alice and bob did not join: 0 candidates"));
 }
 
+TEST_CASE("The doctor says why candidates came to nothing, commas and all", "[doctor]") {
+  const Results results;
+  results.folder.write(
+      "alice/loop_closures.csv",
+      std::string(kHeader) + "0,1,1,2,0.5,received,40,0,,,,,,,,\"no pose, too few inliers\"\n");
+  CHECK_THAT(to_text(examine_results(results.folder.path()).findings),
+             Catch::Contains("most of them: \"no pose, too few inliers\" (1 of 1)"));
+}
+
 TEST_CASE("Of a robot alone the findings are those of its end", "[doctor]") {
   const Results results;
   RunSummary summary = read_summary(results.folder.path() / "alice/summary.json");

@@ -210,14 +210,28 @@ TEST_CASE("V1_01 in flight: of images a second apart only what lies between is f
   CHECK(found_in(recorded) == Ids{"frames.rate", "frames.gap"});
 }
 
-TEST_CASE("Nothing is found wrong with the world of the demo", "[diagnosis]") {
+TEST_CASE("Nothing is found wrong with the world of the demo, and what is planted is named",
+          "[diagnosis]") {
   const fs::path world = "results/demo/world";
   if (!fs::exists(world)) {
     std::cout << "SKIPPED: no " << world << "; apps/demo makes it\n";
     return;
   }
-  const Recorded recorded = read(world / "robot0", 12.0);
-  CHECK(found_in(recorded) == Ids{});
+  const Recorded sound = read(world / "robot0", 12.0);
+  CHECK(found_in(sound) == Ids{});
+  Recorded late = sound;
+  for (ImuSample& measured : late.sample.imu) measured.stamp += 20'000'000;
+  CHECK(found_in(late) == Ids{"imu.time_offset"});
+  Recorded in_degrees = sound;
+  rotate_gyro(in_degrees.sample, [](Eigen::Vector3d& gyro) { gyro *= kDegrees; });
+  CHECK(found_in(in_degrees) == Ids{"imu.gyro_in_degrees"});
+  Recorded swapped = sound;
+  for (StereoMatches& image : swapped.sample.stereo)
+    for (PixelPair& pair : image.pairs) std::swap(pair.a, pair.b);
+  CHECK(found_in(swapped) == Ids{"stereo.swapped"});
+  Recorded inverted = sound;
+  inverted.rig.stereo = undone(sound.rig.stereo, StereoFault::kInvertedCameras);
+  CHECK(found_in(inverted) == Ids{"stereo.inverted_cameras", "extrinsics.inverted"});
 }
 
 }  // namespace km
