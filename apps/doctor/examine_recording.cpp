@@ -84,10 +84,12 @@ Examination examine_packets(DatasetReader& reader, const RobotConfig& config, do
 
 Examination examine_recording(const RobotOptions& options, const RobotConfig& config, double live_s,
                               const TellProgress& tell) try {
-  const std::optional<PartialRig> rig =
-      options.rig.empty() ? std::nullopt : std::optional(read_rig_file(options.rig));
-  const RobotInput input = open_robot_input(options, config, std::nullopt, rig);
-  return examine_packets(*std::get<std::unique_ptr<DatasetReader>>(input.source), config,
+  const auto input = [&] {
+    SignalWatch signals;  // while live topics are to complete the calibration
+    return open_robot_input(options, config, std::nullopt, read_rig_input(options), signals);
+  }();
+  if (!input) return refused("interrupted before the calibration was complete");
+  return examine_packets(*std::get<std::unique_ptr<DatasetReader>>(input->source), config,
                          options.is_live ? live_s : 0.0, tell);
 } catch (const DatasetError& error) {
   return refused(error.what());
