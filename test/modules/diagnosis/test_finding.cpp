@@ -40,7 +40,7 @@ TEST_CASE("A finding is three lines for people", "[diagnosis]") {
   CHECK(to_text({&finding, 1}) == "warning stereo.swapped: 7 of 9\n  means: m\n  to do: t\n");
   finding.to_do.clear();
   CHECK(to_text({&finding, 1}) == "warning stereo.swapped: 7 of 9\n  means: m\n");
-  CHECK(to_text({}).empty());
+  CHECK(to_text(std::span<const Finding>()).empty());
 }
 
 TEST_CASE("A finding is read from JSON as it was written", "[diagnosis]") {
