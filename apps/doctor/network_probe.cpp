@@ -240,15 +240,20 @@ std::uint16_t checksum(const std::vector<std::uint8_t>& bytes) {
   return static_cast<std::uint16_t>(~sum);
 }
 
-// RFC 792: type 8, code 0, checksum, identifier (the kernel's), sequence number.
-std::vector<std::uint8_t> echo_request(std::uint8_t number) {
-  std::vector<std::uint8_t> bytes(64, 0);
+// RFC 792: type 8, code 0, checksum, identifier and sequence number, and what comes back: `data`.
+std::vector<std::uint8_t> echo_request(const std::vector<std::uint8_t>& data) {
+  std::vector<std::uint8_t> bytes(8, 0);
   bytes[0] = 8;
-  bytes[7] = number;
+  bytes.insert(bytes.end(), data.begin(), data.end());
   const std::uint16_t sum = checksum(bytes);
   bytes[2] = static_cast<std::uint8_t>(sum >> 8U);
   bytes[3] = static_cast<std::uint8_t>(sum & 0xffU);
   return bytes;
+}
+
+bool is_echo(const std::vector<std::uint8_t>& bytes, const std::vector<std::uint8_t>& data) {
+  return bytes.size() == 8 + data.size() && bytes[0] == 0 &&
+         std::equal(data.begin(), data.end(), bytes.begin() + 8);
 }
 
 // One after the other, each waited for.
@@ -262,13 +267,12 @@ PeerEcho ask(const std::string& host) {
   if (!socket || !address) return echo;
   std::vector<double> times_s;
   for (; echo.sent < kEchoes; ++echo.sent) {
+    const std::vector<std::uint8_t> data = own_bytes();
     const double start_s = steady_now_s();
-    if (socket->send(*address, 0, echo_request(static_cast<std::uint8_t>(echo.sent)))) continue;
+    if (socket->send(*address, 0, echo_request(data))) continue;
     while (steady_now_s() - start_s < 0.5) {
       const auto answer = socket->receive(milliseconds(100));
-      if (!answer || answer->bytes.size() < 8 || answer->bytes[0] != 0 ||
-          answer->bytes[7] != echo.sent)
-        continue;
+      if (!answer || !is_echo(answer->bytes, data)) continue;
       times_s.push_back(steady_now_s() - start_s);
       break;
     }

@@ -7,6 +7,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -62,6 +63,8 @@ DatagramSocket DatagramSocket::udp(std::uint16_t port) {
 std::optional<DatagramSocket> DatagramSocket::icmp() {
   const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, IPPROTO_ICMP);
   if (socket >= 0) return DatagramSocket(socket);
+  const int raw = ::socket(AF_INET, SOCK_RAW | SOCK_CLOEXEC, IPPROTO_ICMP);
+  if (raw >= 0) return DatagramSocket(raw, true);
   return std::nullopt;
 }
 
@@ -70,7 +73,7 @@ DatagramSocket::~DatagramSocket() {
 }
 
 DatagramSocket::DatagramSocket(DatagramSocket&& other) noexcept
-    : socket_(std::exchange(other.socket_, -1)) {}
+    : socket_(std::exchange(other.socket_, -1)), has_ip_header_(other.has_ip_header_) {}
 
 std::uint16_t DatagramSocket::port() const {
   sockaddr_in own{};
@@ -108,6 +111,11 @@ std::optional<Datagram> DatagramSocket::receive(std::chrono::milliseconds patien
                               reinterpret_cast<sockaddr*>(&from), &size);
   if (count < 0) return std::nullopt;
   bytes.resize(static_cast<std::size_t>(count));
+  if (has_ip_header_ && !bytes.empty()) {
+    const std::size_t words = bytes[0] & 0x0fU;  // RFC 791, Sec. 3.1: IHL, of 4 bytes
+    bytes.erase(bytes.begin(),
+                bytes.begin() + std::min(std::ptrdiff_t(bytes.size()), std::ptrdiff_t(4 * words)));
+  }
   return Datagram{dotted(from.sin_addr), std::move(bytes)};
 }
 

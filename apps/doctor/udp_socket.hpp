@@ -42,8 +42,10 @@ class DatagramSocket {
   [[nodiscard]] std::optional<Datagram> receive(std::chrono::milliseconds patience);
 
  private:
-  explicit DatagramSocket(int socket) : socket_(socket) {}
+  explicit DatagramSocket(int socket, bool has_ip_header = false)
+      : socket_(socket), has_ip_header_(has_ip_header) {}
   int socket_;
+  bool has_ip_header_;  // before what is received
 };
 
 /// Address of a host, dotted, by its name or address, with or without ":port"; nullopt if unknown.

@@ -128,28 +128,64 @@ TEST_CASE("The doctor listens to the topics of a rig file, and looks at what the
   }
 }
 
+namespace {
+
+// The doctor on the network of a host.
+class Look {
+ public:
+  Look(const VirtualNetwork& network, std::vector<std::string> options) {
+    const TemporaryFolder folder;
+    const std::string out = (folder.path() / "out.json").string();
+    std::vector<std::string> command = {kDoctor,     "--network", "--domain", "17",
+                                        "--seconds", "1",         "--json",   out};
+    command.insert(command.end(), options.begin(), options.end());
+    exit_code_ = Process(command, network.host(1)).wait();
+    told_ = read_json(out);
+  }
+  [[nodiscard]] int exit_code() const { return exit_code_; }
+  // Of warnings and errors.
+  [[nodiscard]] std::string ids() const {
+    std::string found;
+    for (const auto& finding : told_["findings"])
+      if (finding["severity"] != "note") found += finding["id"].get<std::string>() + ' ';
+    return found;
+  }
+  [[nodiscard]] std::string figure(const std::string& name) const {
+    for (const auto& figure : told_["figures"])
+      if (figure["name"] == name) return figure["value"];
+    return "";
+  }
+
+ private:
+  int exit_code_ = -1;
+  Json told_;
+};
+
+}  // namespace
+
 TEST_CASE("The doctor finds that multicast does not pass", "[doctor]") {
   if (!VirtualNetwork::available()) return;
   const VirtualNetwork network(1);
-  const auto look = [&](const std::string& out) {
-    Process doctor({kDoctor, "--network", "--domain", "17", "--seconds", "1", "--json", out},
-                   network.host(1));
-    return doctor.wait();
-  };
-  const TemporaryFolder folder;
-  const std::string out = (folder.path() / "out.json").string();
-  const auto ids = [&] {
-    const Json told = read_json(out);
-    std::string found;
-    for (const auto& finding : told["findings"])
-      if (finding["severity"] != "note") found += finding["id"].get<std::string>() + ' ';
-    return found;
-  };
-  CHECK(look(out) == 0);
-  CHECK(ids().empty());
+  const Look sound(network, {});
+  CHECK(sound.exit_code() == 0);
+  CHECK(sound.ids().empty());
   REQUIRE(Process({"ip", "link", "set", "eth0", "multicast", "off"}, network.host(1)).wait() == 0);
-  CHECK(look(out) == 2);
-  CHECK(ids() == "network.multicast ");
+  const Look look(network, {});
+  CHECK(look.exit_code() == 2);
+  CHECK(look.ids() == "network.multicast ");
+}
+
+TEST_CASE("The doctor finds that a peer is out of reach, or that no robot runs there", "[doctor]") {
+  if (!VirtualNetwork::available()) return;
+  VirtualNetwork network(2);
+  const std::string peer = VirtualNetwork::address(2);
+  const Look reached(network, {"--peers", peer});
+  CHECK(reached.ids() == "network.nobody ");
+  CHECK_THAT(reached.figure("peer " + peer), Catch::Contains("0 of 20 lost"));
+  network.set_link(2, false);
+  const Look lost(network, {"--peers", peer});
+  CHECK(lost.exit_code() == 1);
+  CHECK_THAT(lost.ids(), Catch::Contains("network.unreachable"));
 }
 
 }  // namespace km
