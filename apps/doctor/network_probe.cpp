@@ -62,7 +62,7 @@ std::vector<std::uint8_t> own_bytes() {
 // Why a datagram to `address` did not come back; it may be among others.
 std::optional<std::string> echo_to(DatagramSocket& socket, const std::string& address) {
   const std::vector<std::uint8_t> bytes = own_bytes();
-  if (const auto problem = socket.send(address, socket.port(), bytes)) return problem;
+  if (auto problem = socket.send(address, socket.port(), bytes)) return problem;
   const double end_s = steady_now_s() + 1e-3 * static_cast<double>(kPatience.count());
   while (steady_now_s() < end_s)
     if (const auto datagram = socket.receive(milliseconds(50));
@@ -74,7 +74,7 @@ std::optional<std::string> echo_to(DatagramSocket& socket, const std::string& ad
 std::optional<std::string> try_multicast(const DdsConfig& config, const NetworkInterface& chosen) {
   if (!chosen.multicast && !chosen.loopback) return chosen.name + " is not capable of multicast";
   DatagramSocket socket = DatagramSocket::udp(discovery_port(config.domain));
-  if (const auto problem = socket.join(kGroup, chosen.address)) return problem;
+  if (auto problem = socket.join(kGroup, chosen.address)) return problem;
   return echo_to(socket, kGroup);
 }
 
