@@ -17,8 +17,7 @@ class GyroNoiseScale {
   /// Over `dt_s` between two images the estimate turns by `difference_rad` from what the samples
   /// say, which are uncertain by `variance_rad2`, the sum over three axes, if noise is as assumed.
   void add(double difference_rad, double variance_rad2, double dt_s) {
-    const double misfit =
-        std::min(difference_rad * difference_rad / variance_rad2, kMost * kMost);
+    const double misfit = std::min(difference_rad * difference_rad / variance_rad2, kMost * kMost);
     misfit_ += std::min(dt_s / kMemory_s, 1.0) * (misfit - misfit_);
   }
 

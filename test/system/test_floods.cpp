@@ -413,7 +413,9 @@ TEST_CASE("A flood from one robot costs a robot little, and the others next to n
           "[floods]") {
   log::set_level(log::Level::kError);
   print_head();
-  for (const Flood& flood : all_floods()) DYNAMIC_SECTION(flood.name) { check(flood); }
+  for (const Flood& flood : all_floods()) DYNAMIC_SECTION(flood.name) {
+      check(flood);
+    }
 }
 
 TEST_CASE("A flood of places costs little, too", "[floods]") {
