@@ -23,8 +23,9 @@ const timeline = new Timeline(
 let changed = true, chartsChanged = true, caughtUp = false, live = false;
 let pointed = null;  // where the pointer is in the scene
 let camera = null;   // robot whose images are shown
-const waiting = [];  // when what came was told, until it is shown [ms since 1970]
-const delays = [];   // from told to shown [ms]
+let waiting = [];    // what has come and is not in the scene
+let showing = [];    // what is, and has not been drawn
+const delays = [];   // {kind, ms}: from told to drawn
 
 // ---- what comes
 
@@ -44,7 +45,7 @@ const connection = new Connection({
       setLink(live ? 'live' : 'finished run', live ? 'good' : '');
     } else {
       model.add(message);
-      if (caughtUp && waiting.length < 10000) waiting.push(message.told);
+      if (caughtUp && timeline.follows) waiting.push(message);
     }
     changed = chartsChanged = true;
   },
@@ -76,6 +77,8 @@ function show() {
   if (timeline.follows) timeline.time = model.end;
   model.seek(timeline.time);
   scene.update(model);
+  showing.push(...waiting);
+  waiting = [];
   const counts = countClosures();
   panels.updateCards(model);
   panels.mark(scene.follows, camera);
@@ -110,13 +113,14 @@ function tick(now) {
   }
 }
 requestAnimationFrame(tick);
-// What was told is shown once the scene is drawn with it.
 scene.onDrawn = () => {
-  if (scene.building) return;
-  drawLegend();
-  if (changed) return;
+  if (!scene.building) drawLegend();
   const now = Date.now();
-  for (const told of waiting.splice(0)) delays.push(now - told);
+  showing = showing.filter(({kind, told}) => {
+    if (kind === 'mesh' && scene.building) return true;
+    delays.push({kind, ms: now - told});
+    return false;
+  });
   if (delays.length > 20000) delays.splice(0, 10000);
 };
 
