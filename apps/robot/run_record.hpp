@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "apps/robot/run_findings.hpp"
+#include "modules/core/closure_verdicts.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/core/stamped_pose.hpp"
@@ -20,7 +21,6 @@
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/place_recognition/candidate_filter.hpp"
-#include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/vio/camera_calibration.hpp"
 #include "modules/vio/vio_statistics.hpp"

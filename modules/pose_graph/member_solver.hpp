@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "modules/core/closure_verdicts.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/pose_graph/noise_histogram.hpp"
 
 namespace km {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/pose_graph/closure_verdicts.hpp"
+#include "modules/core/closure_verdicts.hpp"
 #include "modules/pose_graph/own_graph.hpp"
 #include "modules/pose_graph/pose_graph_config.hpp"
 #include "modules/pose_graph/relay.hpp"

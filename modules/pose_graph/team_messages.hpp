@@ -10,11 +10,11 @@
 #include <variant>
 #include <vector>
 
+#include "modules/core/closure_verdicts.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/core/precision.hpp"
 #include "modules/core/robot_identity.hpp"
-#include "modules/pose_graph/closure_verdicts.hpp"
 #include "modules/pose_graph/pgo_method.hpp"
 
 namespace km {
