@@ -13,8 +13,9 @@
 namespace km {
 namespace {
 
-// Of the small ones: what comes in a minute or more, the time after which silence ends a match.
-constexpr int kKept = 2000;
+// Updates that not all readers have acknowledged. Who watches is gone after ViewListener's lease
+// without a word: in that time fewer come.
+constexpr int kKept = 10000;
 // Of those that arrived and nobody has taken.
 constexpr int kMostUntaken = 20000;
 
@@ -30,16 +31,20 @@ const char* name_of(ViewChannel channel) {
   return "view_images";
 }
 
+// A volatile update would be lost if it overtook the discovery of its writer. So the last one is
+// kept, and comes first to who is new.
 DdsQos view_qos() {
   DdsQos qos = make_dds_qos();
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
-  dds_qset_durability(qos.get(), DDS_DURABILITY_VOLATILE);
+  dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+  dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, 1, DDS_LENGTH_UNLIMITED,
+                              DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   return qos;
 }
 
 DdsQos writer_qos(ViewChannel channel) {
   DdsQos qos = view_qos();
-  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, channel == ViewChannel::kView ? kKept : 1);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, channel == ViewChannel::kImages ? 1 : kKept);
   dds_qset_writer_data_lifecycle(qos.get(), false);
   return qos;
 }
@@ -57,14 +62,6 @@ DdsQos partition(ViewChannel channel, RobotId robot) {
   if (channel == ViewChannel::kImages)
     dds_qset_partition1(qos.get(), std::to_string(robot).c_str());
   return qos;
-}
-
-MessageKey key_of(const ViewContent& content) {
-  const auto* chunk = std::get_if<MeshChunk>(&content);
-  if (chunk == nullptr) return 0;
-  const auto number = [](std::int32_t c) { return static_cast<std::uint32_t>(c); };
-  const auto& [x, y, z] = chunk->key.cell;
-  return message_key({number(x), number(y), number(z), chunk->key.part});
 }
 
 Stamp system_now() {
@@ -124,13 +121,12 @@ std::size_t ViewWriter::newcomers() {
 std::size_t ViewWriter::write(const ViewContent& content) {
   std::vector<std::uint8_t> bytes = encode_view(content);
   km_wire_ViewUpdate wire{};
-  wire.key = key_of(content);
   wire.robot = self_.robot;
   wire.boot = self_.boot;
   wire.told = system_now();
   borrow(wire.content, bytes);
   check_dds(dds_write(writer_.handle(), &wire), std::string("cannot tell ") + name_of(channel_));
-  constexpr std::size_t kHead = 4 + 40;  // encoding header, the fields before the content
+  constexpr std::size_t kHead = 4 + 28;  // encoding header, the fields before the content
   return bytes.size() + kHead;
 }
 

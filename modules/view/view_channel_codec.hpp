@@ -13,11 +13,11 @@
 
 namespace km {
 
-/// The DDS topics on which robots tell those who watch. All are reliable, without a past for those
-/// who come late, and keep so little that no writer waits for a reader.
+/// The DDS topics on which robots tell those who watch. All are reliable, keep no past but the last
+/// update, and so little for slow readers that no writer waits for them.
 enum class ViewChannel {
   kView,    ///< All that is small.
-  kMesh,    ///< Pieces of the mesh: of each the newest.
+  kMesh,    ///< Pieces of the mesh.
   kImages,  ///< The newest image. In the partition of its robot's id: to read it is to ask for it.
 };
 

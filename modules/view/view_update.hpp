@@ -43,9 +43,9 @@ struct ViewState {
   double gradient_norm = 0.0;
   double cpu_s = 0.0;  ///< Of all threads, since the start.
   double resident_MB = 0.0;
-  std::vector<ViewLink> links;
-  std::vector<ViewNumber> sent_bytes;  ///< By kind, since the start.
-  std::vector<ViewNumber> loads;       ///< Of modules: share of the time that they are busy.
+  std::vector<ViewLink> links = {};
+  std::vector<ViewNumber> sent_bytes = {};  ///< By kind, since the start.
+  std::vector<ViewNumber> loads = {};       ///< Of modules that work: share of the time.
 };
 
 /// Where a robot is now: a few times a second, the newest counts.
@@ -60,10 +60,11 @@ struct ViewKeyframes {
   bool optimized = false;
   RobotId anchor = 0;  ///< Robot whose odometry frame is `world`.
   std::uint32_t first = 0;
-  std::vector<SE3> T_world_kf;
+  std::vector<SE3> T_world_kf = {};
 };
 
-/// What has become of a pair of keyframes; the newest of an id counts.
+/// What has become of a pair of keyframes, as its teller knows it; the newest of an id counts.
+/// kVerified: not, or not yet, among those that are optimised.
 enum class ViewVerdict : std::uint8_t { kCandidate, kVerified, kKept, kRejected };
 struct ViewClosure {
   ClosureId id;
@@ -79,8 +80,8 @@ struct ViewClosures {
 /// A robot's camera image, small, and what it tracks in it. Only told to who asks.
 struct ViewImage {
   Stamp stamp = 0;
-  std::vector<std::uint8_t> jpeg;
-  std::vector<std::array<float, 2>> features;  ///< [pixel] of the small image.
+  std::vector<std::uint8_t> jpeg = {};
+  std::vector<std::array<float, 2>> features = {};  ///< [pixel] of the small image.
 };
 
 using ViewContent =

@@ -123,8 +123,12 @@ TEST_CASE("Images come of the robots that are asked", "[view]") {
 TEST_CASE("What robots do not write is counted and not handed on", "[view]") {
   Watching w;
   const DdsEntity topic = create_view_topic(w.teller.participant.handle(), ViewChannel::kView);
+  const DdsQos qos = make_dds_qos();
+  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
+  dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
   const DdsEntity stranger(
-      dds_create_writer(w.teller.participant.handle(), topic.handle(), nullptr, nullptr), "writer");
+      dds_create_writer(w.teller.participant.handle(), topic.handle(), qos.get(), nullptr),
+      "writer");
   REQUIRE(eventually([&] {
     dds_publication_matched_status_t status{};
     dds_get_publication_matched_status(stranger.handle(), &status);
