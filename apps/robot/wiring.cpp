@@ -157,7 +157,8 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
                            .keyframes = topics_.keyframe_odometry,
                            .frames = topics_.located_frames,
                            .calibration = topics_.camera_calibration,
-                           .statistics = topics_.odometry_statistics};
+                           .statistics = topics_.odometry_statistics,
+                           .images = topics_.tracked_images};
   if (gives_poses)
     add_odometry<OutsideOdometryNode>(rig.stereo.depth_source, config.vio, odometry);
   else

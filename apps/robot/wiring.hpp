@@ -18,6 +18,7 @@
 #include "modules/core/closure_verdicts.hpp"
 #include "modules/core/dense_frame.hpp"
 #include "modules/core/frame.hpp"
+#include "modules/core/tracked_image.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
 #include "modules/mesh/map_mesh.hpp"
@@ -50,6 +51,7 @@ struct Topics {
   Topic<LocatedFrame> located_frames;
   Topic<UncertainCalibration> camera_calibration;
   Topic<VioStatistics> odometry_statistics;
+  Topic<TrackedImage> tracked_images;
   Topic<DenseFrame> dense_frames;
   Topic<DenseSensingProgress> dense_sensing_progress;
   Topic<MapMesh> maps;

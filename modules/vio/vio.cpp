@@ -73,6 +73,8 @@ VioResult Vio::process(const SensorPacket& packet) {
   const double gap_s = longest_step_s(held.data.samples);
   held.data.tracked = tracker_.track(*frame, turn(held.data.samples, before, frame->stamp));
   result.tracking = tracker_.statistics();
+  for (const TrackedFeature& feature : held.data.tracked.features)
+    result.tracked.push_back(feature.left);
   const int features = static_cast<int>(held.data.tracked.features.size());
   const bool first = !last_image_.has_value();
   last_image_ = frame->stamp;

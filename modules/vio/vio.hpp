@@ -39,6 +39,7 @@ struct VioResult {
   std::vector<LocatedFrame> frames;         ///< One for each state.
   std::optional<StartStatus> start;         ///< Outcome, if a start was attempted.
   TrackerStatistics tracking;               ///< Of this image.
+  std::vector<Eigen::Vector2d> tracked;     ///< Its features: bearings in the left camera.
   std::optional<SmootherUpdate> smoother;   ///< Not before the start.
   std::optional<VisionEvent> vision;        ///< Lost, or back.
 };

@@ -1,5 +1,7 @@
 #include "modules/vio/vio_node.hpp"
 
+#include <utility>
+
 #include "modules/core/text_table.hpp"
 #include "runtime/log.hpp"
 
@@ -73,7 +75,7 @@ void VioNode::stop() noexcept {
 }
 
 void VioNode::step(const SensorPacket& packet) {
-  const VioResult result = vio_.process(packet);
+  VioResult result = vio_.process(packet);
   report(result, packet.frame ? packet.frame->stamp : 0);
   for (const OdometryState& state : result.states) topics_.odometry.publish(state);
   for (const KeyframeOdometry& keyframe : result.keyframes) topics_.keyframes.publish(keyframe);
@@ -82,6 +84,8 @@ void VioNode::step(const SensorPacket& packet) {
       vio_.statistics().blind_s > blind_s_)
     topics_.statistics.publish(vio_.statistics());
   blind_s_ = vio_.statistics().blind_s;
+  if (result.problem != VioProblem::kNoImage && result.problem != VioProblem::kUnorderedImage)
+    topics_.images.publish(TrackedImage{packet.frame, std::move(result.tracked)});
   if (calibrates_ && !result.keyframes.empty()) topics_.calibration.publish(vio_.calibration());
 }
 

@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "modules/core/tracked_image.hpp"
 #include "modules/vio/vio.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
@@ -19,6 +20,7 @@ struct VioTopics {
   Out<LocatedFrame> frames;               ///< One per image, after its keyframe.
   Out<UncertainCalibration> calibration;  ///< With each keyframe, where it is estimated.
   Out<VioStatistics> statistics;          ///< When something has happened, and while blind.
+  Out<TrackedImage> images;               ///< All that are accepted.
 };
 
 /// Stereo-inertial odometry as a thread: one Vio. A full queue holds the sensors up.

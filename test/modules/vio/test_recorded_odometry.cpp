@@ -245,13 +245,17 @@ TEST_CASE("The odometry node publishes what odometry gives, in order of time", "
   frames.subscribe([&](const auto& frame) { located.push_back(*frame); });
   std::vector<UncertainCalibration> calibrated;
   calibrations.subscribe([&](const auto& known) { calibrated.push_back(*known); });
+  Topic<TrackedImage> images;
+  std::vector<TrackedImage> tracked;
+  images.subscribe([&](const auto& image) { tracked.push_back(*image); });
   VioNode node(5, data->rig, TrackerConfig{}, VioConfig{},
                {.packets = packets,
                 .odometry = odometry,
                 .keyframes = keyframes,
                 .frames = frames,
                 .calibration = calibrations,
-                .statistics = statistics});
+                .statistics = statistics,
+                .images = images});
   node.start();
   for (std::size_t k = 0; k < 40; ++k) packets.publish(data->packets[k]);
   node.stop();  // drains the queue
@@ -263,6 +267,9 @@ TEST_CASE("The odometry node publishes what odometry gives, in order of time", "
   REQUIRE(located.size() == stamps.size());
   for (std::size_t k = 0; k < stamps.size(); ++k) CHECK(located[k].frame->stamp == stamps[k]);
   CHECK(located.back().keyframe == indices.back());
+  REQUIRE(tracked.size() == 40);
+  for (const TrackedImage& image : tracked) CHECK(image.bearings.size() > 20);
+  CHECK(tracked.back().frame == data->packets[39].frame);
   REQUIRE_FALSE(calibrated.empty());
   CHECK(std::abs(calibrated.back().calibration.offset_s) < 5e-3);
 }
