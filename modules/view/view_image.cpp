@@ -1,0 +1,47 @@
+#include "modules/view/view_image.hpp"
+
+#include <algorithm>
+#include <array>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+
+#include "modules/images/image_view.hpp"
+
+namespace km {
+namespace {
+
+// Of an update, what is left for the features and the rest.
+constexpr std::size_t kMaxJpegBytes = kMaxViewBytes - 20000;
+constexpr std::size_t kMaxFeatures = 2000;
+
+std::vector<std::uint8_t> jpeg_of(const cv::Mat& image) {
+  std::vector<std::uint8_t> jpeg;
+  for (const int quality : {60, 30, 10}) {
+    cv::imencode(".jpg", image, jpeg, {cv::IMWRITE_JPEG_QUALITY, quality});
+    if (jpeg.size() <= kMaxJpegBytes) return jpeg;
+  }
+  return {};  // noise, tall and narrow
+}
+
+}  // namespace
+
+ViewImage view_image(const TrackedImage& image, const Camera& camera) {
+  const GrayImage& left = image.frame->left;
+  if (left.width <= 0 || left.height <= 0)
+    throw std::invalid_argument("view: an image without pixels");
+  const double scale = std::min(1.0, static_cast<double>(kMaxViewWidth) / left.width);
+  cv::Mat small = view(left);
+  if (scale < 1.0) cv::resize(small, small, {}, scale, scale, cv::INTER_AREA);
+  ViewImage result{image.frame->stamp, jpeg_of(small), {}};
+  for (const Eigen::Vector2d& bearing : image.bearings) {
+    const auto pixel = camera.project(bearing);
+    if (!pixel || !pixel->allFinite() || result.features.size() == kMaxFeatures) continue;
+    // Pixels are counted from their centres.
+    const Eigen::Vector2f there = (scale * (pixel->array() + 0.5) - 0.5).matrix().cast<float>();
+    result.features.push_back({there.x(), there.y()});
+  }
+  return result;
+}
+
+}  // namespace km

@@ -1,0 +1,88 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <opencv2/imgcodecs.hpp>
+#include <random>
+#include <stdexcept>
+#include <utility>
+
+#include "modules/view/view_image.hpp"
+
+namespace km {
+namespace {
+
+TrackedImage image_of(int width, int height) {
+  StereoFrame frame;
+  frame.stamp = 77;
+  frame.left.width = width;
+  frame.left.height = height;
+  frame.left.pixels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  return {std::make_shared<const StereoFrame>(std::move(frame)), {}};
+}
+
+Camera camera_of(int width, int height) {
+  Camera camera;
+  camera.width = width;
+  camera.height = height;
+  camera.fx = camera.fy = 400.0;
+  camera.cx = 0.5 * (width - 1);
+  camera.cy = 0.5 * (height - 1);
+  return camera;
+}
+
+cv::Mat shown(const ViewImage& image) {
+  return cv::imdecode(image.jpeg, cv::IMREAD_UNCHANGED);
+}
+
+}  // namespace
+
+TEST_CASE("Images are told as they are, or smaller", "[view]") {
+  const ViewImage as_it_is = view_image(image_of(640, 480), camera_of(640, 480));
+  CHECK(as_it_is.stamp == 77);
+  CHECK(shown(as_it_is).cols == 640);
+  CHECK(shown(as_it_is).rows == 480);
+  const ViewImage smaller = view_image(image_of(1280, 800), camera_of(1280, 800));
+  CHECK(shown(smaller).cols == 640);
+  CHECK(shown(smaller).rows == 400);
+  CHECK(shown(smaller).channels() == 1);
+  CHECK_THROWS_AS(view_image(image_of(0, 0), Camera{}), std::invalid_argument);
+}
+
+// A bright square around a feature is where the feature is said to be.
+TEST_CASE("Features are where the image shows them", "[view]") {
+  TrackedImage image = image_of(1280, 800);
+  StereoFrame frame = *image.frame;
+  const int u = 1000, v = 202;
+  for (int y = v - 20; y <= v + 20; ++y)
+    for (int x = u - 20; x <= u + 20; ++x)
+      frame.left.pixels[static_cast<std::size_t>(y * 1280 + x)] = 255;
+  const Camera camera = camera_of(1280, 800);
+  image = {std::make_shared<const StereoFrame>(std::move(frame)),
+           {{(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy}}};
+  const ViewImage told = view_image(image, camera);
+  REQUIRE(told.features.size() == 1);
+  const cv::Mat pixels = shown(told);
+  double sum = 0.0, sum_x = 0.0, sum_y = 0.0;
+  for (int y = 0; y < pixels.rows; ++y)
+    for (int x = 0; x < pixels.cols; ++x) {
+      const double value = pixels.at<std::uint8_t>(y, x);
+      sum += value;
+      sum_x += value * x;
+      sum_y += value * y;
+    }
+  CHECK(static_cast<double>(told.features[0][0]) == Approx(sum_x / sum).margin(0.2));
+  CHECK(static_cast<double>(told.features[0][1]) == Approx(sum_y / sum).margin(0.2));
+}
+
+TEST_CASE("Whatever the camera sees fits into an update", "[view]") {
+  TrackedImage image = image_of(640, 640);
+  StereoFrame frame = *image.frame;
+  std::mt19937 rng(1);
+  for (std::uint8_t& pixel : frame.left.pixels) pixel = static_cast<std::uint8_t>(rng());
+  image.frame = std::make_shared<const StereoFrame>(std::move(frame));
+  image.bearings.resize(5000, Eigen::Vector2d::Zero());
+  CHECK_NOTHROW(encode_view(view_image(image, camera_of(640, 640))));
+}
+
+}  // namespace km

@@ -1,0 +1,300 @@
+#include <catch2/catch.hpp>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <random>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "modules/core/lie.hpp"
+#include "modules/view/view_teller.hpp"
+#include "test/modules/view/watcher.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+constexpr RobotId kSelf = 3;
+
+// Poses are told as float32: at 100 m.
+constexpr double kRounding_m = 2e-5;
+constexpr double kRounding_rad = 1e-6;
+
+// As it comes over the network.
+void hear(const ViewContent& content, Watcher& watcher) {
+  const auto bytes = encode_view(content);
+  CHECK(bytes.size() < ViewTeller::kUpdateBytes + 100);
+  const auto decoded = decode_view(bytes);
+  REQUIRE(decoded);
+  watcher.hear(*decoded);
+}
+
+void hear_all(ViewTeller& teller, Watcher& watcher, double now_s) {
+  while (const auto content = teller.next(now_s)) hear(*content, watcher);
+}
+
+KeyframeOdometry keyframe(KeyframeIndex index, const SE3& T) {
+  KeyframeOdometry result;
+  result.id = {kSelf, index};
+  result.T_odom_kf = T;
+  return result;
+}
+
+std::shared_ptr<const Trajectory> trajectory(std::vector<SE3> poses, RobotId anchor = kSelf) {
+  return std::make_shared<const Trajectory>(Trajectory{kSelf, anchor, std::move(poses)});
+}
+
+SE3 shifted(const SE3& T, double x_m) {
+  SE3 result = T;
+  result.translation().x() += x_m;
+  return result;
+}
+
+std::vector<SE3> line(std::size_t count) {
+  std::vector<SE3> poses(count, SE3::Identity());
+  for (std::size_t k = 0; k < count; ++k) poses[k].translation().x() = 0.1 * static_cast<double>(k);
+  return poses;
+}
+
+void check_within_bounds(const Watcher& watcher, const std::vector<SE3>& truth, RobotId anchor) {
+  REQUIRE(watcher.optimized.size() == truth.size());
+  for (std::size_t k = 0; k < truth.size(); ++k) {
+    CAPTURE(k);
+    const auto& known = watcher.optimized.at(static_cast<KeyframeIndex>(k));
+    CHECK(known.anchor == anchor);
+    CHECK((known.T.translation() - truth[k].translation()).norm() <=
+          ViewTeller::kMaxShift_m + kRounding_m);
+    CHECK(angle_of(known.T.linear().transpose() * truth[k].linear()) <=
+          ViewTeller::kMaxTurn_rad + kRounding_rad);
+  }
+}
+
+ClosureId pair_of(KeyframeIndex own, KeyframeIndex other) {
+  return closure_id({kSelf, own}, {7, other});
+}
+
+ClosureOutcome outcome(const ClosureId& id, ClosureStage stage, const char* reason = "") {
+  return {id, 0.5, stage, reason, 40, 20};
+}
+
+Closure closure(const ClosureId& id, int inliers) {
+  Closure result;
+  result.from.id = id.from;
+  result.to.id = id.to;
+  result.inliers = inliers;
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("The newest pose is told a few times a second", "[view]") {
+  ViewTeller teller(kSelf);
+  Watcher watcher;
+  Stamp last = 0;
+  for (int tick = 0; tick < 200; ++tick) {  // 20 images a second for 10 s
+    OdometryState state;
+    state.stamp = last = 1000 + tick;
+    teller.add(state);
+    hear_all(teller, watcher, 0.05 * tick);
+  }
+  CHECK(watcher.poses.size() == 25);
+  hear_all(teller, watcher, 11.0);
+  CHECK(watcher.poses.back().stamp == last);
+  hear_all(teller, watcher, 12.0);
+  CHECK(watcher.poses.size() == 26);  // once
+}
+
+TEST_CASE("Keyframes of odometry are told once, several at a time", "[view]") {
+  ViewTeller teller(kSelf);
+  Watcher watcher;
+  std::mt19937 rng(5);
+  std::vector<SE3> truth;
+  int updates = 0;
+  for (KeyframeIndex k = 0; k < 100; ++k) {  // 4 a second
+    truth.push_back(random_pose(rng, 100.0));
+    teller.add(keyframe(k, truth.back()));
+    while (const auto content = teller.next(0.25 * k)) {
+      hear(*content, watcher);
+      ++updates;
+    }
+  }
+  hear_all(teller, watcher, 100.0);
+  CHECK(updates <= 26);
+  CHECK(watcher.odometry_told == 100);
+  REQUIRE(watcher.odometry.size() == 100);
+  for (KeyframeIndex k = 0; k < 100; ++k)
+    CHECK((watcher.odometry.at(k).T.translation() - truth[k].translation()).norm() < kRounding_m);
+  CHECK(watcher.odometry.at(0).anchor == kSelf);
+}
+
+TEST_CASE("Optimised poses are told again where they have moved", "[view]") {
+  ViewTeller teller(kSelf);
+  Watcher watcher;
+  std::vector<SE3> poses = line(100);
+  teller.add(trajectory(poses));
+  hear_all(teller, watcher, 0.0);
+  CHECK(watcher.optimized_told == 100);
+  SECTION("not within the bound") {
+    for (SE3& T : poses) T = shifted(T, 0.009);
+    teller.add(trajectory(poses));
+    hear_all(teller, watcher, 10.0);
+    CHECK(watcher.optimized_told == 100);
+  }
+  SECTION("in small steps, once their sum is beyond the bound") {
+    for (int step = 1; step <= 12; ++step) {  // 4 mm: told after 3, 6, 9, 12 of them
+      poses[40] = shifted(poses[40], 0.004);
+      teller.add(trajectory(poses));
+      hear_all(teller, watcher, 10.0 * step);
+    }
+    CHECK(watcher.optimized_told == 100 + 4);
+  }
+  SECTION("turned") {
+    poses[7].linear() = so3_exp({0.0, 0.0, 0.4 / kDegrees});
+    teller.add(trajectory(poses));
+    hear_all(teller, watcher, 10.0);
+    CHECK(watcher.optimized_told == 100);
+    poses[7].linear() = so3_exp({0.0, 0.0, 0.6 / kDegrees});
+    teller.add(trajectory(poses));
+    hear_all(teller, watcher, 20.0);
+    CHECK(watcher.optimized_told == 101);
+  }
+  SECTION("all of them in another frame") {
+    teller.add(trajectory(poses, 9));
+    hear_all(teller, watcher, 10.0);
+    CHECK(watcher.optimized_told == 200);
+    check_within_bounds(watcher, poses, 9);
+  }
+  SECTION("not those of others, nor what is not finite") {
+    Trajectory other{9, 9, line(3)};
+    other.T_world_kf[0].translation().y() = 50.0;
+    teller.add(std::make_shared<const Trajectory>(other));
+    std::vector<SE3> broken = poses;
+    broken[0].translation().y() = std::numeric_limits<double>::quiet_NaN();
+    teller.add(trajectory(broken));
+    hear_all(teller, watcher, 10.0);
+    CHECK(watcher.optimized_told == 100);
+  }
+}
+
+// A graph that is optimised faster than it can be told: one update per round.
+TEST_CASE("What was told is within the bound in the end", "[view]") {
+  std::mt19937 rng(GENERATE(1U, 2U, 3U));
+  ViewTeller teller(kSelf);
+  Watcher watcher, late;
+  std::vector<SE3> poses;
+  std::normal_distribution<double> step(0.0, 0.005);
+  for (int round = 0; round < 300; ++round) {
+    poses.push_back(random_pose(rng, 100.0));
+    for (SE3& T : poses) {
+      T.translation() += Eigen::Vector3d(step(rng), step(rng), step(rng));
+      T.linear() = T.linear() * so3_exp({step(rng), 0.0, 0.0});
+    }
+    teller.add(keyframe(static_cast<KeyframeIndex>(round), poses.back()));
+    teller.add(trajectory(poses, round < 150 ? kSelf : RobotId{1}));
+    const auto content = teller.next(round);
+    if (content) hear(*content, watcher);
+  }
+  hear_all(teller, watcher, 300.0);
+  check_within_bounds(watcher, poses, 1);
+  CHECK(watcher.odometry.size() == 300);
+  CHECK_FALSE(teller.tells_past());
+
+  teller.begin_again();
+  CHECK(teller.tells_past());
+  hear_all(teller, late, 300.0);
+  CHECK_FALSE(teller.tells_past());
+  check_within_bounds(late, poses, 1);
+  CHECK(late.odometry.size() == 300);
+}
+
+TEST_CASE("What becomes of a pair of keyframes is told as it changes", "[view]") {
+  ViewTeller teller(kSelf);
+  Watcher watcher;
+  const ClosureId id = pair_of(10, 20);
+  const auto verdict = [&] {
+    hear_all(teller, watcher, 0.0);
+    return watcher.closures.at(id).verdict;
+  };
+  teller.add(outcome(id, ClosureStage::kCandidate));
+  CHECK(verdict() == ViewVerdict::kCandidate);
+  teller.add(outcome(id, ClosureStage::kRequested));
+  CHECK(verdict() == ViewVerdict::kCandidate);
+  CHECK(watcher.order.size() == 1);  // no news
+  SECTION("verification stops") {
+    teller.add(outcome(id, ClosureStage::kReceived, "too few matches"));
+    CHECK(verdict() == ViewVerdict::kRejected);
+    CHECK(watcher.closures.at(id).reason == "too few matches");
+    CHECK(watcher.closures.at(id).matches == 40);
+    teller.add(closure(id, 33));  // the other robot has verified it
+    CHECK(verdict() == ViewVerdict::kVerified);
+    CHECK(watcher.closures.at(id).reason.empty());
+    CHECK(watcher.closures.at(id).inliers == 33);
+  }
+  SECTION("verified, kept, and overruled") {
+    teller.add(outcome(id, ClosureStage::kVerified));
+    CHECK(verdict() == ViewVerdict::kVerified);
+    teller.add(InlierSet{kSelf, 7, 2, {id, pair_of(11, 21)}});
+    CHECK(verdict() == ViewVerdict::kKept);
+    teller.add(ClosureVerdicts{{{id, false}}});
+    CHECK(verdict() == ViewVerdict::kRejected);
+    CHECK(watcher.closures.at(id).reason == "the other closures contradict it");
+    teller.add(ClosureVerdicts{{{id, true}}});
+    CHECK(verdict() == ViewVerdict::kKept);
+    teller.add(InlierSet{kSelf, 7, 1, {}});  // an old one
+    CHECK(verdict() == ViewVerdict::kKept);
+    teller.add(InlierSet{kSelf, 7, 3, {pair_of(11, 21)}});
+    CHECK(verdict() == ViewVerdict::kVerified);
+    teller.restarted(8);
+    CHECK(verdict() == ViewVerdict::kVerified);
+    teller.restarted(7);
+    CHECK(verdict() == ViewVerdict::kRejected);
+    CHECK(watcher.closures.at(id).reason == "its robot was restarted");
+  }
+  SECTION("a set that is known before its closure") {
+    teller.add(InlierSet{kSelf, 7, 2, {pair_of(12, 22)}});
+    teller.add(closure(pair_of(12, 22), 50));
+    hear_all(teller, watcher, 0.0);
+    CHECK(watcher.closures.at(pair_of(12, 22)).verdict == ViewVerdict::kKept);
+  }
+  SECTION("of other robots nothing is told") {
+    teller.add(closure(closure_id({1, 1}, {2, 2}), 50));
+    hear_all(teller, watcher, 0.0);
+    CHECK(watcher.closures.size() == 1);
+  }
+  SECTION("to who comes late, as it is now") {
+    teller.add(outcome(id, ClosureStage::kVerified));
+    hear_all(teller, watcher, 0.0);
+    Watcher late;
+    teller.begin_again();
+    hear_all(teller, late, 0.0);
+    REQUIRE(late.closures.size() == 1);
+    CHECK(late.closures.at(id).verdict == ViewVerdict::kVerified);
+  }
+}
+
+TEST_CASE("Verified closures are told before all else", "[view]") {
+  ViewTeller teller(kSelf);
+  for (KeyframeIndex k = 0; k < 500; ++k) {
+    teller.add(keyframe(k, SE3::Identity()));
+    teller.add(outcome(pair_of(k, 1), ClosureStage::kCandidate));
+  }
+  teller.add(OdometryState{});
+  teller.add(outcome(pair_of(300, 1), ClosureStage::kVerified));
+  Watcher watcher;
+  hear(*teller.next(0.0), watcher);
+  REQUIRE(watcher.order.size() == 1);
+  CHECK(watcher.order[0] == pair_of(300, 1));
+  hear(*teller.next(0.0), watcher);
+  CHECK(watcher.poses.size() == 1);
+  hear(*teller.next(0.0), watcher);
+  CHECK(watcher.odometry_told > 10);
+  hear_all(teller, watcher, 0.0);
+  CHECK(watcher.closures.size() == 500);
+  CHECK(watcher.order.size() == 500);        // each once
+  CHECK(watcher.order[1] == pair_of(0, 1));  // in the order in which they were found
+}
+
+}  // namespace km

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <variant>
+#include <vector>
+
+#include "modules/mesh/team_mesh.hpp"
+#include "modules/view/view_update.hpp"
+
+namespace km {
+
+/// What is known of a robot to one who watches from the beginning, or from when it came.
+struct Watcher {
+  void hear(const ViewContent& content) {
+    std::visit([this](const auto& c) { take(c); }, content);
+  }
+  void take(const ViewPose& pose) { poses.push_back(pose); }
+  void take(const ViewKeyframes& keyframes) {
+    auto& known = keyframes.optimized ? optimized : odometry;
+    for (std::size_t k = 0; k < keyframes.T_world_kf.size(); ++k) {
+      ++(keyframes.optimized ? optimized_told : odometry_told);
+      known[keyframes.first + static_cast<KeyframeIndex>(k)] = {keyframes.anchor,
+                                                                keyframes.T_world_kf[k]};
+    }
+  }
+  void take(const ViewClosures& update) {
+    for (const ViewClosure& closure : update.closures) {
+      closures[closure.id] = closure;
+      order.push_back(closure.id);
+    }
+  }
+  void take(const ViewState& state) { states.push_back(state); }
+  void take(const MeshChunk& chunk) { (void)mesh.add(chunk); }
+  void take(const ViewImage& image) { images.push_back(image); }
+
+  struct Placed {
+    RobotId anchor = 0;
+    SE3 T = SE3::Identity();
+  };
+  std::vector<ViewPose> poses;
+  std::map<KeyframeIndex, Placed> odometry, optimized;
+  std::map<ClosureId, ViewClosure> closures;
+  std::vector<ClosureId> order;
+  std::size_t odometry_told = 0, optimized_told = 0;
+  std::vector<ViewState> states;
+  std::vector<ViewImage> images;
+  TeamMesh mesh;
+};
+
+}  // namespace km
