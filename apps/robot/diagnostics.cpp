@@ -28,16 +28,23 @@ RosDiagnosticStatus sensors_status(std::size_t published, std::size_t skipped,
 ModuleLoads::ModuleLoads(std::vector<const Node*> nodes)
     : nodes_(std::move(nodes)), asked_s_(steady_now_s()) {}
 
-RosDiagnosticStatus ModuleLoads::status() {
-  constexpr double kBusy = 0.95;
+std::vector<std::pair<std::string, double>> ModuleLoads::shares() {
   const double now_s = steady_now_s();
   const double elapsed_s = std::max(now_s - std::exchange(asked_s_, now_s), 1e-3);
-  RosDiagnosticStatus status;
-  status.name = "modules";
+  std::vector<std::pair<std::string, double>> shares;
   for (const Node* node : nodes_) {
     const double total_s = node->timing().total_s();
-    const double share = (total_s - std::exchange(spent_s_[node], total_s)) / elapsed_s;
-    const std::string name(node->name());
+    const double spent_s = total_s - std::exchange(spent_s_[node], total_s);
+    shares.emplace_back(node->name(), spent_s / elapsed_s);
+  }
+  return shares;
+}
+
+RosDiagnosticStatus ModuleLoads::status() {
+  constexpr double kBusy = 0.95;
+  RosDiagnosticStatus status;
+  status.name = "modules";
+  for (const auto& [name, share] : shares()) {
     status.values.push_back({name + " busy [%]", fixed(100.0 * share, 0)});
     if (share > kBusy) status.message += (status.message.empty() ? "busy: " : ", ") + name;
   }

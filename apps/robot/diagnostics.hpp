@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "modules/recordings/ros_messages.hpp"
@@ -23,8 +24,10 @@ class ModuleLoads {
   /// The nodes outlive it.
   explicit ModuleLoads(std::vector<const Node*> nodes);
 
-  /// The share of the time since the last call that each spent in its steps; a warning where one
-  /// hardly rests.
+  /// By name, the share of the time since the last call that each spent in its steps.
+  [[nodiscard]] std::vector<std::pair<std::string, double>> shares();
+
+  /// These; a warning where one hardly rests.
   [[nodiscard]] RosDiagnosticStatus status();
 
  private:

@@ -21,6 +21,7 @@
 #include "modules/pose_graph/pose_graph_config.hpp"
 #include "modules/semantic_mapping/semantic_mapping_config.hpp"
 #include "modules/sensors/sensors_config.hpp"
+#include "modules/view/view_config.hpp"
 #include "modules/vio/tracker_config.hpp"
 #include "modules/vio/vio_config.hpp"
 #include "runtime/dds/budget_config.hpp"
@@ -81,6 +82,7 @@ struct RobotConfig {
   SemanticMappingConfig semantic_mapping;
   MeshDeformationConfig mesh_deformation;
   MeshChunksConfig mesh_chunks;
+  ViewConfig view;
 
   std::string effective;  ///< As YAML: a file that gives this configuration again.
 
@@ -89,7 +91,7 @@ struct RobotConfig {
     const auto visit_all = [&](auto&... sections) { (visit(sections), ...); };
     visit_all(run, dds, budget, sensors, ros, tracker, vio, keyframe_features, place_recognition,
               loop_closure, pcm, pose_graph, graph_playback, mapping, stereo_depth, segmentation,
-              semantic_mapping, mesh_deformation, mesh_chunks);
+              semantic_mapping, mesh_deformation, mesh_chunks, view);
   }
 };
 

@@ -6,6 +6,7 @@
 
 #include "apps/result_files.hpp"
 #include "apps/robot/diagnostics.hpp"
+#include "apps/robot/process_usage.hpp"
 #include "apps/robot/results.hpp"
 #include "apps/robot/team_keys_node.hpp"
 #include "modules/dense_sensing/dense_sensing_node.hpp"
@@ -23,6 +24,7 @@
 #include "modules/ros_dds/live_sink_codec.hpp"
 #include "modules/ros_dds/mcap_sink.hpp"
 #include "modules/semantic_mapping/semantic_mapping_node.hpp"
+#include "modules/view/view_node.hpp"
 #include "modules/vio/outside_odometry_node.hpp"
 #include "modules/vio/vio_node.hpp"
 #include "runtime/dds/robot_status.hpp"
@@ -41,6 +43,11 @@ void forward(In<T> from, Out<T> to) {
 std::uint64_t boot_of(const RobotInput& input) {
   const bool goes_on = input.restored && !std::holds_alternative<PastRun>(input.source);
   return goes_on ? next_boot(input.restored->boot) : random_boot_id();
+}
+
+std::optional<Camera> left_camera_of(const RobotInput& input) {
+  const auto* reader = std::get_if<std::unique_ptr<DatasetReader>>(&input.source);
+  return reader != nullptr ? std::optional((*reader)->rig().stereo.cameras[0]) : std::nullopt;
 }
 
 std::optional<KeyframeId> keyframe_of(const KeyframeReply& reply) {
@@ -66,6 +73,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
       supervisor_(signals, config.run.patience) {
   auto bridge = std::make_unique<DdsBridge>(participant_, config.budget);
   bridge_ = bridge.get();
+  const std::optional<Camera> camera = left_camera_of(input);
   if (auto* reader = std::get_if<std::unique_ptr<DatasetReader>>(&input.source))
     add_sensing(config, options.rate, std::move(*reader), mapping, std::move(input.map));
   else if (auto* graph = std::get_if<RecordedGraph>(&input.source))
@@ -80,6 +88,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   if (mapping) add_mesh_correction(config, options.output, results);
   add_network(share_meshes(config.mesh_chunks));
   add_records();
+  add_view(config, camera);
   if (input.ros != nullptr && config.ros.publish.value_or(true))
     add_ros_output("ros_output", std::make_unique<LiveSink>(std::move(input.ros)),
                    {.mesh_points = config.ros.mesh_points}, std::nullopt);
@@ -451,6 +460,59 @@ std::string Robot::name_of(RobotId robot) const {
   for (const Peer& peer : bridge_->peers().list())
     if (peer.identity.robot == robot) return peer.identity.name;
   return "robot" + std::to_string(robot);
+}
+
+void Robot::add_view(const RobotConfig& config, const std::optional<Camera>& camera) {
+  if (!config.view.on) return;
+  if (seal_ != nullptr && !config.view.in_clear) {
+    log::info(ViewConfig::kSection)
+        << "off: the team has keys, and who watches would be told in clear (view.in_clear)";
+    return;
+  }
+  const MeshChunksConfig& mesh = config.mesh_chunks;
+  Topics& t = topics_;
+  auto& view = add<ViewNode>(
+      false, config.view, participant_,
+      ViewMesh{{mesh.cell_m, mesh.position_step_m}, mesh.min_move_m}, camera,
+      [this, loads = ModuleLoads(nodes_)]() mutable { return view_state(loads); },
+      ViewTopics{.odometry = t.odometry,
+                 .keyframes = t.keyframe_odometry,
+                 .trajectory = t.trajectory,
+                 .progress = t.progress,
+                 .outcomes = t.outcomes,
+                 .restored_outcomes = t.restored_outcomes,
+                 .closures = t.closures,
+                 .own_inlier_sets = t.own_inlier_sets,
+                 .peer_inlier_sets = t.peer_inlier_sets,
+                 .verdicts = t.closure_verdicts,
+                 .restarts = t.closure_restarts,
+                 .statuses = t.status.from_peers(),
+                 .images = t.tracked_images});
+  t.optimized_meshes.subscribe([&view](const auto& optimized) {
+    view.offer(optimized->anchor, {optimized, &optimized->mesh});
+  });
+}
+
+ViewState Robot::view_state(ModuleLoads& loads) const {
+  const ProcessUsage usage = process_usage();
+  const TrafficSnapshot traffic = bridge_->traffic();
+  ViewState state;
+  state.name = identity_.name;
+  state.phase = to_string(phase_.load());
+  state.dataset_time_s = dataset_time_s_;
+  state.keyframes = keyframes_;
+  state.skipped_frames = sensors_ != nullptr ? static_cast<std::uint32_t>(sensors_->skipped()) : 0;
+  state.cpu_s = usage.cpu_s;
+  state.resident_MB = static_cast<double>(usage.resident_bytes) / 1e6;
+  for (const auto category :
+       {TrafficCategory::kPlaceRecognition, TrafficCategory::kGeometricVerification,
+        TrafficCategory::kPoseGraphOptimization, TrafficCategory::kOther})
+    state.sent_bytes.push_back(
+        {to_string(category), static_cast<double>(traffic.bytes(Direction::kOut, category))});
+  constexpr double kIdle = 0.005;  // is not worth a line
+  for (const auto& [name, share] : loads.shares())
+    if (share > kIdle) state.loads.push_back({name, share});
+  return state;
 }
 
 RobotStatus Robot::own_status() const {

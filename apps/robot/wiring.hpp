@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "apps/robot/diagnostics.hpp"
 #include "apps/robot/journal_node.hpp"
 #include "apps/robot/lives_met.hpp"
 #include "apps/robot/mapping_plan.hpp"
@@ -34,6 +35,7 @@
 #include "modules/ros_dds/ros_output_node.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/sensors/sensors_node.hpp"
+#include "modules/view/view_update.hpp"
 #include "runtime/dds/bridge.hpp"
 #include "runtime/dds/robot_status.hpp"
 #include "runtime/supervisor.hpp"
@@ -165,6 +167,8 @@ class Robot {
   void add_relay();
   void add_network(CrossingEnds meshes);
   void add_records();
+  void add_view(const RobotConfig& config, const std::optional<Camera>& camera);
+  [[nodiscard]] ViewState view_state(ModuleLoads& loads) const;
   void add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
                       RosOutputOptions options, std::optional<In<SensorPacket>> images);
   void add_record(const RobotOptions& options, const RosConfig& config, ResultWriter& results);

@@ -1,0 +1,254 @@
+#include "modules/view/view_node.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "modules/view/view_image.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/log.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kQueue = 4096;  // nobody waits for who watches: the oldest go
+constexpr double kTick_s = 0.1;
+constexpr double kStatePeriod_s = 1.0;
+constexpr double kBurst_s = 0.5;          // unused budget is kept this long
+constexpr double kRest_s = 2.0;           // worth of budget that is told at the end
+constexpr double kAcknowledged_s = 0.5;   // waited for there
+constexpr double kCutShare = 1.0 / 30.0;  // of the time, at most, a mesh is cut up
+
+ViewWriter writer_on(const DdsParticipant& participant, ViewChannel channel) {
+  const RobotIdentity& self = participant.identity();
+  return {participant.handle(), channel, TeamPeer{self.robot, self.boot}};
+}
+
+TokenBucket budget_of(double bytes_per_s) {
+  return {bytes_per_s, kBurst_s * bytes_per_s, kBurst_s * bytes_per_s};
+}
+
+// Images are pushed as wanted.
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+
+double finite(double value) {
+  return std::isfinite(value) ? value : 0.0;
+}
+
+}  // namespace
+
+ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
+                   const ViewMesh& mesh, const std::optional<Camera>& camera, Describe describe,
+                   const ViewTopics& topics)
+    : config_(checked(config)),
+      self_(participant.identity().robot),
+      mesh_settings_(mesh),
+      camera_(camera),
+      describe_(std::move(describe)),
+      channels_{{{writer_on(participant, ViewChannel::kView), budget_of(config.bytes_per_s)},
+                 {writer_on(participant, ViewChannel::kMesh), budget_of(config.mesh_bytes_per_s)},
+                 {writer_on(participant, ViewChannel::kImages), budget_of(kUnlimited)}}},
+      past_budget_(budget_of(config.past_bytes_per_s)),
+      teller_(self_),
+      worker_(
+          kQueue, Overflow::kDropOldest, [this](const Input& input) { step(input); },
+          ViewConfig::kSection),
+      ticks_(
+          steady_duration(kTick_s), [this] { worker_.post(Tick{}); }, "view tick") {
+  const auto post = [this](const auto& message) { worker_.post(message); };
+  topics.odometry.subscribe(post);
+  topics.keyframes.subscribe(post);
+  topics.trajectory.subscribe(post);
+  topics.progress.subscribe(post);
+  topics.outcomes.subscribe(post);
+  topics.restored_outcomes.subscribe(post);
+  topics.closures.subscribe(post);
+  topics.own_inlier_sets.subscribe(post);
+  topics.peer_inlier_sets.subscribe(post);
+  topics.verdicts.subscribe(post);
+  topics.restarts.subscribe(post);
+  topics.statuses.subscribe(post);
+  if (!camera_ || config_.images_per_s <= 0.0) return;
+  topics.images.subscribe([this, post, due_s = 0.0](const auto& image) mutable {
+    const double now_s = steady_now_s();
+    if (!are_images_asked_ || now_s < due_s) return;
+    due_s = now_s + 1.0 / config_.images_per_s;
+    post(image);
+  });
+}
+
+void ViewNode::offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh) {
+  worker_.post(MeshOffer{anchor, std::move(mesh)});
+}
+
+void ViewNode::start() {
+  worker_.start();
+  ticks_.start();
+}
+
+void ViewNode::stop() noexcept try {
+  worker_.stop();
+  ticks_.stop();
+  if (!std::exchange(stopped_, true) && error() == nullptr) tell_rest();
+} catch (const std::exception& error) {
+  log::warn(name()) << "the last was not told: " << error.what();
+}
+
+std::exception_ptr ViewNode::error() const {
+  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
+}
+
+std::size_t ViewNode::told_bytes(ViewChannel channel) const {
+  return channels_[static_cast<std::size_t>(channel)].told_bytes;
+}
+
+void ViewNode::step(const Input& input) {
+  std::visit([this](const auto& message) { take(message); }, input);
+}
+
+void ViewNode::take(const Tick& /*tick*/) {
+  tell(steady_now_s());
+}
+
+void ViewNode::take(const MeshOffer& offer) {
+  mesh_ = offer;
+  is_cut_ = false;
+}
+
+void ViewNode::take(const Topic<PeerEvent>::Message& event) {
+  if (event->kind == PeerEventKind::kRestarted) teller_.restarted(event->identity.robot);
+}
+
+void ViewNode::take(const Topic<RobotStatus>::Message& status) {
+  heard_s_[status->robot] = steady_now_s();
+}
+
+void ViewNode::take(const Topic<TrackedImage>::Message& image) {
+  write(on(ViewChannel::kImages), view_image(*image, *camera_));
+}
+
+void ViewNode::tell(double now_s) {
+  are_images_asked_ = on(ViewChannel::kImages).writer.readers() > 0;
+  tell_view(now_s);
+  tell_mesh(now_s);
+}
+
+TokenBucket& ViewNode::view_budget() {
+  return teller_.tells_past() ? past_budget_ : on(ViewChannel::kView).budget;
+}
+
+// An update leaves while there is no debt, and may make one.
+void ViewNode::tell_view(double now_s) {
+  Channel& view = on(ViewChannel::kView);
+  if (view.writer.newcomers() > 0) {
+    teller_.begin_again();
+    state_due_s_ = now_s;
+  }
+  if (view.writer.readers() == 0) return;
+  while (view_budget().wait_s(0.0, now_s) <= 0.0) {
+    TokenBucket& budget = view_budget();  // of what comes next
+    std::optional<ViewContent> content;
+    if (now_s >= state_due_s_) {
+      content = state(now_s);
+      state_due_s_ = now_s + kStatePeriod_s;
+    } else {
+      content = teller_.next(now_s);
+    }
+    const std::size_t bytes = content ? write(view, *content) : 0;
+    if (bytes == 0) return;
+    budget.spend(static_cast<double>(bytes), now_s);
+  }
+}
+
+void ViewNode::tell_mesh(double now_s) {
+  Channel& mesh = on(ViewChannel::kMesh);
+  const bool has_newcomers = mesh.writer.newcomers() > 0;
+  if (mesh.writer.readers() == 0) return schedule_.reset();
+  if (has_newcomers || !schedule_) {
+    schedule_.emplace(mesh_settings_.min_move_m);
+    is_cut_ = mesh_.mesh == nullptr;
+    cut_due_s_ = now_s;
+  }
+  if (!is_cut_ && now_s >= cut_due_s_) cut_mesh(now_s);
+  while (mesh.budget.wait_s(0.0, now_s) <= 0.0) {
+    const std::optional<MeshChunk> chunk = schedule_->next();
+    const std::size_t bytes = chunk ? write(mesh, *chunk) : 0;
+    if (bytes == 0) return;
+    mesh.budget.spend(static_cast<double>(bytes), now_s);
+  }
+}
+
+// The larger the mesh, the longer that takes, and the less often it is done. One that cannot be
+// told harms nobody else.
+void ViewNode::cut_mesh(double now_s) {
+  const double begin_s = steady_now_s();
+  is_cut_ = true;
+  try {
+    schedule_->update(split_mesh(*mesh_.mesh, self_, mesh_.anchor, mesh_settings_.grid).chunks);
+  } catch (const std::invalid_argument& error) {
+    log::limited(log::Level::kWarn, name(), "mesh") << "a mesh is not told: " << error.what();
+  }
+  cut_due_s_ = now_s + (steady_now_s() - begin_s) / kCutShare;
+}
+
+ViewState ViewNode::state(double now_s) {
+  ViewState state = describe_();
+  state.anchor = self_;
+  if (progress_ != nullptr) {
+    state.anchor = progress_->anchor;
+    state.round = progress_->round;
+    state.cost = finite(progress_->cost);
+    state.gradient_norm = finite(progress_->gradient_norm);
+  }
+  for (const auto& [robot, heard_s] : heard_s_)
+    state.links.push_back({robot, static_cast<float>(std::max(0.0, now_s - heard_s))});
+  constexpr std::array kNames = {"view", "view_mesh", "view_images"};
+  for (std::size_t k = 0; k < kNames.size(); ++k)
+    state.sent_bytes.push_back({kNames[k], static_cast<double>(channels_[k].told_bytes)});
+  return state;
+}
+
+// Bytes; none if DDS did not take it.
+std::size_t ViewNode::write(Channel& channel, const ViewContent& content) try {
+  const std::size_t bytes = channel.writer.write(content);
+  channel.told_bytes += bytes;
+  return bytes;
+} catch (const DdsError& error) {
+  log::limited(log::Level::kWarn, name(), "dds") << error.what();
+  return 0;
+}
+
+// How it all ended, to who watches still.
+void ViewNode::tell_rest() {
+  const double now_s = steady_now_s();
+  Channel& view = on(ViewChannel::kView);
+  Channel& mesh = on(ViewChannel::kMesh);
+  const auto is_within = [](std::size_t bytes, double bytes_per_s) {
+    return static_cast<double>(bytes) < kRest_s * bytes_per_s;
+  };
+  if (view.writer.readers() > 0) {
+    std::size_t bytes = write(view, state(now_s));
+    const double late_s = now_s + ViewTeller::kKeyframePeriod_s;  // everything is due
+    while (is_within(bytes, config_.past_bytes_per_s)) {
+      const auto content = teller_.next(late_s);
+      if (!content) break;
+      bytes += write(view, *content);
+    }
+  }
+  if (mesh.writer.readers() > 0 && schedule_) {
+    if (!is_cut_) cut_mesh(now_s);
+    std::size_t bytes = 0;
+    while (is_within(bytes, config_.mesh_bytes_per_s)) {
+      const auto chunk = schedule_->next();
+      if (!chunk) break;
+      bytes += write(mesh, *chunk);
+    }
+  }
+  for (const Channel* channel : {&view, &mesh})
+    if (channel->writer.readers() > 0) channel->writer.await_readers(kAcknowledged_s);
+}
+
+}  // namespace km

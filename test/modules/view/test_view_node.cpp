@@ -1,0 +1,284 @@
+#include <catch2/catch.hpp>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "modules/view/view_listener_node.hpp"
+#include "modules/view/view_node.hpp"
+#include "test/modules/mesh/wavy_sheet.hpp"
+#include "test/modules/view/watcher.hpp"
+#include "test/runtime/dds/dds_fixture.hpp"
+
+namespace km {
+namespace {
+
+constexpr RobotId kSelf = 7;
+constexpr double kDt_s = 0.1;  // between two ticks
+
+// A robot that is watched: time passes as the test says.
+struct Watched {
+  explicit Watched(const ViewConfig& config = {})
+      : participant(domain, {.robot = kSelf, .name = "alpha", .boot = 9}),
+        node(config, participant, {}, camera(),
+             [this] {
+               ++described;
+               return ViewState{.name = "alpha", .phase = "running"};
+             },
+             {.odometry = odometry,
+              .keyframes = keyframes,
+              .trajectory = trajectory,
+              .progress = progress,
+              .outcomes = outcomes,
+              .restored_outcomes = restored_outcomes,
+              .closures = closures,
+              .own_inlier_sets = own_sets,
+              .peer_inlier_sets = peer_sets,
+              .verdicts = verdicts,
+              .restarts = restarts,
+              .statuses = statuses,
+              .images = images}) {}
+
+  static Camera camera() {
+    Camera result;
+    result.width = 64;
+    result.height = 48;
+    result.fx = result.fy = 50.0;
+    result.cx = 31.5;
+    result.cy = 23.5;
+    return result;
+  }
+
+  // Whoever has just come is noticed with the next tick.
+  void pass(double seconds) {
+    for (const double end_s = now_s + seconds; now_s < end_s; now_s += kDt_s) node.tell(now_s);
+  }
+  template <typename T>
+  void learn(T message) {
+    node.step(std::make_shared<const T>(std::move(message)));
+  }
+  void learn_mesh(std::uint32_t side) {
+    node.step(
+        ViewNode::MeshOffer{kSelf, std::make_shared<const LabelledMesh>(wavy_sheet(side, 0.1))});
+  }
+  void learn_keyframes(std::size_t count) {
+    for (std::size_t k = 0; k < count; ++k) {
+      KeyframeOdometry keyframe;
+      keyframe.id = {kSelf, static_cast<KeyframeIndex>(k)};
+      learn(std::move(keyframe));
+    }
+    learn_trajectory(count, 0.0);
+  }
+  void learn_trajectory(std::size_t count, double x_m) {
+    SE3 T = SE3::Identity();
+    T.translation().x() = x_m;
+    learn(Trajectory{kSelf, kSelf, std::vector<SE3>(count, T)});
+  }
+  [[nodiscard]] std::size_t told(ViewChannel channel = ViewChannel::kView) const {
+    return node.told_bytes(channel);
+  }
+
+  std::shared_ptr<const DdsDomain> domain = std::make_shared<DdsDomain>(loopback_config());
+  DdsParticipant participant;
+  Topic<OdometryState> odometry;
+  Topic<KeyframeOdometry> keyframes;
+  Topic<Trajectory> trajectory;
+  Topic<OptimizerProgress> progress;
+  Topic<ClosureOutcome> outcomes, restored_outcomes;
+  Topic<Closure> closures;
+  Topic<InlierSet> own_sets, peer_sets;
+  Topic<ClosureVerdicts> verdicts;
+  Topic<PeerEvent> restarts;
+  Topic<RobotStatus> statuses;
+  Topic<TrackedImage> images;
+  int described = 0;
+  double now_s = 1000.0;
+  ViewNode node;
+};
+
+// One who has come to watch, once it hears the robot.
+struct Visitor {
+  explicit Visitor(Watched& robot) : listener(robot.domain) {
+    REQUIRE(eventually([&] {
+      robot.pass(kDt_s);
+      hear_all();
+      return !watcher.states.empty();
+    }));
+  }
+  void hear_all() {
+    while (auto update = listener.next(0.0)) watcher.hear(update->content);
+  }
+  [[nodiscard]] std::size_t faces() const {
+    const auto meshes = watcher.mesh.snapshot();
+    return meshes.empty() ? 0 : meshes[0].mesh.faces.size();
+  }
+
+  ViewListener listener;
+  Watcher watcher;
+};
+
+}  // namespace
+
+TEST_CASE("With nobody to watch, nothing is told", "[view]") {
+  Watched robot;
+  robot.learn_keyframes(100);
+  robot.learn_mesh(20);
+  robot.pass(60.0);
+  CHECK(robot.described == 0);
+  for (const auto channel : {ViewChannel::kView, ViewChannel::kMesh, ViewChannel::kImages})
+    CHECK(robot.told(channel) == 0);
+}
+
+TEST_CASE("The past and the present are told within their budgets", "[view]") {
+  const ViewConfig config = {};
+  Watched robot(config);
+  constexpr std::size_t kKeyframes = 3000;  // twice 84 kB
+  robot.learn_keyframes(kKeyframes);
+  const double begin_s = robot.now_s;
+  Visitor visitor(robot);
+  const double come_s = robot.now_s;
+  const double slack = static_cast<double>(ViewTeller::kUpdateBytes) + 200.0;
+  const auto told = [&] { return static_cast<double>(robot.told()); };
+  constexpr double kPast_bytes = 2.0 * 28.0 * kKeyframes;
+  while (told() < kPast_bytes) {
+    robot.pass(kDt_s);
+    REQUIRE(told() <= config.past_bytes_per_s * (robot.now_s - begin_s + 0.5) + slack);
+    REQUIRE(robot.now_s - come_s < kPast_bytes / config.past_bytes_per_s + 2.0);
+  }
+  CHECK(eventually([&] {
+    robot.pass(kDt_s);
+    visitor.hear_all();
+    return visitor.watcher.odometry.size() == kKeyframes &&
+           visitor.watcher.optimized.size() == kKeyframes;
+  }));
+
+  // More moves than can be told.
+  robot.pass(5.0);
+  const double present_s = robot.now_s;
+  const std::size_t present = robot.told();
+  double x_m = 0.0;
+  while (robot.now_s < present_s + 60.0) {
+    robot.learn_trajectory(kKeyframes, x_m += 1.0);
+    robot.pass(1.0);
+  }
+  const double rate = static_cast<double>(robot.told() - present) / (robot.now_s - present_s);
+  CHECK(rate <= config.bytes_per_s + (0.5 * config.bytes_per_s + slack) / 60.0);
+  CHECK(rate > 0.9 * config.bytes_per_s);
+}
+
+TEST_CASE("A state is told once a second", "[view]") {
+  Watched robot;
+  Visitor visitor(robot);
+  robot.learn(OptimizerProgress{.anchor = 3, .members = {3, kSelf}, .round = 12, .cost = 5.5});
+  robot.learn(RobotStatus{.robot = 4, .name = "beta"});
+  const std::size_t before = visitor.watcher.states.size();
+  robot.pass(10.0);
+  REQUIRE(eventually([&] {
+    visitor.hear_all();
+    return visitor.watcher.states.size() >= before + 10;
+  }));
+  CHECK(visitor.watcher.states.size() <= before + 11);
+  const ViewState& state = visitor.watcher.states.back();
+  CHECK(state.name == "alpha");
+  CHECK(state.anchor == 3);
+  CHECK(state.round == 12);
+  CHECK(state.cost == 5.5);
+  REQUIRE(state.links.size() == 1);
+  CHECK(state.links[0].robot == 4);
+  REQUIRE(state.sent_bytes.size() == 3);
+  CHECK(state.sent_bytes[0].name == "view");
+  CHECK(state.sent_bytes[0].value > 0.0);
+}
+
+TEST_CASE("Who comes late is told all there is", "[view]") {
+  Watched robot;
+  robot.learn_keyframes(50);
+  const ClosureId id = closure_id({kSelf, 3}, {4, 9});
+  robot.learn(ClosureOutcome{.id = id, .stage = ClosureStage::kVerified, .reason = {}});
+  robot.learn_mesh(60);
+  const std::size_t faces = wavy_sheet(60, 0.1).faces.size();
+  std::optional<Visitor> first(std::in_place, robot);
+  const auto knows_all = [&](Visitor& visitor) {
+    return eventually([&] {
+      robot.pass(1.0);
+      visitor.hear_all();
+      const Watcher& watcher = visitor.watcher;
+      return watcher.odometry.size() == 50 && watcher.optimized.size() == 50 &&
+             watcher.closures.contains(id) && visitor.faces() == faces;
+    });
+  };
+  CHECK(knows_all(*first));
+  Visitor second(robot);
+  CHECK(knows_all(second));
+  first.reset();
+  CHECK(eventually([&] {  // and when it is alone
+    robot.learn_mesh(20);
+    robot.pass(1.0);
+    second.hear_all();
+    return second.faces() == wavy_sheet(20, 0.1).faces.size();
+  }));
+}
+
+TEST_CASE("Pieces of the mesh leave no faster than configured", "[view]") {
+  ViewConfig config = {};
+  config.mesh_bytes_per_s = 20000.0;
+  Watched robot(config);
+  robot.learn_mesh(150);
+  Visitor visitor(robot);
+  const double begin_s = robot.now_s;
+  const std::size_t before = robot.told(ViewChannel::kMesh);
+  const auto told_since = [&] {
+    return static_cast<double>(robot.told(ViewChannel::kMesh) - before);
+  };
+  for (int tick = 0; tick < 100; ++tick) {
+    robot.pass(kDt_s);
+    REQUIRE(told_since() <=
+            config.mesh_bytes_per_s * (robot.now_s - begin_s + 0.5) + kMaxChunkBytes);
+  }
+  CHECK(told_since() > 0.8 * config.mesh_bytes_per_s * (robot.now_s - begin_s));
+}
+
+TEST_CASE("At the end all is told", "[view]") {
+  Watched robot;
+  std::optional<Visitor> visitor(std::in_place, robot);
+  robot.learn_keyframes(400);
+  robot.learn_mesh(40);
+  robot.node.start();
+  robot.node.stop();
+  const std::size_t told = robot.told();
+  robot.node.stop();
+  CHECK(robot.told() == told);
+  CHECK(eventually([&] {
+    visitor->hear_all();
+    return visitor->watcher.optimized.size() == 400 &&
+           visitor->faces() == wavy_sheet(40, 0.1).faces.size();
+  }));
+}
+
+TEST_CASE("Images are told while they are asked for", "[view]") {
+  ViewConfig config = {};
+  config.images_per_s = 30.0;
+  Watched robot(config);
+  StereoFrame frame;
+  frame.left = {64, 48, std::vector<std::uint8_t>(64 * 48, 100)};
+  const auto shared = std::make_shared<const StereoFrame>(std::move(frame));
+  Visitor visitor(robot);
+  robot.node.start();
+  for (int k = 0; k < 20; ++k) robot.images.publish(TrackedImage{shared, {{0.1, 0.2}}});
+  CHECK(robot.told(ViewChannel::kImages) == 0);
+  visitor.listener.ask_for_images({kSelf});
+  CHECK(eventually([&] {
+    robot.images.publish(TrackedImage{shared, {{0.1, 0.2}}});
+    visitor.hear_all();
+    return !visitor.watcher.images.empty();
+  }));
+  REQUIRE_FALSE(visitor.watcher.images.empty());
+  REQUIRE(visitor.watcher.images[0].features.size() == 1);
+  CHECK(visitor.watcher.images[0].features[0][0] == Approx(36.5F));
+  CHECK(visitor.watcher.images[0].features[0][1] == Approx(33.5F));
+  robot.node.stop();
+}
+
+}  // namespace km
