@@ -89,6 +89,7 @@ Finding image_finding(const char* id, std::string what, const char* means, const
 
 std::vector<double> values_of(const std::vector<ImageLook>& looks, const auto& value) {
   std::vector<double> values;
+  values.reserve(looks.size());
   for (const ImageLook& look : looks) values.push_back(static_cast<double>(value(look)));
   return values;
 }
@@ -297,6 +298,7 @@ void examine_focal(const InertialFit& fit, bool has_depth, Examination& result) 
 
 void examine_gravity(const SensorSample& sample, Examination& result) {
   std::vector<double> norms;
+  norms.reserve(sample.imu.size());
   for (const ImuSample& measured : sample.imu) norms.push_back(measured.accel.norm());
   constexpr double kGravity = 9.81;
   const double found = quantile(std::move(norms), 0.5);
@@ -340,6 +342,7 @@ Examination examine_streams(const SensorSample& sample, const ReaderReport& repo
   if (sample.frames.size() > 1)
     examine_rate("images", "frames", sample.frames, kFrames_hz, kFrameGap_s, result);
   std::vector<Stamp> stamps;
+  stamps.reserve(sample.imu.size());
   for (const ImuSample& measured : sample.imu) stamps.push_back(measured.stamp);
   if (stamps.size() > 1)
     examine_rate("inertial samples", "imu", stamps, kSamples_hz, kSampleGap_s, result);

@@ -88,7 +88,9 @@ double trimmed_sum(Eigen::VectorXd squares) {
 double coarse_offset(const GyroIntegral& gyro, std::span<const SeenRotation> seen,
                      const Rates& image) {
   double best_s = 0.0, least = std::numeric_limits<double>::infinity();
-  for (double offset_s = -kMaxOffset_s; offset_s <= kMaxOffset_s + 1e-9; offset_s += kCoarse_s) {
+  const auto most = static_cast<int>(std::lround(kMaxOffset_s / kCoarse_s));
+  for (int k = -most; k <= most; ++k) {
+    const double offset_s = kCoarse_s * k;
     const double sum = trimmed_sum(residuals(image, gyro_rates(gyro, seen, offset_s)));
     if (sum < least) best_s = offset_s;
     least = std::min(least, sum);
@@ -117,8 +119,13 @@ void refine_offset(const GyroIntegral& gyro, std::span<const SeenRotation> seen,
     return residuals(image, gyro_rates(gyro, seen, offset_s)).sum();
   };
   double at_s = start_s, sum = sum_at(start_s);
-  for (double s = start_s - 2 * kCoarse_s; s <= start_s + 2 * kCoarse_s; s += kFine_s)
-    if (const double here = sum_at(s); here < sum) at_s = s, sum = here;
+  const auto most = static_cast<int>(std::lround(2.0 * kCoarse_s / kFine_s));
+  for (int k = -most; k <= most; ++k) {
+    const double s = start_s + kFine_s * k, here = sum_at(s);
+    if (here >= sum) continue;
+    at_s = s;
+    sum = here;
+  }
   // Wide enough that noise does not make the parabola.
   const double before = sum_at(at_s - kCoarse_s), after = sum_at(at_s + kCoarse_s);
   const double curvature = (before - 2.0 * sum + after) / (kCoarse_s * kCoarse_s);
@@ -139,7 +146,7 @@ void fit_rotation(const Rates& image, const Rates& gyro, InertialFit& fit) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(image * gyro.transpose(),
                                               Eigen::ComputeFullU | Eigen::ComputeFullV);
   fit.Q = svd.matrixU() * svd.matrixV().transpose();
-  const Eigen::Vector3d gains = svd.singularValues();
+  const Eigen::Vector3d& gains = svd.singularValues();
   fit.scale = gains.sum() / gyro.squaredNorm();
   // A rotation in place of it loses twice the least gain.
   const double of_all = gains.sum() * gains.sum();

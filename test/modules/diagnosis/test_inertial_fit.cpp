@@ -11,7 +11,7 @@ namespace km {
 namespace {
 
 constexpr Stamp kStart = 1'000'000'000;
-constexpr double kEnd_s = 12.0, kNoise_rad = 3e-4;
+constexpr double kNoise_rad = 3e-4;
 
 // A hand that turns a camera about all axes [rad/s].
 Eigen::Vector3d rate_at(double t_s) {
@@ -21,9 +21,11 @@ Eigen::Vector3d rate_at(double t_s) {
 // Of a gyroscope with that scale, a bias, and a clock that is `late_s` ahead of the images'.
 std::vector<ImuSample> samples(double scale, double late_s) {
   std::vector<ImuSample> result;
-  for (double t_s = 0.0; t_s < kEnd_s; t_s += 0.005)
+  for (int k = 0; k < 2400; ++k) {
+    const double t_s = 0.005 * k;
     result.push_back({.stamp = kStart + nanoseconds(t_s + late_s),
                       .gyro = scale * (rate_at(t_s) + Eigen::Vector3d(0.05, -0.02, 0.08))});
+  }
   return result;
 }
 
@@ -33,7 +35,8 @@ std::vector<SeenRotation> seen(const Eigen::Matrix3d& R_cam_body, double focal =
   std::mt19937 rng(3);
   std::normal_distribution<double> noise(0.0, kNoise_rad);
   std::vector<SeenRotation> result;
-  for (double t_s = 0.5; t_s + 0.1 < kEnd_s - 0.5; t_s += 0.1) {
+  for (int step = 5; step < 114; ++step) {
+    const double t_s = 0.1 * step;
     Eigen::Vector3d turned = Eigen::Vector3d::Zero();
     for (int k = 0; k < 100; ++k) turned += 0.001 * rate_at(t_s + 0.001 * (k + 0.5));
     Eigen::Vector3d rotation = R_cam_body * turned;
