@@ -37,10 +37,11 @@ TEST_CASE("Findings are sorted by how grave they are, and keep their order", "[d
 
 TEST_CASE("A finding is three lines for people", "[diagnosis]") {
   Finding finding = finding_of("stereo.swapped", Severity::kWarning);
-  CHECK(to_text({&finding, 1}) == "warning stereo.swapped: 7 of 9\n  means: m\n  to do: t\n");
+  CHECK(to_text(std::span(&finding, 1)) ==
+        "warning stereo.swapped: 7 of 9\n  means: m\n  to do: t\n");
   finding.to_do.clear();
-  CHECK(to_text({&finding, 1}) == "warning stereo.swapped: 7 of 9\n  means: m\n");
-  CHECK(to_text(std::span<const Finding>()).empty());
+  CHECK(to_text(std::span(&finding, 1)) == "warning stereo.swapped: 7 of 9\n  means: m\n");
+  CHECK(to_text(std::vector<Finding>()).empty());
 }
 
 TEST_CASE("A finding is read from JSON as it was written", "[diagnosis]") {

@@ -91,7 +91,7 @@ void link_v1(const fs::path& recording, const fs::path& folder,
 
 TEST_CASE("Nothing is found wrong with MH_01", "[diagnosis]") {
   if (!machine_hall()) return;
-  CHECK(found_in(*machine_hall()) == Ids{});
+  CHECK(found_in(*machine_hall()).empty());
 }
 
 TEST_CASE("A fault planted in the calibration of MH_01 is named, and nothing else", "[diagnosis]") {
@@ -218,7 +218,7 @@ TEST_CASE("Nothing is found wrong with the world of the demo, and what is plante
     return;
   }
   const Recorded sound = read(world / "robot0", 12.0);
-  CHECK(found_in(sound) == Ids{});
+  CHECK(found_in(sound).empty());
   Recorded late = sound;
   for (ImuSample& measured : late.sample.imu) measured.stamp += 20'000'000;
   CHECK(found_in(late) == Ids{"imu.time_offset"});
