@@ -71,8 +71,10 @@ TEST_CASE("Spoilt tables of a run are refused with file and line", "[evaluation]
   }
   SECTION("loop_closures.csv") {
     check_spoilt<ClosureFileError>(
-        "robot_a,index_a,robot_b,index_b,similarity,stage,reason,matches,x,y,z,qx,qy,qz,qw\n"
-        "0,1,1,7,0.5,inlier,,30,1.5,2.5,3.5,0,0,0.6,0.8\n0,2,1,9,0.25,candidate,,0,,,,,,,\n",
+        "robot_a,index_a,robot_b,index_b,similarity,stage,matches,inliers,x,y,z,qx,qy,qz,qw,"
+        "reason\n"
+        "0,1,1,7,0.5,inlier,40,30,1.5,2.5,3.5,0,0,0.6,0.8,\n"
+        "0,2,1,9,0.25,candidate,0,0,,,,,,,,\"far, apart\"\n",
         "loop_closures.csv", [&](const std::string& text) {
           for (const auto& closure : read_closures(folder.write("loop_closures.csv", text)))
             if (closure.T_from_to) CHECK(closure.T_from_to->matrix().allFinite());
