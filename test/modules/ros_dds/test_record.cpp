@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -175,6 +176,38 @@ TEST_CASE("A robot's record holds what viewers are told, and the states it ended
   CHECK(image->header.stamp == 1007);
   CHECK(image->data.size() > 100);
   for (const ToldMessage& message : messages) CHECK(message.log_time >= 1000);
+}
+
+TEST_CASE("The map of a robot that is not joined hangs in no other", "[ros_dds]") {
+  const RobotId anchor = GENERATE(as<RobotId>(), 3, 7);
+  const TemporaryFolder folder;
+  const fs::path file = folder.path() / "a.mcap";
+  Topic<OdometryState> odometry;
+  Topic<KeyframeOdometry> keyframes;
+  Topic<Trajectory> trajectories;
+  RosOutputNode node(
+      "record", std::make_unique<McapSink>(file, [](const auto&) {}),
+      {.robot = "bob", .id = 3, .name_of = [](RobotId robot) { return robot == 3 ? "bob" : "al"; }},
+      [] { return std::vector<RosDiagnosticStatus>(); }, {},
+      {odometry, keyframes, trajectories, {}});
+  node.start();
+  odometry.publish(OdometryState{.stamp = 1000});
+  trajectories.publish(straight(anchor));
+  node.stop();
+  node.finish({}, {}, {});
+  McapReader reader(file);
+  std::set<std::pair<std::string, std::string>> links;
+  for (const ToldMessage& message : told_by(reader)) {
+    if (message.topic != "/tf") continue;
+    const auto transforms = decode_ros<RosTransforms>("cdr", message.bytes);
+    REQUIRE(transforms.value);
+    for (const RosTransform& link : transforms.value->transforms)
+      links.emplace(link.header.frame, link.child_frame);
+  }
+  CHECK(links.contains({"bob/map", "bob/odom"}));
+  CHECK(links.contains({"bob/odom", "bob/base_link"}));
+  CHECK(links.contains({"al/map", "bob/map"}) == (anchor == 7));
+  CHECK(links.size() == (anchor == 7 ? 3 : 2));
 }
 
 TEST_CASE("A record ends where the disk is full, and says so once", "[ros_dds]") {
