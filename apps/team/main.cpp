@@ -220,7 +220,11 @@ int main(int argc, char** argv) try {
   TeamOptions options;
   define(app, options);
   try {
-    app.parse(argc, argv);
+    // CLI11 takes "--" behind --record for the end of its values, and no more.
+    char** const robots = std::find(argv, argv + argc, std::string_view("--"));
+    app.parse(static_cast<int>(robots - argv), argv);
+    if (robots != argv + argc)
+      options.arguments.insert(options.arguments.end(), robots + 1, argv + argc);
   } catch (const CLI::ExtrasError& error) {
     app.exit(error);
     std::cerr << "Options of the robots come after --, as in\n"
