@@ -10,7 +10,7 @@
 
 #include "apps/viewer/page_files.hpp"
 #include "apps/viewer/page_server.hpp"
-#include "test/support/patience.hpp"
+#include "test/apps/viewer/page_listener.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -49,45 +49,6 @@ Answer get(int port, const std::string& path, const std::string& headers = {}) {
   mg_close_connection(connection);
   return answer;
 }
-
-// A page without a browser: collects the frames it is sent.
-class Listener {
- public:
-  Listener(int port, const std::string& path) {
-    std::array<char, 256> error{};
-    connection_ = mg_connect_websocket_client(
-        "127.0.0.1", port, 0, error.data(), error.size(), path.c_str(), nullptr,
-        [](mg_connection*, int, char* data, size_t size, void* self) {
-          static_cast<Listener*>(self)->hear({data, size});
-          return 1;
-        },
-        [](const mg_connection*, void*) {}, this);
-    INFO(error.data());
-    REQUIRE(connection_ != nullptr);
-  }
-  ~Listener() { mg_close_connection(connection_); }
-
-  void say(const std::string& text) {
-    mg_websocket_client_write(connection_, MG_WEBSOCKET_OPCODE_TEXT, text.data(), text.size());
-  }
-
-  bool hears(const std::string& text) {
-    std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, kPatience, [&] { return all_.find(text) != std::string::npos; });
-  }
-
- private:
-  void hear(std::string_view frame) {
-    const std::lock_guard lock(mutex_);
-    all_.append(frame);
-    changed_.notify_all();
-  }
-
-  mg_connection* connection_ = nullptr;
-  std::mutex mutex_;  // guards all_
-  std::condition_variable changed_;
-  std::string all_;
-};
 
 PageServerOptions any_port() {
   PageServerOptions options;
@@ -150,7 +111,7 @@ TEST_CASE("A page hears the greeting, the past, and what comes", "[page_server]"
   ViewStore store(1'000'000);
   store.add(state_of("early"));
   const PageServer server(store, any_port());
-  Listener page(port_of(server), "/updates");
+  PageListener page(port_of(server), "/updates");
   CHECK(page.hears(R"([{"kind":"hello"}])"));
   CHECK(page.hears(R"("name":"early")"));
   CHECK(page.hears(R"([{"kind":"caught_up"}])"));
@@ -175,14 +136,14 @@ TEST_CASE("A robot is asked for images as long as any page wants them", "[page_s
   };
   const PageServer server(store, options);
   {
-    Listener one(port_of(server), "/updates");
+    PageListener one(port_of(server), "/updates");
     one.say("no JSON");
     one.say(R"({"images":-1,"on":true})");
     one.say(R"({"images":70000,"on":true})");
     one.say(R"({"images":3,"on":true})");
     REQUIRE(wait_for(1));
     {
-      Listener other(port_of(server), "/updates");
+      PageListener other(port_of(server), "/updates");
       other.say(R"({"images":3,"on":true})");
       other.say(R"({"images":4,"on":true})");
       REQUIRE(wait_for(2));

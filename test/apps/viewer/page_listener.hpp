@@ -1,0 +1,56 @@
+#pragma once
+
+#include <civetweb.h>
+
+#include <array>
+#include <catch2/catch.hpp>
+#include <condition_variable>
+#include <mutex>
+#include <string>
+#include <string_view>
+
+#include "test/support/patience.hpp"
+
+namespace km {
+
+/// A page without a browser: collects the frames it is sent.
+class PageListener {
+ public:
+  PageListener(int port, const std::string& path) {
+    std::array<char, 256> error{};
+    connection_ = mg_connect_websocket_client(
+        "127.0.0.1", port, 0, error.data(), error.size(), path.c_str(), nullptr,
+        [](mg_connection*, int, char* data, size_t size, void* self) {
+          static_cast<PageListener*>(self)->hear({data, size});
+          return 1;
+        },
+        [](const mg_connection*, void*) {}, this);
+    INFO(error.data());
+    REQUIRE(connection_ != nullptr);
+  }
+  ~PageListener() { mg_close_connection(connection_); }
+
+  void say(const std::string& text) {
+    mg_websocket_client_write(connection_, MG_WEBSOCKET_OPCODE_TEXT, text.data(), text.size());
+  }
+
+  /// Waits until a frame holds this.
+  bool hears(const std::string& text) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, kPatience, [&] { return all_.find(text) != std::string::npos; });
+  }
+
+ private:
+  void hear(std::string_view frame) {
+    const std::lock_guard lock(mutex_);
+    all_.append(frame);
+    changed_.notify_all();
+  }
+
+  mg_connection* connection_ = nullptr;
+  std::mutex mutex_;  // guards all_
+  std::condition_variable changed_;
+  std::string all_;
+};
+
+}  // namespace km
