@@ -9,6 +9,7 @@
 #include "apps/result_files.hpp"
 #include "apps/result_writer.hpp"
 #include "apps/team/links_file.hpp"
+#include "apps/team/report_page.hpp"
 #include "apps/team/run_team.hpp"
 #include "apps/team/team_record.hpp"
 #include "apps/team/team_report.hpp"
@@ -29,6 +30,8 @@ constexpr const char* kAbout =
     "the\n"
     "trajectories and how many closures are true (see kimera_multi_evaluate closures --help), "
     "with\ntruth_mesh also how far the robots' meshes are from it.\n\n"
+    "report.html in the folder of the results shows all of it, with charts over time, every "
+    "closure\nand what stands out: one file for any browser, without a network.\n\n"
     "Exit code: 0 if every robot ended well, 1 for input that cannot be used and results that "
     "cannot\nbe written, 3 if a robot failed.\n"
     "Ctrl-C asks the robots to end in order and prints what there is; a second one ends them. If "
@@ -173,15 +176,21 @@ void write_record(const km::TeamPlan& plan, const km::TeamResult& team, const fs
   km::merge_records(records, root, file);
 }
 
-// The JSON, the plot and the mesh of the whole team; `told` hears where the latter two are.
+// The JSON, the report, the plot and the mesh of the whole team; `told` hears where all but the
+// first are.
 void write_results(const TeamOptions& options, const km::TeamPlan& plan, const km::TeamResult& team,
                    km::ResultWriter& results, std::ostream& told) {
   if (!options.json.empty())
     results.write(options.json, [&](const fs::path& file) { km::write_json(file, team); });
+  if (!std::ranges::all_of(team.robots, &km::RobotResult::left_nothing))
+    results.write(plan.output / km::kReportPage, [&](const fs::path& file) {
+      km::write_report(file, plan, team);
+      told << "\nThe report, for a browser: " << file.string() << '\n';
+    });
   if (!team.plot.empty())
     results.write(plan.output / "trajectories.svg", [&](const fs::path& file) {
       km::write_file(file, team.plot);
-      told << "\nSeen from above: " << file.string() << '\n';
+      told << "Seen from above: " << file.string() << '\n';
     });
   if (options.record)
     results.write(options.record->empty() ? plan.output / km::kTeamRecord : *options.record,

@@ -30,7 +30,7 @@ void remove_earlier_run(const TeamPlan& plan) {
     fs::remove(folder / "exit_code");
   }
   for (const char* file :
-       {"trajectories.svg", "team_mesh.ply", kTeamRecord, kLinksTable, kLabelPalette})
+       {"trajectories.svg", "team_mesh.ply", kReportPage, kTeamRecord, kLinksTable, kLabelPalette})
     fs::remove(plan.output / file);
 }
 

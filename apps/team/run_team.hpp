@@ -19,6 +19,9 @@ inline constexpr const char* kLinksTable = "links.csv";
 /// The records of all robots, likewise.
 inline constexpr const char* kTeamRecord = "team.mcap";
 
+/// The report of the run, likewise.
+inline constexpr const char* kReportPage = "report.html";
+
 /// How one robot's process ended.
 struct RobotRun {
   ProcessExit exit;

@@ -96,6 +96,10 @@ class Trajectories {
 
   const std::vector<StampedPose>& truth(const RobotPlan& robot) { return read(robot.truth); }
 
+  const std::vector<StampedPose>& optimized(const RobotPlan& robot) {
+    return read(plan_.output / robot.name / "optimized.tum");
+  }
+
  private:
   const std::vector<StampedPose>& read(const fs::path& file) {
     const auto known = read_.find(file);
@@ -107,8 +111,70 @@ class Trajectories {
   std::map<fs::path, std::vector<StampedPose>> read_;
 };
 
+std::vector<StampedPose> moved(std::span<const StampedPose> poses, const Alignment& alignment) {
+  std::vector<StampedPose> result(poses.begin(), poses.end());
+  for (StampedPose& pose : result) pose.T = alignment.apply(pose.T);
+  return result;
+}
+
+// The part of the truth that an estimate covers.
+std::vector<StampedPose> beside(std::span<const StampedPose> truth,
+                                std::span<const StampedPose> estimate) {
+  std::vector<StampedPose> result;
+  for (const StampedPose& pose : truth)
+    if (!estimate.empty() && pose.stamp >= estimate.front().stamp &&
+        pose.stamp <= estimate.back().stamp)
+      result.push_back(pose);
+  return result;
+}
+
+void judge_odometry(const TrajectoryInput& input, RobotResult& robot) {
+  const TeamError error = trajectory_error({&input, 1});
+  robot.odometry = error.joint;
+  robot.paths.odometry = moved(input.estimate, error.alignment);
+  robot.paths.truth = beside(input.truth, input.estimate);
+}
+
+// Judges the optimised poses of the robots in the team's frame, and moves them to the truth.
+void judge_optimized(TeamResult& team, Trajectories& trajectories) {
+  std::vector<TrajectoryInput> inputs;
+  for (RobotResult& robot : team.robots)
+    if (robot.in_team_frame)
+      if (const auto input = trajectories.input(robot.plan, "optimized.tum", robot.notes))
+        inputs.push_back(*input);
+  if (!inputs.empty()) {
+    team.optimized = trajectory_error(inputs);
+    team.plot = plot_from_above(inputs, *team.optimized);
+  }
+  const Alignment alignment = team.optimized ? team.optimized->alignment : Alignment{};
+  for (RobotResult& robot : team.robots) {
+    if (!robot.in_team_frame || robot.left_nothing()) continue;
+    std::vector<std::string> known;  // what judging them has noted, or nobody asked for
+    const auto poses = attempt(known, [&] { return trajectories.optimized(robot.plan); });
+    if (poses) robot.paths.optimized = moved(*poses, alignment);
+  }
+}
+
+// Keyframes and closures. What keeps a robot out is noted with the team.
+void read_all_closures(const TeamPlan& plan, std::vector<RobotResult>& robots,
+                       std::vector<std::string>& notes) {
+  for (RobotResult& robot : robots) {
+    const auto folder = plan.output / robot.plan.name;
+    const bool expected =
+        !robot.plan.truth.empty() && !robot.plan.dataset.empty() && !robot.left_nothing();
+    if (!expected && !is_there(folder / "loop_closures.csv")) continue;
+    try {
+      auto keyframes = read_keyframes(folder / "keyframes.csv");
+      robot.closures = read_closures(folder / "loop_closures.csv");
+      robot.keyframes = std::move(keyframes);
+    } catch (const std::exception& error) {
+      notes.push_back(robot.plan.name + ": closures are not judged: " + error.what());
+    }
+  }
+}
+
 // The closures of all robots whose truth is known against it; nullopt where there is nothing to
-// judge. What keeps a robot out is noted with the team.
+// judge.
 std::optional<ClosureScores> judge_closures(const TeamPlan& plan,
                                             const std::vector<RobotResult>& robots,
                                             Trajectories& trajectories,
@@ -117,18 +183,14 @@ std::optional<ClosureScores> judge_closures(const TeamPlan& plan,
   if (!camera) return std::nullopt;
   std::vector<TrueKeyframe> keyframes;
   std::vector<ClosureRecord> closures;
-  for (const RobotResult& result : robots) {
-    const RobotPlan& robot = result.plan;
-    if (robot.truth.empty() || result.left_nothing()) continue;
+  for (const RobotResult& robot : robots) {
+    if (robot.plan.truth.empty() || robot.keyframes.empty()) continue;
     try {
-      const auto folder = plan.output / robot.name;
-      const auto own =
-          place_keyframes(read_keyframes(folder / "keyframes.csv"), trajectories.truth(robot));
-      const auto found = read_closures(folder / "loop_closures.csv");
+      const auto own = place_keyframes(robot.keyframes, trajectories.truth(robot.plan));
       keyframes.insert(keyframes.end(), own.begin(), own.end());
-      closures.insert(closures.end(), found.begin(), found.end());
+      closures.insert(closures.end(), robot.closures.begin(), robot.closures.end());
     } catch (const std::exception& error) {
-      notes.push_back(robot.name + ": closures are not judged: " + error.what());
+      notes.push_back(robot.plan.name + ": closures are not judged: " + error.what());
     }
   }
   if (keyframes.empty()) return std::nullopt;
@@ -201,26 +263,19 @@ TeamResult collect_results(const TeamPlan& plan, std::vector<RobotRun> runs) {
     const fs::path summary = plan.output / robot.plan.name / "summary.json";
     robot.summary = attempt(robot.notes, [&] { return read_summary(summary); });
     if (const auto input = trajectories.input(robot.plan, "odometry.tum", robot.notes))
-      robot.odometry = trajectory_error({&*input, 1}).joint;
+      judge_odometry(*input, robot);
   }
   find_team_frame(result.robots);
   TeamPlan joined = plan;
   joined.robots.clear();
-  std::vector<TrajectoryInput> optimized;
-  for (RobotResult& robot : result.robots) {
-    if (!robot.in_team_frame) continue;
-    joined.robots.push_back(robot.plan);
-    if (const auto input = trajectories.input(robot.plan, "optimized.tum", robot.notes))
-      optimized.push_back(*input);
-  }
-  if (!optimized.empty()) {
-    result.optimized = trajectory_error(optimized);
-    result.plot = plot_from_above(optimized, *result.optimized);
-  }
+  for (const RobotResult& robot : result.robots)
+    if (robot.in_team_frame) joined.robots.push_back(robot.plan);
+  judge_optimized(result, trajectories);
   if (plan.truth_mesh.empty() || result.optimized)
     result.meshes = collect_meshes(
         joined, result.optimized ? result.optimized->alignment.T_truth_estimate : SE3::Identity(),
         result.notes);
+  read_all_closures(plan, result.robots, result.notes);
   result.closures = judge_closures(plan, result.robots, trajectories, result.notes);
   return result;
 }

@@ -14,6 +14,13 @@
 
 namespace km {
 
+/// Where a robot was, over the time of its estimate: in the world of the truth, if there is one,
+/// the odometry aligned alone and the optimised poses as the team is; else `optimized` alone, in
+/// the team's frame. What there is not is empty.
+struct RobotPaths {
+  std::vector<StampedPose> truth, odometry, optimized;
+};
+
 /// One robot after the run. What could not be had is absent, and `notes` say why.
 struct RobotResult {
   RobotPlan plan;
@@ -21,6 +28,9 @@ struct RobotResult {
   std::optional<RunSummary> summary;
   std::optional<TrajectoryError> odometry;  ///< Aligned alone.
   bool in_team_frame = true;                ///< Its optimised poses are, see find_team_frame().
+  RobotPaths paths;
+  std::vector<KeyframeRecord> keyframes;  ///< Of a robot with cameras.
+  std::vector<ClosureRecord> closures;    ///< That it considered, likewise.
   std::vector<std::string> notes;
 
   /// True if it failed before it wrote results: why is in its last words.

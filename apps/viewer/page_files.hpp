@@ -14,8 +14,11 @@ struct PageFile {
 /// All of the page: those in apps/viewer/page, and three.js where its modules look for each other.
 [[nodiscard]] std::span<const PageFile> page_files();
 
-/// What draws charts alone, for pages of other programs: a module that needs no other file. In the
-/// library km_charts.
+/// What pages of other programs share with it: charts.js, a module that needs no other file, and
+/// theme.css. In the library km_charts.
 [[nodiscard]] std::span<const PageFile> chart_files();
+
+/// Of the report of a team's run: report.js and report.css. In the library km_report_files.
+[[nodiscard]] std::span<const PageFile> report_files();
 
 }  // namespace km

@@ -1,7 +1,6 @@
 #include "apps/viewer/run_playback.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <exception>
 #include <functional>
 #include <iterator>
@@ -9,12 +8,11 @@
 #include <map>
 #include <optional>
 #include <stdexcept>
-#include <tuple>
 
 #include "apps/result_files.hpp"
 #include "apps/robot/run_summary.hpp"
+#include "apps/robot/run_tables.hpp"
 #include "modules/core/input_file.hpp"
-#include "modules/core/text_rows.hpp"
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
@@ -29,17 +27,6 @@ constexpr double kPoseInterval_s = 0.2;
 constexpr double kMaxPoseGap_s = 0.5;                             // of the estimate, at a keyframe
 constexpr std::size_t kMostClosures = 200, kMostKeyframes = 500;  // of one update
 
-// A row of process.csv or optimizer.csv as numbers.
-using Row = std::vector<double>;
-
-// Bytes sent and messages heard until a time of the run.
-struct TrafficRow {
-  double time_s = 0.0;
-  bool out = false;
-  std::string topic, category, peer;
-  double messages = 0.0, bytes = 0.0;
-};
-
 // What a robot left; times are since its start [s].
 struct RobotFiles {
   RobotId id = 0;
@@ -47,55 +34,16 @@ struct RobotFiles {
   std::vector<StampedPose> odometry, optimized;
   std::vector<KeyframeRecord> keyframes;
   std::vector<ClosureRecord> closures;
-  std::vector<Row> process, rounds;
+  std::vector<NumberRow> process, rounds;
   std::vector<TrafficRow> traffic;
   std::vector<ViewNumber> loads;
   LabelledMesh mesh, optimized_mesh;
 };
 
-std::vector<TextRow> rows_below_header(std::string_view text) {
-  std::vector<TextRow> rows = split_rows(text);
-  if (!rows.empty()) rows.erase(rows.begin());
-  return rows;
-}
-
-double number(const TextRow& row, std::size_t i, const fs::path& file) {
-  const auto value = number_in(row, i);
-  if (!value || !std::isfinite(*value))
-    throw std::runtime_error(file.string() + " line " + std::to_string(row.line) + ": field " +
-                             std::to_string(i + 1) + " is not a number");
-  return *value;
-}
-
-std::vector<Row> read_numbers(const fs::path& file, std::size_t columns) {
-  const std::string text = read_input_file(file);
-  std::vector<Row> rows;
-  for (const TextRow& row : rows_below_header(text)) {
-    Row& values = rows.emplace_back();
-    for (std::size_t i = 0; i < columns; ++i) values.push_back(number(row, i, file));
-  }
-  return rows;
-}
-
-std::vector<TrafficRow> read_traffic(const fs::path& file) {
-  const std::string text = read_input_file(file);
-  std::vector<TrafficRow> rows;
-  for (const TextRow& row : rows_below_header(text)) {
-    if (row.fields.size() < 7)
-      throw std::runtime_error(file.string() + " line " + std::to_string(row.line) +
-                               ": fewer than 7 fields");
-    rows.push_back({number(row, 0, file), row.fields[1] == "out", std::string(row.fields[2]),
-                    std::string(row.fields[3]), std::string(row.fields[4]), number(row, 5, file),
-                    number(row, 6, file)});
-  }
-  return rows;
-}
-
 std::vector<ViewNumber> read_loads(const fs::path& file, double seconds) {
-  const std::string text = read_input_file(file);
   std::vector<ViewNumber> loads;
-  for (const TextRow& row : rows_below_header(text))
-    loads.push_back({std::string(row.fields[0]), number(row, 5, file) / std::max(seconds, 1e-3)});
+  for (const ModuleTiming& timing : read_timing(file))
+    loads.push_back({timing.module, timing.total_s / std::max(seconds, 1e-3)});
   return loads;
 }
 
@@ -115,8 +63,8 @@ RobotFiles read_robot(const fs::path& folder, std::vector<std::string>& notes) {
   attempt(robot.optimized, "optimized.tum", [](const fs::path& f) { return read_trajectory(f); });
   attempt(robot.keyframes, "keyframes.csv", read_keyframes);
   attempt(robot.closures, "loop_closures.csv", read_closures);
-  attempt(robot.process, "process.csv", [](const fs::path& f) { return read_numbers(f, 3); });
-  attempt(robot.rounds, "optimizer.csv", [](const fs::path& f) { return read_numbers(f, 5); });
+  attempt(robot.process, "process.csv", [](const fs::path& f) { return read_number_rows(f, 3); });
+  attempt(robot.rounds, "optimizer.csv", [](const fs::path& f) { return read_number_rows(f, 5); });
   attempt(robot.traffic, "traffic.csv", read_traffic);
   attempt(robot.loads, "timing.csv",
           [&](const fs::path& f) { return read_loads(f, robot.summary.seconds); });
@@ -153,49 +101,18 @@ class RobotTimes {
   double end_of_data_s_ = 0.0;
 };
 
-// A robot's traffic, gone through in time.
-class TrafficUntil {
- public:
-  explicit TrafficUntil(const std::vector<TrafficRow>& rows) : rows_(rows) {}
+std::vector<ViewNumber> sent_by_category(const TrafficUntil& traffic) {
+  std::vector<ViewNumber> numbers;
+  for (const auto& [category, bytes] : traffic.sent()) numbers.push_back({category, bytes});
+  return numbers;
+}
 
-  void advance(double time_s) {
-    for (; next_ < rows_.size() && rows_[next_].time_s <= time_s; ++next_) {
-      const TrafficRow& row = rows_[next_];
-      if (row.peer == "*") continue;  // what DDS sent again, to all
-      auto& known = sums_[{row.out, row.topic, row.peer}];
-      if (row.out) sent_[row.category] += row.bytes - known.bytes;
-      if (const auto peer = parse_int64(row.peer);
-          !row.out && peer && row.messages > known.messages)
-        heard_[static_cast<RobotId>(*peer)] = row.time_s;
-      known = row;
-    }
-    time_s_ = time_s;
-  }
-
-  [[nodiscard]] std::vector<ViewNumber> sent() const {
-    std::vector<ViewNumber> numbers;
-    for (const auto& [category, bytes] : sent_) numbers.push_back({category, bytes});
-    return numbers;
-  }
-  [[nodiscard]] double sent(const std::string& category) const {
-    const auto known = sent_.find(category);
-    return known != sent_.end() ? known->second : 0.0;
-  }
-  [[nodiscard]] std::vector<ViewLink> links() const {
-    std::vector<ViewLink> links;
-    for (const auto& [robot, time_s] : heard_)
-      links.push_back({robot, static_cast<float>(time_s_ - time_s)});
-    return links;
-  }
-
- private:
-  const std::vector<TrafficRow>& rows_;
-  std::size_t next_ = 0;
-  double time_s_ = 0.0;
-  std::map<std::tuple<bool, std::string, std::string>, TrafficRow> sums_;
-  std::map<std::string, double> sent_;
-  std::map<RobotId, double> heard_;
-};
+std::vector<ViewLink> links_of(const TrafficUntil& traffic) {
+  std::vector<ViewLink> links;
+  for (const auto& [robot, silent_s] : traffic.silent_s())
+    links.push_back({robot, static_cast<float>(silent_s)});
+  return links;
+}
 
 constexpr double kNever_s = std::numeric_limits<double>::infinity();
 constexpr double kAnswer_s = 0.5;  // from a candidate to what becomes of it
@@ -204,7 +121,7 @@ constexpr double kAnswer_s = 0.5;  // from a candidate to what becomes of it
 // others by the share of the bytes that were sent for them from then on.
 std::vector<double> times_of_rounds(const RobotFiles& robot, double joined_s, double end_s) {
   const auto alone = static_cast<std::size_t>(std::count_if(
-      robot.rounds.begin(), robot.rounds.end(), [](const Row& r) { return r[2] < 2.0; }));
+      robot.rounds.begin(), robot.rounds.end(), [](const NumberRow& r) { return r[2] < 2.0; }));
   std::vector<double> times_s;
   for (std::size_t i = 0; i < alone; ++i)
     times_s.push_back(std::min(joined_s, end_s) * static_cast<double>(i + 1) /
@@ -216,7 +133,7 @@ std::vector<double> times_of_rounds(const RobotFiles& robot, double joined_s, do
   all.advance(kNever_s);
   const double total = std::max(1.0, all.sent("pgo") - before);
   const auto rows = static_cast<double>(robot.rounds.size() - alone);
-  for (const Row& process : robot.process) {
+  for (const NumberRow& process : robot.process) {
     until.advance(process[0]);
     const double due = 1.0 + (until.sent("pgo") - before) / total * (rows - 1.0);
     while (process[0] >= joined_s && times_s.size() < robot.rounds.size() &&
@@ -240,7 +157,7 @@ class RobotPlayback {
   // robot tells of one.
   void join(double kept_s) {
     const bool joined = std::any_of(robot_.rounds.begin(), robot_.rounds.end(),
-                                    [](const Row& round) { return round[2] > 1.0; });
+                                    [](const NumberRow& round) { return round[2] > 1.0; });
     if (joined) joined_s_ = std::min(kept_s, end_s_);
     round_times_s_ = times_of_rounds(robot_, joined_s_, end_s_);
   }
@@ -253,7 +170,7 @@ class RobotPlayback {
   void tell_states() {
     TrafficUntil traffic(robot_.traffic);
     std::size_t round = 0;
-    for (const Row& process : robot_.process) {
+    for (const NumberRow& process : robot_.process) {
       const double time_s = process[0];
       traffic.advance(time_s);
       while (round < round_times_s_.size() && round_times_s_[round] <= time_s) ++round;
@@ -264,8 +181,8 @@ class RobotPlayback {
                          .anchor = anchor_at(time_s),
                          .cpu_s = process[1],
                          .resident_MB = process[2] * 1e-6,
-                         .links = traffic.links(),
-                         .sent_bytes = traffic.sent(),
+                         .links = links_of(traffic),
+                         .sent_bytes = sent_by_category(traffic),
                          .loads = robot_.loads};
       if (time_s >= times_.end_of_data_s())
         state.skipped_frames = static_cast<std::uint32_t>(robot_.summary.frames_skipped);

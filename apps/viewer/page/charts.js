@@ -113,7 +113,8 @@ const STYLE = `
   background: none; border: 0; padding: 0; font: inherit; }
 .chart-key i { width: 10px; height: 3px; border-radius: 2px; }
 .chart-key.off { opacity: 0.35; }
-.chart svg { display: block; width: 100%; }
+.chart-zoom { min-width: 20px; justify-content: center; border: 1px solid var(--chart-grid, #e3e5e8); border-radius: 4px; }
+.chart div > svg { display: block; width: 100%; }
 .chart svg text { fill: var(--chart-muted, #666); font-size: 10px; }
 .chart-grid { stroke: var(--chart-grid, #e3e5e8); shape-rendering: crispEdges; }
 .chart-cursor { stroke: var(--chart-muted, #666); shape-rendering: crispEdges; }
@@ -142,7 +143,7 @@ function frame(host, options, draw) {
   const canvas = element('div', '', root);
   const tip = element('div', 'chart-tip', root);
   tip.hidden = true;
-  const chart = {root, canvas, tip, series: [], hidden: new Set(), width: 0};
+  const chart = {root, head, canvas, tip, series: [], hidden: new Set(), width: 0};
   let legend = '';
   const drawLegend = () => {
     const now = chart.series.map((s) => `${s.name}${s.color}${chart.hidden.has(s.name)}`).join();
@@ -167,6 +168,7 @@ function frame(host, options, draw) {
     if (chart.width > 60) draw(chart, chart.series.filter((s) => !chart.hidden.has(s.name)));
   };
   new ResizeObserver(() => canvas.clientWidth !== chart.width && redraw()).observe(canvas);
+  chart.redraw = redraw;
   chart.set = (series) => {
     chart.series = series;
     redraw();
@@ -363,21 +365,101 @@ export function barChart(host, options = {}) {
   });
 }
 
+// What part of a map is shown: the middle [m] and pixels per metre. Dragging moves it, Ctrl and the
+// wheel zoom about the pointer, a double click shows all again; `view` is null until then.
+function navigate(chart, scaleOf) {
+  chart.view = null;
+  const place = (event) => {
+    const box = chart.canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  };
+  const show = (view) => {
+    chart.view = view;
+    chart.tip.hidden = true;
+    chart.redraw();
+  };
+  const zoom = (factor, [at, down]) => {
+    const s = scaleOf();
+    if (!s) return;
+    const scale = s.scale * factor;
+    show({
+      x: s.atX(at) - (at - s.toX(s.middle[0])) / scale,
+      y: s.atY(down) + (down - s.toY(s.middle[1])) / scale,
+      scale
+    });
+  };
+  const middle = () => {
+    const s = scaleOf();
+    return s ? [s.toX(s.middle[0]), s.toY(s.middle[1])] : [0, 0];
+  };
+  for (const [text, title, act] of [
+           ['+', 'Zoom in', () => zoom(1.5, middle())],
+           ['−', 'Zoom out', () => zoom(1 / 1.5, middle())],
+           ['All', 'Show all', () => show(null)]]) {
+    const key = element('button', 'chart-key chart-zoom', chart.head, text);
+    key.title = title;
+    key.onclick = act;
+  }
+  chart.canvas.style.cursor = 'grab';
+  chart.canvas.addEventListener('wheel', (event) => {
+    if (!event.ctrlKey && !event.metaKey) return;
+    event.preventDefault();
+    zoom(Math.exp(-event.deltaY / 300), place(event));
+  }, {passive: false});
+  chart.canvas.ondblclick = () => show(null);
+  let from = null;
+  chart.canvas.onpointerdown = (event) => {
+    const s = scaleOf();
+    if (event.button !== 0 || !s) return;
+    chart.canvas.setPointerCapture(event.pointerId);
+    from = {at: place(event), view: {x: s.middle[0], y: s.middle[1], scale: s.scale}};
+  };
+  chart.canvas.onpointerup = chart.canvas.onpointercancel = () => from = null;
+  chart.canvas.onpointerleave = () => chart.tip.hidden = true;
+  chart.canvas.onpointermove = (event) => {
+    const [x, y] = place(event);
+    if (!from) return point(chart, scaleOf(), x, y);
+    const {view, at} = from;
+    show({...view, x: view.x - (x - at[0]) / view.scale, y: view.y + (y - at[1]) / view.scale});
+  };
+}
+
+// Tells of the point of a map that is nearest to the pointer.
+function point(chart, s, x, y) {
+  const reach_px = 14;
+  let found = null, least = reach_px * reach_px;
+  for (const one of s?.series ?? [])
+    for (const place of one.points) {
+      const distance = (s.toX(place[0]) - x) ** 2 + (s.toY(place[1]) - y) ** 2;
+      if (distance < least) [found, least] = [[one, place], distance];
+    }
+  chart.tip.hidden = !found;
+  if (!found) return;
+  const [one, place] = found;
+  const head = `${place[0].toFixed(2)}, ${place[1].toFixed(2)} m`;
+  showTip(chart, x, head, [[one, one.tell?.(place) ?? '']]);
+  chart.tip.style.top = `${y + 12}px`;
+}
+
 /**
  * Trajectories seen from above, both axes to one scale: set() takes {name, color, points, dashed,
- * dots}. Options: title, height [px].
+ * dots, width, tell}; a point that is no number breaks a line, and tell(point) is said of the one
+ * under the pointer. Options: title, height [px].
  */
 export function mapChart(host, options = {}) {
   const {height = 360} = options;
-  return frame(host, options, (self, series) => {
+  const left = 40, right = 10, top = 8, bottom = 22;
+  let shown = null;
+  const chart = frame(host, options, (self, series) => {
     const [x0, x1] = extent(series, 0) ?? [0, 1], [y0, y1] = extent(series, 1) ?? [0, 1];
-    const left = 40, right = 10, top = 8, bottom = 22;
     const wide = self.width - left - right, high = height - top - bottom;
-    const scale = Math.min(wide / Math.max(x1 - x0, 1e-3), high / Math.max(y1 - y0, 1e-3)) * 0.94;
-    const toX = (x) => left + wide / 2 + (x - (x0 + x1) / 2) * scale;
-    const toY = (y) => top + high / 2 - (y - (y0 + y1) / 2) * scale;
-    const atX = (p) => (x0 + x1) / 2 + (p - left - wide / 2) / scale;
-    const atY = (p) => (y0 + y1) / 2 - (p - top - high / 2) / scale;
+    const all = Math.min(wide / Math.max(x1 - x0, 1e-3), high / Math.max(y1 - y0, 1e-3)) * 0.94;
+    const {scale, x: middleX, y: middleY} =
+        self.view ?? {scale: all, x: (x0 + x1) / 2, y: (y0 + y1) / 2};
+    const toX = (x) => left + wide / 2 + (x - middleX) * scale;
+    const toY = (y) => top + high / 2 - (y - middleY) * scale;
+    const atX = (p) => middleX + (p - left - wide / 2) / scale;
+    const atY = (p) => middleY - (p - top - high / 2) / scale;
     let svg = `<svg viewBox="0 0 ${self.width} ${height}" height="${
         height}" role="img" aria-label="${escaped(options.title ?? '')}">`;
     for (const x of ticks(atX(left), atX(self.width - right), wide / 80))
@@ -389,6 +471,9 @@ export function mapChart(host, options = {}) {
                  px(toY(y))}" y2="${px(toY(y))}"/>` +
           `<text x="${left - 6}" y="${px(toY(y)) + 3}" text-anchor="end">${quantity(y)}</text>`;
     svg += `<text x="${self.width - right}" y="${height - 6}" text-anchor="end">m</text>`;
+    // Cut off at the axes.
+    svg += `<svg x="${left}" y="${top}" width="${wide}" height="${high}" viewBox="${left} ${top} ${
+        wide} ${high}">`;
     for (const one of series)
       svg += one.dots ?
           one.points
@@ -397,6 +482,9 @@ export function mapChart(host, options = {}) {
                       `<circle r="2" fill="${one.color}" cx="${px(toX(x))}" cy="${px(toY(y))}"/>`)
               .join('') :
           lineSvg(one, path(one.points, toX, toY));
-    self.canvas.innerHTML = `${svg}</svg>`;
+    self.canvas.innerHTML = `${svg}</svg></svg>`;
+    shown = {toX, toY, atX, atY, scale, middle: [middleX, middleY], series};
   });
+  navigate(chart, () => shown);
+  return chart;
 }

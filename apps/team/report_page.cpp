@@ -1,0 +1,218 @@
+#include "apps/team/report_page.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <ostream>
+#include <span>
+#include <stdexcept>
+#include <string_view>
+
+#include "apps/output_file.hpp"
+#include "apps/robot/run_tables.hpp"
+#include "apps/team/team_report.hpp"
+#include "apps/viewer/page_files.hpp"
+#include "modules/core/input_file.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMostPoints = 1500;  // of a series: a page is no wider
+
+// Every k-th element, and the last.
+template <typename T>
+std::vector<T> thinned(std::vector<T> all) {
+  const std::size_t stride = all.size() / kMostPoints + 1;
+  if (stride == 1) return all;
+  std::vector<T> kept;
+  for (std::size_t i = 0; i < all.size(); i += stride) kept.push_back(std::move(all[i]));
+  if ((all.size() - 1) % stride != 0) kept.push_back(std::move(all.back()));
+  return kept;
+}
+
+// A page needs no more digits of a metre and a second.
+double in_thousandths(double value) {
+  return std::round(value * 1e3) / 1e3;
+}
+
+Stamp first_stamp(const RobotPaths& paths) {
+  Stamp first = std::numeric_limits<Stamp>::max();
+  for (const auto* path : {&paths.odometry, &paths.optimized})
+    if (!path->empty()) first = std::min(first, path->front().stamp);
+  return first;
+}
+
+Json from_above(const std::vector<StampedPose>& path, Stamp first) {
+  Json points = Json::array();
+  for (const StampedPose& pose : thinned(path))
+    points.push_back({in_thousandths(pose.T.translation().x()),
+                      in_thousandths(pose.T.translation().y()),
+                      in_thousandths(seconds_between(first, pose.stamp))});
+  return points;
+}
+
+// Distance from the truth over time, between the poses that trajectory_error() compares.
+Json position_error(const RobotPaths& paths, const std::vector<StampedPose>& estimate,
+                    Stamp first) {
+  Json points = Json::array();
+  if (paths.truth.empty() || estimate.empty()) return points;
+  const TrajectoryErrorOptions options;
+  const TimeWindow window{paths.truth.front().stamp, paths.truth.back().stamp};
+  for (const PosePair& pair : thinned(
+           associate(paths.truth, estimate, window, options.max_gap_s, options.max_difference_s)))
+    points.push_back(
+        {in_thousandths(seconds_between(first, pair.stamp)),
+         (pair.T_truth_body.translation() - pair.T_estimate_body.translation()).norm()});
+  return points;
+}
+
+// Where the robot was at its keyframes; those of which that is not known are left out.
+Json keyframes_from_above(const RobotResult& robot) {
+  constexpr double kMaxGap_s = 0.5;
+  Json points = Json::array();
+  for (const KeyframeRecord& keyframe : robot.keyframes) {
+    const auto T = pose_at(robot.paths.optimized, keyframe.stamp, kMaxGap_s, kMaxGap_s);
+    if (T)
+      points.push_back({keyframe.id.index, in_thousandths(T->translation().x()),
+                        in_thousandths(T->translation().y())});
+  }
+  return points;
+}
+
+// Reasons are few, closures many.
+class Reasons {
+ public:
+  std::size_t number(const std::string& reason) {
+    const auto [known, is_new] = numbers_.try_emplace(reason, numbers_.size());
+    if (is_new) texts_.push_back(reason);
+    return known->second;
+  }
+  [[nodiscard]] const std::vector<std::string>& texts() const { return texts_; }
+
+ private:
+  std::map<std::string, std::size_t> numbers_;
+  std::vector<std::string> texts_;
+};
+
+Json closures_of(const RobotResult& robot, Reasons& reasons) {
+  Json rows = Json::array();
+  for (const ClosureRecord& closure : robot.closures)
+    rows.push_back({closure.id.from.robot, closure.id.from.index, closure.id.to.robot,
+                    closure.id.to.index, static_cast<int>(closure.stage), closure.matches,
+                    closure.inliers, reasons.number(closure.reason)});
+  return rows;
+}
+
+Json rounds_of(const fs::path& file) {
+  Json rows = Json::array();
+  for (const NumberRow& row : thinned(read_number_rows(file, 5))) rows.push_back({row[1], row[3]});
+  return rows;
+}
+
+Json process_of(const fs::path& file) {
+  return thinned(read_number_rows(file, 3));
+}
+
+Json timing_of(const fs::path& file) {
+  Json rows = Json::array();
+  for (const ModuleTiming& m : read_timing(file))
+    rows.push_back({m.module, m.calls, m.median_ms, m.p95_ms, m.max_ms, m.total_s});
+  return rows;
+}
+
+// Bytes sent until each time that the table knows, by category.
+Json sent_of(const fs::path& file) {
+  const std::vector<TrafficRow> rows = read_traffic(file);
+  std::vector<double> times_s;
+  for (const TrafficRow& row : rows)
+    if (times_s.empty() || row.time_s > times_s.back()) times_s.push_back(row.time_s);
+  TrafficUntil traffic(rows);
+  Json sent = Json::object();
+  for (const double time_s : thinned(std::move(times_s))) {
+    traffic.advance(time_s);
+    for (const auto& [category, bytes] : traffic.sent()) sent[category].push_back({time_s, bytes});
+  }
+  return sent;
+}
+
+// What robots that ran no such part do not leave is no fault.
+Json table(const fs::path& file, Json (*read)(const fs::path&), Json& notes) try {
+  return is_there(file) ? read(file) : Json::array();
+} catch (const std::exception& error) {
+  notes.push_back(error.what());
+  return Json::array();
+}
+
+std::string_view page_file(std::span<const PageFile> files, std::string_view path) {
+  const auto found = std::ranges::find(files, path, &PageFile::path);
+  if (found == files.end()) throw std::logic_error("no page file " + std::string(path));
+  return found->bytes;
+}
+
+// JSON that a script element can hold: "<" is in strings alone, where an escape says the same.
+std::string script_text(const Json& json) {
+  std::string text;
+  for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace)) {
+    if (c == '<')
+      text += "\\u003c";
+    else
+      text += c;
+  }
+  return text;
+}
+
+}  // namespace
+
+Json report_data(const TeamPlan& plan, const TeamResult& team) {
+  Reasons reasons;
+  Json notes = Json::array(), robots = Json::array();
+  for (const RobotResult& robot : team.robots) {
+    const fs::path folder = plan.output / robot.plan.name;
+    const RobotPaths& paths = robot.paths;
+    const Stamp first = first_stamp(paths);
+    robots.push_back({{"id", robot.plan.id},
+                      {"name", robot.plan.name},
+                      {"truth", from_above(paths.truth, first)},
+                      {"odometry", from_above(paths.odometry, first)},
+                      {"optimized", from_above(paths.optimized, first)},
+                      {"odometry_error", position_error(paths, paths.odometry, first)},
+                      {"optimized_error", position_error(paths, paths.optimized, first)},
+                      {"keyframes", keyframes_from_above(robot)},
+                      {"closures", closures_of(robot, reasons)},
+                      {"rounds", table(folder / "optimizer.csv", rounds_of, notes)},
+                      {"sent", table(folder / "traffic.csv", sent_of, notes)},
+                      {"process", table(folder / "process.csv", process_of, notes)},
+                      {"timing", table(folder / "timing.csv", timing_of, notes)}});
+  }
+  return {{"folder", plan.output.string()},
+          {"team", team},
+          {"reasons", reasons.texts()},
+          {"notes", std::move(notes)},
+          {"robots", std::move(robots)}};
+}
+
+std::string report_page(const Json& data) {
+  std::string page =
+      "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<title>Report of a run</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n";
+  page.append(page_file(chart_files(), "theme.css"))
+      .append(page_file(report_files(), "report.css"));
+  page.append("</style>\n</head>\n<body>\n<main></main>\n")
+      .append("<script type=\"application/json\" id=\"run\">")
+      .append(script_text(data))
+      .append("</script>\n<script type=\"module\">\n");
+  page.append(page_file(chart_files(), "charts.js")).append(page_file(report_files(), "report.js"));
+  return page.append("</script>\n</body>\n</html>\n");
+}
+
+void write_report(const fs::path& file, const TeamPlan& plan, const TeamResult& team) {
+  write_output(file, [&](std::ostream& out) { out << report_page(report_data(plan, team)); });
+}
+
+}  // namespace km

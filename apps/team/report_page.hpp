@@ -1,0 +1,36 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "apps/team/team_results.hpp"
+#include "modules/core/json.hpp"
+
+namespace km {
+
+/// What the report shows. Times [s] are since the robot's first pose, or (sent, process) the start
+/// of its process; positions [m] are those of RobotPaths, seen from above:
+///
+///   {folder, team: as to_json(TeamResult), reasons: [text...], notes: [text...],
+///    robots: [{id, name, truth, odometry, optimized: [[x, y, t]...],
+///              odometry_error, optimized_error: [[t, m]...],
+///              keyframes: [[index, x, y]...],
+///              closures: [[from_robot, from_keyframe, to_robot, to_keyframe, stage (number of the
+///                          ClosureStage), matches, inliers, number of the reason]...],
+///              rounds: [[round, cost]...], sent: {category: [[t, bytes]...]},
+///              process: [[t, cpu_s, bytes]...],
+///              timing: [[module, calls, median_ms, p95_ms, max_ms, total_s]...]}]}
+///
+/// Of long series so many points are left out that about 1500 stay. Reads the tables that the
+/// robots left below `plan.output`: one that is not there leaves its part empty, one that cannot be
+/// used a note.
+[[nodiscard]] Json report_data(const TeamPlan& plan, const TeamResult& team);
+
+/// The report as one HTML document that needs no other file and no network. Whatever text is in
+/// `data` is shown as text.
+[[nodiscard]] std::string report_page(const Json& data);
+
+/// The page of the run. Throws std::runtime_error naming the file.
+void write_report(const std::filesystem::path& file, const TeamPlan& plan, const TeamResult& team);
+
+}  // namespace km

@@ -1,0 +1,47 @@
+// Opens the report of the run in test_report_page.cpp and looks at what it shows.
+//   node report_in_browser.mjs REPORT [SCREENSHOT]
+import assert from 'node:assert/strict';
+import {pathToFileURL} from 'node:url';
+
+import {Browser} from '../viewer/browser.mjs';
+
+const [report, shot] = process.argv.slice(2);
+const browser = new Browser();
+try {
+  const page = await browser.open(pathToFileURL(report).href);
+  await page.until('document.body.dataset.ready');
+  if (shot) await page.screenshot(shot);
+  const textOf = (where) => page.evaluate(`document.querySelector('${where}').textContent`);
+  const count = (where) => page.evaluate(`document.querySelectorAll('${where}').length`);
+
+  // Text of the run is text.
+  assert.match(await textOf('#findings'), /r0: <\/script><script>alert\(1\)<\/script><!--/);
+  assert.equal(await count('script'), 2);
+
+  // Truth, closures kept and two robots; their odometry is there to be shown.
+  assert.equal(await count('#trajectories svg svg path'), 4);
+  await page.evaluate(`[...document.querySelectorAll('#trajectories .chart-key')].find(
+      (key) => key.textContent === 'r1, odometry').click()`);
+  assert.equal(await count('#trajectories svg svg path'), 5);
+  assert.equal(await count('#errors svg path'), 4);
+  assert.ok(await count('#work svg') >= 4);
+  assert.ok(await count('#modules rect') >= 4);
+
+  // The list of closures, of one stage alone.
+  const rows = '#closures > div:not(.scroll) tbody tr';
+  assert.equal(await count(rows), 2);
+  await page.evaluate(`[...document.querySelectorAll('#closures .pick button')].find(
+      (button) => button.textContent === 'compared 1').click()`);
+  assert.equal(await count(rows), 1);
+  assert.match(await textOf(rows), /r0 1.*r1 2.*no pose/);
+
+  // Zoomed in, the first robot's line is longer.
+  const length = `Number(document.querySelector('#trajectories svg svg path').getTotalLength())`;
+  const before = await page.evaluate(length);
+  await page.evaluate(`document.querySelector('#trajectories .chart-zoom').click()`);
+  assert.ok(Math.abs(await page.evaluate(length) / before - 1.5) < 0.05);
+
+  assert.deepEqual(page.errors, []);
+} finally {
+  await browser.close();
+}

@@ -1,0 +1,174 @@
+#include <catch2/catch.hpp>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "apps/team/report_page.hpp"
+#include "apps/team/team_report.hpp"
+#include "test/apps/viewer/page_programs.hpp"
+#include "test/apps/viewer/small_run.hpp"
+#include "test/support/command.hpp"
+
+namespace km {
+namespace {
+
+using Catch::Contains;
+
+constexpr const char* kHostile = "</script><script>alert(1)</script><!-- \" ' & \\ ]]>";
+
+// SmallRun as team has run it. Robot r0 went 10 m along x, as its truth says; it says itself, in
+// `optimized`, that it was so; r1 is 3 m beside. There is something to say of r0.
+struct ReportedRun {
+  SmallRun run;
+  TeamPlan plan;
+
+  ReportedRun() {
+    plan.output = run.folder.path();
+    for (const RobotId id : {RobotId{0}, RobotId{1}}) {
+      RobotPlan& robot = plan.robots.emplace_back();
+      robot.id = id;
+      robot.name = "r" + std::to_string(id);
+      robot.graph = "g.csv";
+    }
+    const auto file = plan.output / "r0/summary.json";
+    RunSummary summary = read_summary(file);
+    summary.exit_reason = kHostile;
+    summary.findings = {{"closures.few", Severity::kWarning, kHostile, "it follows", "look"}};
+    write_summary(file, summary);
+  }
+
+  // The true poses of both in one world, turned by a quarter about z.
+  void know_truth() {
+    for (RobotPlan& robot : plan.robots) {
+      std::string text;
+      for (int i = 0; i <= 100; ++i)
+        text += std::to_string(500.0 + 0.1 * i) + ' ' + std::to_string(-3.0 * robot.id) + ' ' +
+                std::to_string(0.1 * i) + " 0 0 0 0.70710678 0.70710678\n";
+      robot.truth = run.folder.write(robot.name + "_truth.tum", text);
+    }
+  }
+
+  [[nodiscard]] TeamResult collect() const {
+    return collect_results(plan, std::vector<RobotRun>(plan.robots.size()));
+  }
+  [[nodiscard]] Json data() const { return report_data(plan, collect()); }
+};
+
+// What is in the script element, as a browser cuts it out.
+Json data_in(const std::string& page) {
+  const std::string begin = "<script type=\"application/json\" id=\"run\">";
+  const auto from = page.find(begin) + begin.size();
+  return Json::parse(page.substr(from, page.find("</script", from) - from));
+}
+
+std::size_t count(const std::string& text, const std::string& part) {
+  std::size_t n = 0;
+  for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
+  return n;
+}
+
+}  // namespace
+
+TEST_CASE("The report has the numbers that the robots left", "[report_page]") {
+  const Json data = ReportedRun().data();
+  REQUIRE(data["robots"].size() == 2);
+  const Json& robot = data["robots"][0];
+  CHECK(robot["name"] == "r0");
+  REQUIRE(robot["optimized"].size() == 101);
+  CHECK(robot["optimized"][50] == Json::parse("[5, 0, 5]"));
+  CHECK(data["robots"][1]["optimized"][50] == Json::parse("[5, 3, 5]"));
+  CHECK(robot["truth"].empty());
+  CHECK(robot["optimized_error"].empty());
+  CHECK(robot["keyframes"] == Json::parse("[[0, 0, 0], [1, 4, 0], [2, 8, 0]]"));
+  CHECK(robot["rounds"] == Json::parse("[[1, 5], [2, 7]]"));
+  CHECK(robot["sent"] == Json::parse(R"({"pgo": [[2, 100], [6, 200]]})"));
+  CHECK(robot["process"].size() == 12);
+  CHECK(robot["process"][1] == Json::parse("[2, 1, 1e8]"));
+  CHECK(robot["timing"] == Json::parse(R"([["vio", 9, 1, 1, 1, 3]])"));
+  REQUIRE(robot["closures"].size() == 2);
+  CHECK(robot["closures"][0] == Json::parse("[0, 0, 1, 1, 4, 80, 60, 0]"));
+  CHECK(robot["closures"][1] == Json::parse("[0, 1, 1, 2, 2, 9, 0, 1]"));
+  CHECK(data["reasons"] == Json::parse(R"(["", "no pose"])"));
+  CHECK(data["team"]["robots"][0]["findings"][0]["id"] == "closures.few");
+}
+
+TEST_CASE("Where there is a truth, the report has it and the error over time", "[report_page]") {
+  constexpr double kRounded_m = 2e-3, kExact_m = 1e-6;
+  ReportedRun reported;
+  reported.know_truth();
+  const Json data = reported.data();
+  for (const Json& robot : data["robots"]) {
+    CAPTURE(robot["name"]);
+    REQUIRE(robot["truth"].size() == 101);
+    REQUIRE(robot["optimized_error"].size() == 101);
+    REQUIRE(robot["odometry_error"].size() == 101);
+    for (int i = 0; i <= 100; ++i) {
+      CHECK(robot["optimized_error"][i][0] == Approx(0.1 * i));
+      CHECK(robot["optimized_error"][i][1].get<double>() < kExact_m);
+      // In the world of the truth, where the robots drove along y.
+      CHECK(robot["optimized"][i][0].get<double>() ==
+            Approx(-3.0 * robot["id"].get<int>()).margin(kRounded_m));
+      CHECK(robot["optimized"][i][1].get<double>() == Approx(0.1 * i).margin(kRounded_m));
+    }
+  }
+}
+
+TEST_CASE("Long series are thinned, with both ends", "[report_page]") {
+  const ReportedRun reported;
+  std::string rounds = "seconds,round,members,cost,gradient_norm\n";
+  for (int i = 1; i <= 10000; ++i) rounds += "0," + std::to_string(i) + ",2,3,0.1\n";
+  reported.run.folder.write("r0/optimizer.csv", rounds);
+  const Json points = reported.data()["robots"][0]["rounds"];
+  CHECK(points.size() > 1000);
+  CHECK(points.size() <= 1502);
+  CHECK(points.front()[0] == 1);
+  CHECK(points.back()[0] == 10000);
+}
+
+TEST_CASE("A table that cannot be used is a note of the report, a missing one none",
+          "[report_page]") {
+  const ReportedRun reported;
+  reported.run.folder.write("r1/traffic.csv", "time_s\nsoon,out\n");
+  std::filesystem::remove(reported.plan.output / "r1/optimizer.csv");
+  const Json data = reported.data();
+  CHECK(data["robots"][1]["sent"].empty());
+  CHECK(data["robots"][1]["rounds"].empty());
+  REQUIRE(data["notes"].size() == 1);
+  CHECK_THAT(data["notes"][0].get<std::string>(), Contains("r1/traffic.csv line 2"));
+}
+
+TEST_CASE("No text of a run gets out of its place in the report", "[report_page]") {
+  ReportedRun reported;
+  TeamResult team = reported.collect();
+  team.robots[1].plan.name = kHostile;
+  team.notes.emplace_back("no UTF-8: \xff");
+  const std::string page = report_page(report_data(reported.plan, team));
+  CHECK(count(page, "<script") == 2);
+  CHECK(count(page, "</script") == 2);
+  CHECK(count(page, "<!--") == 0);
+  const Json data = data_in(page);
+  CHECK(data["robots"][1]["name"] == kHostile);
+  CHECK(data["team"]["robots"][0]["findings"][0]["what"] == kHostile);
+  CHECK(data["team"]["robots"][0]["exit_reason"] == kHostile);
+}
+
+TEST_CASE("The report needs no other file and no network", "[report_page]") {
+  const std::string page = report_page(ReportedRun().data());
+  for (const char* reference : {"src=", "http:", "https:", "@import", "url(", "fetch("})
+    CHECK(count(page, reference) == 0);
+}
+
+TEST_CASE("The report opens in a browser and shows its charts", "[report_page]") {
+  if (const std::string why = missing_page_program(); !why.empty()) {
+    std::cout << "SKIPPED: " << why << '\n';
+    return;
+  }
+  ReportedRun reported;
+  reported.know_truth();
+  write_report(reported.plan.output / kReportPage, reported.plan, reported.collect());
+  const CommandResult result = run_command("node test/apps/team/report_in_browser.mjs " +
+                                           (reported.plan.output / kReportPage).string());
+  INFO(result.output);
+  CHECK(result.exit_code == 0);
+}
+
+}  // namespace km
