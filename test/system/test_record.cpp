@@ -235,16 +235,18 @@ TEST_CASE("A team's records become one", "[system]") {
   CHECK(links.contains({"b/odom", "b/base_link"}));
 
   // The evaluation reads the poses from it.
-  const std::string evaluate = std::string(KM_BIN_DIR) +
-                               "/kimera_multi_evaluate trajectory --truth " +
-                               (folder.path() / "a/optimized.tum").string() + " --estimate ";
+  const auto evaluate = [](const fs::path& truth, const std::string& estimate) {
+    return run_command(std::string(KM_BIN_DIR) + "/kimera_multi_evaluate trajectory --truth " +
+                       truth.string() + " --estimate " + estimate);
+  };
   const fs::path json = folder.path() / "same.json";
-  const CommandResult same = run_command(evaluate + (folder.path() / "team.mcap").string() +
-                                         ":/a/path --json " + json.string());
+  const std::string record = (folder.path() / "team.mcap").string();
+  const CommandResult same =
+      evaluate(folder.path() / "a/optimized.tum", record + ":/a/path --json " + json.string());
   CAPTURE(same.output);
   REQUIRE(same.exit_code == 0);
   CHECK(read_json(json)["joint"]["position_m"]["max"] < 1e-8);
-  const CommandResult both = run_command(evaluate + (folder.path() / "team.mcap").string());
+  const CommandResult both = evaluate(*dataset / "mav0/state_groundtruth_estimate0", record);
   CAPTURE(both.output);
   CHECK(both.exit_code == 0);
   CHECK(both.output.find("team/a") != std::string::npos);
