@@ -27,7 +27,7 @@ class OwnGraph {
   explicit OwnGraph(RobotId self) : self_(self) {}
 
   /// Closures to one peer; more are not taken.
-  static constexpr std::size_t kMaxClosures = 6000;
+  static constexpr std::size_t kMaxClosures = 8000;
 
   /// False, and ignored, unless it is this robot's next keyframe.
   /// Throws std::invalid_argument if its pose, covariance or vertical is not usable.
