@@ -64,6 +64,8 @@ OutgoingTopic::Writer& OutgoingTopic::writer_to(const std::optional<TeamPeer>& r
   writer.receiver = receiver;
   writer.partition = partition;
   writer.readers.clear();
+  writer.history = {};
+  writer.newest.clear();
   writer.statistics.reset();
   writer.writer = DdsEntity();
   const DdsQos group = make_dds_qos();
@@ -128,7 +130,26 @@ void OutgoingTopic::send(Writer& writer, MessageKey key, Octets content) {
   ++number;
   const std::uint64_t size = envelope_bytes(content.size());
   writer.written.add(size);
+  add_to_history(writer, key, size);
   for (const Guid& reader : writer.readers) writer.sent_to[reader].add(size);
+}
+
+// Of a state the newest. Requests are soon forgotten: they count only for who comes first.
+void OutgoingTopic::add_to_history(Writer& writer, MessageKey key, std::uint64_t bytes) const {
+  if (spec_.kind == TopicKind::kStatus) return;
+  if (spec_.kind == TopicKind::kRequest && !writer.readers.empty()) return;
+  if (spec_.kind == TopicKind::kState) {
+    const auto [newest, is_first] = writer.newest.try_emplace(key, bytes);
+    if (!is_first) {
+      writer.history.bytes += bytes - std::exchange(newest->second, bytes);
+      return;
+    }
+  }
+  writer.history.add(bytes);
+}
+
+void OutgoingTopic::notice_readers() {
+  for (auto& [to, writer] : writers_) refresh_readers(writer);
 }
 
 std::vector<RobotId> OutgoingTopic::readers_of(std::optional<Addressee> addressee) {
@@ -164,10 +185,15 @@ void OutgoingTopic::refresh_readers(Writer& writer) {
   const dds_return_t count =
       dds_get_matched_subscriptions(writer.writer.handle(), handles.data(), handles.size());
   handles.resize(std::min(handles.size(), static_cast<std::size_t>(std::max(count, 0))));
-  writer.readers.clear();
-  for (const dds_instance_handle_t handle : handles)
-    if (const auto guid = participant_of_subscription(writer.writer.handle(), handle))
-      writer.readers.push_back(*guid);
+  const std::vector<Guid> former = std::exchange(writer.readers, {});
+  const std::lock_guard lock(mutex_);
+  for (const dds_instance_handle_t handle : handles) {
+    const auto guid = participant_of_subscription(writer.writer.handle(), handle);
+    if (!guid) continue;
+    writer.readers.push_back(*guid);
+    if (std::ranges::find(former, *guid) == former.end()) writer.sent_to[*guid].add(writer.history);
+  }
+  if (spec_.kind == TopicKind::kRequest && !writer.readers.empty()) writer.history = {};
 }
 
 bool OutgoingTopic::wait_for_acks(std::chrono::nanoseconds timeout) {

@@ -51,8 +51,8 @@ struct Addressee {
 /// is not what DDS keeps, sealed as it is for the former process: events and states for one robot
 /// are kept here in clear as well, and sealed anew for the next one.
 ///
-/// write(), catch_up(), readers_of() and wait_for_acks() belong to one thread; the rest is
-/// thread-safe.
+/// write(), catch_up(), notice_readers(), readers_of() and wait_for_acks() belong to one thread;
+/// the rest is thread-safe.
 class OutgoingTopic {
  public:
   OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec);
@@ -71,6 +71,9 @@ class OutgoingTopic {
   [[nodiscard]] std::vector<RobotId> readers_of(std::optional<Addressee> addressee);
 
   [[nodiscard]] const TopicSpec& spec() const { return spec_; }
+
+  /// Counts what DDS sends by itself to robots that have come since: all that it keeps for them.
+  void notice_readers();
 
   /// So far: once per reader, and what was sent again.
   [[nodiscard]] std::uint64_t sent_bytes() const;
@@ -95,6 +98,8 @@ class OutgoingTopic {
     std::map<MessageKey, Octets> kept;                 // to be sealed for the next process
     std::set<MessageKey> due;                          // of these, to this one
     TrafficCount written;
+    TrafficCount history;                        // what DDS sends to a reader that comes
+    std::map<MessageKey, std::uint64_t> newest;  // bytes of a state in it
     std::uint64_t failures = 0;
     std::map<Guid, TrafficCount> sent_to;
   };
@@ -107,7 +112,8 @@ class OutgoingTopic {
   void send_due(Writer& writer);
   void send(Writer& writer, MessageKey key, Octets content);
   const char* seal(const Writer& writer, const km_wire_Envelope& head, Octets& content) const;
-  static void refresh_readers(Writer& writer);
+  void refresh_readers(Writer& writer);
+  void add_to_history(Writer& writer, MessageKey key, std::uint64_t bytes) const;
   static std::uint64_t retransmitted_bytes(const Writer& writer);
 
   const DdsParticipant& participant_;

@@ -136,8 +136,10 @@ std::optional<std::vector<RobotId>> Sender::readers_of(const Schedule::Entry& en
 }
 
 void Sender::settle(double now_s) {
-  if (!schedule_.is_limited() || now_s - settled_s_ < kTick_s) return;
+  if (now_s - settled_s_ < kTick_s) return;
   settled_s_ = now_s;
+  for (const auto& topic : topics_) topic->notice_readers();
+  if (!schedule_.is_limited()) return;
   std::uint64_t sent_bytes = 0;
   for (const auto& topic : topics_) sent_bytes += topic->sent_bytes();
   schedule_.settle(sent_bytes, now_s);

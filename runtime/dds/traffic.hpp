@@ -26,6 +26,10 @@ struct TrafficCount {
     ++messages;
     bytes += size;
   }
+  void add(const TrafficCount& other) {
+    messages += other.messages;
+    bytes += other.bytes;
+  }
   bool operator==(const TrafficCount&) const = default;
 };
 

@@ -156,6 +156,26 @@ TEST_CASE("Sender and receiver count the same bytes, whatever the size", "[dds]"
   CHECK(once.bytes == expected);
 }
 
+TEST_CASE("What a robot that joins late is sent counts once", "[dds]") {
+  const auto kind = GENERATE(TopicKind::kEvent, TopicKind::kState);
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3, kind), b(domain, 4, kind);
+  a.start();
+  b.start();
+  REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+  for (std::uint32_t i = 0; i < 50; ++i) a.ping(i, std::vector<std::uint8_t>(1000));
+  const std::uint32_t newer = kind == TopicKind::kState ? 25 : 0;
+  for (std::uint32_t i = 0; i < newer; ++i) a.ping(i, std::vector<std::uint8_t>(2000));
+  REQUIRE(eventually([&] { return a.traffic(Direction::kOut).count.messages == 50 + newer; }));
+  TestRobot late(domain, 5, kind);
+  late.start();
+  REQUIRE(late.received.wait_for(50).size() == 50);
+  CHECK(eventually(
+      [&] { return a.traffic_with(5, Direction::kOut) == late.traffic_with(3, Direction::kIn); }));
+  CHECK(a.traffic_with(5, Direction::kOut).messages == 50);
+  for (const PeerTraffic& row : a.bridge.traffic().peers) CHECK(row.retransmitted_bytes == 0);
+}
+
 TEST_CASE("A hostile peer is counted by reason and harms nobody", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4), foe(domain, 9);

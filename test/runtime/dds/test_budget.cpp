@@ -105,5 +105,20 @@ TEST_CASE("What a robot has said while it was alone comes within its budget", "[
   CHECK(a.traffic(Direction::kOut).held.delayed.messages > 0);
 }
 
+TEST_CASE("What a robot that joins late is sent is paid for by what comes after", "[dds][budget]") {
+  constexpr double kRate = 100'000.0;
+  Thrifty team({.bytes_per_s = kRate});
+  team.offer(300, 1000);
+  REQUIRE(team.b.received.wait_for(300).size() == 300);
+  TestRobot late(team.domain, 5, TopicKind::kEvent, TopicKind::kEvent);
+  const double from_s = steady_now_s();
+  late.start();
+  REQUIRE(late.received.wait_for(300).size() == 300);
+  REQUIRE(eventually([&] { return team.a.traffic_with(5, Direction::kOut).messages == 300; }));
+  team.a.ping(300);
+  CHECK(team.b.received.wait_for(301).size() == 301);
+  CHECK(steady_now_s() - from_s > 0.9 * 300 * 1000 / kRate);
+}
+
 }  // namespace
 }  // namespace km
