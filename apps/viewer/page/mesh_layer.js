@@ -69,17 +69,6 @@ export class MeshLayer {
 
   colorOf(label) { return this.colors[label]; }
 
-  material(message) {
-    if (this.mode === 'normals') return this.materials.normals;
-    if (this.mode === 'labels' && message.labels) return this.materials.labels;
-    const {robots} = this.materials;
-    if (!robots.has(message.of)) {
-      const color = new THREE.Color(robotColor(message.of)).lerp(new THREE.Color('#c8ccd2'), 0.35);
-      robots.set(message.of, this.lit({color}));
-    }
-    return robots.get(message.of);
-  }
-
   /** Faces that are drawn. */
   get faces() {
     let faces = 0;

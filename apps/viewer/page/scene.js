@@ -18,6 +18,8 @@ export const VERDICTS = {
 
 const FRAME_GAP_M = 4;
 const BUILDING_DRAW_MS = 400;
+const EDGE_PX = 8;     // between a label and the edge
+const LEGEND_PX = 80;  // at the lower edge, with a label above it
 
 function matrixOf([x, y, z, qx, qy, qz, qw], matrix = new THREE.Matrix4()) {
   return matrix.compose(
@@ -252,7 +254,8 @@ export class Scene {
       for (const p of robot.trail) box.expandByPoint(point.set(p[0], p[1], p[2]).applyMatrix4(T));
       for (const m of robot.meshes.values())
         if (m.anchor === anchor)
-          box.expandByPoint(point.fromArray(m.origin).multiplyScalar(m.step_m));
+          for (const corner of [m.origin, m.reach ?? m.origin])
+            box.expandByPoint(point.fromArray(corner).multiplyScalar(m.step_m));
     }
     if (box.isEmpty()) box.set(new THREE.Vector3(-1, -1, 0), new THREE.Vector3(1, 1, 1));
     return box;
@@ -375,7 +378,10 @@ export class Scene {
   bounds() {
     const all = new THREE.Box3();
     for (const frame of this.frames.values())
-      if (frame.box) all.union(frame.box.clone().translate(frame.group.position));
+      if (frame.box)
+        all.union(frame.box.clone()
+                      .translate(frame.group.position)
+                      .expandByVector(new THREE.Vector3(1, 1, 0)));  // its grid
     return all.isEmpty() ?
         new THREE.Box3(new THREE.Vector3(-3, -3, 0), new THREE.Vector3(3, 3, 2)) :
         all;
@@ -454,10 +460,21 @@ export class Scene {
     return [(p.x * 0.5 + 0.5) * this.resolution.x, (0.5 - p.y * 0.5) * this.resolution.y];
   }
 
+  // A label just beyond the edge, or where the legend stands, is moved into view.
+  keepInView(at, label) {
+    const half = label.offsetWidth / 2 + EDGE_PX, lowest = this.resolution.y - LEGEND_PX;
+    const isNear = at[0] > -half && at[0] < this.resolution.x + half && at[1] > 0 &&
+        at[1] < this.resolution.y + LEGEND_PX;
+    if (!isNear) return;
+    at[0] = Math.max(half, Math.min(this.resolution.x - half, at[0]));
+    at[1] = Math.min(lowest, at[1]);
+  }
+
   placeLabels() {
-    const put = (label, point) => {
+    const put = (label, point, inView = false) => {
       const at = point && this.onScreen(point);
       label.hidden = !at;
+      if (at && inView) this.keepInView(at, label);
       if (at)
         label.style.transform =
             `translate(${at[0].toFixed(1)}px, ${at[1].toFixed(1)}px) translate(-50%, 0)`;
@@ -468,7 +485,7 @@ export class Scene {
               new THREE.Vector3().setFromMatrixPosition(figure.body.matrixWorld) :
               null);
     for (const frame of this.frames.values())
-      put(frame.label, frame.corner ? frame.corner.clone().add(frame.group.position) : null);
+      put(frame.label, frame.corner ? frame.corner.clone().add(frame.group.position) : null, true);
     if (this.ruler.label)
       put(this.ruler.label,
           this.measured?.length === 2 ? this.measured[0].clone().lerp(this.measured[1], 0.5) :
