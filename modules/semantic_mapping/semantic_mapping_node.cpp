@@ -36,6 +36,7 @@ void SemanticMappingNode::stop() noexcept {
   if (std::exchange(stopped_, true) || nothing || error()) return;
   progress_.too_late = worker_.load().dropped;
   publish_mesh();
+  progress_.size = mapper_.size();
   topics_.progress.publish(progress_);
   const MappingProgress& p = progress_;
   log::info(name()) << p.integrated << " frames, " << p.size.vertices << " vertices, "

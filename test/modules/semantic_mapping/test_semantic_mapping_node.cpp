@@ -60,6 +60,18 @@ TEST_CASE("A mesh comes every few seconds and at the end, coloured by its labels
   CHECK(bench.last.unlabelled == 0);
 }
 
+TEST_CASE("The size that is told in the end is that of the last mesh", "[semantic_mapping_node]") {
+  Bench bench;
+  bench.node->step(frame(0));
+  DenseFrame elsewhere = frame(1);  // of the same keyframe: not meshed before the end
+  elsewhere.T_odom_cam = at(20.0);
+  bench.node->step(elsewhere);
+  const std::size_t before = bench.last.size.faces;
+  bench.node->stop();
+  CHECK(bench.last.size.faces > before);
+  CHECK(bench.last.size.faces == bench.meshes.back()->mesh.faces.size());
+}
+
 TEST_CASE("Frames that cannot be used are counted, by reason", "[semantic_mapping_node]") {
   Bench bench;
   DenseFrame unlabelled = frame(0);
