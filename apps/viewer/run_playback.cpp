@@ -209,8 +209,11 @@ class RobotPlayback {
     for (std::size_t i = 0; i < robot_.keyframes.size(); ++i) {
       const auto pose = pose_at_keyframe(robot_.odometry, i);
       if (!pose) break;  // an index stands for those before it
-      tell(*seen_s(static_cast<KeyframeIndex>(i)),
-           ViewKeyframes{false, robot_.id, static_cast<std::uint32_t>(i), {*pose}});
+      tell(*seen_s(static_cast<KeyframeIndex>(i)), ViewKeyframes{false,
+                                                                 robot_.id,
+                                                                 static_cast<std::uint32_t>(i),
+                                                                 {*pose},
+                                                                 {robot_.keyframes[i].stamp}});
     }
     if (joined_s_ == kNever_s) return;
     ViewKeyframes before{true, anchor_at(joined_s_), 0, {}};

@@ -7,7 +7,9 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kPosesAtOnce = ViewTeller::kUpdateBytes / (7 * sizeof(float));
+constexpr std::size_t kBytesOfPose = 7 * sizeof(float);
+constexpr std::size_t kPosesAtOnce = ViewTeller::kUpdateBytes / kBytesOfPose;
+constexpr std::size_t kOdometryAtOnce = ViewTeller::kUpdateBytes / (kBytesOfPose + sizeof(Stamp));
 
 // Ranks of closures: verified ones come before all else, the many others behind new keyframes.
 constexpr int kVerifiedRank = 0;
@@ -35,8 +37,9 @@ bool has_moved(const SE3& told, const SE3& now) {
          cosine < kMinCosine;
 }
 
-std::vector<SE3> part(const std::vector<SE3>& poses, std::size_t first, std::size_t end) {
-  const auto begin = poses.begin();
+template <typename T>
+std::vector<T> part(const std::vector<T>& list, std::size_t first, std::size_t end) {
+  const auto begin = list.begin();
   return {begin + static_cast<std::ptrdiff_t>(first), begin + static_cast<std::ptrdiff_t>(end)};
 }
 
@@ -46,11 +49,13 @@ void ViewTeller::add(const OdometryState& state) {
   if (state.T_odom_body.matrix().allFinite()) pose_ = ViewPose{state.stamp, state.T_odom_body};
 }
 
-// One that was lost on its way here takes the pose of the next.
+// One that was lost on its way here takes the pose and the stamp of the next.
 void ViewTeller::add(const KeyframeOdometry& keyframe) {
   if (!keyframe.T_odom_kf.matrix().allFinite()) return;
   const auto index = static_cast<std::size_t>(keyframe.id.index);
-  if (index >= odometry_.size()) odometry_.resize(index + 1, keyframe.T_odom_kf);
+  if (index < odometry_.size()) return;
+  odometry_.resize(index + 1, keyframe.T_odom_kf);
+  stamps_.resize(index + 1, keyframe.stamp);
 }
 
 void ViewTeller::add(std::shared_ptr<const Trajectory> trajectory) {
@@ -169,9 +174,10 @@ std::optional<ViewContent> ViewTeller::next_closures(int max_rank) {
 std::optional<ViewContent> ViewTeller::next_odometry() {
   const std::size_t first = odometry_told_;
   if (first >= odometry_.size()) return std::nullopt;
-  odometry_told_ = std::min(odometry_.size(), first + kPosesAtOnce);
+  odometry_told_ = std::min(odometry_.size(), first + kOdometryAtOnce);
   return ViewKeyframes{false, self_, static_cast<KeyframeIndex>(first),
-                       part(odometry_, first, odometry_told_)};
+                       part(odometry_, first, odometry_told_),
+                       part(stamps_, first, odometry_told_)};
 }
 
 std::optional<ViewContent> ViewTeller::next_optimized() {

@@ -82,6 +82,7 @@ class ViewTeller {
   double pose_due_s_ = 0.0;
   double keyframes_due_s_ = 0.0;
   std::vector<SE3> odometry_;  // of the keyframes
+  std::vector<Stamp> stamps_;
   std::size_t odometry_told_ = 0;
   std::shared_ptr<const Trajectory> trajectory_;
   std::vector<SE3> optimized_told_;  // in the frame of the trajectory's anchor

@@ -68,6 +68,7 @@ class ContentWriter {
     out_.varint(keyframes.anchor);
     out_.varint(keyframes.first);
     put_all(keyframes.T_world_kf, [this](const SE3& T) { put(T); });
+    for (const Stamp stamp : keyframes.stamps) out_.u64(static_cast<std::uint64_t>(stamp));
   }
 
   void put(const ViewClosures& closures) {
@@ -195,6 +196,8 @@ class ContentReader {
     result.anchor = in_.varint_as<RobotId>();
     result.first = in_.varint_as<KeyframeIndex>();
     get_all(result.T_world_kf, kPoseBytes, [this](SE3& T) { T = pose(); });
+    if (!result.optimized) result.stamps.resize(result.T_world_kf.size());
+    for (Stamp& stamp : result.stamps) stamp = static_cast<Stamp>(in_.u64());
     return result;
   }
 

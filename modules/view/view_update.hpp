@@ -61,6 +61,7 @@ struct ViewKeyframes {
   RobotId anchor = 0;  ///< Robot whose odometry frame is `world`.
   std::uint32_t first = 0;
   std::vector<SE3> T_world_kf = {};
+  std::vector<Stamp> stamps = {};  ///< Of the same keyframes where odometry has them, else none.
 };
 
 /// What has become of a pair of keyframes, as its teller knows it; the newest of an id counts.

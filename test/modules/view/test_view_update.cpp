@@ -65,9 +65,13 @@ ViewImage some_image() {
 
 std::vector<ViewContent> all_kinds() {
   std::mt19937 rng(3);
-  return {some_state(),      ViewPose{1'400'000'000'123'456'789, random_pose(rng)},
-          some_keyframes(5), some_closures(),
-          some_chunk(),      some_image()};
+  return {some_state(),
+          ViewPose{1'400'000'000'123'456'789, random_pose(rng)},
+          some_keyframes(5),
+          some_closures(),
+          some_chunk(),
+          some_image(),
+          ViewKeyframes{.T_world_kf = {random_pose(rng)}, .stamps = {7}}};
 }
 
 std::vector<Bytes> samples() {
@@ -127,7 +131,12 @@ TEST_CASE("Poses survive the wire as float32", "[view]") {
   for (std::size_t k = 0; k < 20; ++k)
     CHECK((keyframes.T_world_kf[k].matrix() - some_keyframes(20).T_world_kf[k].matrix()).norm() <
           kPoseTolerance);
-  CHECK_FALSE(round_trip(ViewKeyframes{}).optimized);
+  CHECK(keyframes.stamps.empty());
+  ViewKeyframes odometry = some_keyframes(2);
+  odometry.optimized = false;
+  odometry.stamps = {1'400'000'000'123'456'789, -5};
+  CHECK_FALSE(round_trip(odometry).optimized);
+  CHECK(round_trip(odometry).stamps == odometry.stamps);
 }
 
 TEST_CASE("Closures survive the wire", "[view]") {
