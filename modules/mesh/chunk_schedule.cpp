@@ -6,8 +6,8 @@ namespace km {
 
 void ChunkSchedule::want(Piece& piece, MeshChunk chunk) {
   const MeshChunkKey key = chunk.key;
-  const bool news = piece.sent.empty() || chunk.empty() ? piece.sent.empty() != chunk.empty()
-                                                        : differ(piece.sent, chunk, min_move_m_);
+  const bool news =
+      chunk.empty() ? piece.is_out : piece.sent.empty() || differ(piece.sent, chunk, min_move_m_);
   if (news) {
     piece.waiting = std::move(chunk);
     order_.emplace(piece.turn, key);
@@ -35,6 +35,11 @@ void ChunkSchedule::update(std::vector<MeshChunk> chunks) {
   }
 }
 
+void ChunkSchedule::begin_again() {
+  order_.clear();
+  for (auto& [key, piece] : pieces_) piece = {.sent = {}, .is_out = piece.is_out, .waiting = {}};
+}
+
 std::optional<MeshChunk> ChunkSchedule::next() {
   if (order_.empty()) return std::nullopt;
   Piece& piece = pieces_.at(order_.begin()->second);
@@ -42,6 +47,7 @@ std::optional<MeshChunk> ChunkSchedule::next() {
   piece.turn = ++turn_;
   piece.sent = *std::move(piece.waiting);
   piece.waiting.reset();
+  piece.is_out = !piece.sent.empty();
   return piece.sent;
 }
 

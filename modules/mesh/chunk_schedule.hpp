@@ -26,6 +26,11 @@ class ChunkSchedule {
   /// sent once more, empty.
   void update(std::vector<MeshChunk> chunks);
 
+  /// From now on all is to be sent again, as to somebody who has nothing. Pieces that were sent and
+  /// are not in what update() is given next are sent empty to those who have them. What was sent
+  /// takes no memory until then.
+  void begin_again();
+
   /// The next chunk to send, which counts as sent then; nullopt if nothing has changed.
   [[nodiscard]] std::optional<MeshChunk> next();
 
@@ -33,7 +38,8 @@ class ChunkSchedule {
 
  private:
   struct Piece {
-    MeshChunk sent;          // empty: not there
+    MeshChunk sent;          // empty: not there, or to be sent again
+    bool is_out = false;     // somebody may have it
     std::uint64_t turn = 0;  // when it was sent; 0: never
     std::optional<MeshChunk> waiting;
   };

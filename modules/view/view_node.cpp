@@ -18,7 +18,8 @@ constexpr std::size_t kQueue = 4096;  // nobody waits for who watches: the oldes
 constexpr double kTick_s = 0.1;
 constexpr double kStatePeriod_s = 1.0;
 constexpr double kBurst_s = 0.5;          // unused budget is kept this long
-constexpr double kRest_s = 2.0;           // worth of budget that is told at the end
+constexpr double kRest_s = 2.0;           // worth of budget that is told at the end,
+constexpr double kMeshRest_s = 10.0;      // and of that for the mesh: its last correction
 constexpr double kAcknowledged_s = 0.5;   // waited for there
 constexpr double kCutShare = 1.0 / 30.0;  // of the time, at most, a mesh is cut up
 
@@ -53,6 +54,7 @@ ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
                  {writer_on(participant, ViewChannel::kImages), budget_of(kUnlimited)}}},
       past_budget_(budget_of(config.past_bytes_per_s)),
       teller_(self_),
+      schedule_(mesh.min_move_m),
       worker_(
           kQueue, Overflow::kDropOldest, [this](const Input& input) { step(input); },
           ViewConfig::kSection),
@@ -166,15 +168,16 @@ void ViewNode::tell_view(double now_s) {
 void ViewNode::tell_mesh(double now_s) {
   Channel& mesh = on(ViewChannel::kMesh);
   const bool has_newcomers = mesh.writer.newcomers() > 0;
-  if (mesh.writer.readers() == 0) return schedule_.reset();
-  if (has_newcomers || !schedule_) {
-    schedule_.emplace(mesh_settings_.min_move_m);
+  const bool told_before = std::exchange(tells_mesh_, mesh.writer.readers() > 0);
+  if (has_newcomers || (told_before && !tells_mesh_)) {
+    schedule_.begin_again();
     is_cut_ = mesh_.mesh == nullptr;
     cut_due_s_ = now_s;
   }
+  if (!tells_mesh_) return;
   if (!is_cut_ && now_s >= cut_due_s_) cut_mesh(now_s);
   while (mesh.budget.wait_s(0.0, now_s) <= 0.0) {
-    const std::optional<MeshChunk> chunk = schedule_->next();
+    const std::optional<MeshChunk> chunk = schedule_.next();
     const std::size_t bytes = chunk ? write(mesh, *chunk) : 0;
     if (bytes == 0) return;
     mesh.budget.spend(static_cast<double>(bytes), now_s);
@@ -187,7 +190,7 @@ void ViewNode::cut_mesh(double now_s) {
   const double begin_s = steady_now_s();
   is_cut_ = true;
   try {
-    schedule_->update(split_mesh(*mesh_.mesh, self_, mesh_.anchor, mesh_settings_.grid).chunks);
+    schedule_.update(split_mesh(*mesh_.mesh, self_, mesh_.anchor, mesh_settings_.grid).chunks);
   } catch (const std::invalid_argument& error) {
     log::limited(log::Level::kWarn, name(), "mesh") << "a mesh is not told: " << error.what();
   }
@@ -226,26 +229,25 @@ void ViewNode::tell_rest() {
   const double now_s = steady_now_s();
   Channel& view = on(ViewChannel::kView);
   Channel& mesh = on(ViewChannel::kMesh);
-  const auto is_within = [](std::size_t bytes, double bytes_per_s) {
-    return static_cast<double>(bytes) < kRest_s * bytes_per_s;
-  };
   if (view.writer.readers() > 0) {
-    std::size_t bytes = write(view, state(now_s));
+    auto bytes = static_cast<double>(write(view, state(now_s)));
     const double late_s = now_s + ViewTeller::kKeyframePeriod_s;  // everything is due
-    while (is_within(bytes, config_.past_bytes_per_s)) {
+    while (bytes < kRest_s * config_.past_bytes_per_s) {
       const auto content = teller_.next(late_s);
       if (!content) break;
-      bytes += write(view, *content);
+      bytes += static_cast<double>(write(view, *content));
     }
   }
-  if (mesh.writer.readers() > 0 && schedule_) {
+  if (tells_mesh_) {
     if (!is_cut_) cut_mesh(now_s);
-    std::size_t bytes = 0;
-    while (is_within(bytes, config_.mesh_bytes_per_s)) {
-      const auto chunk = schedule_->next();
+    double bytes = 0.0;
+    while (bytes < kMeshRest_s * config_.mesh_bytes_per_s) {
+      const auto chunk = schedule_.next();
       if (!chunk) break;
-      bytes += write(mesh, *chunk);
+      bytes += static_cast<double>(write(mesh, *chunk));
     }
+    if (schedule_.waiting() > 0)
+      log::info(name()) << schedule_.waiting() << " pieces of the last mesh are not told";
   }
   for (const Channel* channel : {&view, &mesh})
     if (channel->writer.readers() > 0) channel->writer.await_readers(kAcknowledged_s);

@@ -71,7 +71,7 @@ class ViewNode final : public Node {
 
   std::string_view name() const override { return ViewConfig::kSection; }
   void start() override;
-  /// Tells what is left, up to two seconds' worth of each budget.
+  /// Tells what is left, up to two seconds' worth of the budget, and ten of that for the mesh.
   void stop() noexcept override;
   std::exception_ptr error() const override;
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
@@ -145,7 +145,8 @@ class ViewNode final : public Node {
   MeshOffer mesh_;                     // the newest
   bool is_cut_ = true;                 // it is in the schedule
   double cut_due_s_ = 0.0;
-  std::optional<ChunkSchedule> schedule_;  // while somebody reads the mesh
+  bool tells_mesh_ = false;  // somebody reads it
+  ChunkSchedule schedule_;
   std::atomic<bool> are_images_asked_ = false;
   bool stopped_ = false;
   Worker<Input> worker_;

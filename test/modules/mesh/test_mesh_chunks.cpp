@@ -284,6 +284,21 @@ TEST_CASE("A cell that vanishes before it was sent is never sent", "[mesh]") {
   CHECK(sent_cells(schedule) == Cells{1});
 }
 
+TEST_CASE("To who comes late all is sent, and to those before what is gone", "[mesh]") {
+  ChunkSchedule schedule(0.0);
+  schedule.update({chunk(0), chunk(1), chunk(2)});
+  CHECK(sent_cells(schedule) == Cells{0, 1, 2});
+  schedule.update({chunk(1), chunk(2)});
+  schedule.begin_again();
+  CHECK(schedule.waiting() == 0);
+  schedule.update({chunk(2), chunk(3)});
+  std::map<std::int32_t, bool> is_empty;
+  while (const auto next = schedule.next()) is_empty[next->key.cell[0]] = next->empty();
+  CHECK(is_empty == std::map<std::int32_t, bool>{{0, true}, {1, true}, {2, false}, {3, false}});
+  schedule.update({chunk(2), chunk(3)});
+  CHECK_FALSE(schedule.next());
+}
+
 TEST_CASE("Every chunk has its turn although all change faster than they can be sent", "[mesh]") {
   ChunkSchedule schedule(0.0);
   Cells sent;

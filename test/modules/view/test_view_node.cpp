@@ -221,6 +221,26 @@ TEST_CASE("Who comes late is told all there is", "[view]") {
   }));
 }
 
+TEST_CASE("Pieces that are gone when somebody comes go from those who have them", "[view]") {
+  ViewConfig config = {};
+  config.mesh_bytes_per_s = 1000.0;  // so slow that both happen between two pieces
+  Watched robot(config);
+  robot.learn_mesh(60);
+  Visitor first(robot);
+  const auto knows = [&](Visitor& visitor, std::uint32_t side) {
+    return eventually([&] {
+      robot.pass(10.0);
+      visitor.hear_all();
+      return visitor.faces() == wavy_sheet(side, 0.1).faces.size();
+    });
+  };
+  REQUIRE(knows(first, 60));
+  robot.learn_mesh(20);
+  Visitor second(robot);
+  CHECK(knows(second, 20));
+  CHECK(knows(first, 20));
+}
+
 TEST_CASE("Pieces of the mesh leave no faster than configured", "[view]") {
   ViewConfig config = {};
   config.mesh_bytes_per_s = 20000.0;
@@ -244,7 +264,7 @@ TEST_CASE("At the end all is told", "[view]") {
   Watched robot;
   std::optional<Visitor> visitor(std::in_place, robot);
   robot.learn_keyframes(400);
-  robot.learn_mesh(40);
+  robot.learn_mesh(150);
   robot.node.start();
   robot.node.stop();
   const std::size_t told = robot.told();
@@ -253,7 +273,7 @@ TEST_CASE("At the end all is told", "[view]") {
   CHECK(eventually([&] {
     visitor->hear_all();
     return visitor->watcher.optimized.size() == 400 &&
-           visitor->faces() == wavy_sheet(40, 0.1).faces.size();
+           visitor->faces() == wavy_sheet(150, 0.1).faces.size();
   }));
 }
 
