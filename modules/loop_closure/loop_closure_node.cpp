@@ -310,6 +310,7 @@ bool LoopClosureNode::complete(const Work& work, const Keyframe& from, const Key
     closure.covariance = numbers.covariance;
     closure.inliers = numbers.inliers;
   }
+  log::debug(name()) << "verified " << to_string(work.id.from) << ' ' << to_string(work.id.to);
   report(work, ClosureStage::kVerified, {}, numbers);
   topics_.own_closures.publish(std::move(closure));
   return true;

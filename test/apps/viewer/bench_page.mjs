@@ -5,6 +5,7 @@ import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 
 import {Browser} from './browser.mjs';
+import {percentile} from './run_files.mjs';
 import {Viewer} from './viewer.mjs';
 
 const [program, faces = '2000000', ...rest] = process.argv.slice(2);
@@ -54,9 +55,6 @@ function writeRun(folder, faces) {
     writeHills(join(own, 'mesh_optimized.ply'), faces / 3);
   }
 }
-
-const percentile = (numbers, share) => [...numbers].sort(
-    (a, b) => a - b)[Math.min(numbers.length - 1, Math.floor(share * numbers.length))];
 
 const folder = mkdtempSync(join(tmpdir(), 'km_bench_'));
 writeRun(folder, Number(faces));

@@ -129,6 +129,13 @@ class Page {
           'Input.dispatchMouseEvent', {type, x, y, button: 'left', buttons: 1, clickCount: 1});
   }
 
+  /** Into the middle of an element, or so far along its width. */
+  async clickAt(selector, share = 0.5) {
+    const {x, y, width, height} = await this.evaluate(
+        `document.querySelector('${selector}').getBoundingClientRect().toJSON()`);
+    await this.click(x + share * width, y + height / 2);
+  }
+
   async hover(x, y) { await this.send('Input.dispatchMouseEvent', {type: 'mouseMoved', x, y}); }
 
   async screenshot(file, format = 'png', quality = undefined) {

@@ -4,6 +4,9 @@ import {join} from 'node:path';
 
 export const sum = (numbers) => numbers.reduce((a, b) => a + b, 0);
 
+export const percentile = (numbers, share) => [...numbers].sort(
+    (a, b) => a - b)[Math.min(numbers.length - 1, Math.floor(share * numbers.length))];
+
 /** The summaries of the robots, by id. */
 export function readSummaries(folder) {
   return readdirSync(folder)
@@ -29,3 +32,10 @@ export function readStages(folder, robots) {
 
 /** Faces of all robots' meshes. */
 export const facesOf = (robots) => sum(robots.map((robot) => robot.mapping?.faces ?? 0));
+
+/** Of the corrected meshes themselves, by the heads of their files. */
+export function facesOfMeshes(folder, robots) {
+  const files = robots.map(({name}) => join(folder, name, 'mesh_optimized.ply')).filter(existsSync);
+  return sum(files.map(
+      (file) => Number(/element face (\d+)/.exec(readFileSync(file).toString('latin1', 0, 1000))[1])));
+}
