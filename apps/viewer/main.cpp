@@ -2,6 +2,7 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <mutex>
 #include <optional>
 #include <set>
 #include <thread>
@@ -9,6 +10,7 @@
 #include "apps/viewer/page_message.hpp"
 #include "apps/viewer/page_server.hpp"
 #include "apps/viewer/run_playback.hpp"
+#include "apps/viewer/view_recorder.hpp"
 #include "apps/viewer/view_store.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/view/view_listener_node.hpp"
@@ -46,15 +48,17 @@ has a random token that is another one every time; what is sent is not encrypted
 Examples
   kimera_multi_viewer --domain 7                     # a team that runs
   kimera_multi_viewer --domain 7 --peers 10.0.0.2,10.0.0.3   # where multicast is off
+  kimera_multi_viewer --domain 7 --record team.mcap  # and keep what is told, for Foxglove and others
   kimera_multi_viewer results/demo                   # a run that has ended
   kimera_multi_viewer results/demo --rate 2          # as if it were live, twice as fast
   kimera_multi_viewer results/demo --listen 0.0.0.0  # for other hosts
 
-Exit codes: 0 ended by Ctrl-C; 1 for input that cannot be used and an address that cannot be had; 2 for
-a command line that cannot be used.)";
+Exit codes: 0 ended by Ctrl-C; 1 for input that cannot be used, an address that cannot be had, and a
+record that is not whole; 2 for a command line that cannot be used.)";
 
 struct ViewerOptions {
-  std::filesystem::path results, palette;
+  std::filesystem::path results, palette, record;
+  bool record_images = false;
   DdsConfig dds;
   PageServerOptions server;
   double memory_MB = 500.0;
@@ -74,6 +78,13 @@ void define(CLI::App& app, ViewerOptions& options) {
   app.add_option("--peers", options.dds.peers, "Addresses of its hosts, where multicast is off")
       ->delimiter(',')
       ->needs(domain);
+  auto* const record = app.add_option(
+      "--record", options.record,
+      "Write what robots tell into this MCAP file, replacing it: the topics of their own records");
+  record->needs(domain);
+  app.add_flag("--record-images", options.record_images,
+               "And all their camera images, small; else those that a page shows")
+      ->needs(record);
   app.add_option(
          "--palette", options.palette,
          "label_palette.csv with names and colours of the labels (default: that of RESULTS)")
@@ -142,18 +153,47 @@ void show_run(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
   wait_for_end(signals);
 }
 
+// Whose images are asked for: those that pages show, and those that are recorded. Thread-safe.
+class ImageRequests {
+ public:
+  explicit ImageRequests(ViewListener& listener) : listener_(listener) {}
+
+  void show(const std::set<RobotId>& robots) { change(shown_, robots); }
+  void record(RobotId robot) { change(recorded_, {robot}); }
+
+ private:
+  void change(std::set<RobotId>& these, const std::set<RobotId>& robots) {
+    const std::lock_guard lock(mutex_);
+    if (&these == &shown_) these.clear();
+    these.insert(robots.begin(), robots.end());
+    std::set<RobotId> all = shown_;
+    all.insert(recorded_.begin(), recorded_.end());
+    if (all != asked_) listener_.ask_for_images(asked_ = std::move(all));
+  }
+
+  ViewListener& listener_;
+  std::mutex mutex_;  // guards what follows
+  std::set<RobotId> shown_, recorded_, asked_;
+};
+
 void show_team(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
   if (!options.dds.peers.empty()) options.dds.discovery = Discovery::kPeers;
   ViewListener listener(options.dds);
+  ImageRequests images(listener);
+  std::optional<ViewRecorder> recorder;
+  if (!options.record.empty()) recorder.emplace(options.record, palette_of(options));
   std::jthread teller([&](const std::stop_token& stop) {
-    while (!stop.stop_requested())
-      if (auto update = listener.next(1.0)) store.add(*std::move(update));
+    while (!stop.stop_requested()) {
+      auto update = listener.next(1.0);
+      if (!update) continue;
+      if (recorder) recorder->add(*update);
+      if (options.record_images) images.record(update->robot);
+      store.add(*std::move(update));
+    }
   });
   const std::string title = "domain " + std::to_string(options.dds.domain);
   options.server.greeting = page_greeting(true, title, palette_of(options));
-  options.server.on_images = [&](const std::set<RobotId>& robots) {
-    listener.ask_for_images(robots);
-  };
+  options.server.on_images = [&](const std::set<RobotId>& robots) { images.show(robots); };
   const PageServer server(store, options.server);
   log::info("viewer") << title << " on " << listener.interface().name << " ("
                       << listener.interface().address << ")";
@@ -161,6 +201,8 @@ void show_team(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
   wait_for_end(signals);
   teller.request_stop();
   listener.stop();
+  teller.join();
+  if (recorder) recorder->finish();
 }
 
 }  // namespace

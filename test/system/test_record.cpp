@@ -14,6 +14,7 @@
 #include "test/modules/recordings/bag_contents.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/system/record/other_readers.hpp"
 #include "test/system/team_run.hpp"
 
 // Records of robots and teams, read by our reader and by others.
@@ -87,24 +88,6 @@ void check_equal(const RosPath& path, const std::vector<StampedPose>& poses) {
   }
   CHECK(farthest_m < kDigits);
   CHECK(most_turned < 10 * kDigits);  // of a quaternion's four
-}
-
-// What readers of npm say of a file, or nothing where they cannot be had.
-std::optional<Json> told_by_others(const fs::path& file, const TemporaryFolder& folder) {
-  const fs::path work = folder.path() / "npm";
-  fs::create_directories(work);
-  for (const char* source : {"package.json", "read_record.mjs"})
-    fs::copy_file(fs::path("test/system/record") / source, work / source,
-                  fs::copy_options::overwrite_existing);
-  const std::string in_work = "cd " + work.string() + " && ";
-  if (run_command(in_work + "npm install --silent --no-audit --no-fund --prefer-offline")
-          .exit_code != 0)
-    return std::nullopt;
-  const CommandResult result =
-      run_command(in_work + "node read_record.mjs " + file.string() + " > told.json");
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
-  return read_json(work / "told.json");
 }
 
 }  // namespace

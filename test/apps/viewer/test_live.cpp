@@ -1,12 +1,16 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <csignal>
+#include <filesystem>
 #include <string>
 #include <thread>
 
+#include "modules/recordings/mcap_reader.hpp"
 #include "modules/view/view_channel_codec.hpp"
 #include "runtime/dds/participant.hpp"
 #include "test/apps/viewer/page_listener.hpp"
+#include "test/modules/recordings/bag_contents.hpp"
 #include "test/support/process.hpp"
 #include "test/system/team_run.hpp"
 
@@ -20,10 +24,12 @@ DdsConfig loopback(int domain) {
   return config;
 }
 
-TEST_CASE("What robots of a domain tell is shown in the page", "[viewer]") {
+TEST_CASE("What robots of a domain tell is shown in the page, and recorded", "[viewer]") {
+  const TemporaryFolder folder;
+  const std::filesystem::path record = folder.path() / "team.mcap";
   const int domain = random_domain();
   Process viewer({KM_BIN_DIR "/kimera_multi_viewer", "--domain", std::to_string(domain),
-                  "--interface", "lo", "--port", "0"});
+                  "--interface", "lo", "--port", "0", "--record", record.string()});
   const auto told = viewer.wait_for_prefix("Open http://127.0.0.1:");
   REQUIRE(told);
   PageListener page(std::stoi(told->text.substr(std::string("Open http://127.0.0.1:").size())),
@@ -42,8 +48,14 @@ TEST_CASE("What robots of a domain tell is shown in the page", "[viewer]") {
   state.keyframes = 4711;
   writer.write(state);
   CHECK(page.hears(R"("keyframes":4711)"));
+  writer.write(ViewPose{5'000'000'000, SE3::Identity()});
+  CHECK(page.hears(R"("kind":"pose")"));
   viewer.kill(SIGINT);
   CHECK(viewer.wait() == 0);
+  McapReader reader(record);
+  const auto messages = told_by(reader);
+  CHECK(std::ranges::count(messages, "/alpha/pose", &ToldMessage::topic) == 1);
+  CHECK(to_string(reader.report()) == "");
 }
 
 }  // namespace

@@ -1,0 +1,331 @@
+#include "apps/viewer/view_recorder.hpp"
+
+#include <chrono>
+#include <functional>
+#include <stdexcept>
+#include <utility>
+#include <variant>
+
+#include "modules/core/stamped_pose.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/mesh/team_mesh.hpp"
+#include "modules/recordings/ros_definitions.hpp"
+#include "modules/ros_dds/mcap_sink.hpp"
+#include "modules/ros_dds/ros_output_node.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/log.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kQueue = 10000;         // as of a robot's record, as is what follows
+constexpr double kState_bytes_per_s = 200e3;  // of paths, meshes and closures, not compressed
+constexpr int kMeshPoints = 200000;
+constexpr double kMeshPeriod_s = 5.0;  // to put the pieces of a mesh together takes a while
+constexpr double kSteady_s = 1.0;      // poses farther apart say nothing of velocity
+
+ClosureStage stage_of(ViewVerdict verdict) {
+  if (verdict == ViewVerdict::kKept) return ClosureStage::kInlier;
+  return verdict == ViewVerdict::kCandidate ? ClosureStage::kCandidate : ClosureStage::kVerified;
+}
+
+RosDiagnosticStatus status_of(const ViewState& state) {
+  RosDiagnosticStatus status;
+  status.name = "robot";
+  status.message = state.phase;
+  status.values = {{"keyframes", std::to_string(state.keyframes)},
+                   {"skipped frames", std::to_string(state.skipped_frames)},
+                   {"cost", rounded(state.cost, 6)},
+                   {"cpu [s]", fixed(state.cpu_s, 2)},
+                   {"memory [MB]", fixed(state.resident_MB, 1)}};
+  for (const ViewNumber& sent : state.sent_bytes)
+    status.values.push_back({"sent: " + sent.name + " [B]", fixed(sent.value, 0)});
+  for (const ViewNumber& load : state.loads)
+    status.values.push_back({"load: " + load.name, fixed(load.value, 3)});
+  return status;
+}
+
+// In order, or known already.
+template <typename T>
+bool put(std::vector<T>& list, std::size_t index, const T& value) {
+  if (index < list.size()) list[index] = value;
+  if (index != list.size()) return false;
+  list.push_back(value);
+  return true;
+}
+
+}  // namespace
+
+// The one file of all robots, whose threads write it.
+class ViewRecorder::File {
+ public:
+  explicit File(const std::filesystem::path& file)
+      : sink_(file, [this, file](const std::string& why) {
+          failure_ = file.string() + ": " + why;
+          log::error("viewer") << failure_;
+        }) {}
+
+  auto with_sink(const auto& use) {
+    const std::lock_guard lock(mutex_);
+    return use(sink_);
+  }
+  [[nodiscard]] std::string failure() const {
+    const std::lock_guard lock(mutex_);
+    return failure_;
+  }
+
+ private:
+  mutable std::mutex mutex_;  // guards what follows
+  std::string failure_;
+  McapSink sink_;
+};
+
+// Where one robot's messages go.
+class ViewRecorder::Sink final : public RosSink {
+ public:
+  explicit Sink(std::shared_ptr<File> file) : file_(std::move(file)) {}
+
+  std::size_t open(const ToldTopic& topic) override {
+    return file_->with_sink([&](McapSink& sink) { return sink.open(topic); });
+  }
+  void put(std::size_t topic, std::optional<Stamp> time,
+           std::span<const std::uint8_t> message) override {
+    file_->with_sink([&](McapSink& sink) { sink.put(topic, time, message); });
+  }
+  void flush() override {
+    file_->with_sink([](McapSink& sink) { sink.flush(); });
+  }
+
+ private:
+  std::shared_ptr<File> file_;
+};
+
+// What one process of a robot has told.
+class ViewRecorder::Robot {
+ public:
+  Robot(RobotId id, std::uint64_t process) : boot(process) {
+    trajectory.robot = trajectory.anchor = id;
+  }
+
+  // From here on it is written, what is known already first.
+  void begin(const std::string& name, const std::shared_ptr<File>& file,
+             const std::function<std::string(RobotId)>& name_of) {
+    images_ = std::make_unique<Sink>(file);
+    image_topic_ = images_->open(
+        {'/' + ros_name(name) + "/left/image_raw/compressed", RosCompressedImage::kType});
+    camera_ = ros_name(name) + "/left_camera";
+    node_.emplace(
+        "record", std::make_unique<Sink>(file),
+        RosOutputOptions{.robot = name,
+                         .id = trajectory.robot,
+                         .name_of = name_of,
+                         .mesh_points = kMeshPoints,
+                         .draws = true,
+                         .state_bytes_per_s = kState_bytes_per_s,
+                         .queue = kQueue},
+        [this] {
+          const std::lock_guard lock(mutex_);
+          return std::vector<RosDiagnosticStatus>{status_};
+        },
+        [this] {
+          const std::lock_guard lock(mutex_);
+          return std::exchange(closures_now_, std::nullopt);
+        },
+        RosOutputTopics{odometry_topic_, keyframe_topic_, trajectory_topic_, std::nullopt});
+    node_->start();
+    for (std::size_t k = 0; k < odometry.size(); ++k) publish_keyframe(k);
+    if (!trajectory.T_world_kf.empty()) trajectory_topic_.publish(trajectory);
+  }
+  [[nodiscard]] bool has_begun() const { return node_.has_value(); }
+
+  void hear(const ViewState& state) {
+    const std::lock_guard lock(mutex_);
+    status_ = status_of(state);
+  }
+
+  void hear(const ViewPose& pose) { publish_state(pose.stamp, pose.T_odom_body); }
+
+  void hear(const ViewKeyframes& told) {
+    if (told.optimized && told.anchor != std::exchange(trajectory.anchor, told.anchor))
+      trajectory.T_world_kf.clear();
+    for (std::size_t k = 0; k < told.T_world_kf.size(); ++k) {
+      const std::size_t index = told.first + k;
+      if (told.optimized)
+        put(trajectory.T_world_kf, index, told.T_world_kf[k]);
+      else if (put(odometry, index, StampedPose{told.stamps[k], told.T_world_kf[k]}))
+        publish_keyframe(index);
+    }
+    if (told.optimized) trajectory_topic_.publish(trajectory);
+  }
+
+  void hear(const ViewClosures& told) {
+    for (const ViewClosure& closure : told.closures) closures[closure.id] = closure;
+  }
+
+  void hear(const MeshChunk& chunk) { mesh_changed_ |= mesh_.add(chunk) == ChunkVerdict::kTaken; }
+
+  void hear(const ViewImage& image) {
+    if (!images_) return;
+    images_->put(image_topic_, image.stamp,
+                 encode_ros(RosCompressedImage{{image.stamp, camera_}, "jpeg", image.jpeg}));
+  }
+
+  void tell_closures(std::vector<ToldClosure> now) {
+    const std::lock_guard lock(mutex_);
+    closures_now_ = std::move(now);
+  }
+
+  // The mesh as it is, if it has changed and it is time.
+  void tell_mesh(const LabelPalette& palette, double now_s) {
+    if (!mesh_changed_ || !node_ || now_s < mesh_due_s_) return;
+    mesh_changed_ = false;
+    mesh_due_s_ = now_s + kMeshPeriod_s;
+    std::vector<RobotMesh> known = mesh_.snapshot();
+    if (known.empty()) return;
+    LabelledMesh& mesh = known.front().mesh;
+    if (!palette.classes().empty()) mesh.colour_by(palette);
+    node_->offer(std::make_shared<const LabelledMesh>(std::move(mesh)));
+  }
+
+  // Messages for which there was no time.
+  std::size_t finish(std::vector<ToldClosure> now, const LabelPalette& palette) {
+    if (!node_) return 0;
+    mesh_due_s_ = 0.0;
+    tell_mesh(palette, steady_now_s());
+    node_->stop();
+    node_->finish({}, std::move(now), {});
+    return node_->left_out();
+  }
+
+  const std::uint64_t boot;
+  std::vector<StampedPose> odometry;  // of keyframes
+  Trajectory trajectory;
+  std::map<ClosureId, ViewClosure> closures;
+
+ private:
+  void publish_state(Stamp stamp, const SE3& T_odom_body) {
+    OdometryState state{.stamp = stamp, .T_odom_body = T_odom_body};
+    const double dt_s = newest_ ? seconds_between(newest_->stamp, stamp) : 0.0;
+    if (dt_s > 0.0 && dt_s < kSteady_s)
+      state.v_odom = (T_odom_body.translation() - newest_->T.translation()) / dt_s;
+    if (!newest_ || dt_s > 0.0) newest_ = StampedPose{stamp, T_odom_body};
+    odometry_topic_.publish(std::move(state));
+  }
+
+  // The state of its image comes first: that is how the frames of a robot hang together.
+  void publish_keyframe(std::size_t index) {
+    const auto& [stamp, T_odom_kf] = odometry[index];
+    publish_state(stamp, T_odom_kf);
+    KeyframeOdometry keyframe;
+    keyframe.id = {trajectory.robot, static_cast<KeyframeIndex>(index)};
+    keyframe.stamp = stamp;
+    keyframe.T_odom_kf = T_odom_kf;
+    keyframe_topic_.publish(std::move(keyframe));
+  }
+
+  Topic<OdometryState> odometry_topic_;
+  Topic<KeyframeOdometry> keyframe_topic_;
+  Topic<Trajectory> trajectory_topic_;
+  std::optional<StampedPose> newest_;
+  TeamMesh mesh_;
+  bool mesh_changed_ = false;
+  double mesh_due_s_ = 0.0;
+  std::unique_ptr<Sink> images_;
+  std::size_t image_topic_ = 0;
+  std::string camera_;
+  std::mutex mutex_;  // guards what the node asks for
+  RosDiagnosticStatus status_;
+  std::optional<std::vector<ToldClosure>> closures_now_;
+  std::optional<RosOutputNode> node_;  // last member: stops first
+};
+
+ViewRecorder::ViewRecorder(const std::filesystem::path& file, LabelPalette palette)
+    : palette_(std::move(palette)),
+      file_(std::make_shared<File>(file)),
+      worker_(
+          kQueue, Overflow::kDropOldest, [this](const Input& update) { step(update); }, "record"),
+      clock_(
+          std::chrono::seconds(1), [this] { worker_.post(std::nullopt); }, "record tick") {
+  worker_.start();
+  clock_.start();
+}
+
+ViewRecorder::~ViewRecorder() {
+  clock_.stop();
+  worker_.stop();
+}
+
+void ViewRecorder::step(const Input& update) {
+  if (!update) {
+    for (auto& [id, robot] : robots_) {
+      robot->tell_closures(closures_of(*robot));
+      robot->tell_mesh(palette_, steady_now_s());
+    }
+    return;
+  }
+  Robot& robot = robot_of(*update);
+  const auto* const state = std::get_if<ViewState>(&update->content);
+  if (state != nullptr && !robot.has_begun()) {
+    {
+      const std::lock_guard lock(mutex_);
+      names_[update->robot] = state->name;
+    }
+    robot.begin(state->name, file_, [this](RobotId id) { return name_of(id); });
+  }
+  std::visit([&](const auto& content) { robot.hear(content); }, update->content);
+}
+
+// What another process of it told is over.
+ViewRecorder::Robot& ViewRecorder::robot_of(const ViewUpdate& update) {
+  auto& robot = robots_[update.robot];
+  if (robot != nullptr && robot->boot != update.boot) finish_robot(*std::exchange(robot, nullptr));
+  if (robot == nullptr) robot = std::make_unique<Robot>(update.robot, update.boot);
+  return *robot;
+}
+
+std::string ViewRecorder::name_of(RobotId robot) const {
+  const std::lock_guard lock(mutex_);
+  const auto known = names_.find(robot);
+  return known != names_.end() ? known->second : "robot" + std::to_string(robot);
+}
+
+std::vector<ToldClosure> ViewRecorder::closures_of(const Robot& robot) const {
+  const auto pose_of = [&](const KeyframeId& keyframe) -> const SE3* {
+    const auto known = robots_.find(keyframe.robot);
+    if (known == robots_.end() || known->second == nullptr) return nullptr;
+    const Trajectory& trajectory = known->second->trajectory;
+    const bool is_there = trajectory.anchor == robot.trajectory.anchor &&
+                          keyframe.index < trajectory.T_world_kf.size();
+    return is_there ? &trajectory.T_world_kf[keyframe.index] : nullptr;
+  };
+  std::vector<ToldClosure> told;
+  for (const auto& [id, closure] : robot.closures) {
+    ToldClosure& one = told.emplace_back();
+    one.id = id;
+    one.stage = stage_of(closure.verdict);
+    one.rejected = closure.verdict == ViewVerdict::kRejected;
+    const SE3* const from = pose_of(id.from);
+    const SE3* const to = pose_of(id.to);
+    if (from != nullptr && to != nullptr) one.T_from_to = from->inverse() * *to;
+  }
+  return told;
+}
+
+void ViewRecorder::finish_robot(Robot& robot) {
+  lost_ += robot.finish(closures_of(robot), palette_);
+}
+
+void ViewRecorder::finish() {
+  clock_.stop();
+  worker_.stop();
+  if (worker_.error() != nullptr) std::rethrow_exception(worker_.error());
+  for (auto& [id, robot] : robots_) finish_robot(*robot);
+  file_->with_sink([](McapSink& sink) { sink.finish(); });
+  lost_ += worker_.load().dropped;
+  if (const std::string why = file_->failure(); !why.empty()) throw std::runtime_error(why);
+  if (lost_ > 0)
+    throw std::runtime_error("the record lacks " + std::to_string(lost_) +
+                             " updates: they came faster than they were written");
+}
+
+}  // namespace km

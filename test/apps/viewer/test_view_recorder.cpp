@@ -1,0 +1,176 @@
+#include <catch2/catch.hpp>
+
+#include <filesystem>
+#include <map>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "apps/viewer/view_recorder.hpp"
+#include "modules/recordings/mcap_reader.hpp"
+#include "modules/recordings/ros_messages.hpp"
+#include "test/modules/mesh/wavy_sheet.hpp"
+#include "test/modules/recordings/bag_contents.hpp"
+#include "test/support/patience.hpp"
+#include "test/support/temporary_folder.hpp"
+#include "test/system/record/other_readers.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr Stamp kSecond = 1'000'000'000;
+constexpr Stamp kBegin = 100 * kSecond;
+
+SE3 at(double x, double y) {
+  SE3 T = SE3::Identity();
+  T.translation() = Eigen::Vector3d(x, y, 0.0);
+  return T;
+}
+
+const ClosureId kClosure = closure_id({0, 1}, {1, 2});
+
+LabelPalette palette() {
+  return LabelPalette({{.id = 5, .name = "wall", .color = {255, 0, 51}}});
+}
+
+// What two robots tell: `alice` goes along x, `bob` 2 m beside her, and both are in her frame.
+std::vector<ViewUpdate> team() {
+  std::vector<ViewUpdate> all;
+  for (const RobotId robot : {RobotId{0}, RobotId{1}}) {
+    const auto tell = [&](ViewContent content) {
+      all.push_back({robot, 9, 0, std::move(content)});
+    };
+    const Stamp begin = kBegin + robot * 10 * kSecond;
+    tell(ViewState{.name = robot == 0 ? "alice" : "bob", .phase = "running"});
+    tell(ViewKeyframes{false,
+                       robot,
+                       0,
+                       {at(0, 0), at(1, 0), at(2, 0)},
+                       {begin, begin + kSecond, begin + 2 * kSecond}});
+    const double y = 2.0 * robot;
+    tell(ViewKeyframes{true, 0, 0, {at(0, y), at(1, y), at(2, y)}});
+    tell(ViewPose{begin + 5 * kSecond / 2, at(2.5, 0)});
+    tell(ViewClosures{{{kClosure, ViewVerdict::kKept, 80, 60, ""}}});
+    tell(ViewImage{.stamp = begin, .jpeg = {0xFF, 0xD8}, .features = {}});
+    LabelledMesh sheet = wavy_sheet(4, 0.1);
+    sheet.labels.assign(sheet.vertices.size(), 5);
+    for (MeshChunk& chunk : split_mesh(sheet, robot, 0, {}).chunks) tell(std::move(chunk));
+  }
+  return all;
+}
+
+struct Record {
+  explicit Record(const fs::path& file) : reader(file), messages(told_by(reader)) {}
+
+  [[nodiscard]] std::size_t count(const std::string& topic) const {
+    return static_cast<std::size_t>(std::ranges::count(messages, topic, &ToldMessage::topic));
+  }
+  template <typename Message>
+  [[nodiscard]] Message last(const std::string& topic) const {
+    for (std::size_t k = messages.size(); k-- > 0;)
+      if (messages[k].topic == topic)
+        return decode_ros<Message>("cdr", messages[k].bytes).value.value();
+    throw std::out_of_range(topic);
+  }
+
+  McapReader reader;
+  std::vector<ToldMessage> messages;
+};
+
+}  // namespace
+
+TEST_CASE("A viewer's record has what robots tell, each as its own record has it", "[viewer]") {
+  const TemporaryFolder folder;
+  const fs::path file = folder.path() / "team.mcap";
+  ViewRecorder recorder(file, palette());
+  for (const ViewUpdate& update : team()) recorder.add(update);
+  recorder.finish();
+  const Record record(file);
+  CHECK(to_string(record.reader.report()) == "");
+
+  const auto path = record.last<RosPath>("/bob/path");
+  CHECK(path.header.frame == "bob/map");
+  REQUIRE(path.poses.size() == 3);
+  CHECK(path.poses[1].header.stamp == kBegin + 11 * kSecond);
+  CHECK(path.poses[1].pose.position == Eigen::Vector3d(1, 2, 0));
+  const auto pose = record.last<RosPoseStamped>("/bob/pose");  // corrected as the keyframes are
+  CHECK(pose.header.stamp == kBegin + 25 * kSecond / 2);
+  CHECK(pose.pose.position == Eigen::Vector3d(2.5, 2, 0));
+  CHECK(record.count("/bob/odometry") == 4);  // three keyframes, one pose
+  CHECK(record.last<RosOdometry>("/bob/odometry").linear_velocity == Eigen::Vector3d(1, 0, 0));
+
+  const auto faces = record.last<RosMarker>("/alice/mesh_faces");
+  CHECK(faces.points.size() == 3 * wavy_sheet(4, 0.1).faces.size());
+  REQUIRE_FALSE(faces.colors.empty());
+  CHECK(faces.colors[0] == Eigen::Vector4f(1, 0, 0.2F, 1));
+  const auto lines = record.last<RosMarkers>("/bob/closures").markers.at(3);
+  CHECK(lines.name_space == "kept");
+  CHECK(lines.points == std::vector<Eigen::Vector3d>{{1, 0, 0}, {2, 2, 0}});
+  CHECK(record.last<RosCompressedImage>("/bob/left/image_raw/compressed").data ==
+        std::vector<std::uint8_t>{0xFF, 0xD8});
+
+  std::set<std::pair<std::string, std::string>> links;
+  for (const ToldMessage& message : record.messages)
+    if (message.topic == "/tf") {
+      const auto transforms = decode_ros<RosTransforms>("cdr", message.bytes);
+      REQUIRE(transforms.value);
+      for (const RosTransform& link : transforms.value->transforms)
+        links.emplace(link.header.frame, link.child_frame);
+    }
+  CHECK(links == std::set<std::pair<std::string, std::string>>{{"alice/map", "alice/odom"},
+                                                               {"alice/odom", "alice/base_link"},
+                                                               {"alice/map", "bob/map"},
+                                                               {"bob/map", "bob/odom"},
+                                                               {"bob/odom", "bob/base_link"}});
+
+  const auto told = told_by_others(file, folder);
+  if (!told) {
+    WARN("npm cannot install the readers of test/system/record");
+    return;
+  }
+  CHECK(told->at("whole") == true);
+  CHECK(told->at("messages") == record.messages.size());
+}
+
+TEST_CASE("A viewer's record is readable while it is written", "[viewer]") {
+  const TemporaryFolder folder;
+  const fs::path file = folder.path() / "team.mcap", copy = folder.path() / "copy.mcap";
+  ViewRecorder recorder(file, {});
+  for (const ViewUpdate& update : team()) recorder.add(update);
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  std::size_t poses = 0;
+  while (poses < 4 && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    if (!fs::exists(file)) continue;
+    fs::copy_file(file, copy, fs::copy_options::overwrite_existing);
+    poses = Record(copy).count("/bob/pose");
+  }
+  CHECK(poses == 4);
+}
+
+TEST_CASE("A robot that was started again begins its path anew", "[viewer]") {
+  const TemporaryFolder folder;
+  const fs::path file = folder.path() / "team.mcap";
+  ViewRecorder recorder(file, {});
+  for (const ViewUpdate& update : team()) recorder.add(update);
+  recorder.add({1, 10, 0, ViewState{.name = "bob", .phase = "running"}});
+  recorder.add({1, 10, 0, ViewKeyframes{false, 1, 0, {at(0, 0)}, {kBegin + 60 * kSecond}}});
+  recorder.add({1, 10, 0, ViewKeyframes{true, 1, 0, {at(7, 0)}}});
+  recorder.finish();
+  const auto path = Record(file).last<RosPath>("/bob/path");
+  REQUIRE(path.poses.size() == 1);
+  CHECK(path.poses[0].pose.position.x() == 7.0);
+}
+
+TEST_CASE("A record that cannot be written says so", "[viewer]") {
+  ViewRecorder recorder("/dev/full", {});
+  for (const ViewUpdate& update : team()) recorder.add(update);
+  CHECK_THROWS_WITH(recorder.finish(), Catch::Contains("/dev/full"));
+}
+
+}  // namespace km
