@@ -1,7 +1,7 @@
 // How long it takes from a robot's verifying a closure, by its log, to the page's drawing it.
 //   node bench_live.mjs PROGRAMS TEAM.yaml [labels|off [option of kimera_multi_team]...]
 import {spawn} from 'node:child_process';
-import {mkdtempSync, readdirSync, readFileSync, rmSync} from 'node:fs';
+import {existsSync, mkdtempSync, readdirSync, readFileSync, rmSync} from 'node:fs';
 import {loadavg, tmpdir} from 'node:os';
 import {join} from 'node:path';
 
@@ -18,7 +18,8 @@ function verified() {
   const times = new Map();
   for (const name of readdirSync(folder)) {
     const pattern = /^(\d+):(\d+):(\d+)\.(\d+) debug loop_closure: verified (\d+:\d+) (\d+:\d+)$/gm;
-    const log = readFileSync(join(folder, name, 'robot.log'), 'latin1');
+    const file = join(folder, name, 'robot.log');
+    const log = existsSync(file) ? readFileSync(file, 'latin1') : '';
     for (const [, h, m, s, ms, from, to] of log.matchAll(pattern)) {
       const at = new Date().setHours(h, m, s, ms);
       const id = [from, to].sort((a, b) => compare(a, b)).join(' ');

@@ -1,5 +1,6 @@
 #include <catch2/catch.hpp>
 
+#include <filesystem>
 #include <iostream>
 
 #include "test/apps/viewer/page_programs.hpp"
@@ -19,6 +20,22 @@ TEST_CASE("The page knows what the files of a run say, at any time of it", "[pag
   const SmallRun run;
   const CommandResult result = run_command("node test/apps/viewer/page_of_run.mjs " + kViewer +
                                            ' ' + run.folder.path().string());
+  INFO(result.output);
+  CHECK(result.exit_code == 0);
+}
+
+TEST_CASE("The page follows a team that runs, shows its past, and knows how it ended",
+          "[page][slow]") {
+  std::string why = missing_page_program();
+  if (!std::filesystem::exists(KM_BIN_DIR "/kimera_multi_simulate")) why = "no simulator (Embree)";
+  if (!why.empty()) {
+    std::cout << "SKIPPED: " << why << '\n';
+    return;
+  }
+  const TemporaryFolder folder;
+  const CommandResult result =
+      run_command("node test/apps/viewer/page_of_team.mjs " KM_BIN_DIR " " +
+                  folder.path().string() + " '' --short --rate 0.3");
   INFO(result.output);
   CHECK(result.exit_code == 0);
 }

@@ -1,0 +1,120 @@
+// Opens the page on a team that runs, started by apps/demo --view: apart, joined, in the past while
+// the run goes on, closed and opened again, a camera image, and the end, which is compared with what
+// the robots left.
+//   node page_of_team.mjs PROGRAMS RESULTS [FOLDER for screenshots [argument of the demo]...]
+import assert from 'node:assert/strict';
+import {spawn} from 'node:child_process';
+import {mkdirSync, readFileSync} from 'node:fs';
+import {join} from 'node:path';
+import {createInterface} from 'node:readline';
+
+import {Browser} from './browser.mjs';
+import {facesOfMeshes, sum} from './run_files.mjs';
+
+const [programs, results, shots, ...rest] = process.argv.slice(2);
+if (shots) mkdirSync(shots, {recursive: true});
+
+// What it prints goes on to who started this.
+class Demo {
+  constructor() {
+    const args = [...rest, '--view', '--programs', programs, '--output', results];
+    this.process = spawn('apps/demo', args, {stdio: ['ignore', 'pipe', 'inherit'], detached: true});
+    this.ended = new Promise((done) => this.process.on('exit', done));
+    this.lines = createInterface({input: this.process.stdout});
+    this.lines.on('line', (line) => console.log(line));
+    this.url = this.says(/http:\S+/);
+    this.finished = this.says(/The viewer goes on showing it/);
+  }
+
+  says(pattern) {
+    const said = new Promise((done) => this.lines.on('line', (line) => {
+      const match = pattern.exec(line);
+      if (match) done(match[0]);
+    }));
+    const ended = this.ended.then((code) => {
+      throw new Error(`the demo ended with ${code}, and had not said ${pattern}`);
+    });
+    const first = Promise.race([said, ended]);
+    first.catch(() => {});  // who waits for it is told nevertheless
+    return first;
+  }
+
+  /** Ends it and what it started, as Ctrl-C does. */
+  stop() {
+    process.kill(-this.process.pid, 'SIGINT');
+    return this.ended;
+  }
+}
+
+const demo = new Demo();
+const browser = new Browser();
+const errors = [];
+async function open() {
+  const page = await browser.open(await demo.url);
+  errors.push(page.errors);
+  return page;
+}
+const all = (what) => `kimera.robots.length > 1 && kimera.robots.every((r) => ${what})`;
+
+try {
+  let page = await open();
+  const shoot = (name) => shots && page.screenshot(join(shots, `${name}.png`));
+
+  // Each in a frame of its own, and what one of them sees.
+  await page.until(`${all('r.keyframes > 1')} && kimera.frames.every((f) => f.length === 1)`, 120);
+  const apart = await page.evaluate(
+      '({time: kimera.time, frames: kimera.frames, start: kimera.model.start_ms})');
+  await page.clickAt('.robot .buttons button:last-child');
+  await page.until(`kimera.model.robots.get(${apart.frames[0][0]}).image?.features > 0`);
+  await page.until('kimera.ready');
+  await shoot('apart');
+  await page.clickAt('#camera button');
+
+  // Back while it goes on, and to the present again.
+  await page.until(`kimera.end > ${apart.time + 2}`);
+  await page.clickAt('#slider', apart.time / (await page.evaluate('kimera.end')));
+  const shown = async () => {
+    await page.until('kimera.ready');
+    return page.evaluate('({time: kimera.time, frames: kimera.frames, faces: kimera.drawnFaces})');
+  };
+  const past = await shown();
+  assert.deepEqual(past.frames, apart.frames);
+  const end = await page.evaluate('kimera.end');
+  assert.ok(past.time < end - 1);
+  await page.until(`kimera.end > ${end + 1}`);
+  assert.deepEqual(await shown(), past);
+  await shoot('past');
+  await page.clickAt('#live');
+  await page.until(`kimera.time > ${end + 1} && kimera.time === kimera.end`);
+
+  // Closed and opened again: it knows the past.
+  await page.close();
+  page = await open();
+  await page.until('kimera.ready');
+  assert.equal(await page.evaluate('kimera.model.start_ms'), apart.start);
+  await page.evaluate(`kimera.seek(${past.time})`);
+  assert.deepEqual(await shown(), past);
+  await page.clickAt('#live');
+  await page.until(`${all('r.keyframes > 1')} && kimera.frames.length === 1 && kimera.ready`, 120);
+  await shoot('joined');
+
+  // The end: as the robots left it.
+  await demo.finished;
+  await page.until(all(`r.phase === 'leaving'`));
+  const team = JSON.parse(readFileSync(join(results, 'team.json')));
+  await page.until('kimera.ready');
+  await shoot('finished');
+  assert.deepEqual(
+      await page.evaluate('kimera.robots.map((r) => [r.id, r.name, r.keyframes])'),
+      team.robots.map((r) => [r.robot, r.name, r.keyframes]));
+  const kept = sum(team.robots.map((r) => r.closures.inliers));
+  assert.equal((await page.evaluate('kimera.closures')).kept, kept);
+  // The last correction of a large mesh is not told to its end.
+  const faces = facesOfMeshes(results, team.robots), known = await page.evaluate('kimera.faces');
+  console.log(`faces: ${known} in the page, ${faces} in the files`);
+  assert.ok(Math.abs(known - faces) <= 0.01 * faces);
+  assert.deepEqual(errors.flat(), []);
+} finally {
+  await demo.stop();
+  await browser.close();
+}
