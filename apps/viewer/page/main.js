@@ -170,9 +170,10 @@ async function drawCamera() {
   c.scale(2, 2);
   c.drawImage(bitmap, 0, 0);
   c.strokeStyle = '#6fdc8c';
+  c.lineWidth = bitmap.width / 260;  // as wide on the screen, however large the image
   for (let i = 0; i < image.pixels.length; i += 2) {
     c.beginPath();
-    c.arc(image.pixels[i] + 0.5, image.pixels[i + 1] + 0.5, 2.5, 0, 7);
+    c.arc(image.pixels[i] + 0.5, image.pixels[i + 1] + 0.5, bitmap.width / 110, 0, 7);
     c.stroke();
   }
 }

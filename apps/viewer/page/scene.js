@@ -272,6 +272,7 @@ export class Scene {
       snap(max.y + step, Math.ceil)
     ];
     const z = Math.round((min.z - 0.1) * 2) / 2;
+    frame.floor = new THREE.Box3(new THREE.Vector3(x0, y0, z), new THREE.Vector3(x1, y1, max.z));
     const drawn = [x0, x1, y0, y1, z, step].join();
     frame.grid.position.copy(frame.group.position);
     if (drawn === frame.drawn) return;
@@ -378,10 +379,7 @@ export class Scene {
   bounds() {
     const all = new THREE.Box3();
     for (const frame of this.frames.values())
-      if (frame.box)
-        all.union(frame.box.clone()
-                      .translate(frame.group.position)
-                      .expandByVector(new THREE.Vector3(1, 1, 0)));  // its grid
+      if (frame.floor) all.union(frame.floor.clone().translate(frame.group.position));
     return all.isEmpty() ?
         new THREE.Box3(new THREE.Vector3(-3, -3, 0), new THREE.Vector3(3, 3, 2)) :
         all;

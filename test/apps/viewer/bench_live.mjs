@@ -6,7 +6,7 @@ import {loadavg, tmpdir} from 'node:os';
 import {join} from 'node:path';
 
 import {Browser, pause} from './browser.mjs';
-import {percentile} from './run_files.mjs';
+import {pairOf, percentile} from './run_files.mjs';
 import {Viewer} from './viewer.mjs';
 
 const [programs, team, map = 'labels', ...rest] = process.argv.slice(2);
@@ -22,16 +22,11 @@ function verified() {
     const log = existsSync(file) ? readFileSync(file, 'latin1') : '';
     for (const [, h, m, s, ms, from, to] of log.matchAll(pattern)) {
       const at = new Date().setHours(h, m, s, ms);
-      const id = [from, to].sort((a, b) => compare(a, b)).join(' ');
+      const id = pairOf(from, to);
       times.set(id, Math.min(at, times.get(id) ?? Infinity));
     }
   }
   return times;
-}
-
-function compare(a, b) {
-  const [[r0, k0], [r1, k1]] = [a, b].map((keyframe) => keyframe.split(':').map(Number));
-  return r0 - r1 || k0 - k1;
 }
 
 const viewer = await Viewer.start(join(programs, 'kimera_multi_viewer'), ['--domain', domain]);

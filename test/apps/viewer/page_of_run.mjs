@@ -12,7 +12,7 @@ const [program, results, shots] = process.argv.slice(2);
 if (shots) mkdirSync(shots, {recursive: true});
 
 const summaries = readSummaries(results);
-const pairs = readStages(results, summaries);
+const pairs = [...readStages(results, summaries).values()];
 const faces = facesOf(summaries);
 const viewer = await Viewer.start(program, [results]);
 const browser = new Browser();

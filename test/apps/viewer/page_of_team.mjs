@@ -9,7 +9,7 @@ import {join} from 'node:path';
 import {createInterface} from 'node:readline';
 
 import {Browser} from './browser.mjs';
-import {facesOfMeshes, sum} from './run_files.mjs';
+import {facesOfMeshes, readStages} from './run_files.mjs';
 
 const [programs, results, shots, ...rest] = process.argv.slice(2);
 if (shots) mkdirSync(shots, {recursive: true});
@@ -107,8 +107,11 @@ try {
   assert.deepEqual(
       await page.evaluate('kimera.robots.map((r) => [r.id, r.name, r.keyframes])'),
       team.robots.map((r) => [r.robot, r.name, r.keyframes]));
-  const kept = sum(team.robots.map((r) => r.closures.inliers));
-  assert.equal((await page.evaluate('kimera.closures')).kept, kept);
+  const stages = [...readStages(results, team.robots)];
+  assert.deepEqual(
+      await page.evaluate(`[...kimera.model.closures()].filter(([, c]) => c.verdict === 'kept')
+                               .map(([id]) => id).sort()`),
+      stages.filter(([, stage]) => stage === 'inlier').map(([pair]) => pair).sort());
   // The last correction of a large mesh is not told to its end.
   const faces = facesOfMeshes(results, team.robots), known = await page.evaluate('kimera.faces');
   console.log(`faces: ${known} in the page, ${faces} in the files`);

@@ -16,18 +16,24 @@ export function readSummaries(folder) {
       .sort((a, b) => a.robot - b.robot);
 }
 
-/** How far each pair of keyframes in any robot's loop_closures.csv came: a stage for each. */
+/** A pair of keyframes "robot:index" as the page names it. */
+export const pairOf = (...ends) => ends.sort((a, b) => {
+  const [[r0, k0], [r1, k1]] = [a, b].map((end) => end.split(':').map(Number));
+  return r0 - r1 || k0 - k1;
+}).join(' ');
+
+/** How far each pair of keyframes in any robot's loop_closures.csv came: a stage by pair. */
 export function readStages(folder, robots) {
   const stages = new Map();
   for (const {name} of robots) {
     const lines = readFileSync(join(folder, name, 'loop_closures.csv'), 'utf8').trim().split('\n');
     for (const line of lines.slice(1)) {
       const [r0, k0, r1, k1, , stage] = line.split(',');
-      const pair = [`${r0}:${k0}`, `${r1}:${k1}`].sort().join();
+      const pair = pairOf(`${r0}:${k0}`, `${r1}:${k1}`);
       if (stages.get(pair) !== 'inlier') stages.set(pair, stage);
     }
   }
-  return [...stages.values()];
+  return stages;
 }
 
 /** Faces of all robots' meshes. */
