@@ -13,6 +13,7 @@
 #include "apps/evaluate/inputs.hpp"
 #include "apps/evaluate/recorded_poses.hpp"
 #include "apps/output_file.hpp"
+#include "modules/charts/chart_page.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/evaluation/trajectory_report.hpp"
@@ -64,7 +65,9 @@ void run(TrajectoryCommand command) {
   std::cout << to_table(team);
   if (command.options.with_scale) std::cout << "scale " << team.alignment.scale << '\n';
   write_output(command.json, [&](std::ostream& out) { out << json_text(team); });
-  write_output(command.plot, [&](std::ostream& out) { out << plot_from_above(inputs, team); });
+  write_output(command.plot, [&](std::ostream& out) {
+    out << chart_page("Truth and estimates", {plot_from_above(inputs, team)});
+  });
 }
 
 constexpr const char* kTrajectoryDetails =
@@ -84,7 +87,7 @@ constexpr const char* kTrajectoryDetails =
     "Examples:\n"
     "  kimera_multi_evaluate trajectory --truth groundtruth_tum.txt --estimate odometry.tum\n"
     "  kimera_multi_evaluate trajectory --truth data.csv \\\n"
-    "      --estimate robot0/optimized.tum robot1/optimized.tum --json team.json --plot team.svg\n"
+    "      --estimate robot0/optimized.tum robot1/optimized.tum --json team.json --plot team.html\n"
     "  kimera_multi_evaluate trajectory --truth a.csv --truth b.csv --estimate a.tum b.tum\n"
     "  kimera_multi_evaluate trajectory --truth data.csv --estimate team.mcap";
 
@@ -107,7 +110,8 @@ void define(CLI::App& app, TrajectoryCommand& command) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   app.add_option("--json", command.json, "Also write the numbers to this file, as JSON");
-  app.add_option("--plot", command.plot, "Also draw truth and estimates from above, as SVG");
+  app.add_option("--plot", command.plot,
+                 "Also draw truth and estimates from above, as a page for a browser");
 }
 
 }  // namespace

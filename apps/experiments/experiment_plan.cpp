@@ -378,7 +378,7 @@ AloneFiles alone_files(const ExperimentConfig& config, const ExperimentPaths& pa
 
 PcmFiles pcm_files(unsigned seed, const ExperimentPaths& paths) {
   const std::string name = "pcm-" + std::to_string(seed);
-  return {paths.results / (name + ".json"), paths.results / "figures" / (name + ".svg")};
+  return {paths.results / (name + ".json"), paths.results / "figures" / (name + ".html")};
 }
 
 fs::path picture_file(const WorldConfig& world, bool corrected, const ExperimentPaths& paths) {

@@ -4,7 +4,6 @@
 #include "apps/experiments/paper_results.hpp"
 #include "apps/experiments/report.hpp"
 #include "modules/core/text_table.hpp"
-#include "modules/evaluation/plot.hpp"
 
 namespace km {
 namespace {
@@ -87,7 +86,7 @@ ReportFigures charts(const std::vector<ReportInput::World>& worlds) {
   for (const auto& world : worlds)
     row.figures.push_back({.name = "mesh-error-" + world.config->name,
                            .caption = world.config->title + ": without what no robot saw.",
-                           .svg = draw_plots(std::array{error_chart(world)})});
+                           .plots = {error_chart(world)}});
   return row;
 }
 

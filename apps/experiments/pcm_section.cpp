@@ -5,7 +5,6 @@
 #include "apps/experiments/report.hpp"
 #include "modules/core/json.hpp"
 #include "modules/core/text_table.hpp"
-#include "modules/evaluation/plot.hpp"
 #include "modules/evaluation/statistics.hpp"
 
 namespace km {
@@ -105,7 +104,8 @@ ReportTable table_of(const std::vector<Search>& searches) {
 void add_curves(const Search& search, std::size_t colour, std::size_t all, const auto& value,
                 Plot& plot) {
   constexpr std::size_t kPoints = 150;
-  PlotSeries median{search.name, {}, colour}, range{"", {}, colour, PlotSeries::Style::kDots};
+  PlotSeries median{search.name, {}, colour},
+      range{search.name, {}, colour, PlotSeries::Style::kDots};
   const std::size_t step = std::max<std::size_t>(1, all / kPoints);
   for (std::size_t size = step; size <= all; size += step) {
     const Spread spread = spread_over(search.runs, [&](auto& run) { return value(run, size); });
@@ -135,7 +135,7 @@ ReportFigure figure_of(const std::vector<Search>& searches) {
           .caption =
               "Time of a search and size of the clique against vertices: medians over the "
               "seeds; faint points: the lowest and highest.",
-          .svg = draw_plots(std::vector{time, size})};
+          .plots = {time, size}};
 }
 
 void add_targets(const std::vector<Search>& searches, ReportInput& input) {

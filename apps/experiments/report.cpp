@@ -123,20 +123,6 @@ ReportDocument make_document(ReportInput& input) {
   return document;
 }
 
-// Pictures beside the Markdown.
-void write_figures(const ReportDocument& document, const fs::path& folder) {
-  fs::create_directories(folder);
-  for (const ReportSection& section : document.sections)
-    for (const ReportBlock& block : section.blocks) {
-      const auto* const row = std::get_if<ReportFigures>(&block);
-      if (row == nullptr) continue;
-      for (const ReportFigure& figure : row->figures)
-        if (!figure.svg.empty())
-          write_output(folder / (figure.name + ".svg"),
-                       [&](std::ostream& out) { out << figure.svg; });
-    }
-}
-
 Json to_json(const ReportTable& table) {
   Json rows = Json::array();
   for (const auto& row : table.rows) {
@@ -171,7 +157,6 @@ ReportSummary write_report(const ExperimentConfig& config, const ExperimentPaths
     summary.targets += target.judged ? 1 : 0;
     summary.met += target.judged && target.met ? 1 : 0;
   }
-  write_figures(document, paths.results / "figures");
   write_output(summary.html, [&](std::ostream& out) { out << to_html(document); });
   write_output(summary.markdown, [&](std::ostream& out) { out << to_markdown(document); });
   write_output(paths.results / "numbers.json",

@@ -3,9 +3,12 @@
 #include <array>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <sstream>
 #include <stdexcept>
 
+#include "modules/charts/chart_page.hpp"
+#include "modules/charts/html_page.hpp"
 #include "modules/core/xml_text.hpp"
 
 namespace km {
@@ -56,8 +59,10 @@ class MarkdownWriter {
 
   void operator()(const ReportFigures& row) {
     for (const ReportFigure& figure : row.figures)
-      out_ << "![" << figure.caption << "](figures/" << figure.name
-           << (figure.svg.empty() ? ".png" : ".svg") << ")\n\n";
+      if (figure.plots.empty())
+        out_ << "![" << figure.caption << "](figures/" << figure.name << ".png)\n\n";
+      else
+        out_ << '[' << figure.caption << "](report.html#figure-" << figure.name << ")\n\n";
   }
 
   void operator()(const ReportProvenance& provenance) {
@@ -133,10 +138,10 @@ table.words { width: 100%; }
   margin: 26px 0; }
 .figures.one { grid-template-columns: minmax(300px, 860px); }
 figure { margin: 0; }
-figure svg, figure img { width: 100%; height: auto; display: block; border: 1px solid var(--line);
-  border-radius: 6px; }
-figure svg { max-height: 520px; padding: 8px; }
-.figures.one svg { max-height: none; }
+figure img { width: 100%; height: auto; display: block; }
+figure img, .plots { border: 1px solid var(--line); border-radius: 6px; }
+.plots { padding: 8px 12px; }
+.plot + .plot { margin-top: 16px; }
 figcaption { color: var(--soft); font-size: 13.5px; margin-top: 6px; }
 details { margin: 22px 0; border: 1px solid var(--line); border-radius: 8px; padding: 8px 14px; }
 summary { cursor: pointer; color: var(--accent); font-size: 14.5px; }
@@ -145,21 +150,6 @@ details td, details th { white-space: normal; text-align: left; }
 code { font: 12px/1.45 ui-monospace, "DejaVu Sans Mono", monospace; overflow-wrap: anywhere; }
 @media print { details { break-inside: auto; } nav { display: none; } tr { break-inside: avoid; } }
 )";
-
-std::string base64(const std::string& bytes) {
-  constexpr const char* kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t group = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      group = (group << 8) | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k)
-      text += i + k > bytes.size() ? '=' : kDigits[(group >> (18 - 6 * k)) & 63];
-  }
-  return text;
-}
 
 std::string contents_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -206,11 +196,11 @@ class HtmlWriter {
     out_ << "<div class=\"figures" << (row.figures.size() == 1 ? " one" : "") << "\">\n";
     for (const ReportFigure& figure : row.figures) {
       out_ << "<figure>\n";
-      if (!figure.svg.empty())
-        out_ << figure.svg;
+      if (!figure.plots.empty())
+        place(figure);
       else
-        out_ << "<img alt=\"" << xml_escaped(figure.caption) << "\" src=\"data:image/png;base64,"
-             << base64(contents_of(figure.png)) << "\"/>\n";
+        out_ << "<img alt=\"" << xml_escaped(figure.caption) << "\" src=\""
+             << data_uri("image/png", contents_of(figure.png)) << "\"/>\n";
       out_ << "<figcaption>" << xml_escaped(figure.caption) << "</figcaption>\n</figure>\n";
     }
     out_ << "</div>\n";
@@ -238,9 +228,16 @@ class HtmlWriter {
     out_ << "</section>\n";
   }
 
-  std::string text() const { return out_.str(); }
+  std::string text() const { return out_.str() + plot_scripts(plots_); }
 
  private:
+  // Its plots are drawn there by the scripts.
+  void place(const ReportFigure& figure) {
+    const std::string id = "figure-" + figure.name;
+    out_ << "<div class=\"plots\" id=\"" << id << "\"></div>\n";
+    plots_[id] = figure.plots;
+  }
+
   void write(const ReportCell& cell) {
     out_ << "<td" << style_class(cell.style) << '>' << xml_escaped(cell.text);
     if (!cell.paper.empty())
@@ -249,24 +246,22 @@ class HtmlWriter {
   }
 
   std::ostringstream out_;
+  std::map<std::string, std::vector<Plot>> plots_;
 };
 
 }  // namespace
 
 std::string to_html(const ReportDocument& document) {
   std::ostringstream out;
-  out << "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
-         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>"
-      << xml_escaped(document.title) << "</title>\n<style>" << kStyle
-      << "</style>\n</head>\n<body>\n<main>\n<h1>" << xml_escaped(document.title)
-      << "</h1>\n<p class=\"lead\">" << xml_escaped(document.lead) << "</p>\n<nav>";
+  out << "<main>\n<h1>" << xml_escaped(document.title) << "</h1>\n<p class=\"lead\">"
+      << xml_escaped(document.lead) << "</p>\n<nav>";
   for (const ReportSection& section : document.sections)
     out << "<a href=\"#" << section.id << "\">" << xml_escaped(section.title) << "</a> ";
   out << "</nav>\n";
   HtmlWriter writer;
   for (const ReportSection& section : document.sections) writer.write(section);
-  out << writer.text() << "</main>\n</body>\n</html>\n";
-  return out.str();
+  out << writer.text() << "</main>\n";
+  return html_page({.title = document.title, .styles = {kStyle}, .body = out.str()});
 }
 
 }  // namespace km

@@ -6,6 +6,8 @@
 #include <variant>
 #include <vector>
 
+#include "modules/charts/plot.hpp"
+
 namespace km {
 
 /// A cell of a table: our value and, if there is one, that of the paper.
@@ -34,11 +36,11 @@ struct ReportParagraph {
   std::string text;
 };
 
-/// One picture of a row of them: SVG text with a view box, or a PNG file.
+/// One picture of a row of them: plots, or a PNG file.
 struct ReportFigure {
-  std::string name;  ///< Stem of its file beside the Markdown.
+  std::string name;  ///< figure-NAME is its anchor; of a picture, stem of its file.
   std::string caption;
-  std::string svg = {};
+  std::vector<Plot> plots = {};
   std::filesystem::path png = {};
 };
 
@@ -73,11 +75,11 @@ struct ReportDocument {
   std::vector<ReportSection> sections;
 };
 
-/// One page without references to anything outside: styles, drawings and pictures are in it.
-/// Throws std::runtime_error for a picture that cannot be read.
+/// One page without references to anything outside: styles, plots and pictures are in it. Throws
+/// std::runtime_error for a picture that cannot be read.
 [[nodiscard]] std::string to_html(const ReportDocument& document);
 
-/// The same as Markdown; its pictures are figures/NAME.svg and figures/NAME.png.
+/// The same as Markdown; its pictures are figures/NAME.png, its plots those of report.html.
 [[nodiscard]] std::string to_markdown(const ReportDocument& document);
 
 }  // namespace km

@@ -120,11 +120,11 @@ ReportFigures plots(ReportInput& input, const std::vector<ReportInput::World>& w
     for (const PgoMethodConfig& method : input.config().methods) {
       if (method.name != "local" && method.name != "vertical") continue;
       const PgoNumbers* const pgo = input.pgo(*world.config, method);
-      if (pgo == nullptr || pgo->plot.empty()) continue;
+      if (pgo == nullptr || !pgo->plot) continue;
       row.figures.push_back({.name = "trajectory-" + world.config->name + '-' + method.name,
                              .caption = world.config->title + ", " + method.title +
                                         ": keyframes from above, truth in grey.",
-                             .svg = pgo->plot});
+                             .plots = {*pgo->plot}});
     }
   return row;
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "apps/experiments/experiment_plan.hpp"
+#include "modules/charts/plot.hpp"
 
 namespace km {
 
@@ -74,7 +75,7 @@ struct PgoNumbers {
   double cost = 0.0;       ///< Of rigid poses in the end.
   double optimum = 0.0;    ///< The certified one.
   std::optional<double> error_m;  ///< Absolute trajectory error of all keyframes, rmse.
-  std::string plot;               ///< SVG from above.
+  std::optional<Plot> plot;       ///< From above, likewise.
 };
 
 /// Throws std::runtime_error, as above.

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "apps/output_file.hpp"
+#include "modules/charts/chart_page.hpp"
 #include "modules/pgo_study/team_graph.hpp"
 
 namespace km {
@@ -23,7 +24,7 @@ struct ReportFiles {
   /// Defines --json and --plot, with what they have in them.
   void define(CLI::App& app, const std::string& in_json, const std::string& in_plot) {
     app.add_option("--json", json, "Also write " + in_json + " to this file, as JSON");
-    app.add_option("--plot", plot, "Also draw " + in_plot + ", as SVG");
+    app.add_option("--plot", plot, "Also draw " + in_plot + ", as a page for a browser");
   }
 
   /// As check_output_folder(), before the work.
@@ -32,10 +33,10 @@ struct ReportFiles {
     check_output_folder(plot);
   }
 
-  /// `write_json(std::ostream&)`; `draw()` makes the text of the SVG.
-  void write(const auto& write_json, const auto& draw) const {
+  /// `write_json(std::ostream&)`; `draw()` makes the plots of the page called `title`.
+  void write(const auto& write_json, const std::string& title, const auto& draw) const {
     write_output(json, write_json);
-    write_output(plot, [&](std::ostream& out) { out << draw(); });
+    write_output(plot, [&](std::ostream& out) { out << chart_page(title, draw()); });
   }
 };
 

@@ -11,7 +11,6 @@
 #include "apps/pgo/outlier_study.hpp"
 #include "modules/core/json.hpp"
 #include "modules/core/text_table.hpp"
-#include "modules/evaluation/plot.hpp"
 #include "modules/evaluation/statistics.hpp"
 
 namespace km {
@@ -131,16 +130,15 @@ void write_outlier_json(std::ostream& out, const OutlierStudy& study) {
 }
 
 // Error, closures kept, and CPU time against the share of false closures.
-std::string outlier_plot(const OutlierStudy& study) {
-  return draw_plots(
-      std::vector{panel(study, "RMSE of positions to the optimum without false closures", "m", true,
-                        [](const Cell& cell) { return cell.largest(&OutlierResult::rmse_m); }),
-                  panel(study, "True closures lost", "closures", false,
-                        [&](const Cell& cell) { return study.true_closures - cell.true_kept(); }),
-                  panel(study, "False closures kept", "closures", false,
-                        [](const Cell& cell) { return cell.largest(&OutlierResult::false_kept); }),
-                  panel(study, "CPU time of all robots", "s", false,
-                        [](const Cell& cell) { return cell.median(&OutlierResult::cpu_s); })});
+std::vector<Plot> outlier_plots(const OutlierStudy& study) {
+  return {panel(study, "RMSE of positions to the optimum without false closures", "m", true,
+                [](const Cell& cell) { return cell.largest(&OutlierResult::rmse_m); }),
+          panel(study, "True closures lost", "closures", false,
+                [&](const Cell& cell) { return study.true_closures - cell.true_kept(); }),
+          panel(study, "False closures kept", "closures", false,
+                [](const Cell& cell) { return cell.largest(&OutlierResult::false_kept); }),
+          panel(study, "CPU time of all robots", "s", false,
+                [](const Cell& cell) { return cell.median(&OutlierResult::cpu_s); })};
 }
 
 constexpr const char* kOutliersDetails =
@@ -164,7 +162,7 @@ constexpr const char* kOutliersDetails =
     "worst is shown: fewest true and most false closures kept, largest error, most rounds; of\n"
     "what is sent and of CPU time the median.\n\n"
     "Examples:\n"
-    "  kimera_multi_pgo outliers sphere2500.g2o --json out.json --plot out.svg\n"
+    "  kimera_multi_pgo outliers sphere2500.g2o --json out.json --plot out.html\n"
     "  kimera_multi_pgo outliers parking-garage.g2o --shares 30,100,400 --methods newton \\\n"
     "      --seeds 1,2,3\n"
     "  kimera_multi_pgo outliers sphere2500.g2o --shares 0 --clusters 5 --cluster-size 10";
@@ -218,7 +216,8 @@ void run(const CLI::App& app, const OutliersCommand& command) {
       });
   std::cout << outlier_text(study);
   command.files.write([&](std::ostream& out) { write_outlier_json(out, study); },
-                      [&] { return outlier_plot(study); });
+                      "Rejecting false closures: " + command.input.file.string(),
+                      [&] { return outlier_plots(study); });
 }
 
 }  // namespace

@@ -47,7 +47,8 @@ constexpr const char* kPcmDetails =
     "of the last 50 searches, the worst search and their sum, the median time of the last 50\n"
     "rounds of checks and their sum. Times are CPU times of one thread.\n\n"
     "Examples:\n"
-    "  kimera_multi_pgo pcm manhattan.g2o --outliers 1000 --seed 1 --json pcm.json --plot pcm.svg\n"
+    "  kimera_multi_pgo pcm manhattan.g2o --outliers 1000 --seed 1 --json pcm.json --plot "
+    "pcm.html\n"
     "  kimera_multi_pgo pcm manhattan.g2o --outliers 1000 --search exact incremental batch\n"
     "  kimera_multi_pgo pcm consistency_1500.adjacency.txt --search exact";
 
@@ -173,7 +174,8 @@ void add_pcm(CLI::App& parent) {
     check(app, *command);
     const std::vector<PcmRun> runs = run_file(*command);
     command->files.write([&](std::ostream& out) { write_pcm_json(out, runs); },
-                         [&] { return pcm_plot(runs); });
+                         "Consistent closures: " + command->file.string(),
+                         [&] { return pcm_plots(runs); });
   });
 }
 

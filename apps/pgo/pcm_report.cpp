@@ -4,11 +4,9 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <ostream>
-#include <vector>
 
 #include "modules/core/json.hpp"
 #include "modules/core/text_table.hpp"
-#include "modules/evaluation/plot.hpp"
 #include "modules/evaluation/statistics.hpp"
 
 namespace km {
@@ -128,7 +126,7 @@ void write_pcm_json(std::ostream& out, std::span<const PcmRun> runs) {
   out << json_text(runs.size() == 1 ? all.front() : all);
 }
 
-std::string pcm_plot(std::span<const PcmRun> runs) {
+std::vector<Plot> pcm_plots(std::span<const PcmRun> runs) {
   Plot time{.title = "CPU time of one addition: each, and the median of 50",
             .x_label = "vertices",
             .y_label = "ms",
@@ -137,7 +135,8 @@ std::string pcm_plot(std::span<const PcmRun> runs) {
   for (std::size_t colour = 0; colour < runs.size(); ++colour) {
     const std::string& search = runs[colour].search;
     const Additions additions(runs[colour].additions);
-    time.series.push_back({"", points(additions, [](const auto& a) { return 1e3 * a.search_s; }),
+    time.series.push_back({search,
+                           points(additions, [](const auto& a) { return 1e3 * a.search_s; }),
                            colour, PlotSeries::Style::kDots});
     time.series.push_back({search, running_median_ms(additions, &PcmAddition::search_s), colour});
     size.series.push_back(
@@ -151,7 +150,7 @@ std::string pcm_plot(std::span<const PcmRun> runs) {
     size.series.push_back({"true closures added",
                            points(first, [](const auto& a) { return a.true_vertices.value_or(0); }),
                            runs.size()});
-  return draw_plots(std::vector{time, size});
+  return {time, size};
 }
 
 }  // namespace km

@@ -3,8 +3,10 @@
 #include <iosfwd>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "apps/pgo/pcm_run.hpp"
+#include "modules/charts/plot.hpp"
 
 namespace km {
 
@@ -15,7 +17,7 @@ namespace km {
 /// "true_members", "false_members"}]}, members null without labels; an array of them for several.
 void write_pcm_json(std::ostream& out, std::span<const PcmRun> runs);
 
-/// SVG: time of search and checks, and size of the clique, against vertices.
-[[nodiscard]] std::string pcm_plot(std::span<const PcmRun> runs);
+/// Time of search and checks, and size of the clique, against vertices.
+[[nodiscard]] std::vector<Plot> pcm_plots(std::span<const PcmRun> runs);
 
 }  // namespace km

@@ -52,7 +52,7 @@ constexpr const char* kSolveDetails =
     "Examples:\n"
     "  kimera_multi_pgo solve sphere2500.g2o --robots 5 --method newton --trust-all --json "
     "out.json\n"
-    "  kimera_multi_pgo solve tunnels_8robots --method rbcd --rounds 300 --plot gap.svg\n"
+    "  kimera_multi_pgo solve tunnels_8robots --method rbcd --rounds 300 --plot gap.html\n"
     "  kimera_multi_pgo solve tunnels_8robots\n"
     "  kimera_multi_pgo solve tunnels_8robots --barc 20 --links chain\n"
     "  kimera_multi_pgo solve manhattan.g2o --method centralized --output manhattan.tum";
@@ -210,7 +210,8 @@ void run(const CLI::App& app, SolveCommand& command) {
                                " found no finite poses: do steps and weights make sense?");
   std::cout << solution_text(graph, solution);
   command.files.write([&](std::ostream& out) { write_solution_json(out, graph, solution); },
-                      [&] { return gap_plot(solution); });
+                      "Gap to the optimum: " + command.input.file.string(),
+                      [&] { return gap_plots(solution); });
   write_output(command.output, [&](std::ostream& out) {
     command.output.extension() == ".tum" ? write_tum(out, solution.T_world_kf)
                                          : write_solved(out, graph, solution.T_world_kf);

@@ -9,7 +9,6 @@
 #include "apps/pgo/commands.hpp"
 #include "modules/core/json.hpp"
 #include "modules/core/text_table.hpp"
-#include "modules/evaluation/plot.hpp"
 
 namespace km {
 namespace {
@@ -182,7 +181,7 @@ void write_solution_json(std::ostream& out, const TeamGraph& graph, const Soluti
   out << json_text(json);
 }
 
-std::string gap_plot(const Solution& solution) {
+std::vector<Plot> gap_plots(const Solution& solution) {
   const std::vector<TeamRound>& rounds = solution.run.rounds;
   const double floor = gap_floor(solution);
   const bool clipped = std::any_of(rounds.begin(), rounds.end(), [&](const TeamRound& round) {
@@ -200,12 +199,11 @@ std::string gap_plot(const Solution& solution) {
                 .log_y = true,
                 .series = {std::move(curve)}};
   };
-  return draw_plots(std::vector{
-      panel("rounds", [](std::size_t k) { return static_cast<double>(k); }),
-      panel("sent by all robots [MB]",
-            [&](std::size_t k) { return 1e-6 * static_cast<double>(rounds[k].work.bytes); }),
-      panel("critical path [s of CPU time]",
-            [&](std::size_t k) { return rounds[k].work.critical_path_s; })});
+  return {panel("rounds", [](std::size_t k) { return static_cast<double>(k); }),
+          panel("sent by all robots [MB]",
+                [&](std::size_t k) { return 1e-6 * static_cast<double>(rounds[k].work.bytes); }),
+          panel("critical path [s of CPU time]",
+                [&](std::size_t k) { return rounds[k].work.critical_path_s; })};
 }
 
 }  // namespace km

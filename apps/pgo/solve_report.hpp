@@ -2,8 +2,10 @@
 
 #include <iosfwd>
 #include <string>
+#include <vector>
 
 #include "apps/pgo/solvers.hpp"
+#include "modules/charts/plot.hpp"
 
 namespace km {
 
@@ -19,8 +21,8 @@ namespace km {
 /// bytes and times are sums up to the round.
 void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution);
 
-/// SVG: the relative gap to the optimum against rounds, bytes and critical-path time, on a
-/// logarithmic axis; where there is no gap, at the bottom of it. Precondition: a judgement.
-[[nodiscard]] std::string gap_plot(const Solution& solution);
+/// The relative gap to the optimum against rounds, bytes and critical-path time, on a logarithmic
+/// axis; where there is no gap, at the bottom of it. Precondition: a judgement.
+[[nodiscard]] std::vector<Plot> gap_plots(const Solution& solution);
 
 }  // namespace km

@@ -176,7 +176,7 @@ void write_record(const km::TeamPlan& plan, const km::TeamResult& team, const fs
   km::merge_records(records, root, file);
 }
 
-// The JSON, the report, the plot and the mesh of the whole team; `told` hears where all but the
+// The JSON, the report and the mesh of the whole team; `told` hears where all but the
 // first are.
 void write_results(const TeamOptions& options, const km::TeamPlan& plan, const km::TeamResult& team,
                    km::ResultWriter& results, std::ostream& told) {
@@ -186,11 +186,6 @@ void write_results(const TeamOptions& options, const km::TeamPlan& plan, const k
     results.write(plan.output / km::kReportPage, [&](const fs::path& file) {
       km::write_report(file, plan, team);
       told << "\nThe report, for a browser: " << file.string() << '\n';
-    });
-  if (!team.plot.empty())
-    results.write(plan.output / "trajectories.svg", [&](const fs::path& file) {
-      km::write_file(file, team.plot);
-      told << "Seen from above: " << file.string() << '\n';
     });
   if (options.record)
     results.write(options.record->empty() ? plan.output / km::kTeamRecord : *options.record,

@@ -8,16 +8,19 @@
 #include <nlohmann/json.hpp>
 #include <ostream>
 #include <span>
-#include <stdexcept>
-#include <string_view>
 
 #include "apps/output_file.hpp"
 #include "apps/robot/run_tables.hpp"
 #include "apps/team/team_report.hpp"
-#include "apps/viewer/page_files.hpp"
+#include "modules/charts/html_page.hpp"
+#include "modules/charts/page_file.hpp"
 #include "modules/core/input_file.hpp"
 
 namespace km {
+
+// report.js and report.css, see CMakeLists.txt.
+[[nodiscard]] std::span<const PageFile> report_files();
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -148,24 +151,6 @@ Json table(const fs::path& file, Json (*read)(const fs::path&), Json& notes) try
   return Json::array();
 }
 
-std::string_view page_file(std::span<const PageFile> files, std::string_view path) {
-  const auto found = std::ranges::find(files, path, &PageFile::path);
-  if (found == files.end()) throw std::logic_error("no page file " + std::string(path));
-  return found->bytes;
-}
-
-// JSON that a script element can hold: "<" is in strings alone, where an escape says the same.
-std::string script_text(const Json& json) {
-  std::string text;
-  for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace)) {
-    if (c == '<')
-      text += "\\u003c";
-    else
-      text += c;
-  }
-  return text;
-}
-
 }  // namespace
 
 Json report_data(const TeamPlan& plan, const TeamResult& team) {
@@ -197,18 +182,13 @@ Json report_data(const TeamPlan& plan, const TeamResult& team) {
 }
 
 std::string report_page(const Json& data) {
-  std::string page =
-      "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<title>Report of a run</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n";
-  page.append(page_file(chart_files(), "theme.css"))
-      .append(page_file(report_files(), "report.css"));
-  page.append("</style>\n</head>\n<body>\n<main></main>\n")
-      .append("<script type=\"application/json\" id=\"run\">")
-      .append(script_text(data))
-      .append("</script>\n<script type=\"module\">\n");
-  page.append(page_file(chart_files(), "charts.js")).append(page_file(report_files(), "report.js"));
-  return page.append("</script>\n</body>\n</html>\n");
+  const std::span<const PageFile> shared = chart_files(), own = report_files();
+  return html_page(
+      {.title = "Report of a run",
+       .styles = {page_file(shared, "theme.css"), page_file(shared, "document.css"),
+                  page_file(own, "report.css")},
+       .body = "<main></main>\n" + data_script("run", data) +
+               module_script({page_file(shared, "charts.js"), page_file(own, "report.js")})});
 }
 
 void write_report(const fs::path& file, const TeamPlan& plan, const TeamResult& team) {

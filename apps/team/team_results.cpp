@@ -9,7 +9,6 @@
 
 #include "modules/core/input_file.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/evaluation/trajectory_report.hpp"
 #include "modules/mesh/ply_file.hpp"
 #include "modules/sensors/euroc_rig_codec.hpp"
 
@@ -142,10 +141,7 @@ void judge_optimized(TeamResult& team, Trajectories& trajectories) {
     if (robot.in_team_frame)
       if (const auto input = trajectories.input(robot.plan, "optimized.tum", robot.notes))
         inputs.push_back(*input);
-  if (!inputs.empty()) {
-    team.optimized = trajectory_error(inputs);
-    team.plot = plot_from_above(inputs, *team.optimized);
-  }
+  if (!inputs.empty()) team.optimized = trajectory_error(inputs);
   const Alignment alignment = team.optimized ? team.optimized->alignment : Alignment{};
   for (RobotResult& robot : team.robots) {
     if (!robot.in_team_frame || robot.left_nothing()) continue;
@@ -228,10 +224,11 @@ void find_team_frame(std::vector<RobotResult>& robots) {
     const auto frame = frame_of(robot);
     if (!frame || *frame == team->first) continue;
     robot.in_team_frame = false;
-    robot.notes.push_back((*frame == robot.plan.id && sizes[*frame] == 1
-                               ? std::string("never joined the others")
-                               : "ended in the frame of robot " + std::to_string(*frame)) +
-                          ": left out of the optimised errors, the drawing and the team's map");
+    robot.notes.push_back(
+        (*frame == robot.plan.id && sizes[*frame] == 1
+             ? std::string("never joined the others")
+             : "ended in the frame of robot " + std::to_string(*frame)) +
+        ": left out of the optimised errors, the report's trajectories and the team's map");
   }
 }
 

@@ -48,7 +48,6 @@ struct TeamMeshes {
 struct TeamResult {
   std::vector<RobotResult> robots;
   std::optional<TeamError> optimized;  ///< Of the robots in the team's frame, under one alignment.
-  std::string plot;                    ///< SVG of `optimized` from above; empty without it.
   std::optional<ClosureScores> closures;  ///< Of robots with cameras, where the truth is known.
   TeamMeshes meshes;                      ///< Of robots that made a map.
   std::vector<std::string> notes;         ///< Why something of the team is absent.

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "modules/core/text_table.hpp"
-#include "modules/evaluation/plot.hpp"
 
 namespace km {
 namespace {
@@ -108,7 +107,7 @@ std::vector<PlotSeries> truth_series(std::span<const TrajectoryInput> inputs) {
   std::vector<PlotSeries> all;
   for (const auto& [key, entry] : drawn) {
     PlotSeries& series = all.emplace_back();
-    series.name = all.size() == 1 ? "truth" : "";
+    series.name = "truth";
     series.colour = PlotSeries::kGrey;
     series.width_px = 3.0;
     for (const StampedPose& pose : entry.truth)
@@ -120,8 +119,8 @@ std::vector<PlotSeries> truth_series(std::span<const TrajectoryInput> inputs) {
 
 }  // namespace
 
-std::string plot_from_above(std::span<const TrajectoryInput> inputs, const TeamError& team) {
-  Plot plot{.x_label = "x [m]", .y_label = "y [m]", .is_map = true, .series = truth_series(inputs)};
+Plot plot_from_above(std::span<const TrajectoryInput> inputs, const TeamError& team) {
+  Plot plot{.title = "From above", .is_map = true, .series = truth_series(inputs)};
   for (std::size_t r = 0; r < inputs.size(); ++r) {
     PlotSeries& series = plot.series.emplace_back();
     series.name = team.robots[r].name + ", position rmse " +
@@ -131,7 +130,7 @@ std::string plot_from_above(std::span<const TrajectoryInput> inputs, const TeamE
     for (const StampedPose& pose : inputs[r].estimate)
       series.points.push_back(from_above(team.alignment.apply(pose.T)));
   }
-  return draw_plots({&plot, 1});
+  return plot;
 }
 
 }  // namespace km

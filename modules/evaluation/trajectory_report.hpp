@@ -3,6 +3,7 @@
 #include <span>
 #include <string>
 
+#include "modules/charts/plot.hpp"
 #include "modules/core/json.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 
@@ -21,11 +22,9 @@ void to_json(Json& json, const TeamError& team);
 /// The entry of one estimate alone.
 void to_json(Json& json, const TrajectoryError& error);
 
-/// An SVG document: truth (grey) and the aligned estimates (one colour each) from above, x to the
-/// right and y up in the truth's world [m], at one scale for both axes, with a legend that gives
-/// each estimate's position rmse. `team` is the result of trajectory_error() for `inputs`. Truths
-/// that are one and the same are drawn once, over the time of their estimates.
-[[nodiscard]] std::string plot_from_above(std::span<const TrajectoryInput> inputs,
-                                          const TeamError& team);
+/// A map: truth (grey) and the aligned estimates (one colour each) from above in the truth's world,
+/// with each estimate's position rmse in its name. `team` is the result of trajectory_error() for
+/// `inputs`. Truths that are one and the same are drawn once, over the time of their estimates.
+[[nodiscard]] Plot plot_from_above(std::span<const TrajectoryInput> inputs, const TeamError& team);
 
 }  // namespace km

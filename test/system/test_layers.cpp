@@ -33,7 +33,7 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"ros_dds", {"images", "mesh", "recordings"}},
     {"sensors", {"recordings"}},
     {"pgo_study", {"pose_graph", "outlier_rejection"}},
-    {"evaluation", {"images", "mesh"}},
+    {"evaluation", {"charts", "images", "mesh"}},
     {"simulation", {"images", "mesh"}},
     {"semantic_mapping", {"mesh"}},
     {"mesh_deformation", {"mesh"}},

@@ -9,7 +9,6 @@ const SEVERITY_BADGES = {
   warning: 'warn',
   note: ''
 };
-const TRUTH_COLOR = '#98a1ae';
 
 const run = JSON.parse(document.getElementById('run').textContent);
 const nameOf = (id) => run.robots.find((robot) => robot.id === id)?.name ?? `robot ${id}`;
@@ -165,13 +164,13 @@ function showTrajectories() {
   const at = (what) => (p) => `${what}, ${duration(p[2])}`;
   const series = [];
   const truths = run.robots.flatMap((robot) => [...robot.truth, [NaN, NaN]]);
-  if (known)
-    series.push({name: 'truth', color: TRUTH_COLOR, points: truths, width: 3, tell: () => ''});
+  if (known) series.push({name: 'truth', color: GREY, points: truths, width: 3, tell: () => ''});
   const links = closureLines();
   if (links.length)
     series.push({
       name: 'closures kept',
-      color: '#6fdc8c66',
+      color: '#6fdc8c',
+      opacity: 0.4,
       points: links,
       width: 0.8,
       tell: (p) => p[2] ?? ''

@@ -6,6 +6,7 @@
 
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/command.hpp"
+#include "test/support/page_text.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -36,7 +37,7 @@ struct Files {
 TEST_CASE("trajectory prints a table and writes JSON and a plot", "[evaluate]") {
   const Files files;
   const std::string json = (files.folder.path() / "out.json").string();
-  const std::string plot = (files.folder.path() / "out.svg").string();
+  const std::string plot = (files.folder.path() / "out.html").string();
   const auto result = run_command(kTool + "trajectory --truth " + files.truth + " --estimate " +
                                   files.a + ' ' + files.b + " --json " + json + " --plot " + plot);
   CAPTURE(result.output);
@@ -44,7 +45,10 @@ TEST_CASE("trajectory prints a table and writes JSON and a plot", "[evaluate]") 
   CHECK_THAT(result.output, Catch::Contains("a/optimized") && Catch::Contains("b/optimized") &&
                                 Catch::Contains("\nteam"));
   CHECK_THAT(files.folder.read("out.json"), Catch::Contains("\"joint\""));
-  CHECK_THAT(files.folder.read("out.svg"), Catch::StartsWith("<svg"));
+  const Json plots = data_of_page(files.folder.read("out.html"), "plots")["charts"];
+  REQUIRE(plots.size() == 1);
+  CHECK(plots[0]["map"] == true);
+  CHECK(plots[0]["series"].size() == 3);
 }
 
 TEST_CASE("trajectory judges a window, in seconds or stamps", "[evaluate]") {

@@ -188,8 +188,7 @@ class CannedCity {
     runs << ']';
     const std::string name = "pcm-" + std::to_string(seed);
     folder_.write("results/" + name + ".json", runs.str());
-    folder_.write("results/figures/" + name + ".svg",
-                  "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"9\" height=\"9\"></svg>");
+    folder_.write("results/figures/" + name + ".html", "<!doctype html>");
   }
 
   void write_records() const {

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "test/support/command.hpp"
+#include "test/support/page_text.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -58,8 +59,8 @@ TEST_CASE("The quick pcm experiment runs, reports, and is not run twice", "[expe
   CHECK_THAT(page, Contains("search time and clique against vertices") && Contains("--seed 2") &&
                        Contains("--outliers 30") && Contains("small versions") &&
                        Contains("exact search: clique against batch"));
-  CHECK_THAT(laboratory.folder.read("results/report.md"), Contains("figures/pcm.svg"));
-  CHECK_THAT(laboratory.folder.read("results/figures/pcm.svg"), Catch::StartsWith("<svg"));
+  CHECK_THAT(laboratory.folder.read("results/report.md"), Contains("(report.html#figure-pcm)"));
+  CHECK(data_of_page(page, "plots")["figure-pcm"].size() == 2);
   const CommandResult second = laboratory.run("run pcm");
   CHECK_THAT(second.output, Contains("0 steps made, 2 were done before"));
   CHECK_THAT(laboratory.run("list").output, Contains("pcm-1") && Contains("done"));

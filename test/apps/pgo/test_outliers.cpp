@@ -6,6 +6,7 @@
 
 #include "apps/pgo/outlier_study.hpp"
 #include "test/support/command.hpp"
+#include "test/support/page_text.hpp"
 #include "test/support/team_graphs.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -34,7 +35,7 @@ TEST_CASE("outliers compares methods in a table, JSON and a plot", "[outliers]")
   const CommandResult result = run_command(
       kOutliersTool + graph + " --robots 2 --shares 12.5,25 --seeds 1,2 --outlier-range 20 " +
       "--json " + (folder.path() / "out.json").string() + " --plot " +
-      (folder.path() / "out.svg").string());
+      (folder.path() / "out.html").string());
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
   CHECK_THAT(result.output,
@@ -46,8 +47,15 @@ TEST_CASE("outliers compares methods in a table, JSON and a plot", "[outliers]")
                           "false_kept", "rmse_m", "rounds", "decided", "bytes", "cpu_s"})
     CHECK_THAT(json, Contains(std::string("\"") + key + "\":"));
   CHECK_THAT(json, Contains("\"share_percent\": 12.5"));
-  CHECK_THAT(folder.read("out.svg"),
-             Catch::StartsWith("<svg") && Contains(">pcm+newton<") && Contains("<circle"));
+  const Json plots = data_of_page(folder.read("out.html"), "plots")["charts"];
+  REQUIRE(plots.size() == 4);
+  for (const Json& plot : plots) {
+    REQUIRE(plot["series"].size() == 3);
+    CHECK(plot["series"][2]["name"] == "pcm+newton");
+    CHECK(plot["series"][2]["style"] == "marked");
+    CHECK(plot["series"][2]["points"].size() == 2);
+    CHECK(plot["series"][2]["points"][1][0] == 25);
+  }
 }
 
 TEST_CASE("Clusters of false closures are added on request", "[outliers]") {

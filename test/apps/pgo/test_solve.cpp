@@ -7,6 +7,7 @@
 #include "apps/pgo/solve_report.hpp"
 #include "modules/pose_graph/g2o_io.hpp"
 #include "test/support/command.hpp"
+#include "test/support/page_text.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -57,10 +58,10 @@ TEST_CASE("Poses and plot are written", "[pgo]") {
   const auto graph = folder.write("square.g2o", square_g2o());
   const auto tum = folder.path() / "poses.tum";
   const auto g2o = folder.path() / "poses.g2o";
-  const auto svg = folder.path() / "gap.svg";
+  const auto page = folder.path() / "gap.html";
   for (const auto& output : {tum, g2o})
     REQUIRE(run_command(kSolveTool + graph.string() + " --method centralized --output " +
-                        output.string() + " --plot " + svg.string())
+                        output.string() + " --plot " + page.string())
                 .exit_code == 0);
   const G2oGraph written = read_g2o(g2o);
   REQUIRE(written.vertices.size() == 8);
@@ -77,7 +78,7 @@ TEST_CASE("Poses and plot are written", "[pgo]") {
     CHECK((make_pose(q.toRotationMatrix(), t).matrix() - T.matrix()).norm() < 1e-12);
   }
   CHECK((rows >> std::ws).eof());
-  CHECK_THAT(folder.read("gap.svg"), Contains("<svg") && Contains("</svg>"));
+  CHECK(data_of_page(folder.read("gap.html"), "plots")["charts"].size() == 3);
 }
 
 TEST_CASE("A graph without noise has no gap to report, and is certified", "[pgo]") {
@@ -100,18 +101,27 @@ TEST_CASE("The plot goes on to the last round where no gap is left", "[pgo]") {
     round.cost = 1.0 + gap;
     solution.run.rounds.push_back(round);
   }
-  const std::string svg = gap_plot(solution);
-  CHECK_THAT(svg, Contains(">1e-5<") && !Contains(">1e-6<"));
-  CHECK_THAT(svg, Contains("cx=\"630.0\" cy=\"294.0\""));  // round 3, lower right corner
+  const std::vector<Plot> plots = gap_plots(solution);
+  REQUIRE(plots.size() == 3);
+  CHECK_THAT(plots[0].title, Contains("bottom"));
+  const std::vector<PlotPoint>& points = plots[0].series[0].points;
+  REQUIRE(points.size() == 4);
+  CHECK(points[1].y == Approx(3e-5));
+  for (const std::size_t k : {2, 3}) {  // the decade below the least gap
+    CHECK(points[k].x == static_cast<double>(k));
+    CHECK(points[k].y == Approx(1e-5));
+  }
   solution.run.rounds.resize(2);
-  CHECK_THAT(gap_plot(solution), !Contains("bottom"));
+  CHECK_THAT(gap_plots(solution)[0].title, !Contains("bottom"));
 }
 
 TEST_CASE("A method without rounds has a plot to look at", "[pgo]") {
   Solution solution;
   solution.run.rounds.emplace_back().cost = 1.0;
   solution.judgement = Judgement{.optimum = 1.0};
-  CHECK_THAT(gap_plot(solution), Contains("<circle"));
+  const PlotSeries& series = gap_plots(solution)[0].series[0];
+  CHECK(series.points.size() == 1);
+  CHECK(series.style == PlotSeries::Style::kMarkedLine);
 }
 
 TEST_CASE("newton decides, and says how noisy closures are", "[pgo]") {
@@ -151,7 +161,7 @@ TEST_CASE("What cannot be done is told with the reason", "[pgo]") {
         "--over-relaxation is for --schedule coloured"},
        {"FILE --method dgs --over-relaxation 1.5", "--over-relaxation is for"},
        {"FILE --method dgs --verify", "--verify is for"},
-       {"FILE --method newton --plot gap.svg", "only, not for newton"},
+       {"FILE --method newton --plot gap.html", "only, not for newton"},
        {"FILE --links ring", "ring not in {all,chain}"},
        {"FILE --method newton --trust-all --barc 5", "--barc is for --method newton only, not"},
        {"FILE --method rbcd --barc 5", "--barc is for --method newton only, not for rbcd"},

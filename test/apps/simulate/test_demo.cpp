@@ -35,7 +35,7 @@ TEST_CASE("The demo joins three robots of a simulated world into one frame", "[d
   CHECK(mesh["truth_to_estimate"]["point"]["median_m"].as<double>() < 0.1);
   CHECK(mesh["truth_to_estimate"]["labels"]["accuracy"].as<double>() > 0.7);
   CHECK(team["optimized"]["joint"]["position_m"]["rmse"].as<double>() < kMaxError_m);
-  for (const char* file : {"trajectories.svg", "team_mesh.ply", "team_mesh.png", "robot0/mesh.ply",
+  for (const char* file : {"report.html", "team_mesh.ply", "team_mesh.png", "robot0/mesh.ply",
                            "robot0/mesh_optimized.ply", "robot0/label_palette.csv",
                            "robot0/optimized.tum", "robot0/loop_closures.csv", "robot0/traffic.csv",
                            "robot0/robot.log", "robot0/config.yaml", "world_short/README.md"})

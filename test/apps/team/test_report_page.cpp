@@ -7,13 +7,12 @@
 #include "test/apps/viewer/page_programs.hpp"
 #include "test/apps/viewer/small_run.hpp"
 #include "test/support/command.hpp"
+#include "test/support/page_text.hpp"
 
 namespace km {
 namespace {
 
 using Catch::Contains;
-
-constexpr const char* kHostile = "</script><script>alert(1)</script><!-- \" ' & \\ ]]>";
 
 // SmallRun as team has run it. Robot r0 went 10 m along x, as its truth says; it says itself, in
 // `optimized`, that it was so; r1 is 3 m beside. There is something to say of r0.
@@ -31,8 +30,8 @@ struct ReportedRun {
     }
     const auto file = plan.output / "r0/summary.json";
     RunSummary summary = read_summary(file);
-    summary.exit_reason = kHostile;
-    summary.findings = {{"closures.few", Severity::kWarning, kHostile, "it follows", "look"}};
+    summary.exit_reason = kHostileText;
+    summary.findings = {{"closures.few", Severity::kWarning, kHostileText, "it follows", "look"}};
     write_summary(file, summary);
   }
 
@@ -52,19 +51,6 @@ struct ReportedRun {
   }
   [[nodiscard]] Json data() const { return report_data(plan, collect()); }
 };
-
-// What is in the script element, as a browser cuts it out.
-Json data_in(const std::string& page) {
-  const std::string begin = "<script type=\"application/json\" id=\"run\">";
-  const auto from = page.find(begin) + begin.size();
-  return Json::parse(page.substr(from, page.find("</script", from) - from));
-}
-
-std::size_t count(const std::string& text, const std::string& part) {
-  std::size_t n = 0;
-  for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
-  return n;
-}
 
 }  // namespace
 
@@ -139,22 +125,21 @@ TEST_CASE("A table that cannot be used is a note of the report, a missing one no
 TEST_CASE("No text of a run gets out of its place in the report", "[report_page]") {
   ReportedRun reported;
   TeamResult team = reported.collect();
-  team.robots[1].plan.name = kHostile;
+  team.robots[1].plan.name = kHostileText;
   team.notes.emplace_back("no UTF-8: \xff");
   const std::string page = report_page(report_data(reported.plan, team));
-  CHECK(count(page, "<script") == 2);
-  CHECK(count(page, "</script") == 2);
-  CHECK(count(page, "<!--") == 0);
-  const Json data = data_in(page);
-  CHECK(data["robots"][1]["name"] == kHostile);
-  CHECK(data["team"]["robots"][0]["findings"][0]["what"] == kHostile);
-  CHECK(data["team"]["robots"][0]["exit_reason"] == kHostile);
+  CHECK(occurrences(page, "<script") == 2);
+  CHECK(occurrences(page, "</script") == 2);
+  CHECK(occurrences(page, "<!--") == 0);
+  const Json data = data_of_page(page, "run");
+  CHECK(data["robots"][1]["name"] == kHostileText);
+  CHECK(data["team"]["robots"][0]["findings"][0]["what"] == kHostileText);
+  CHECK(data["team"]["robots"][0]["exit_reason"] == kHostileText);
 }
 
 TEST_CASE("The report needs no other file and no network", "[report_page]") {
   const std::string page = report_page(ReportedRun().data());
-  for (const char* reference : {"src=", "http:", "https:", "@import", "url(", "fetch("})
-    CHECK(count(page, reference) == 0);
+  CHECK(references_of_page(page) == 0);
 }
 
 TEST_CASE("The report opens in a browser and shows its charts", "[report_page]") {

@@ -103,7 +103,7 @@ TEST_CASE("Results of an earlier run are not shown for a robot that fails", "[te
   const Team team("[ $name = bob ] && { rm \"$out/summary.json\"; exit 1; }; exit 0");
   for (const char* file : {"summary.json", "optimized.tum", "exit_code"})
     team.folder.write(std::string("out/bob/") + file, "{\"frames\": 4711}");
-  for (const char* file : {"out/trajectories.svg", "out/team_mesh.ply", "out/label_palette.csv"})
+  for (const char* file : {"out/team_mesh.ply", "out/label_palette.csv"})
     team.folder.write(file, "old");
   team.folder.write("out/bob/notes.txt", "of the user");
   const auto result = run_command(team.command);
@@ -112,7 +112,7 @@ TEST_CASE("Results of an earlier run are not shown for a robot that fails", "[te
   CHECK_THAT(result.output, !Catch::Contains("4711"));
   CHECK_FALSE(fs::exists(team.folder.path() / "out/bob/optimized.tum"));
   CHECK_FALSE(fs::exists(team.folder.path() / "out/bob/exit_code"));
-  for (const char* file : {"out/trajectories.svg", "out/team_mesh.ply", "out/label_palette.csv"})
+  for (const char* file : {"out/team_mesh.ply", "out/label_palette.csv"})
     CHECK_FALSE(fs::exists(team.folder.path() / file));
   CHECK(fs::exists(team.folder.path() / "out/bob/notes.txt"));
 }

@@ -1,5 +1,6 @@
 // Charts as SVG in a page: lines over time, bars, trajectories from above. Stands for itself, needs
-// no other file. A chart fills the width of the element it is given and is drawn anew by set().
+// no other file. A chart fills the width of the element it is given, is drawn anew by set(), and
+// can be saved as a picture.
 //
 //   const chart = lineChart(element, {title: 'Memory', unit: 'MB', x: duration});
 //   chart.set([{name: 'robot0', color: robotColor(0), points: [[0, 80], [1, 82]]}]);
@@ -18,6 +19,9 @@ const KIND_COLORS =
 /** A colour for the n-th thing that is no robot. */
 export const kindColor = (n) => KIND_COLORS[n % KIND_COLORS.length];
 
+/** Of what is there to compare with: the truth, say. */
+export const GREY = '#98a1ae';
+
 // ---- texts of numbers
 
 const trimmed = (value, digits) => String(Number(value.toPrecision(digits)));
@@ -30,7 +34,8 @@ export function quantity(value, unit = '') {
   const steps = [[1e9, 'G'], [1e6, 'M'], [1e3, 'k']];
   for (const [step, prefix] of steps)
     if (size >= step) return `${trimmed(value / step, 3)} ${prefix}${unit}`;
-  if (size > 0 && size < 1e-3) return `${value.toExponential(0)}${unit && ` ${unit}`}`;
+  if (size > 0 && size < 1e-3)
+    return `${value.toExponential(2).replace(/\.?0*e/, 'e')}${unit && ` ${unit}`}`;
   return `${trimmed(value, 3)}${unit && ` ${unit}`}`;
 }
 
@@ -79,6 +84,12 @@ function powerTicks(low, high, count) {
   return all;
 }
 
+// Of a power of ten: "0.01", "1e5".
+function powerText(value) {
+  const plain = value > 0.999e-3 && value < 1.001e3;
+  return plain ? trimmed(value, 1) : value.toExponential(0).replace('e+', 'e');
+}
+
 function extent(series, axis, accepts = Number.isFinite) {
   let low = Infinity, high = -Infinity;
   for (const one of series)
@@ -114,6 +125,10 @@ const STYLE = `
 .chart-key i { width: 10px; height: 3px; border-radius: 2px; }
 .chart-key.off { opacity: 0.35; }
 .chart-zoom { min-width: 20px; justify-content: center; border: 1px solid var(--chart-grid, #e3e5e8); border-radius: 4px; }
+.chart-body { position: relative; }
+.chart-save { position: absolute; top: 8px; right: 14px; padding: 1px 6px; border: 1px solid var(--chart-grid, #e3e5e8);
+  border-radius: 4px; background: var(--chart-paper, #fff); opacity: 0; }
+.chart:hover .chart-save, .chart-save:focus-visible { opacity: 1; }
 .chart div > svg { display: block; width: 100%; }
 .chart svg text { fill: var(--chart-muted, #666); font-size: 10px; }
 .chart-grid { stroke: var(--chart-grid, #e3e5e8); shape-rendering: crispEdges; }
@@ -122,7 +137,11 @@ const STYLE = `
   background: var(--chart-paper, #fff); border: 1px solid var(--chart-grid, #ccc); box-shadow: 0 2px 10px #0004; }
 .chart-tip div { display: flex; align-items: center; gap: 6px; }
 .chart-tip i { width: 7px; height: 7px; border-radius: 50%; }
-.chart-tip b { margin-left: auto; padding-left: 10px; font-weight: 600; }`;
+.chart-tip b { margin-left: auto; padding-left: 10px; font-weight: 600; }
+@media print {
+  .chart { break-inside: avoid; }
+  .chart-zoom, .chart-save { display: none; }
+}`;
 
 function ensureStyle() {
   if (document.getElementById('chart-style')) return;
@@ -136,22 +155,37 @@ function frame(host, options, draw) {
   ensureStyle();
   const root = element('div', 'chart', host);
   const head = element('div', 'chart-head', root);
-  const title = element('span', 'chart-title', head, options.title ?? '');
-  if (options.unit) element('span', 'chart-unit', title, options.unit);
+  const title = element('span', 'chart-title', head, options.title);
+  const unit = options.yLabel ?? options.unit;
+  if (unit) element('span', 'chart-unit', title, unit);
   const keys = element('span', 'chart-head', head);
   keys.style.marginBottom = 0;
-  const canvas = element('div', '', root);
+  const body = element('div', 'chart-body', root);
+  const canvas = element('div', '', body);
+  const save = element('button', 'chart-key chart-save', body, 'SVG');
+  save.title = 'Save as SVG';
+  save.onclick = () => saveChart(chart);
   const tip = element('div', 'chart-tip', root);
   tip.hidden = true;
-  const chart = {root, head, canvas, tip, series: [], hidden: new Set(), width: 0};
+  const chart = {
+    title: options.title ?? '',
+    root,
+    head,
+    canvas,
+    tip,
+    series: [],
+    hidden: new Set(),
+    width: 0
+  };
   let legend = '';
   const drawLegend = () => {
     const now = chart.series.map((s) => `${s.name}${s.color}${chart.hidden.has(s.name)}`).join();
     if (now === legend) return;
     legend = now;
     keys.replaceChildren();
-    for (const one of chart.series) {
-      if (!one.name || chart.series.length < 2) continue;
+    const named = [...new Map(chart.series.map((s) => [s.name, s])).values()].filter((s) => s.name);
+    if (named.length < 2) return;
+    for (const one of named) {
       const key = element('button', `chart-key${chart.hidden.has(one.name) ? ' off' : ''}`, keys);
       element('i', '', key).style.background = one.color;
       key.append(one.name);
@@ -202,30 +236,51 @@ function thinned(points, toX) {
 function path(points, toX, toY) {
   let d = '', pen = 'M';
   for (const [x, y] of points) {
-    const at = toY(y);
-    if (!Number.isFinite(at)) {
+    const at = [toX(x), toY(y)];
+    if (!at.every(Number.isFinite)) {
       pen = 'M';
       continue;
     }
-    d += `${pen}${px(toX(x))} ${px(at)}`;
+    d += pen + at.map(px).join(' ');
     pen = 'L';
   }
   return d;
 }
 
-function lineSvg(one, d) {
+// Of a line, or of dots: points without extent, whose ends are round.
+function seriesSvg(one, points, toX, toY) {
+  const at = points.map(([x, y]) => [toX(x), toY(y)])
+                 .filter((p) => p.every(Number.isFinite))
+                 .map((p) => p.map(px));
+  const open =
+      `<path fill="none" stroke="${one.color}" opacity="${one.opacity ?? (one.dots ? 0.35 : 1)}"`;
+  if (one.dots)
+    return `${open} stroke-width="3" stroke-linecap="round" d="${
+        at.map((p) => `M${p.join(' ')}h0`).join('')}"/>`;
   const dash = one.dashed ? ' stroke-dasharray="4 3"' : '';
-  return `<path fill="none" stroke="${one.color}" stroke-width="${
-      one.width ?? 1.5}" stroke-linejoin="round"${dash} d="${d}"/>`;
+  const line = `${open} stroke-width="${one.width ?? 1.5}" stroke-linejoin="round"${dash} d="${
+      path(points, toX, toY)}"/>`;
+  const marks = one.marks ? at : [];
+  return line +
+      marks.map(([x, y]) => `<circle r="3" fill="${one.color}" cx="${x}" cy="${y}"/>`).join('');
 }
 
 /**
- * Lines over a common x. Options: title, unit of y, height [px], logY, x: text of an x (default: as
- * it is), from0 (y begins at 0; default true without logY), cursor: x of a vertical line.
+ * Lines over a common x: set() takes {name, color, points, width, dashed, marks: discs at its
+ * points, dots: only faint ones}. Options: title, unit of y, or yLabel; xLabel; height [px]; logY,
+ * decades: the most of them below the largest value; x: text of an x (default: as it is), from0 (y
+ * begins at 0; default true without logY), cursor: x of a vertical line.
  */
 export function lineChart(host, options = {}) {
-  const {unit = '', height = 120, logY = false, from0 = !logY, x: textOfX = (x) => quantity(x)} =
-      options;
+  const {
+    unit = '',
+    height = 120,
+    logY = false,
+    decades = 6,
+    from0 = !logY,
+    xLabel,
+    x: textOfX = (x) => quantity(x)
+  } = options;
   const time = textOfX === duration;
   let scale = null;
   const chart = frame(host, options, (self, series) => {
@@ -235,17 +290,17 @@ export function lineChart(host, options = {}) {
     // What is six powers of ten below the largest is as good as nothing.
     if (logY)
       [y0, y1] = [
-        10 ** Math.floor(Math.log10(Math.max(y0, y1 * 1e-6))),
-        10 ** Math.ceil(Math.log10(y1) + 1e-9)
+        10 ** Math.floor(Math.log10(Math.max(y0, y1 * 10 ** -decades)) + 1e-9),
+        10 ** Math.ceil(Math.log10(y1) - 1e-9)
       ];
     else if (from0)
-      [y0, y1] = [Math.min(0, y0), y1 > 0 ? y1 * 1.06 : 1];
-    if (!(y1 > y0)) [y0, y1] = [y0 - 0.5, y0 + 0.5];
-    const marks = logY ? powerTicks(y0, y1, 4) : ticks(y0, y1, height / 36);
-    const labels = marks.map((y) => (logY ? y.toExponential(0).replace('e+', 'e') : quantity(y)));
-    const left = 12 + 6 * Math.max(...labels.map((l) => l.length), 2), right = 8, top = 6,
-          bottom = 18;
-    const width = self.width, span = Math.max(x1 - x0, 1e-9);
+      [y0, y1] = [Math.min(0, y0), y1 > 0 ? y1 * 1.06 : y0 < 0 ? 0 : 1];
+    if (!(y1 > y0)) [y0, y1] = logY ? [y0, 10 * y0] : [y0 - 0.5, y0 + 0.5];
+    const marks = logY ? powerTicks(y0, y1, height / 30) : ticks(y0, y1, height / 36);
+    const labels = marks.map((y) => (logY ? powerText(y) : quantity(y)));
+    const left = 12 + 6 * Math.max(...labels.map((l) => l.length), 2), right = 12, top = 6,
+          bottom = xLabel ? 34 : 18;
+    const width = self.width, span = x1 > x0 ? x1 - x0 : 1;
     const toX = (x) => left + ((x - x0) / span) * (width - left - right);
     const f = logY ? (y) => (y > 0 ? Math.log10(Math.max(y, y0)) : NaN) : (y) => y;
     const toY = (y) =>
@@ -258,9 +313,12 @@ export function lineChart(host, options = {}) {
       svg += `<text x="${left - 6}" y="${px(toY(y)) + 3}" text-anchor="end">${labels[i]}</text>`;
     });
     for (const x of (time ? timeTicks : ticks)(x0, x0 + span, width / 90))
-      svg += `<text x="${px(toX(x))}" y="${height - 4}" text-anchor="middle">${
+      svg += `<text x="${px(toX(x))}" y="${height - bottom + 14}" text-anchor="middle">${
           escaped(textOfX(x))}</text>`;
-    for (const one of series) svg += lineSvg(one, path(thinned(one.points, toX), toX, toY));
+    if (xLabel)
+      svg += `<text x="${px((left + width - right) / 2)}" y="${height - 4}" text-anchor="middle">${
+          escaped(xLabel)}</text>`;
+    for (const one of series) svg += seriesSvg(one, thinned(one.points, toX), toX, toY);
     if (Number.isFinite(options.cursor))
       svg += `<line class="chart-cursor" x1="${px(toX(options.cursor))}" x2="${
           px(toX(options.cursor))}" y1="${top}" y2="${height - bottom}"/>`;
@@ -299,7 +357,9 @@ function hover(chart, scaleOf, textOfX, unit, height) {
     if (!s || !group) return;
     const at = event.clientX - chart.canvas.getBoundingClientRect().left;
     const x = s.x0 + ((at - s.left) / (s.width - s.left - s.right)) * s.span;
-    const found = s.series.map((one) => [one, nearest(one.points, x)]).filter(([, p]) => p);
+    const found = s.series.filter((one) => !one.dots)
+                      .map((one) => [one, nearest(one.points, x)])
+                      .filter(([, p]) => p);
     if (!found.length) return;
     const shown =
         found.reduce((a, b) => (Math.abs(a[1][0] - x) <= Math.abs(b[1][0] - x) ? a : b))[1][0];
@@ -331,16 +391,19 @@ function showTip(chart, at, head, rows) {
 
 /**
  * Groups of horizontal bars, a bar per series in each: set() takes {name, color, values: {group:
- * value}}. Options: title, unit, most: groups shown, the largest first; full: value of a bar over
- * the whole width.
+ * value}}. Options: title, unit, or yLabel; most: groups shown, the largest first; groups: these,
+ * in this order; decimals: each bar has its value, with so many, in place of the largest of its
+ * group; full: value of a bar over the whole width.
  */
 export function barChart(host, options = {}) {
-  const {unit = '', most = 8} = options;
+  const {unit = '', most = 8, decimals} = options;
+  const each = decimals !== undefined;
   return frame(host, options, (self, series) => {
-    const groups = [...new Set(series.flatMap((s) => Object.keys(s.values)))];
+    const groups = options.groups ?? [...new Set(series.flatMap((s) => Object.keys(s.values)))];
     const largest = (g) => Math.max(...series.map((s) => s.values[g] ?? 0));
-    groups.sort((a, b) => largest(b) - largest(a) || (a < b ? -1 : 1)).splice(most);
-    const bar = 5, gap = 2, row = Math.max(18, series.length * (bar + gap) + 8);
+    if (!options.groups)
+      groups.sort((a, b) => largest(b) - largest(a) || (a < b ? -1 : 1)).splice(most);
+    const bar = each ? 11 : 5, gap = 2, row = Math.max(18, series.length * (bar + gap) + 8);
     const left = 10 + 6.3 * Math.max(...groups.map((g) => g.length), 4), right = 44;
     const full = options.full ?? Math.max(1e-12, ...groups.map(largest));
     const height = Math.max(20, row * groups.length + 2);
@@ -352,12 +415,17 @@ export function barChart(host, options = {}) {
           escaped(group.replaceAll('_', ' '))}</text>`;
       series.forEach((one, i) => {
         const value = one.values[group] ?? 0;
+        if (each && !(group in one.values)) return;
         const y = middle + (i - series.length / 2) * (bar + gap) + gap / 2;
         const length = Math.max(1, Math.min(1, value / full) * (self.width - left - right));
         svg += `<rect x="${px(left)}" y="${px(y)}" width="${px(length)}" height="${
                    bar}" rx="1.5" fill="${one.color}">` +
             `<title>${escaped(`${one.name}: ${quantity(value, unit)}`)}</title></rect>`;
+        if (each)
+          svg += `<text x="${px(left + length + 4)}" y="${px(y + bar - 2)}">${
+              value.toFixed(decimals)}</text>`;
       });
+      if (each) return;
       svg += `<text x="${self.width}" y="${middle + 3}" text-anchor="end">${
           escaped(quantity(largest(group), unit))}</text>`;
     });
@@ -442,13 +510,13 @@ function point(chart, s, x, y) {
 }
 
 /**
- * Trajectories seen from above, both axes to one scale: set() takes {name, color, points, dashed,
- * dots, width, tell}; a point that is no number breaks a line, and tell(point) is said of the one
+ * Trajectories seen from above [m], both axes to one scale: set() takes series as of lines with
+ * tell; a point that is no number breaks a line, and tell(point) is said of the one
  * under the pointer. Options: title, height [px].
  */
 export function mapChart(host, options = {}) {
   const {height = 360} = options;
-  const left = 40, right = 10, top = 8, bottom = 22;
+  const left = 54, right = 10, top = 8, bottom = 36;
   let shown = null;
   const chart = frame(host, options, (self, series) => {
     const [x0, x1] = extent(series, 0) ?? [0, 1], [y0, y1] = extent(series, 1) ?? [0, 1];
@@ -465,26 +533,118 @@ export function mapChart(host, options = {}) {
     for (const x of ticks(atX(left), atX(self.width - right), wide / 80))
       svg += `<line class="chart-grid" x1="${px(toX(x))}" x2="${px(toX(x))}" y1="${top}" y2="${
                  top + high}"/>` +
-          `<text x="${px(toX(x))}" y="${height - 6}" text-anchor="middle">${quantity(x)}</text>`;
+          `<text x="${px(toX(x))}" y="${height - 21}" text-anchor="middle">${quantity(x)}</text>`;
     for (const y of ticks(atY(top + high), atY(top), high / 60))
       svg += `<line class="chart-grid" x1="${left}" x2="${self.width - right}" y1="${
                  px(toY(y))}" y2="${px(toY(y))}"/>` +
           `<text x="${left - 6}" y="${px(toY(y)) + 3}" text-anchor="end">${quantity(y)}</text>`;
-    svg += `<text x="${self.width - right}" y="${height - 6}" text-anchor="end">m</text>`;
+    svg += `<text x="${left + wide / 2}" y="${height - 5}" text-anchor="middle">x [m]</text>` +
+        `<text transform="translate(12 ${
+               top + high / 2}) rotate(-90)" text-anchor="middle">y [m]</text>`;
     // Cut off at the axes.
     svg += `<svg x="${left}" y="${top}" width="${wide}" height="${high}" viewBox="${left} ${top} ${
         wide} ${high}">`;
-    for (const one of series)
-      svg += one.dots ?
-          one.points
-              .map(
-                  ([x, y]) =>
-                      `<circle r="2" fill="${one.color}" cx="${px(toX(x))}" cy="${px(toY(y))}"/>`)
-              .join('') :
-          lineSvg(one, path(one.points, toX, toY));
+    for (const one of series) svg += seriesSvg(one, one.points, toX, toY);
     self.canvas.innerHTML = `${svg}</svg></svg>`;
     shown = {toX, toY, atX, atY, scale, middle: [middleX, middleY], series};
   });
   navigate(chart, () => shown);
   return chart;
+}
+
+/** A chart of a plot as to_json() of plot.hpp tells it. */
+export function plotChart(host, plot) {
+  const series = plot.series.map((one) => ({
+                                   name: one.name,
+                                   color: one.colour === null ? GREY : robotColor(one.colour),
+                                   width: one.width,
+                                   marks: one.style === 'marked',
+                                   dots: one.style === 'dots',
+                                   points: one.points.map((p) => p.map((n) => n ?? NaN))
+                                 }));
+  const options = {title: plot.title, xLabel: plot.x_label, yLabel: plot.y_label, height: 260};
+  if (plot.map)
+    mapChart(host, {title: plot.title, height: 560}).set(series);
+  else if (plot.groups.length)
+    barChart(host, {...options, groups: plot.groups, decimals: plot.decimals})
+        .set(series.map(
+            (one) => ({
+              ...one,
+              values: Object.fromEntries(one.points.filter((p) => p.every(Number.isFinite))
+                                             .map(([x, y]) => [plot.groups[x], y]))
+            })));
+  else
+    lineChart(host, {...options, logY: plot.log_y, decades: Infinity}).set(series);
+}
+
+// ---- pictures
+
+// Of a picture that stands alone: it has no page to take them from.
+const PICTURE_COLORS = {
+  ink: '#15181d',
+  muted: '#555d69',
+  grid: '#e1e4e8',
+  paper: '#ffffff'
+};
+
+/** The chart as the text of an SVG file: what is shown of it, on white. */
+export function chartSvg(chart) {
+  const drawn = chart.canvas.firstElementChild.cloneNode(true);
+  const make = (parent, tag, attributes, text) => {
+    const made = document.createElementNS(drawn.namespaceURI, tag);
+    for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+    if (text !== undefined) made.textContent = text;
+    parent?.append(made);
+    return made;
+  };
+  const origin = chart.root.getBoundingClientRect();
+  const boxOf = (of) => {
+    const box = of.getBoundingClientRect();
+    return {x: box.left - origin.left, y: box.top - origin.top, height: box.height};
+  };
+  const {muted, ink, grid, paper} = PICTURE_COLORS;
+  const top = boxOf(chart.canvas).y, height = top + Number(drawn.getAttribute('height'));
+  const svg = make(null, 'svg', {
+    viewBox: `0 0 ${chart.width} ${height}`,
+    width: chart.width,
+    height,
+    'font-family': 'sans-serif',
+    'font-size': 11
+  });
+  make(svg, 'rect', {width: chart.width, height, fill: paper});
+  // The head is where it is in the page.
+  const label = (of, text, x, attributes) => {
+    const box = boxOf(of);
+    make(
+        svg, 'text', {x: box.x + x, y: box.y + 0.78 * box.height, fill: muted, ...attributes},
+        text);
+  };
+  const title = chart.head.querySelector('.chart-title');
+  label(title, chart.title, 0, {fill: ink, 'font-size': 12, 'font-weight': 600});
+  for (const unit of title.querySelectorAll('.chart-unit')) label(unit, unit.textContent, 0);
+  for (const key of chart.head.querySelectorAll('.chart-key:not(.off, .chart-zoom)')) {
+    const {x, y, height: high} = boxOf(key);
+    const mark = {x, y: y + high / 2 - 1.5, width: 10, height: 3};
+    make(svg, 'rect', {...mark, fill: key.firstElementChild.style.background});
+    label(key, key.textContent, 15);
+  }
+  drawn.querySelector('.chart-hover')?.remove();
+  for (const text of drawn.querySelectorAll('text')) {
+    text.setAttribute('fill', muted);
+    text.setAttribute('font-size', 10);
+  }
+  for (const line of drawn.querySelectorAll('.chart-grid')) line.setAttribute('stroke', grid);
+  for (const line of drawn.querySelectorAll('.chart-cursor')) line.setAttribute('stroke', muted);
+  drawn.setAttribute('y', top);
+  drawn.setAttribute('width', chart.width);
+  svg.append(drawn);
+  return `${new XMLSerializer().serializeToString(svg)}\n`;
+}
+
+function saveChart(chart) {
+  const link = document.createElement('a');
+  link.href = URL.createObjectURL(new Blob([chartSvg(chart)], {type: 'image/svg+xml'}));
+  link.download = `${(chart.title || 'chart').replace(/[^\w.-]+/g, '_')}.svg`;
+  link.click();
+  URL.revokeObjectURL(link.href);
 }

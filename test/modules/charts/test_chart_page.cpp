@@ -1,0 +1,139 @@
+#include "modules/charts/chart_page.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "modules/charts/html_page.hpp"
+#include "modules/charts/page_file.hpp"
+#include "test/apps/viewer/page_programs.hpp"
+#include "test/support/page_text.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+using Style = PlotSeries::Style;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+Json points_of(const Plot& plot) {
+  return Json(plot)["series"][0]["points"];
+}
+
+TEST_CASE("A plot is told with all that it shows", "[charts]") {
+  const Plot plot{
+      .title = "t",
+      .x_label = "x",
+      .y_label = "y",
+      .log_y = true,
+      .groups = {"one", "two"},
+      .decimals = 2,
+      .series = {{.name = "a", .points = {{0, 0.5}, {1, 2}}, .colour = 3, .style = Style::kBars},
+                 {.name = "b", .colour = PlotSeries::kGrey, .style = Style::kMarkedLine},
+                 {.name = "c", .style = Style::kDots, .width_px = 3.0},
+                 {.name = "d"}}};
+  CHECK(Json(plot) == Json::parse(R"({"title": "t", "x_label": "x", "y_label": "y", "log_y": true,
+      "map": false, "groups": ["one", "two"], "decimals": 2, "series": [
+      {"name": "a", "colour": 3, "style": "bars", "width": 1.6, "points": [[0.0, 0.5], [1.0, 2.0]]},
+      {"name": "b", "colour": null, "style": "marked", "width": 1.6, "points": []},
+      {"name": "c", "colour": 0, "style": "dots", "width": 3.0, "points": []},
+      {"name": "d", "colour": 0, "style": "line", "width": 1.6, "points": []}]})"));
+}
+
+TEST_CASE("Numbers have six digits, what is not finite is null", "[charts]") {
+  const Plot plot{.series = {{.points = {{1.0 / 3.0, 123456789.0}, {kNan, 1e-7}, {2, INFINITY}}}}};
+  CHECK(points_of(plot).dump() == "[[0.333333,123457000.0],[null,1e-07],[2.0,null]]");
+}
+
+TEST_CASE("Of a map what no screen shows is left out, of lines nothing", "[charts]") {
+  Plot plot{.series = {{.points = {}}}};
+  for (int i = 0; i <= 100000; ++i) plot.series[0].points.push_back({1e-3 * i, 0.0});
+  CHECK(points_of(plot).size() == 100001);
+  plot.is_map = true;
+  const Json kept = points_of(plot);
+  CHECK(kept.size() > 3000);
+  CHECK(kept.size() <= 4001);
+  for (std::size_t i = 1; i < kept.size(); ++i)
+    CHECK(kept[i][0].get<double>() - kept[i - 1][0].get<double>() > 0.024);  // a 4000th of 100 m
+}
+
+TEST_CASE("A map without extent keeps its points", "[charts]") {
+  const Plot plot{.is_map = true, .series = {{.points = {{1, 2}, {1, 2}, {kNan, kNan}}}}};
+  CHECK(points_of(plot).size() == 3);
+}
+
+TEST_CASE("No text of a plot gets out of its place in the page", "[charts]") {
+  const std::string page = chart_page(
+      kHostileText,
+      {{.title = kHostileText, .series = {{.name = kHostileText}, {.name = "no UTF-8: \xff"}}}});
+  CHECK(occurrences(page, "<script") == 2);
+  CHECK(occurrences(page, "</script") == 2);
+  CHECK(occurrences(page, "<!--") == 0);
+  const Json plot = data_of_page(page, "plots")["charts"][0];
+  CHECK(plot["title"] == kHostileText);
+  CHECK(plot["series"][0]["name"] == kHostileText);
+}
+
+TEST_CASE("A page of charts needs no other file and no network", "[charts]") {
+  CHECK(references_of_page(chart_page("t", {Plot{}})) == 0);
+}
+
+TEST_CASE("Bytes stand in a page as RFC 4648 has them", "[charts]") {
+  const auto [bytes, text] = GENERATE(table<std::string, std::string>(
+      {{"", ""}, {"f", "Zg=="}, {"fo", "Zm8="}, {"foo", "Zm9v"}, {"foob\xff", "Zm9vYv8="}}));
+  CHECK(data_uri("image/png", bytes) == "data:image/png;base64," + text);
+}
+
+TEST_CASE("A file that no page has is asked for by mistake", "[charts]") {
+  CHECK_FALSE(page_file(chart_files(), "charts.js").empty());
+  CHECK_THROWS_AS(page_file(chart_files(), "carts.js"), std::logic_error);
+}
+
+// What charts_in_browser.mjs looks at, in this order.
+std::vector<Plot> plots_to_look_at() {
+  return {
+      {.title = "a < b & <i>",
+       .x_label = "rounds",
+       .y_label = "m",
+       .series = {{.name = "</svg>", .points = {{0, 0}, {4, 1}, {5, kNan}, {6, 3}, {10, 4}}},
+                  {.name = "marks",
+                   .points = {{2, 1}, {8, kNan}},
+                   .colour = 1,
+                   .style = Style::kMarkedLine}}},
+      {.title = "decades",
+       .log_y = true,
+       .series = {{.name = "a", .points = {{1, 0.02}, {2, 0.0}, {3, -1.0}, {4, 50.0}, {5, 2e-8}}},
+                  {.name = "b", .points = {{1, 10}, {5, 10}}, .colour = 1},
+                  {.name = "b",
+                   .points = {{1, 5}, {1, 20}, {5, kNan}},
+                   .colour = 1,
+                   .style = Style::kDots}}},
+      {.title = "bars",
+       .y_label = "cm",
+       .groups = {"two", "one"},
+       .series = {{"before", {{0, 4.0}, {1, kNan}}, 0, Style::kBars},
+                  {"after", {{0, 2.0}, {1, 1.0}}, PlotSeries::kGrey, Style::kBars}}},
+      {.title = "map", .is_map = true, .series = {{.name = "", .points = {{100, 10}, {110, 12}}}}},
+      {.title = "nothing", .series = {{.name = "none"}, {.points = {{kNan, 1}, {1, INFINITY}}}}},
+      {.title = "nothing, by decades", .log_y = true},
+      {.title = "one point", .series = {{.points = {{0, -3}}, .style = Style::kMarkedLine}}}};
+}
+
+TEST_CASE("Charts show in a browser what their plots say", "[charts]") {
+  if (const std::string why = missing_page_program(); !why.empty()) {
+    std::cout << "SKIPPED: " << why << '\n';
+    return;
+  }
+  const TemporaryFolder folder;
+  const auto page = folder.write("charts.html", chart_page("Charts", plots_to_look_at()));
+  const CommandResult result =
+      run_command("node test/modules/charts/charts_in_browser.mjs " + page.string());
+  INFO(result.output);
+  CHECK(result.exit_code == 0);
+}
+
+}  // namespace
+}  // namespace km
