@@ -66,12 +66,9 @@ function timeTicks(low, high, count) {
   const step =
       [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200].find((s) => s >= rough) ||
       14400;
-  return ticks(low, high, (high - low) / step, [1, 10]).length ? range(low, high, step) : [low];
-}
-function range(low, high, step) {
   const all = [];
   for (let x = Math.ceil(low / step) * step; x <= high + 1e-9; x += step) all.push(x);
-  return all;
+  return all.length ? all : [low];
 }
 
 // Powers of ten, every k-th where they are many.

@@ -1,6 +1,7 @@
 // Opens the page of test_chart_page.cpp and looks at what its charts show.
 //   node charts_in_browser.mjs PAGE [SCREENSHOT]
 import assert from 'node:assert/strict';
+import {readFileSync} from 'node:fs';
 import {pathToFileURL} from 'node:url';
 
 import {Browser} from '../../apps/viewer/browser.mjs';
@@ -75,6 +76,17 @@ try {
       .getBoundingClientRect(); return [b.x, b.y, b.width]; })()`);
   await page.hover(box[0] + box[2] - 15, box[1] + 60);
   assert.deepEqual(await texts(0, '.chart-tip'), ['10</svg>4marks–']);
+
+  // Time has marks, wherever it begins.
+  const module = readFileSync('modules/charts/page/charts.js').toString('base64');
+  const marks = await page.evaluate(`(async () => {
+      const charts = await import('data:text/javascript;base64,${module}');
+      const host = document.createElement('div');
+      host.style.width = '480px';
+      document.querySelector('main').append(host);
+      charts.lineChart(host, {x: charts.duration}).set([{name: 'a', points: [[0.05, 1], [7.4, 1]]}]);
+      return [...host.querySelectorAll('text')].map((e) => e.textContent).slice(-3); })()`);
+  assert.deepEqual(marks, ['0:02', '0:04', '0:06']);
 
   // As a picture of its own: XML, with names, in colours that need no page.
   await page.evaluate(`URL.createObjectURL = (blob) => { window.saved = blob.text(); return 'x:'; };
