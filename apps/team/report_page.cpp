@@ -11,6 +11,7 @@
 
 #include "apps/output_file.hpp"
 #include "apps/robot/run_tables.hpp"
+#include "apps/team/closure_images.hpp"
 #include "apps/team/team_report.hpp"
 #include "modules/charts/html_page.hpp"
 #include "modules/charts/page_file.hpp"
@@ -174,11 +175,14 @@ Json report_data(const TeamPlan& plan, const TeamResult& team) {
                       {"process", table(folder / "process.csv", process_of, notes)},
                       {"timing", table(folder / "timing.csv", timing_of, notes)}});
   }
-  return {{"folder", plan.output.string()},
-          {"team", team},
-          {"reasons", reasons.texts()},
-          {"notes", std::move(notes)},
-          {"robots", std::move(robots)}};
+  ClosureImages seen = closure_images(team.robots);
+  Json images = Json::object();
+  for (const auto& [keyframe, jpeg] : seen.jpegs)
+    images[to_string(keyframe)] = data_uri("image/jpeg", jpeg);
+  for (std::string& note : seen.notes) notes.push_back(std::move(note));
+  return {{"folder", plan.output.string()}, {"team", team},
+          {"reasons", reasons.texts()},     {"notes", std::move(notes)},
+          {"images", std::move(images)},    {"robots", std::move(robots)}};
 }
 
 std::string report_page(const Json& data) {

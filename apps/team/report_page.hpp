@@ -12,6 +12,8 @@ namespace km {
 /// of its process; positions [m] are those of RobotPaths, seen from above:
 ///
 ///   {folder, team: as to_json(TeamResult), reasons: [text...], notes: [text...],
+///    images: {"robot:keyframe": address with a small JPEG in it}, of closures, as closure_images()
+///    has them,
 ///    robots: [{id, name, truth, odometry, optimized: [[x, y, t]...],
 ///              odometry_error, optimized_error: [[t, m]...],
 ///              keyframes: [[index, x, y]...],

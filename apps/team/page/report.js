@@ -268,6 +268,41 @@ function showJudged(section) {
       [['proposed', judged.candidates], ['verified', judged.verified], ['kept', judged.inliers]]);
 }
 
+// Both images of closures that have them, those that were rejected first.
+function showImages(section, all) {
+  const imageOf = (robot, keyframe) => run.images[`${robot}:${keyframe}`];
+  const closures = new Map();  // a pair that two robots looked at, by the one it came further with
+  for (const [, c] of all) {
+    const key = c.slice(0, 4).join();
+    if (c[4] >= VERIFIED && imageOf(c[0], c[1]) && imageOf(c[2], c[3]) && !closures.has(key))
+      closures.set(key, c);
+  }
+  if (!closures.size) return;
+  element('h3', '', section, 'What they saw');
+  const host = element('div', '', section);
+  host.id = 'images';
+  const waiting = [...closures.values()].sort((a, b) => a[4] - b[4]);
+  const more = element('button', 'pick', section);
+  more.onclick = () => {
+    for (const c of waiting.splice(0, 24)) {
+      const figure = element('figure', '', host), sides = [[c[0], c[1]], [c[2], c[3]]];
+      for (const side of sides) {
+        const image = element('img', '', figure);
+        image.src = imageOf(...side);
+        image.alt = `${nameOf(side[0])} ${side[1]}`;
+      }
+      const caption = element('figcaption', '', figure);
+      element('span', `badge ${c[4] === KEPT ? 'good' : 'warn'}`, caption, STAGES[c[4]]);
+      element('b', '', caption, ` ${sides.map(([id, k]) => `${nameOf(id)} ${k}`).join(' – ')} `);
+      caption.append(
+          `${c[6]} inliers of ${c[5]} matches`, run.reasons[c[7]] && `; ${run.reasons[c[7]]}`);
+    }
+    more.textContent = `${waiting.length} more`;
+    more.hidden = !waiting.length;
+  };
+  more.onclick();
+}
+
 // The list, of one stage and one pair of robots at a time or all.
 function showList(section, all) {
   element('h3', '', section, 'One by one');
@@ -345,6 +380,7 @@ function showClosures() {
           'two robots looked at is there twice.');
   showStages(section, all);
   showJudged(section);
+  showImages(section, all);
   showList(section, all);
 }
 

@@ -27,8 +27,14 @@ try {
   assert.ok(await count('#work svg') >= 4);
   assert.ok(await count('#modules rect') >= 4);
 
+  // Images of the closure that was kept; not of one that was not verified.
+  assert.equal(await count('#images img'), 2);
+  assert.equal(await textOf('#images figcaption'), 'kept r0 0 – r1 1 60 inliers of 80 matches');
+  await page.until(
+      `[...document.querySelectorAll('#images img')].every((e) => e.naturalWidth === 1)`);
+
   // The list of closures, of one stage alone.
-  const rows = '#closures > div:not(.scroll) tbody tr';
+  const rows = '#closures > div:not(.scroll, #images) tbody tr';
   assert.equal(await count(rows), 2);
   await page.evaluate(`[...document.querySelectorAll('#closures .pick button')].find(
       (button) => button.textContent === 'compared 1').click()`);

@@ -1,0 +1,144 @@
+#include "apps/team/closure_images.hpp"
+
+#include <algorithm>
+#include <array>
+#include <exception>
+#include <functional>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <set>
+#include <stdexcept>
+
+#include "modules/images/image_view.hpp"
+#include "modules/recordings/open_bag.hpp"
+#include "modules/recordings/ros_messages.hpp"
+#include "modules/sensors/euroc_reader.hpp"
+#include "modules/sensors/frame_files.hpp"
+#include "modules/sensors/rig_file_codec.hpp"
+#include "modules/sensors/ros_image.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Closures of one kind, the first kind to be shown first.
+using Kinds = std::array<std::vector<ClosureId>, 3>;
+
+Kinds kinds_of(const std::vector<RobotResult>& robots) {
+  std::map<ClosureId, ClosureStage> stages;  // a pair that two robots looked at is there twice
+  for (const RobotResult& robot : robots)
+    for (const ClosureRecord& closure : robot.closures) {
+      ClosureStage& stage = stages[closure.id];
+      stage = std::max(stage, closure.stage);
+    }
+  Kinds kinds;
+  for (const auto& [id, stage] : stages)
+    if (stage >= ClosureStage::kVerified)
+      kinds[stage == ClosureStage::kVerified ? 0
+            : id.from.robot != id.to.robot   ? 1
+                                             : 2]
+          .push_back(id);
+  return kinds;
+}
+
+// Keyframes of at most so many closures; what is left out is noted.
+std::set<KeyframeId> keyframes_to_show(const Kinds& kinds, std::size_t max_closures,
+                                       std::vector<std::string>& notes) {
+  std::set<KeyframeId> keyframes;
+  std::size_t shown = 0, all = 0;
+  for (const std::vector<ClosureId>& kind : kinds) {
+    const std::size_t count = std::min(kind.size(), max_closures - shown);
+    for (std::size_t k = 0; k < count; ++k) {
+      const ClosureId& closure = kind[k * kind.size() / count];
+      keyframes.insert({closure.from, closure.to});
+    }
+    shown += count;
+    all += kind.size();
+  }
+  if (shown < all)
+    notes.push_back("images are shown of " + std::to_string(shown) + " of " + std::to_string(all) +
+                    " closures that were verified");
+  return keyframes;
+}
+
+// What follows `option` on the command line of the robot.
+fs::path argument(const RobotPlan& plan, const std::string& option) {
+  const auto found = std::ranges::find(plan.arguments, option);
+  if (found != plan.arguments.end() && std::next(found) != plan.arguments.end())
+    return *std::next(found);
+  for (const std::string& word : plan.arguments)
+    if (word.starts_with(option + "=")) return word.substr(option.size() + 1);
+  return {};
+}
+
+// Keyframes whose left images are looked for, and what is called with each that is there.
+using Wanted = std::map<Stamp, KeyframeId>;
+using Take = std::function<void(const KeyframeId&, const cv::Mat&)>;
+
+void read_folder(const RobotPlan& plan, const Wanted& wanted, const Take& take) {
+  const fs::path rig = argument(plan, "--rig");
+  const double offset_s = rig.empty() ? 0.0 : read_rig_correction(rig).camera_time_offset_s;
+  ReaderReport report;
+  for (const StereoPairFile& file : list_euroc_lefts(find_mav0(plan.dataset), report))
+    if (const auto at = wanted.find(file.stamp + nanoseconds(offset_s)); at != wanted.end())
+      take(at->second, cv::imread(file.left.string(), cv::IMREAD_ANYCOLOR));
+}
+
+void read_bag(const RobotPlan& plan, const Wanted& wanted, const Take& take) {
+  const fs::path file = argument(plan, "--rig");
+  if (file.empty()) throw std::runtime_error(plan.dataset.string() + ": no --rig");
+  const PartialRig partial = read_rig_file(file, !argument(plan, "--odometry").empty());
+  const Rig rig = partial.is_complete()
+                      ? partial.rig
+                      : complete_rig(plan.dataset.string(), *open_bag(plan.dataset), partial);
+  const Camera& camera = rig.sensors.stereo.cameras[0];
+  const auto bag = open_bag(plan.dataset);
+  while (const auto message = bag->next()) {
+    const BagChannel& channel = bag->channels()[message->channel];
+    if (channel.topic != rig.topics.left) continue;
+    const auto header = decode_ros<RosHeader>(channel.encoding, message->bytes);
+    if (!header.value) continue;
+    const auto at = wanted.find(header.value->stamp + nanoseconds(rig.camera_time_offset_s));
+    if (at == wanted.end()) continue;
+    const ImageResult image =
+        gray_of_message(channel, *message, plan.dataset.string(), {camera.width, camera.height});
+    if (image.status == ImageStatus::kOk) take(at->second, view(image.image));
+  }
+}
+
+std::string small_jpeg(const cv::Mat& image, const ClosureImageOptions& options) {
+  const double scale = std::min(1.0, static_cast<double>(options.width_px) / image.cols);
+  cv::Mat small;
+  cv::resize(image, small, {}, scale, scale, cv::INTER_AREA);
+  std::vector<unsigned char> bytes;
+  cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, options.quality});
+  return {bytes.begin(), bytes.end()};
+}
+
+}  // namespace
+
+ClosureImages closure_images(const std::vector<RobotResult>& robots,
+                             const ClosureImageOptions& options) {
+  ClosureImages images;
+  const std::set<KeyframeId> shown =
+      keyframes_to_show(kinds_of(robots), options.max_closures, images.notes);
+  for (const RobotResult& robot : robots) {
+    Wanted wanted;
+    for (const KeyframeRecord& keyframe : robot.keyframes)
+      if (shown.contains(keyframe.id)) wanted.emplace(keyframe.stamp, keyframe.id);
+    if (wanted.empty() || robot.plan.dataset.empty()) continue;
+    const Take take = [&](const KeyframeId& keyframe, const cv::Mat& image) {
+      if (!image.empty()) images.jpegs[keyframe] = small_jpeg(image, options);
+    };
+    try {
+      may_be_bag(robot.plan.dataset) ? read_bag(robot.plan, wanted, take)
+                                     : read_folder(robot.plan, wanted, take);
+    } catch (const std::exception& error) {
+      images.notes.push_back(robot.plan.name + ": no images of its closures: " + error.what());
+    }
+  }
+  return images;
+}
+
+}  // namespace km
