@@ -91,7 +91,10 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   add_view(config, camera);
   if (input.ros != nullptr && config.ros.publish.value_or(true))
     add_ros_output("ros_output", std::make_unique<LiveSink>(std::move(input.ros)),
-                   {.mesh_points = config.ros.mesh_points}, std::nullopt);
+                   {.mesh_points = config.ros.mesh_points,
+                    .mesh_faces = config.ros.mesh_faces,
+                    .mesh_bytes_per_s = config.ros.mesh_bytes_per_s},
+                   std::nullopt);
   if (options.record) add_record(options, config.ros, results);
   if (seal_ != nullptr)
     add<TeamKeysNode>(false, options.security, *seal_, [this] { bridge_->tell_keys(); });

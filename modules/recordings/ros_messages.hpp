@@ -154,11 +154,12 @@ struct RosDiagnostics {
 struct RosMarker {
   static constexpr std::string_view kType = "visualization_msgs/Marker";
   static constexpr std::int32_t kLineList = 5, kTriangleList = 11;  ///< Of points: pairs, triples.
+  static constexpr std::int32_t kDelete = 2;  ///< Takes what has its name away.
   RosHeader header;
   std::string name_space;  ///< With the id the name of what is drawn: another of it replaces it.
   std::int32_t id = 0;
   std::int32_t type = 0;
-  std::int32_t action = 0;                          ///< 0: add or replace.
+  std::int32_t action = 0;                          ///< 0: add or replace, or kDelete.
   RosPose pose;                                     ///< Of the points in the header's frame.
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();  ///< x: width of lines [m].
   Eigen::Vector4f color = {1, 1, 1, 1};             ///< Red, green, blue, alpha: 0 to 1.

@@ -39,7 +39,8 @@ RosPointCloud cloud_of(const LabelledMesh& mesh, std::size_t most, RosHeader hea
   return cloud;
 }
 
-RosMarker surface_of(const LabelledMesh& mesh, RosHeader header) {
+RosMarker surface_of(const LabelledMesh& mesh, std::span<const LabelledMesh::Face> faces,
+                     RosHeader header) {
   constexpr float kFull = 255.0F, kGrey = 0.6F;
   const bool has_colors = mesh.colors.size() == mesh.vertices.size();
   RosMarker marker;
@@ -47,9 +48,9 @@ RosMarker surface_of(const LabelledMesh& mesh, RosHeader header) {
   marker.name_space = "mesh";
   marker.type = RosMarker::kTriangleList;
   marker.color = {kGrey, kGrey, kGrey, 1.0F};
-  marker.points.reserve(3 * mesh.faces.size());
-  if (has_colors) marker.colors.reserve(3 * mesh.faces.size());
-  for (const LabelledMesh::Face& face : mesh.faces)
+  marker.points.reserve(3 * faces.size());
+  if (has_colors) marker.colors.reserve(3 * faces.size());
+  for (const LabelledMesh::Face& face : faces)
     for (const std::uint32_t vertex : face) {
       marker.points.emplace_back(mesh.vertices[vertex].cast<double>());
       if (!has_colors) continue;

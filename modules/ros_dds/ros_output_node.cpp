@@ -9,12 +9,14 @@
 #include "modules/ros_dds/jpeg_image.hpp"
 #include "modules/ros_dds/mesh_cloud.hpp"
 #include "runtime/clock.hpp"
+#include "runtime/thread.hpp"
 
 namespace km {
 namespace {
 
 constexpr double kLate_s = 2.0;
-constexpr std::size_t kImages = 8;  // that wait for being compressed
+constexpr std::size_t kImages = 8;  // and meshes that wait for being made smaller
+constexpr double kPiece_bytes = 65536.0;
 
 RosPose message_of(const SE3& T) {
   return {T.translation(), Eigen::Quaterniond(T.linear())};
@@ -48,6 +50,7 @@ RosOutputNode::RosOutputNode(std::string_view name, std::unique_ptr<RosSink> sin
       map_(map_of(options_.id)),
       diagnose_(std::move(diagnose)),
       closures_of_(std::move(closures)),
+      piece_bytes_(options_.mesh_bytes_per_s, kPiece_bytes, kPiece_bytes),
       worker_(
           options_.queue, Overflow::kDropOldest,
           [this](const Input& input) {
@@ -55,8 +58,12 @@ RosOutputNode::RosOutputNode(std::string_view name, std::unique_ptr<RosSink> sin
           },
           node_name_),
       encoder_(
-          kImages, Overflow::kDropOldest, [this](const Image& image) { encode(image); },
-          node_name_ + "_jpeg"),
+          kImages, Overflow::kDropOldest,
+          [this](const Encoded& input) {
+            work_in_background();
+            std::visit([this](const auto& message) { encode(message); }, input);
+          },
+          node_name_ + "_enc"),
       clock_(
           std::chrono::seconds(1), [this] { worker_.post(std::make_shared<const Tick>()); },
           "ros_tick") {
@@ -81,8 +88,12 @@ void RosOutputNode::open_topics(bool has_images) {
   path_ = state("path", RosPath::kType);
   mesh_ = state("mesh", RosPointCloud::kType);
   diagnostics_ = sink_->open({"/diagnostics", RosDiagnostics::kType});
+  if (options_.draws || options_.mesh_faces > 0) {
+    const std::size_t pieces = SurfacePieces::count(static_cast<std::size_t>(options_.mesh_faces));
+    faces_ = sink_->open(
+        {prefix + "mesh_faces", RosMarker::kType, true, std::max(static_cast<int>(pieces), 1)});
+  }
   if (options_.draws) {
-    faces_ = sink_->open({prefix + "mesh_faces", RosMarker::kType, true, 1});
     closures_ = state("closures", RosMarkers::kType);
   }
   if (options_.logs) log_ = sink_->open({"/rosout", RosLog::kType});
@@ -129,6 +140,13 @@ void RosOutputNode::encode(const Image& image) {
       jpeg_of(image->left, {image->stamp, name_ + "/left_camera"})));
 }
 
+void RosOutputNode::encode(const std::shared_ptr<const LabelledMesh>& mesh) {
+  const auto most = static_cast<std::size_t>(options_.mesh_faces);
+  worker_.post(CoarseMesh{mesh->faces.size() <= most
+                              ? mesh
+                              : std::make_shared<const LabelledMesh>(coarsened(*mesh, most))});
+}
+
 std::string RosOutputNode::map_of(RobotId anchor) const {
   return options_.name_of ? ros_name(options_.name_of(anchor)) + "/map" : "map";
 }
@@ -164,6 +182,7 @@ void RosOutputNode::step(const Topic<OdometryState>::Message& state) {
        RosPoseStamped{{state->stamp, map_}, message_of(frames_.T_map_odom() * state->T_odom_body)});
   tell(tf_, RosTransforms{{{{state->stamp, map_}, odom_, message_of(frames_.T_map_odom())},
                            {{state->stamp, odom_}, base_link_, message_of(state->T_odom_body)}}});
+  tell_pieces();
 }
 
 void RosOutputNode::step(const Topic<KeyframeOdometry>::Message& keyframe) {
@@ -183,7 +202,13 @@ void RosOutputNode::step(const Topic<Trajectory>::Message& trajectory) {
 void RosOutputNode::step(const std::shared_ptr<const LabelledMesh>& mesh) {
   newest_mesh_ = mesh;
   mesh_.changed = options_.mesh_points > 0 && !mesh->empty();
+  if (options_.mesh_faces > 0) encoder_.post(mesh);
   tell_states(false);
+}
+
+void RosOutputNode::step(const CoarseMesh& coarse) {
+  pieces_.offer(coarse.mesh);
+  tell_pieces();
 }
 
 void RosOutputNode::step(const std::shared_ptr<const RosLog>& line) {
@@ -231,8 +256,18 @@ std::size_t RosOutputNode::tell_mesh() {
   const RosHeader header{stamp_.value_or(0), map_};
   std::size_t bytes = tell(
       mesh_.topic, cloud_of(*newest_mesh_, static_cast<std::size_t>(options_.mesh_points), header));
-  if (options_.draws) bytes += tell(faces_, surface_of(*newest_mesh_, header));
+  if (options_.draws) bytes += tell(faces_, surface_of(*newest_mesh_, newest_mesh_->faces, header));
   return bytes;
+}
+
+// As many as may go now.
+void RosOutputNode::tell_pieces() {
+  const double now_s = steady_now_s();
+  while (piece_bytes_.wait_s(0.0, now_s) <= 0.0) {
+    const auto piece = pieces_.next({stamp_.value_or(0), map_});
+    if (!piece) return;
+    piece_bytes_.spend(static_cast<double>(tell(faces_, *piece)), now_s);
+  }
 }
 
 // Robots that are not joined have no common frame: nothing says where one's is for the others.
@@ -271,6 +306,7 @@ void RosOutputNode::step(const std::shared_ptr<const Tick>& /*tick*/) {
     closures_.changed = true;
   }
   tell_states(false);
+  tell_pieces();
   tell_link();
   sink_->flush();
 }

@@ -20,9 +20,11 @@
 #include "modules/ros_dds/closure_lines.hpp"
 #include "modules/ros_dds/live_frames.hpp"
 #include "modules/ros_dds/ros_sink.hpp"
+#include "modules/ros_dds/surface_pieces.hpp"
 #include "runtime/log_listener.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
+#include "runtime/token_bucket.hpp"
 #include "runtime/topic.hpp"
 #include "runtime/worker.hpp"
 
@@ -43,6 +45,8 @@ struct RosOutputOptions {
   /// Names of the robots: each has a frame NAME/map then. Without, the team's is `map` for all.
   std::function<std::string(RobotId)> name_of = {};
   int mesh_points = 0;  ///< Of a mesh, at most; 0: it is not told.
+  int mesh_faces = 0;   ///< Likewise, in pieces: for those who are not to be held up.
+  double mesh_bytes_per_s = std::numeric_limits<double>::infinity();  ///< Of these pieces.
   bool draws = false;   ///< The mesh's faces and the closures, for those who have time for them.
   bool logs = false;    ///< What is logged in this process.
   /// Paths, meshes and closures are told again once what they took last is paid at this rate.
@@ -62,7 +66,8 @@ struct RosOutputOptions {
 ///   /diagnostics       diagnostic_msgs/DiagnosticArray, once a second: odometry, and what it is
 ///                      given
 /// and on request:
-///   /NAME/mesh_faces   visualization_msgs/Marker in `map`: the mesh's faces
+///   /NAME/mesh_faces   visualization_msgs/Marker in `map`: the mesh's faces, in pieces (see
+///                      SurfacePieces) or at once; a state
 ///   /NAME/closures     visualization_msgs/MarkerArray in `map`, see closure_lines()
 ///   /rosout            rcl_interfaces/Log
 ///   /NAME/left/image_raw/compressed  sensor_msgs/CompressedImage
@@ -102,11 +107,17 @@ class RosOutputNode final : public Node {
 
  private:
   struct Tick {};
-  using Input = std::variant<std::shared_ptr<const Tick>, Topic<OdometryState>::Message,
-                             Topic<KeyframeOdometry>::Message, Topic<Trajectory>::Message,
-                             std::shared_ptr<const LabelledMesh>, std::shared_ptr<const RosLog>,
-                             std::shared_ptr<const RosCompressedImage>>;
+  // What of a mesh is to be told in pieces.
+  struct CoarseMesh {
+    std::shared_ptr<const LabelledMesh> mesh;
+  };
+  using Input =
+      std::variant<std::shared_ptr<const Tick>, Topic<OdometryState>::Message,
+                   Topic<KeyframeOdometry>::Message, Topic<Trajectory>::Message,
+                   std::shared_ptr<const LabelledMesh>, CoarseMesh, std::shared_ptr<const RosLog>,
+                   std::shared_ptr<const RosCompressedImage>>;
   using Image = std::shared_ptr<const StereoFrame>;
+  using Encoded = std::variant<Image, std::shared_ptr<const LabelledMesh>>;
   // A state that is told when it has changed and its time has come.
   struct State {
     std::size_t topic = 0;
@@ -120,9 +131,11 @@ class RosOutputNode final : public Node {
   void step(const Topic<KeyframeOdometry>::Message& keyframe);
   void step(const Topic<Trajectory>::Message& trajectory);
   void step(const std::shared_ptr<const LabelledMesh>& mesh);
+  void step(const CoarseMesh& coarse);
   void step(const std::shared_ptr<const RosLog>& line);
   void step(const std::shared_ptr<const RosCompressedImage>& image);
   void encode(const Image& image);
+  void encode(const std::shared_ptr<const LabelledMesh>& mesh);
   void listen(const log::Entry& entry);
   [[nodiscard]] std::string map_of(RobotId anchor) const;
   [[nodiscard]] std::optional<Stamp> time() const;
@@ -133,6 +146,7 @@ class RosOutputNode final : public Node {
   void tell_states(bool all);
   std::size_t tell_path(std::span<const StampedPose> poses);
   std::size_t tell_mesh();
+  void tell_pieces();
   void tell_link();
 
   const std::string node_name_;
@@ -150,9 +164,11 @@ class RosOutputNode final : public Node {
   double told_s_ = 0.0;         // when it came; steady clock
   Topic<Trajectory>::Message trajectory_ = std::make_shared<const Trajectory>();
   std::shared_ptr<const LabelledMesh> newest_mesh_;
+  SurfacePieces pieces_;
+  TokenBucket piece_bytes_;
   std::vector<ToldClosure> newest_closures_;
   Worker<Input> worker_;
-  Worker<Image> encoder_;
+  Worker<Encoded> encoder_;
   Periodic clock_;  // last member: stops first
 };
 

@@ -17,6 +17,8 @@ struct RosConfig {
   std::vector<std::string> peers = {};
   std::optional<bool> publish = {};
   int mesh_points = 200000;
+  int mesh_faces = 50000;
+  double mesh_bytes_per_s = 2e6;
   int receive_buffer_bytes = 33554432;
 
   void visit_fields(auto& visitor) {
@@ -31,6 +33,11 @@ struct RosConfig {
     visitor.field("mesh_points", mesh_points, {0, 10000000},
                   "vertices of the mesh that viewers are told at most, each 12 to 16 B, whenever "
                   "it is corrected; 0: none are");
+    visitor.field("mesh_faces", mesh_faces, {0, 1000000},
+                  "of the mesh that viewers are told at most, made coarser where it has more, each "
+                  "120 B, also kept for those who come later; 0: none are");
+    visitor.field("mesh_bytes_per_s", mesh_bytes_per_s, {1e4, 1e9},
+                  "[B/s] of these faces sent, on average");
     visitor.field("receive_buffer_bytes", receive_buffer_bytes, {65536, 1 << 28},
                   "[B] for images that come faster than they are taken; the kernel may grant less: "
                   "net.core.rmem_max");

@@ -20,7 +20,7 @@ struct KnownType {
   const dds_topic_descriptor_t* descriptor;
 };
 
-constexpr std::array<KnownType, 10> kTypes = {{
+constexpr std::array<KnownType, 11> kTypes = {{
     {"sensor_msgs", "Image", &sensor_msgs_msg_dds__Image__desc},
     {"sensor_msgs", "CompressedImage", &sensor_msgs_msg_dds__CompressedImage__desc},
     {"sensor_msgs", "Imu", &sensor_msgs_msg_dds__Imu__desc},
@@ -31,6 +31,7 @@ constexpr std::array<KnownType, 10> kTypes = {{
     {"sensor_msgs", "PointCloud2", &sensor_msgs_msg_dds__PointCloud2__desc},
     {"diagnostic_msgs", "DiagnosticArray", &diagnostic_msgs_msg_dds__DiagnosticArray__desc},
     {"tf2_msgs", "TFMessage", &tf2_msgs_msg_dds__TFMessage__desc},
+    {"visualization_msgs", "Marker", &visualization_msgs_msg_dds__Marker__desc},
 }};
 
 // DDS has one configuration per domain number and process. That of ROS gets a number of its own
@@ -97,6 +98,9 @@ DdsQos ros_qos(RosQos kind, int depth) {
                        DDS_MSECS(100));
   dds_qset_durability(qos.get(), kind == RosQos::kLatched ? DDS_DURABILITY_TRANSIENT_LOCAL
                                                           : DDS_DURABILITY_VOLATILE);
+  if (kind == RosQos::kLatched)  // else DDS keeps one message for those who come later
+    dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, depth, DDS_LENGTH_UNLIMITED,
+                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   return qos;
 }
 

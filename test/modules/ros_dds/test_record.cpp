@@ -77,7 +77,7 @@ TEST_CASE("The faces of a mesh have the colours of their vertices", "[ros_dds]")
   mesh.vertices = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
   mesh.colors = {{255, 0, 0}, {0, 255, 0}, {0, 0, 51}};
   mesh.faces = {{2, 0, 1}};
-  const RosMarker marker = surface_of(mesh, {5, "map"});
+  const RosMarker marker = surface_of(mesh, mesh.faces, {5, "map"});
   CHECK(marker.type == RosMarker::kTriangleList);
   REQUIRE(marker.points.size() == 3);
   REQUIRE(marker.colors.size() == 3);
@@ -85,7 +85,7 @@ TEST_CASE("The faces of a mesh have the colours of their vertices", "[ros_dds]")
   CHECK(marker.colors[0] == Eigen::Vector4f(0, 0, 0.2F, 1));
   CHECK(marker.colors[1] == Eigen::Vector4f(1, 0, 0, 1));
   mesh.colors.clear();
-  CHECK(surface_of(mesh, {}).colors.empty());
+  CHECK(surface_of(mesh, mesh.faces, {}).colors.empty());
 }
 
 TEST_CASE("A definition has those of all types in it, each once", "[ros_dds]") {

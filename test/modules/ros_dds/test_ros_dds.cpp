@@ -106,6 +106,13 @@ TEST_CASE("Every known type crosses", "[ros_dds]") {
   crosses(cloud);
   crosses(RosDiagnostics{{7, ""}, {{1, "a", "b", "c", {{"d", "e"}}}, {}}});
   crosses(RosTransforms{{{{7, "map"}, "odom", {}}, {{8, "odom"}, "body", {}}}});
+  RosMarker marker;
+  marker.name_space = "mesh";
+  marker.id = 3;
+  marker.points = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
+  marker.colors = {{1, 0, 0, 1}, {0, 1, 0, 1}, {0, 0, 1, 1}};
+  marker.text = "faces";
+  crosses(marker);
 }
 
 TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
@@ -116,14 +123,16 @@ TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
     return std::vector<RosDiagnosticStatus>{{1, "sensors", "faulty", "", {{"gaps", "3"}}}};
   };
   RosOutputNode node("ros_output", std::make_unique<LiveSink>(network()),
-                     {.robot = "robot 3", .mesh_points = 2}, diagnose, {},
+                     {.robot = "robot 3", .mesh_points = 2, .mesh_faces = 10}, diagnose, {},
                      {odometry, keyframes, trajectories, {}});
-  RosSubscription viewer(network(), {{"/robot_3/odometry", "nav_msgs/Odometry", RosQos::kReliable},
-                                     {"/robot_3/pose", "geometry_msgs/PoseStamped"},
-                                     {"/tf", "tf2_msgs/TFMessage", RosQos::kReliable},
-                                     {"/robot_3/path", "nav_msgs/Path", RosQos::kLatched},
-                                     {"/robot_3/mesh", "sensor_msgs/PointCloud2", RosQos::kLatched},
-                                     {"/diagnostics", "diagnostic_msgs/DiagnosticArray"}});
+  RosSubscription viewer(network(),
+                         {{"/robot_3/odometry", "nav_msgs/Odometry", RosQos::kReliable},
+                          {"/robot_3/pose", "geometry_msgs/PoseStamped"},
+                          {"/tf", "tf2_msgs/TFMessage", RosQos::kReliable},
+                          {"/robot_3/path", "nav_msgs/Path", RosQos::kLatched},
+                          {"/robot_3/mesh", "sensor_msgs/PointCloud2", RosQos::kLatched},
+                          {"/diagnostics", "diagnostic_msgs/DiagnosticArray"},
+                          {"/robot_3/mesh_faces", "visualization_msgs/Marker", RosQos::kLatched}});
   OdometryState state;
   state.stamp = 5;
   state.T_odom_body.translation() = Eigen::Vector3d(1, 2, 3);
@@ -138,6 +147,7 @@ TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
   trajectories.publish(Trajectory{0, 0, {T_map_body}});
   LabelledMesh mesh;
   mesh.vertices = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
+  mesh.faces = {{0, 1, 2}};
   node.offer(std::make_shared<const LabelledMesh>(mesh));
   std::optional<RosPath> path;
   std::optional<RosPoseStamped> pose;
@@ -145,8 +155,9 @@ TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
   std::optional<RosTransforms> transforms;
   std::optional<RosPointCloud> cloud;
   std::optional<RosDiagnostics> diagnostics;
+  std::optional<RosMarker> faces;
   // States go on until the viewer has all: it may have come later.
-  while (!(path && pose && told && transforms && cloud && diagnostics)) {
+  while (!(path && pose && told && transforms && cloud && diagnostics && faces)) {
     const auto message = [&] {
       state.stamp += 10;
       odometry.publish(state);
@@ -160,6 +171,7 @@ TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
     if (message->topic == 3) path = decode_ros<RosPath>("cdr", bytes).value;
     if (message->topic == 4) cloud = decode_ros<RosPointCloud>("cdr", bytes).value;
     if (message->topic == 5) diagnostics = decode_ros<RosDiagnostics>("cdr", bytes).value;
+    if (message->topic == 6) faces = decode_ros<RosMarker>("cdr", bytes).value;
     if (diagnostics && diagnostics->header.stamp == 0) diagnostics.reset();  // before a pose
     if (pose && pose->pose.position.x() != 10.0) pose.reset();  // before the correction
     if (transforms && transforms->transforms[0].pose.position.x() != 9.0) transforms.reset();
@@ -176,6 +188,8 @@ TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
   CHECK(path->poses[0].header.stamp == 5);
   CHECK(cloud->header.frame == "map");
   CHECK(cloud->width == 2);  // of three vertices two at most
+  CHECK(faces->header.frame == "map");
+  CHECK(faces->points.size() == 3);
   REQUIRE(diagnostics->status.size() == 2);
   CHECK(diagnostics->status[0].name == "robot_3: odometry");
   CHECK(diagnostics->status[0].level == RosDiagnosticStatus::kOk);
@@ -194,6 +208,23 @@ TEST_CASE("What is latched reaches those who come later", "[ros_dds]") {
   REQUIRE(received);
   CHECK(decode_ros<RosTransforms>("cdr", received->bytes).value->transforms[0].child_frame ==
         "odom");
+}
+
+TEST_CASE("Of what is latched those who come later get as much as is kept", "[ros_dds]") {
+  constexpr int kKept = 5;
+  const RosPublisher publisher(network(), "/pieces", "visualization_msgs/Marker", RosQos::kLatched,
+                               kKept);
+  for (int k = 0; k < kKept + 2; ++k) {
+    RosMarker piece;
+    piece.id = k;
+    publisher.publish(encode_ros(piece));
+  }
+  RosSubscription late(network(), {{"/pieces", "visualization_msgs/Marker", RosQos::kLatched, 10}});
+  for (int k = 2; k < kKept + 2; ++k) {
+    const auto received = late.next();
+    REQUIRE(received);
+    CHECK(decode_ros<RosMarker>("cdr", received->bytes).value->id == k);
+  }
 }
 
 TEST_CASE("Waiting for messages ends with a stop", "[ros_dds]") {

@@ -1,0 +1,94 @@
+#include <catch2/catch.hpp>
+#include <map>
+
+#include "modules/ros_dds/surface_pieces.hpp"
+
+namespace km {
+namespace {
+
+// A square of `n` by `n` cells, two faces each, of 5 cm.
+LabelledMesh square(std::uint32_t n) {
+  LabelledMesh mesh;
+  for (std::uint32_t y = 0; y <= n; ++y)
+    for (std::uint32_t x = 0; x <= n; ++x) {
+      mesh.vertices.emplace_back(0.05F * static_cast<float>(x), 0.05F * static_cast<float>(y),
+                                 1.0F);
+      mesh.colors.push_back({static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y), 0});
+    }
+  for (std::uint32_t y = 0; y < n; ++y)
+    for (std::uint32_t x = 0; x < n; ++x) {
+      const std::uint32_t corner = y * (n + 1) + x;
+      mesh.faces.push_back({corner, corner + 1, corner + n + 2});
+      mesh.faces.push_back({corner, corner + n + 2, corner + n + 1});
+    }
+  return mesh;
+}
+
+double area_m2(const LabelledMesh& mesh) {
+  double area = 0.0;
+  for (const auto& [a, b, c] : mesh.faces)
+    area += 0.5 * static_cast<double>((mesh.vertices[b] - mesh.vertices[a])
+                                          .cross(mesh.vertices[c] - mesh.vertices[a])
+                                          .norm());
+  return area;
+}
+
+// What a viewer shows that is told all there is: points of each piece.
+void show(SurfacePieces& pieces, std::map<std::int32_t, std::size_t>& shown) {
+  while (const auto marker = pieces.next({7, "map"})) {
+    CHECK(marker->header.frame == "map");
+    CHECK(encode_ros(*marker).size() < 65536);
+    CHECK(marker->colors.size() == marker->points.size());
+    if (marker->action == RosMarker::kDelete)
+      CHECK(shown.erase(marker->id) == 1);
+    else
+      shown[marker->id] = marker->points.size();
+  }
+}
+
+std::size_t faces_of(const std::map<std::int32_t, std::size_t>& shown) {
+  std::size_t points = 0;
+  for (const auto& [id, count] : shown) points += count;
+  return points / 3;
+}
+
+TEST_CASE("All faces of a mesh are told in small pieces, and of the next one no others",
+          "[ros_dds]") {
+  SurfacePieces pieces;
+  CHECK_FALSE(pieces.next({}));
+  std::map<std::int32_t, std::size_t> shown;
+  for (const std::uint32_t n : {40U, 70U, 10U, 0U, 20U}) {
+    CAPTURE(n);
+    pieces.offer(std::make_shared<const LabelledMesh>(square(n)));
+    show(pieces, shown);
+    CHECK(faces_of(shown) == 2 * n * n);
+    CHECK(shown.size() == SurfacePieces::count(2 * n * n));
+  }
+}
+
+TEST_CASE("A mesh that comes while another is told waits for its end", "[ros_dds]") {
+  SurfacePieces pieces;
+  pieces.offer(std::make_shared<const LabelledMesh>(square(40)));  // 7 pieces
+  REQUIRE(pieces.next({}));
+  pieces.offer(std::make_shared<const LabelledMesh>(square(10)));
+  pieces.offer(std::make_shared<const LabelledMesh>(square(20)));
+  for (int k = 1; k < 7; ++k) CHECK(pieces.next({})->id == k);
+  CHECK(pieces.next({})->points.size() == 3 * 500);  // of the newest
+  CHECK(pieces.next({})->points.size() == 3 * 300);
+}
+
+TEST_CASE("A mesh with too many faces is made coarser, and covers what it did", "[ros_dds]") {
+  const LabelledMesh mesh = square(100);
+  CHECK(coarsened(mesh, 20000).faces == mesh.faces);
+  for (const std::size_t most : {10000U, 1000U, 100U}) {
+    const LabelledMesh coarse = coarsened(mesh, most);
+    CAPTURE(most, coarse.faces.size());
+    CHECK(coarse.faces.size() <= most);
+    CHECK(coarse.faces.size() > most / 5);
+    CHECK(area_m2(coarse) == Approx(area_m2(mesh)).epsilon(0.3));
+    CHECK(coarse.colors.size() == coarse.vertices.size());
+  }
+}
+
+}  // namespace
+}  // namespace km
