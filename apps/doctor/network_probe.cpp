@@ -20,6 +20,7 @@
 #include "runtime/clock.hpp"
 #include "runtime/dds/qos.hpp"
 #include "runtime/dds/robot_status.hpp"
+#include "runtime/dds/user_data.hpp"
 
 namespace km {
 namespace {
@@ -129,15 +130,6 @@ class DiscoveryListener {
   std::vector<DatagramSocket> sockets_;
   std::vector<int> domains_;
 };
-
-std::string user_data_of(const dds_qos_t* qos) {
-  void* data = nullptr;
-  std::size_t size = 0;
-  if (!dds_qget_userdata(qos, &data, &size) || data == nullptr) return {};
-  std::string result(static_cast<const char*>(data), size);
-  dds_free(data);
-  return result;
-}
 
 // Takes part in DDS discovery as any program may that is no robot: robots do not mind it.
 class Bystander {

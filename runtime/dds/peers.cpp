@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "runtime/clock.hpp"
+#include "runtime/dds/user_data.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -20,15 +21,6 @@ std::optional<Guid> take_participant(dds_builtintopic_endpoint_t* endpoint) {
   const Guid guid = to_guid(endpoint->participant_key);
   dds_builtintopic_free_endpoint(endpoint);
   return guid;
-}
-
-std::string user_data_of(const dds_qos_t* qos) {
-  void* data = nullptr;
-  std::size_t size = 0;
-  if (!dds_qget_userdata(qos, &data, &size) || data == nullptr) return {};
-  std::string result(static_cast<const char*>(data), size);
-  dds_free(data);
-  return result;
 }
 
 // What a stranger announces is shown to people: printable characters only.
