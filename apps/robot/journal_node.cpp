@@ -19,9 +19,10 @@ JournalFile begin_or_go_on(const std::filesystem::path& file, const RestoredRun*
 
 JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
                          const JournalStart& start, const RestoredRun* restored,
-                         const JournalTopics& topics)
+                         const CameraCalibration& correction, const JournalTopics& topics)
     : file_(std::move(file)),
       results_(results),
+      correction_(correction),
       topics_(topics),
       journal_(begin_or_go_on(file_, restored)),
       known_keyframes_(restored == nullptr ? 0 : restored->keyframes.size()),
@@ -99,7 +100,11 @@ void JournalNode::step(const Message<OdometryState>& state) {
 }
 
 void JournalNode::step(const Message<KeyframeOdometry>& odometry) {
-  if (odometry->id.index >= known_keyframes_) add(*odometry);
+  if (odometry->id.index < known_keyframes_) return;
+  KeyframeOdometry keyframe = *odometry;
+  if (keyframe.calibration)
+    keyframe.calibration->calibration = keyframe.calibration->calibration.on_top_of(correction_);
+  add(keyframe);
 }
 
 void JournalNode::step(const Message<Keyframe>& keyframe) {

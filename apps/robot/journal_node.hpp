@@ -48,9 +48,12 @@ struct JournalTopics {
 /// told, and the run goes on.
 class JournalNode final : public Node {
  public:
-  /// Goes on with the journal of `restored`, or begins a new one. `results` outlives this.
+  /// Goes on with the journal of `restored`, or begins a new one. `results` outlives this. What is
+  /// found of the cameras is written on top of `correction`, by which the rig came: it holds
+  /// whatever the rig of a later process is corrected by.
   JournalNode(std::filesystem::path file, ResultWriter& results, const JournalStart& start,
-              const RestoredRun* restored, const JournalTopics& topics);
+              const RestoredRun* restored, const CameraCalibration& correction,
+              const JournalTopics& topics);
   ~JournalNode() override { stop(); }
 
   /// Writes that this process has the run that it goes on with: no later one takes itself for it.
@@ -97,6 +100,7 @@ class JournalNode final : public Node {
 
   const std::filesystem::path file_;
   ResultWriter& results_;
+  const CameraCalibration correction_;
   const JournalTopics topics_;
   JournalFile journal_;
   // What a journal that is gone on with holds already: it is published once more.

@@ -218,6 +218,13 @@ std::unique_ptr<DatasetReader> with_poses(const RobotOptions& options, const Rig
   return std::make_unique<PoseFileReader>(std::move(reader), file);
 }
 
+// What the run has found of the cameras, beyond the rig as it is corrected now.
+void find_beyond(const CameraCalibration& correction, RestoredRun& run) {
+  for (KeyframeOdometry& keyframe : run.odometry)
+    if (keyframe.calibration)
+      keyframe.calibration->calibration = keyframe.calibration->calibration.without(correction);
+}
+
 RecordedGraph open_graph(const RobotOptions& options) {
   RecordedGraph graph = read_recorded_graph(options.graph);
   if (graph.robot != options.robot)
@@ -237,7 +244,7 @@ RigInput read_rig_input(const RobotOptions& options) {
   if (options.rig.empty()) return {};
   if (!has_messages(options)) return {std::nullopt, read_rig_correction(options.rig)};
   PartialRig rig = read_rig_file(options.rig, !options.odometry.empty());
-  const RigCorrection correction{rig.rig.camera_time_offset_s, rig.T_body_rig};
+  const CameraCalibration correction{rig.rig.camera_time_offset_s, rig.T_body_rig};
   return {std::move(rig), correction};
 }
 
@@ -260,7 +267,9 @@ std::optional<RobotInput> open_robot_input(const RobotOptions& options, const Ro
   if (reader == nullptr) return std::nullopt;
   reader = with_poses(options, rig, std::move(reader));
   auto map = restored && mapping ? restore_map(options, *restored) : std::nullopt;
-  return RobotInput{std::move(reader), name, std::move(restored), std::move(map), std::move(ros)};
+  if (restored) find_beyond(rig.correction, *restored);
+  return RobotInput{std::move(reader), name,           std::move(restored),
+                    std::move(map),    std::move(ros), rig.correction};
 }
 
 }  // namespace km

@@ -7,12 +7,12 @@
 
 #include "apps/robot/mapping_plan.hpp"
 #include "apps/robot/robot_config.hpp"
+#include "modules/core/camera_calibration.hpp"
 #include "modules/journal/restored_run.hpp"
 #include "modules/mesh/continued_map.hpp"
 #include "modules/pose_graph/recorded_graph.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/rig_completion.hpp"
-#include "modules/sensors/rig_correction.hpp"
 #include "runtime/dds/ros_network.hpp"
 #include "runtime/supervisor.hpp"
 
@@ -29,12 +29,13 @@ struct RobotInput {
   std::optional<RestoredRun> restored = {};
   std::optional<ContinuedMap> map = {};  ///< Of the restored run, where there is mapping.
   std::shared_ptr<const RosNetwork> ros = nullptr;  ///< Null unless it hears or tells something.
+  CameraCalibration rig_correction = {};            ///< By which the sensors' rig came.
 };
 
 /// What --rig says of the sensors. A EuRoC folder has its own calibration, and takes a correction.
 struct RigInput {
   std::optional<PartialRig> messages;  ///< Of messages.
-  RigCorrection correction;            ///< What the calibration is corrected by.
+  CameraCalibration correction;        ///< What the calibration is corrected by.
 };
 
 /// Throws ConfigError and DatasetError, see read_rig_file() and read_rig_correction().

@@ -466,10 +466,9 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
 // What is estimated is beyond what the run began with. A EuRoC folder keeps its own calibration.
 void write_estimated_rig(const RobotOptions& options, const RigInput& rig, const RunRecord& record,
                          ResultWriter& results) {
-  if (!record.calibration()) return;
-  const CameraCalibration& found = record.calibration()->calibration;
-  const RigCorrection correction{rig.correction.camera_time_offset_s + found.offset_s,
-                                 found.T_body_rig * rig.correction.T_body_rig};
+  const std::optional<UncertainCalibration> found = record.calibration();
+  if (!found) return;
+  const CameraCalibration correction = found->calibration.on_top_of(rig.correction);
   results.write(options.output / kEstimatedRig, [&](const auto& file) {
     write_file(file,
                "# Stamps and mounting of the cameras as vio.calibrate found them: for --rig\n" +

@@ -22,7 +22,6 @@
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/place_recognition/candidate_filter.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
-#include "modules/vio/camera_calibration.hpp"
 #include "modules/vio/vio_statistics.hpp"
 #include "runtime/dds/peer_table.hpp"
 #include "runtime/node.hpp"
@@ -39,7 +38,6 @@ class RunRecord {
 
   void add(const OdometryState& state);  ///< Replaces those of this instant and later.
   void add(const KeyframeOdometry& keyframe);
-  void add(const UncertainCalibration& calibration) { calibration_ = calibration; }
   void add(const VioStatistics& statistics) { odometry_statistics_ = statistics; }
   void add(const Keyframe& keyframe);  ///< Of this robot: what depth it sees.
   void add(const Closure& closure);
@@ -71,13 +69,13 @@ class RunRecord {
   /// Keypoints of all keyframes.
   [[nodiscard]] std::size_t keypoints() const { return keypoints_; }
 
-  /// Of the cameras, as known last; absent where it is not estimated.
   /// As of the last event; none with an odometry from outside.
   [[nodiscard]] const std::optional<VioStatistics>& odometry_statistics() const {
     return odometry_statistics_;
   }
-  [[nodiscard]] const std::optional<UncertainCalibration>& calibration() const {
-    return calibration_;
+  /// Of the cameras, as known last; absent where it is not estimated.
+  [[nodiscard]] std::optional<UncertainCalibration> calibration() const {
+    return keyframes_.empty() ? std::nullopt : keyframes_.back().calibration;
   }
 
   /// Absent where mapping is off, or no frame has come yet.
@@ -132,7 +130,6 @@ class RunRecord {
   RobotId robot_;
   std::vector<StampedPose> odometry_;
   std::vector<KeyframeOdometry> keyframes_;
-  std::optional<UncertainCalibration> calibration_;
   std::optional<VioStatistics> odometry_statistics_;
   std::map<std::uint32_t, double> median_depths_m_;  // by keyframe
   std::size_t keypoints_ = 0;

@@ -82,7 +82,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     add_past();
   if (!std::holds_alternative<RecordedGraph>(input.source)) add_place_recognition(config);
   add_loop_closure(config);
-  if (!std::holds_alternative<PastRun>(input.source)) add_journal(options, input.name, results);
+  if (!std::holds_alternative<PastRun>(input.source)) add_journal(options, input, results);
   add_back_end(config);
   add_relay();
   if (mapping) add_mesh_correction(config, options.output, results);
@@ -128,11 +128,11 @@ void Robot::add_restore() {
 }
 
 // Behind all that finds closures, and before what they are handed on to: none is lost at the end.
-void Robot::add_journal(const RobotOptions& options, const std::string& input,
+void Robot::add_journal(const RobotOptions& options, const RobotInput& input,
                         ResultWriter& results) {
   journal_ = &add<JournalNode>(false, options.output / kJournal, results,
-                               JournalStart{identity_.robot, identity_.boot, input},
-                               restored_ ? &*restored_ : nullptr,
+                               JournalStart{identity_.robot, identity_.boot, input.name},
+                               restored_ ? &*restored_ : nullptr, input.rig_correction,
                                JournalTopics{.states = topics_.odometry,
                                              .odometry = topics_.keyframe_odometry,
                                              .new_keyframes = topics_.new_keyframes,
@@ -168,7 +168,6 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
                            .odometry = topics_.odometry,
                            .keyframes = topics_.keyframe_odometry,
                            .frames = topics_.located_frames,
-                           .calibration = topics_.camera_calibration,
                            .statistics = topics_.odometry_statistics,
                            .images = topics_.tracked_images};
   if (gives_poses)
@@ -378,7 +377,6 @@ void Robot::add_records() {
   recorder_->record(topics_.restored_odometry);
   recorder_->record(topics_.odometry);
   recorder_->record(topics_.keyframe_odometry);
-  recorder_->record(topics_.camera_calibration);
   recorder_->record(topics_.odometry_statistics);
   recorder_->record(topics_.keyframes);
   recorder_->record(topics_.closure_restarts);

@@ -51,7 +51,6 @@ struct Topics {
   Topic<KeyframeOdometry> keyframe_odometry;
   Topic<Keyframe> new_keyframes, keyframes;  // the latter: those that are on the disk
   Topic<LocatedFrame> located_frames;
-  Topic<UncertainCalibration> camera_calibration;
   Topic<VioStatistics> odometry_statistics;
   Topic<TrackedImage> tracked_images;
   Topic<DenseFrame> dense_frames;
@@ -155,7 +154,7 @@ class Robot {
   void add_place_recognition(const RobotConfig& config);
   void add_past();
   void add_restore();
-  void add_journal(const RobotOptions& options, const std::string& input, ResultWriter& results);
+  void add_journal(const RobotOptions& options, const RobotInput& input, ResultWriter& results);
   void add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
                    const MappingPlan& plan, std::optional<ContinuedMap> before);
   void add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder,

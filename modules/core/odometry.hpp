@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 
+#include "modules/core/camera_calibration.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
@@ -42,6 +43,8 @@ struct KeyframeOdometry {
   std::optional<Vertical> vertical = {};  ///< Here; none where there is no inertial sensing.
   /// Of the OdometryState here, for a later process to go on from it; none where it is not known.
   std::optional<StateCovariance> state_covariance = {};
+  /// How the cameras stood to the inertial sensor, as known here; none where it is not estimated.
+  std::optional<UncertainCalibration> calibration = {};
 };
 
 /// An image and where its camera was, relative to the keyframes: what is built from such images

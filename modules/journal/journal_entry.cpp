@@ -15,6 +15,7 @@ constexpr std::size_t kMaxKeypoints = 65536;
 // What follows a keyframe's step.
 constexpr unsigned kHasVertical = 1;
 constexpr unsigned kHasStateCovariance = 2;
+constexpr unsigned kHasCalibration = 4;
 
 class EntryWriter {
  public:
@@ -49,12 +50,17 @@ class EntryWriter {
     put(keyframe.T_previous_kf);
     put(keyframe.covariance);
     out_.u8(static_cast<std::uint8_t>((keyframe.vertical ? kHasVertical : 0U) |
-                                      (keyframe.state_covariance ? kHasStateCovariance : 0U)));
+                                      (keyframe.state_covariance ? kHasStateCovariance : 0U) |
+                                      (keyframe.calibration ? kHasCalibration : 0U)));
     if (keyframe.vertical) {
       put(keyframe.vertical->up_body);
       out_.f64(keyframe.vertical->sigma_rad);
     }
     if (keyframe.state_covariance) put(*keyframe.state_covariance);
+    if (!keyframe.calibration) return;
+    out_.f64(keyframe.calibration->calibration.offset_s);
+    put(keyframe.calibration->calibration.T_body_rig);
+    put(keyframe.calibration->covariance);
   }
   void put(const Keyframe& keyframe) {
     put(keyframe.odometry);
@@ -166,15 +172,21 @@ class EntryReader {
     get(keyframe.T_previous_kf);
     get(keyframe.covariance);
     const unsigned has = in_.u8();
-    if ((has & ~(kHasVertical | kHasStateCovariance)) != 0) in_.fail();
+    if ((has & ~(kHasVertical | kHasStateCovariance | kHasCalibration)) != 0) in_.fail();
     if ((has & kHasVertical) != 0) {
       Vertical& vertical = keyframe.vertical.emplace();
       get(vertical.up_body);
       get(vertical.sigma_rad);
     }
-    if ((has & kHasStateCovariance) == 0) return;
-    get(keyframe.state_covariance.emplace());
-    if (finite_ && !is_usable(*keyframe.state_covariance)) in_.fail();
+    if ((has & kHasStateCovariance) != 0) {
+      get(keyframe.state_covariance.emplace());
+      if (finite_ && !is_usable(*keyframe.state_covariance)) in_.fail();
+    }
+    if ((has & kHasCalibration) == 0) return;
+    UncertainCalibration& known = keyframe.calibration.emplace();
+    get(known.calibration.offset_s);
+    get(known.calibration.T_body_rig);
+    get(known.covariance);
   }
   void get(Keyframe& keyframe) {
     get(keyframe.odometry);

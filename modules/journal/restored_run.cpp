@@ -148,7 +148,10 @@ RestoredRun alone_as(RobotId robot, RestoredRun run) {
   };
   std::erase_if(run.closures, [&](const Closure& c) { return is_shared(c.from.id, c.to.id); });
   std::erase_if(run.outcomes, [&](const auto& o) { return is_shared(o.id.from, o.id.to); });
-  for (KeyframeOdometry& keyframe : run.odometry) keyframe.id.robot = robot;
+  for (KeyframeOdometry& keyframe : run.odometry) {
+    keyframe.id.robot = robot;
+    keyframe.calibration.reset();
+  }
   for (Keyframe& keyframe : run.keyframes) keyframe.odometry.id.robot = robot;
   for (Closure& closure : run.closures) closure.from.id.robot = closure.to.id.robot = robot;
   for (ClosureOutcome& outcome : run.outcomes) outcome.id.from.robot = outcome.id.to.robot = robot;

@@ -34,7 +34,7 @@ struct RestoredRun {
   [[nodiscard]] std::size_t final_states() const;
 };
 
-/// The run under another id, without what it shared with the others of its time.
+/// The run under another id, without its sensors, and what it shared with the others of its time.
 [[nodiscard]] RestoredRun alone_as(RobotId robot, RestoredRun run);
 
 /// Reads the journal of a run. Throws InputFileError, also for entries that contradict each other.

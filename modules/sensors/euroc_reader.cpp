@@ -72,8 +72,7 @@ EurocReader::EurocReader(const std::filesystem::path& folder, EurocCalibration c
                                 " s to " + std::to_string(options.to_s) + " s is empty");
   side_images_.list(options.stereo_tolerance_s.value_or(Synchrony().tolerance_s), files_.pairs,
                     report_);
-  for (StereoPairFile& pair : files_.pairs)
-    pair.stamp += nanoseconds(options.correction.camera_time_offset_s);
+  for (StereoPairFile& pair : files_.pairs) pair.stamp += nanoseconds(options.correction.offset_s);
   recording_start_ = files_.pairs.front().stamp;
   select(options);
 }

@@ -6,10 +6,10 @@
 #include <optional>
 #include <vector>
 
+#include "modules/core/camera_calibration.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/frame_files.hpp"
 #include "modules/sensors/imu_stream.hpp"
-#include "modules/sensors/rig_correction.hpp"
 
 namespace km {
 
@@ -27,7 +27,7 @@ struct EurocOptions {
   std::optional<Stamp> not_before = {};                   ///< No frame before this instant.
   /// Left to right (depth, label) stamp, at most; nullopt: see find_synchrony().
   std::optional<double> stereo_tolerance_s = {};
-  RigCorrection correction = {};  ///< Stamps here; the cameras in open_euroc().
+  CameraCalibration correction = {};  ///< Stamps here; the cameras in open_euroc().
   bool imu = true;      ///< False: there need not be an inertial sensor, packets have no samples.
   bool depth = false;   ///< Depth images also beside a right camera (open_euroc()).
   bool labels = false;  ///< Label images.

@@ -122,7 +122,7 @@ PartialRig read_rig_file(const std::filesystem::path& path, bool has_poses) {
           .pose_file = file.odometry.file.value_or("")};
 }
 
-RigCorrection read_rig_correction(const std::filesystem::path& path) {
+CameraCalibration read_rig_correction(const std::filesystem::path& path) {
   ConfigProblems problems;
   const ConfigContext context{problems, std::filesystem::absolute(path).parent_path()};
   RigCorrectionFile file;
@@ -132,7 +132,8 @@ RigCorrection read_rig_correction(const std::filesystem::path& path) {
           transform_of(path, "T_body_rig", file.T_body_rig)};
 }
 
-std::string corrected_rig_text(const std::filesystem::path& base, const RigCorrection& correction) {
+std::string corrected_rig_text(const std::filesystem::path& base,
+                               const CameraCalibration& correction) {
   YAML::Node root;
   if (!base.empty()) {
     root = load_yaml(base);
@@ -140,7 +141,7 @@ std::string corrected_rig_text(const std::filesystem::path& base, const RigCorre
     if (!root["calibration"].IsMap()) make_absolute(root["calibration"], folder);
     if (root["odometry"]) make_absolute(root["odometry"]["file"], folder);
   }
-  root["camera_time_offset_s"] = correction.camera_time_offset_s;
+  root["camera_time_offset_s"] = correction.offset_s;
   const RowMajor4 T = correction.T_body_rig.matrix();
   root["T_body_rig"] = std::vector<double>(T.data(), T.data() + T.size());
   root["T_body_rig"].SetStyle(YAML::EmitterStyle::Flow);

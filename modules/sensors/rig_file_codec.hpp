@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "modules/core/calibration_limits.hpp"
+#include "modules/core/camera_calibration.hpp"
 #include "modules/core/config.hpp"
 #include "modules/sensors/rig_completion.hpp"
-#include "modules/sensors/rig_correction.hpp"
 
 namespace km {
 
@@ -151,13 +151,13 @@ struct RigFile {
 
 /// Reads a file that has nothing but RigCorrectionFile's keys, for a recording that tells the rest.
 /// Errors as above.
-[[nodiscard]] RigCorrection read_rig_correction(const std::filesystem::path& file);
+[[nodiscard]] CameraCalibration read_rig_correction(const std::filesystem::path& file);
 
 /// The text of a rig file that says what `correction` does; all else is as in the rig file `base`,
 /// wherever it is read from. With an empty path it is one for read_rig_correction(). Comments are
 /// not kept. Throws ConfigError if `base` cannot be read.
 [[nodiscard]] std::string corrected_rig_text(const std::filesystem::path& base,
-                                             const RigCorrection& correction);
+                                             const CameraCalibration& correction);
 
 /// Where drivers tell the camera of a topic of images: "/left/camera_info" of "/left/image_raw" and
 /// of "/left/image_raw/compressed".

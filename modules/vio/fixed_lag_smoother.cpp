@@ -128,15 +128,22 @@ std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
 void FixedLagSmoother::start(const InertialFrame& frame, const OdometryState& state,
                              const StateCovariance& covariance) {
   clear();
-  (void)append(frame, state, 0.0);  // the first needs no inertial factor
+  (void)append(frame, state, first_offset_s(frame));  // the first needs no inertial factor
   observe(window_, frame.tracked);
   window_.frames.back().keyframe = true;
+  window_.frames.back().samples = frame.samples;
   StatePrior& prior = window_.prior;
   prior.frames = {window_.frames.back().id};
   prior.linearization = {window_.frames.back().state};
   prior.J.resize(15, 15);
   prior.J << held_gauge(state), covariance.llt().matrixL().solve(without_gauge(state));
   hold_calibration();
+}
+
+void FixedLagSmoother::recall(const UncertainCalibration& known) {
+  if (!window_.calibrates) return;
+  calibrate(window_, known.calibration);
+  calibration_covariance_ = known.covariance;
 }
 
 // What is known of the calibration stays, if it can be.
@@ -373,6 +380,14 @@ std::optional<StateCovariance> FixedLagSmoother::state_covariance(Stamp stamp) c
   const auto Sigma = covariance_of(std::move(D_T));
   if (!Sigma) return std::nullopt;
   return StateCovariance(Sigma->selfadjointView<Eigen::Upper>());  // rounding leaves none exact
+}
+
+// An instant without samples cannot be gone on from.
+double FixedLagSmoother::first_offset_s(const InertialFrame& frame) const {
+  const double offset_s = std::clamp(window_.calibration.offset_s, -kMostOffset_s, kMostOffset_s);
+  const Stamp instant = frame.tracked.stamp + nanoseconds(offset_s);
+  const bool is_covered = !frame.samples.empty() && frame.samples.front().stamp <= instant;
+  return is_covered ? offset_s : std::max(offset_s, 0.0);
 }
 
 double FixedLagSmoother::next_offset_s(const InertialFrame& frame) const {

@@ -59,8 +59,14 @@ class FixedLagSmoother {
 
   /// Starts on one image, from its state as estimated earlier: heading and position are held, the
   /// rest is kept as well as `covariance`, positive definite, says. What was before is forgotten.
+  /// The state is that of the instant by the calibration known; where that lies before the image,
+  /// frame.samples should begin by then.
   void start(const InertialFrame& frame, const OdometryState& state,
              const StateCovariance& covariance);
+
+  /// What an earlier process knew of the calibration takes the place of the prior, where that is
+  /// possible and it is estimated at all. Call before start().
+  void recall(const UncertainCalibration& known);
 
   /// Adds the next image; `rests`: the body stands still. Precondition: start() succeeded. Where
   /// frame.samples do not cover the time since the image before or make no inertial factor, the
@@ -105,6 +111,7 @@ class FixedLagSmoother {
   void clear();
   void hold_first();
   void hold_calibration();
+  [[nodiscard]] double first_offset_s(const InertialFrame& frame) const;
   [[nodiscard]] double next_offset_s(const InertialFrame& frame) const;
   [[nodiscard]] Matrix7 calibration_prior() const;
   [[nodiscard]] Eigen::Index variables() const;

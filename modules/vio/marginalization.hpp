@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "modules/core/camera_calibration.hpp"
 #include "modules/core/odometry.hpp"
-#include "modules/vio/camera_calibration.hpp"
 
 namespace km {
 

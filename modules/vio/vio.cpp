@@ -53,6 +53,7 @@ void Vio::continue_from(const VioCheckpoint& checkpoint) {
   last_ = checkpoint.state;
   last_keyframe_ = checkpoint.keyframe;
   T_chain_odom_ = checkpoint.keyframe.T_odom_kf * checkpoint.state.T_odom_body.inverse();
+  if (checkpoint.keyframe.calibration) smoother_.recall(*checkpoint.keyframe.calibration);
 }
 
 VioResult Vio::process(const SensorPacket& packet) {
@@ -78,7 +79,6 @@ VioResult Vio::process(const SensorPacket& packet) {
   const int features = static_cast<int>(held.data.tracked.features.size());
   const bool first = !last_image_.has_value();
   last_image_ = frame->stamp;
-  while (samples_.size() > 1 && samples_[1].stamp <= frame->stamp) samples_.erase(samples_.begin());
 
   held.data.is_bridged = !first && gap_s > config_.max_imu_gap_s;
   statistics_.gaps += held.data.is_bridged && !in_gap_;
@@ -95,6 +95,7 @@ VioResult Vio::process(const SensorPacket& packet) {
     held_.push_back(std::move(held));
     try_start(result);
   }
+  while (samples_.size() > 1 && samples_[1].stamp <= frame->stamp) samples_.erase(samples_.begin());
   if (!result.states.empty()) last_ = result.states.back();
   watch_vision(frame->stamp, features, result);
   return result;
@@ -151,7 +152,9 @@ bool Vio::goes_on_at(const Held& held) const {
 
 // The state of this image has been given out, and its keyframe handed on.
 void Vio::go_on(const Held& held, VioResult& result) {
-  smoother_.start(held.data, *last_, *last_keyframe_->state_covariance);
+  InertialFrame frame = held.data;
+  frame.samples = samples_;  // also from before the image
+  smoother_.start(frame, *last_, *last_keyframe_->state_covariance);
   ++statistics_.start_attempts;
   ++statistics_.starts;
   result.start = StartStatus::kGoesOn;
@@ -298,6 +301,12 @@ double Vio::moved_s(Stamp stamp) const {
   return seconds_between(last_keyframe_->stamp, stamp) - rested_s_;
 }
 
+std::optional<UncertainCalibration> Vio::known_calibration() const {
+  if (!config_.calibrate) return std::nullopt;
+  const UncertainCalibration known = smoother_.calibration();
+  return known.covariance.allFinite() ? std::optional(known) : std::nullopt;
+}
+
 std::optional<Vertical> Vio::vertical_at(const OdometryState& state) const {
   const double sigma_rad = config_.tilt_sigma * std::sqrt(config_.tilt_keyframes);
   if (config_.tilt_sigma < kLeastTiltSigma || sigma_rad > kMostTiltSigma) return std::nullopt;
@@ -328,6 +337,7 @@ void Vio::hand_on_first(const OdometryState& state, VioResult& result) {
     keyframe.covariance = restart_covariance();
   }
   keyframe.state_covariance = state_covariance_at(state);
+  keyframe.calibration = known_calibration();
   last_keyframe_ = keyframe;
   rested_s_ = 0.0;
   result.keyframes.push_back(keyframe);
@@ -347,6 +357,7 @@ void Vio::hand_on(const OdometryState& state, VioResult& result) {
                             : restart_covariance();
   keyframe.T_odom_kf = last_keyframe_->T_odom_kf * keyframe.T_previous_kf;
   keyframe.state_covariance = state_covariance_at(state);
+  keyframe.calibration = known_calibration();
   last_keyframe_ = keyframe;
   rested_s_ = 0.0;
   result.keyframes.push_back(keyframe);

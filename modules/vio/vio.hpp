@@ -66,7 +66,8 @@ class Vio {
   /// Goes on from there: the next keyframe follows that one, measured from it like any other where
   /// odometry starts on its image. Where that comes first and the covariance of the state is
   /// known, odometry starts on it at once, from that state; else like any start, with the images
-  /// of VioConfig::start_s. Call before the first process().
+  /// of VioConfig::start_s. What was known of the calibration stays known. Call before the first
+  /// process().
   void continue_from(const VioCheckpoint& checkpoint);
 
   [[nodiscard]] VioResult process(const SensorPacket& packet);
@@ -102,6 +103,7 @@ class Vio {
   void hand_on(const OdometryState& state, VioResult& result);
   [[nodiscard]] std::optional<StateCovariance> state_covariance_at(
       const OdometryState& state) const;
+  [[nodiscard]] std::optional<UncertainCalibration> known_calibration() const;
   [[nodiscard]] std::optional<Vertical> vertical_at(const OdometryState& state) const;
   void locate(const OdometryState& state, const Frame& frame, VioResult& result);
   [[nodiscard]] bool locates_points(const StereoFrame& frame) const;

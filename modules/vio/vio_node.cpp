@@ -54,7 +54,6 @@ VioNode::VioNode(RobotId robot, const SensorRig& rig, const TrackerConfig& track
                  const VioConfig& config, const VioTopics& topics)
     : vio_(robot, rig, tracker, config),
       topics_(topics),
-      calibrates_(config.calibrate),
       worker_(
           kQueuedPackets, Overflow::kBlock, [this](const auto& packet) { step(*packet); },
           VioConfig::kSection) {
@@ -86,7 +85,6 @@ void VioNode::step(const SensorPacket& packet) {
   blind_s_ = vio_.statistics().blind_s;
   if (result.problem != VioProblem::kNoImage && result.problem != VioProblem::kUnorderedImage)
     topics_.images.publish(TrackedImage{packet.frame, std::move(result.tracked)});
-  if (calibrates_ && !result.keyframes.empty()) topics_.calibration.publish(vio_.calibration());
 }
 
 void VioNode::tell(const VisionEvent& event) const {

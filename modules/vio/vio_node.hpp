@@ -18,7 +18,6 @@ struct VioTopics {
   Out<OdometryState> odometry;            ///< One per image, in order of time.
   Out<KeyframeOdometry> keyframes;        ///< Indices without gaps.
   Out<LocatedFrame> frames;               ///< One per image, after its keyframe.
-  Out<UncertainCalibration> calibration;  ///< With each keyframe, where it is estimated.
   Out<VioStatistics> statistics;          ///< When something has happened, and while blind.
   Out<TrackedImage> images;               ///< All that are accepted.
 };
@@ -51,7 +50,6 @@ class VioNode final : public Node {
 
   Vio vio_;
   const VioTopics topics_;
-  const bool calibrates_;
   double blind_s_ = 0.0;
   bool stopped_ = false;
   Worker<Topic<SensorPacket>::Message> worker_;  // last member: stops first

@@ -6,9 +6,10 @@
 #include <span>
 #include <vector>
 
+#include "modules/core/camera_calibration.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/core/odometry.hpp"
-#include "modules/vio/camera_calibration.hpp"
+#include "modules/vio/image_pose.hpp"
 #include "modules/vio/marginalization.hpp"
 #include "modules/vio/residuals.hpp"
 #include "modules/vio/tracked_frame.hpp"
@@ -21,7 +22,8 @@ struct WindowFrame {
   OdometryState state;
   bool keyframe = false;
   bool rests = false;  ///< The body stands still here.
-  /// Cover the time since the frame before, where it was not spent at rest; empty for the first.
+  /// Cover the time since the frame before, where it was not spent at rest; those of the first only
+  /// those after it need.
   std::vector<ImuSample> samples;
   bool is_bridged = false;       ///< With a gap in them: see InertialFrame.
   std::optional<ImuFactor> imu;  ///< From the frame before; none for the first.

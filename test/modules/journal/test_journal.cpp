@@ -34,6 +34,10 @@ KeyframeOdometry step(KeyframeIndex index, std::mt19937& rng) {
   keyframe.covariance = random_covariance(rng, 0.1);
   if (index % 2 == 0) keyframe.vertical = Vertical{random_vector<3>(rng).normalized(), 0.01};
   if (index % 4 > 1) return keyframe;
+  UncertainCalibration& known = keyframe.calibration.emplace();
+  known.calibration = {0.1 * random_vector<1>(rng)(0), random_pose(rng)};
+  for (int c = 0; c < 7; ++c) known.covariance.col(c) = random_vector<7>(rng);
+  known.covariance = Matrix7(known.covariance * known.covariance.transpose());
   StateCovariance& covariance = keyframe.state_covariance.emplace();
   for (int c = 0; c < covariance.cols(); ++c) covariance.col(c) = random_vector<11>(rng);
   covariance = StateCovariance(covariance * covariance.transpose());
@@ -130,6 +134,12 @@ TEST_CASE("Every entry comes back to the last bit", "[journal]") {
   CHECK(back.state_covariance->triangularView<Eigen::Upper>().toDenseMatrix() ==
         keyframe.state_covariance->triangularView<Eigen::Upper>().toDenseMatrix());
   CHECK(*back.state_covariance == back.state_covariance->transpose());
+  REQUIRE(back.calibration);
+  CHECK(back.calibration->calibration.offset_s == keyframe.calibration->calibration.offset_s);
+  CHECK(back.calibration->calibration.T_body_rig.matrix() ==
+        keyframe.calibration->calibration.T_body_rig.matrix());
+  CHECK(back.calibration->covariance.triangularView<Eigen::Upper>().toDenseMatrix() ==
+        keyframe.calibration->covariance.triangularView<Eigen::Upper>().toDenseMatrix());
 
   for (const JournalEntry& entry : some_run()) {
     const auto bytes = encode_journal_entry(entry);
@@ -153,7 +163,7 @@ TEST_CASE("What is no entry is refused", "[journal]") {
   CHECK_FALSE(decode_journal_entry(std::vector<std::uint8_t>{200}).value);
   bytes = encode_journal_entry(KeyframeOdometry{});
   REQUIRE(bytes.back() == 0);  // nothing follows the step
-  bytes.back() = 4;
+  bytes.back() = 8;
   CHECK_FALSE(decode_journal_entry(bytes).value);
 }
 
@@ -175,7 +185,8 @@ TEST_CASE("Covariances of states that odometry cannot go on from are refused", "
   CHECK_FALSE(taken(covariance));
 }
 
-TEST_CASE("A journal from before states had covariances is read, without them", "[journal]") {
+TEST_CASE("A journal from before states had covariances and calibrations is read, without them",
+          "[journal]") {
   // A step then ended in whether it has a vertical: 0 or 1.
   std::mt19937 rng(11);
   for (const KeyframeIndex index : {2U, 3U}) {  // with a vertical, and without
@@ -190,6 +201,7 @@ TEST_CASE("A journal from before states had covariances is read, without them", 
     const auto& back = std::get<KeyframeOdometry>(*decoded.value);
     CHECK(back.vertical.has_value() == keyframe.vertical.has_value());
     CHECK_FALSE(back.state_covariance);
+    CHECK_FALSE(back.calibration);
   }
 }
 

@@ -185,7 +185,8 @@ TEST_CASE("A correction moves the stamps of images and the cameras", "[sensors]"
   const EurocFolder folder;
   folder.add_depth();
   EurocReader right = open_euroc(folder.root());
-  const RigCorrection correction{0.0125, make_pose(Eigen::Matrix3d::Identity(), {0.1, 0.2, 0.3})};
+  const CameraCalibration correction{0.0125,
+                                     make_pose(Eigen::Matrix3d::Identity(), {0.1, 0.2, 0.3})};
   EurocReader corrected = open_euroc(folder.root(), {.correction = correction, .depth = true});
   const auto packets = packets_of(corrected), unmoved = packets_of(right);
   REQUIRE(packets.size() == EurocFolder::kPairs);

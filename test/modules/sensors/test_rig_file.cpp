@@ -114,8 +114,8 @@ TEST_CASE("A rig file needs no inertial sensor beside an odometry named elsewher
   CHECK(read_rig_file(file, true).is_complete());
 }
 
-const RigCorrection kCorrection{0.0123456789,
-                                make_pose(so3_exp({0.02, -0.01, 0.03}), {0.004, -0.005, 0.006})};
+const CameraCalibration kCorrection{
+    0.0123456789, make_pose(so3_exp({0.02, -0.01, 0.03}), {0.004, -0.005, 0.006})};
 
 TEST_CASE("A rig with a correction is the rig file's with it", "[sensors]") {
   const EurocFolder recording;
@@ -135,7 +135,7 @@ TEST_CASE("A rig with a correction is the rig file's with it", "[sensors]") {
   CHECK(read_rig_file(base).T_body_rig.isApprox(SE3::Identity()));
   const std::string corrected = corrected_rig_text(base, kCorrection);
   const PartialRig rig = read_rig_file(elsewhere.write("rig_estimated.yaml", corrected));
-  CHECK(rig.rig.camera_time_offset_s == kCorrection.camera_time_offset_s);
+  CHECK(rig.rig.camera_time_offset_s == kCorrection.offset_s);
   CHECK(rig.T_body_rig.isApprox(kCorrection.T_body_rig, 1e-9));
   CHECK(rig.rig.topics.right == "/cam1");
   CHECK(rig.rig.sensors.stereo.cameras[1].width == (is_inline ? 640 : 32));
@@ -146,8 +146,8 @@ TEST_CASE("A rig with a correction is the rig file's with it", "[sensors]") {
 TEST_CASE("A recording that tells its rig takes a correction alone", "[sensors]") {
   const TemporaryFolder folder;
   const auto file = folder.write("rig.yaml", corrected_rig_text("", kCorrection));
-  const RigCorrection read = read_rig_correction(file);
-  CHECK(read.camera_time_offset_s == kCorrection.camera_time_offset_s);
+  const CameraCalibration read = read_rig_correction(file);
+  CHECK(read.offset_s == kCorrection.offset_s);
   CHECK(read.T_body_rig.isApprox(kCorrection.T_body_rig, 1e-9));
   CHECK_THROWS_WITH(read_rig_correction(folder.write("topics.yaml", kTopics)),
                     Contains("topics.yaml:1: unknown key left"));

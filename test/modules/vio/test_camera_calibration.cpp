@@ -2,7 +2,6 @@
 #include <numbers>
 
 #include "modules/core/lie.hpp"
-#include "modules/vio/camera_calibration.hpp"
 #include "modules/vio/fixed_lag_smoother.hpp"
 #include "synthetic_motion.hpp"
 #include "test/support/numeric_jacobian.hpp"
@@ -11,21 +10,6 @@ namespace km {
 namespace {
 
 constexpr double kDerivative = 1e-6;  // entries are about 1
-
-CameraCalibration some_calibration(std::mt19937& rng) {
-  CameraCalibration calibration;
-  calibration.offset_s = -0.02;
-  calibration.T_body_rig = retract(SE3::Identity(), 0.3 * random_vector<6>(rng));
-  return calibration;
-}
-
-TEST_CASE("A calibration has moved by what it was moved by", "[vio][calibration]") {
-  std::mt19937 rng(1);
-  const CameraCalibration calibration = some_calibration(rng);
-  const Vector7 delta = 0.1 * random_vector<7>(rng);
-  CHECK((calibration.offset_to(calibration.moved(delta)) - delta).norm() < 1e-12);
-  CHECK(calibration.offset_to(calibration).norm() < 1e-12);
-}
 
 TEST_CASE("Derivatives of the pose at an image agree with differences", "[vio][calibration]") {
   const unsigned seed = GENERATE(range(0U, 5U));

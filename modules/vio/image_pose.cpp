@@ -1,19 +1,8 @@
-#include "modules/vio/camera_calibration.hpp"
+#include "modules/vio/image_pose.hpp"
 
 #include "modules/core/lie.hpp"
 
 namespace km {
-
-CameraCalibration CameraCalibration::moved(const Vector7& delta) const {
-  return {offset_s + delta(0), retract(SE3::Identity(), delta.tail<6>()) * T_body_rig};
-}
-
-Vector7 CameraCalibration::offset_to(const CameraCalibration& to) const {
-  Vector7 delta;
-  delta << to.offset_s - offset_s,
-      local_coordinates(SE3::Identity(), to.T_body_rig * T_body_rig.inverse());
-  return delta;
-}
 
 ImagePose ImagePose::at(const OdometryState& state, const Eigen::Vector3d& gyro, double shift_s) {
   ImagePose image;

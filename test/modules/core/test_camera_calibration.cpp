@@ -1,0 +1,46 @@
+#include <catch2/catch.hpp>
+#include <random>
+
+#include "modules/core/camera_calibration.hpp"
+#include "modules/core/lie.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+CameraCalibration some_calibration(std::mt19937& rng) {
+  CameraCalibration calibration;
+  calibration.offset_s = 0.03 * random_vector<1>(rng)(0);
+  calibration.T_body_rig = retract(SE3::Identity(), 0.3 * random_vector<6>(rng));
+  return calibration;
+}
+
+TEST_CASE("A calibration has moved by what it was moved by", "[calibration]") {
+  std::mt19937 rng(1);
+  const CameraCalibration calibration = some_calibration(rng);
+  const Vector7 delta = 0.1 * random_vector<7>(rng);
+  CHECK((calibration.offset_to(calibration.moved(delta)) - delta).norm() < 1e-12);
+  CHECK(calibration.offset_to(calibration).norm() < 1e-12);
+}
+
+TEST_CASE("What is found on top of a correction moves cameras as both in turn", "[calibration]") {
+  std::mt19937 rng(2);
+  const CameraCalibration correction = some_calibration(rng), found = some_calibration(rng);
+  StereoRig in_turn, at_once;
+  for (std::size_t c = 0; c < 2; ++c)
+    in_turn.cameras[c].T_body_cam = at_once.cameras[c].T_body_cam = random_pose(rng);
+  correction.apply_to(in_turn);
+  found.apply_to(in_turn);
+  const CameraCalibration both = found.on_top_of(correction);
+  both.apply_to(at_once);
+  for (std::size_t c = 0; c < 2; ++c)
+    CHECK(in_turn.cameras[c].T_body_cam.isApprox(at_once.cameras[c].T_body_cam));
+  CHECK(both.offset_s == Approx(found.offset_s + correction.offset_s));
+  CHECK(found.offset_to(both.without(correction)).norm() < 1e-12);
+  // One covariance is that of both.
+  const Vector7 delta = 0.1 * random_vector<7>(rng);
+  CHECK((both.offset_to(found.moved(delta).on_top_of(correction)) - delta).norm() < 1e-12);
+}
+
+}  // namespace
+}  // namespace km
