@@ -42,7 +42,7 @@ CandidateSearch CandidateFilter::search_own(const BowVector& query, Stamp stamp)
   const Stamp newest = stamp - nanoseconds(config_.min_gap_s);
   const auto end = std::upper_bound(stamps_.begin(), stamps_.end(), newest);
   return search_among(query, stamps_.empty() ? nullptr : &last_,
-                      static_cast<std::size_t>(end - stamps_.begin()));
+                      std::max(static_cast<std::size_t>(end - stamps_.begin()), known_from_));
 }
 
 CandidateSearch CandidateFilter::search_among(const BowVector& query, const BowVector* previous,

@@ -50,8 +50,11 @@ class CandidateFilter {
   CandidateSearch search(const BowVector& query, const BowVector* previous) const;
 
   /// Candidates for a keyframe of this robot taken at `stamp`, not yet added, among those at least
-  /// min_gap_s older. It is normalised by the keyframe added last.
+  /// min_gap_s older, or from before lose_way(). It is normalised by the keyframe added last.
   CandidateSearch search_own(const BowVector& query, Stamp stamp) const;
+
+  /// From the keyframe added last to the next one the way is hardly known: they are no neighbours.
+  void lose_way() { known_from_ = stamps_.size(); }
 
   /// Adds a keyframe; returns its index. Throws std::invalid_argument if `stamp` is before the last
   /// one or as BowDatabase::add(); state is unchanged then.
@@ -67,6 +70,7 @@ class CandidateFilter {
   PlaceRecognitionConfig config_;
   BowDatabase database_;
   std::vector<Stamp> stamps_;  // ascending
+  std::size_t known_from_ = 0;
   BowVector last_;
 };
 

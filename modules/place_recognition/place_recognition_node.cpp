@@ -11,6 +11,14 @@ namespace {
 // A peer's history arrives in a burst; an hour of keyframes at 4 Hz fits.
 constexpr std::size_t kQueueCapacity = 16384;
 
+// A step between keyframes that is known worse leads anywhere, back to where they were, too.
+constexpr double kLostWay_m = 0.5;
+
+bool loses_way(const UncertainPose& before, const UncertainPose& now) {
+  const Matrix6 step = between_on_chain(before, now).Sigma;
+  return step.bottomRightCorner<3, 3>().trace() > 3.0 * kLostWay_m * kLostWay_m;
+}
+
 }  // namespace
 
 PlaceRecognitionNode::PlaceRecognitionNode(const PlaceRecognitionConfig& config, RobotId self,
@@ -44,6 +52,9 @@ void PlaceRecognitionNode::step(const Keyframe& keyframe) {
   const KeyframeId id = keyframe.odometry.id;
   BagOfWords words = vocabulary_->count(keyframe.features.descriptors);
   BowVector vector = vocabulary_->weigh(words);
+  const UncertainPose chain{keyframe.odometry.T_odom_kf, keyframe.odometry.covariance};
+  if (const auto before = std::exchange(chain_, chain); before && loses_way(*before, chain))
+    own_.lose_way();
   CandidateSearch search = own_.search_own(vector, keyframe.stamp);
   // Known before it is published: see the class comment.
   own_.add(std::move(vector), keyframe.stamp);

@@ -3,10 +3,12 @@
 #include <exception>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <variant>
 #include <vector>
 
+#include "modules/core/covariance.hpp"
 #include "modules/core/keyframe.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/place_recognition/bag_of_words.hpp"
@@ -76,6 +78,7 @@ class PlaceRecognitionNode final : public Node {
   const std::shared_ptr<const Vocabulary> vocabulary_;
   const PlaceRecognitionTopics topics_;
   CandidateFilter own_;
+  std::optional<UncertainPose> chain_;  // up to the keyframe before
   std::vector<KeyframeId> own_ids_;  // by index in own_
   std::map<RobotId, PeerHistory> peers_;
   Worker<Input> worker_;  // last member: stops first

@@ -206,7 +206,8 @@ void Vio::try_start(VioResult& result) {
   }
 }
 
-// A start defines its own first position and heading: both become those of the last pose.
+// A start defines its own first position and heading: the latter becomes that of the last pose, the
+// former where the speeds before and after what nobody has seen lead from there.
 void Vio::continue_from_last_pose(std::vector<OdometryState>& states) const {
   if (!last_) return;
   const SE3 first = states.front().T_odom_body;
@@ -214,7 +215,9 @@ void Vio::continue_from_last_pose(std::vector<OdometryState>& states) const {
   const Eigen::Matrix3d Q = last_->T_odom_body.linear() * first.linear().transpose();
   const double turn = std::atan2(Q(1, 0) - Q(0, 1), Q(0, 0) + Q(1, 1));
   const Eigen::Matrix3d R = so3_exp(turn * Eigen::Vector3d::UnitZ());
-  const SE3 T = make_pose(R, last_->T_odom_body.translation() - R * first.translation());
+  const double coasting = coasting_s(unseen_s(states.front().stamp));
+  const Eigen::Vector3d way = coasting * (last_->v_odom + R * states.front().v_odom);
+  const SE3 T = make_pose(R, last_->T_odom_body.translation() + way - R * first.translation());
   for (OdometryState& state : states) {
     state.T_odom_body = T * state.T_odom_body;
     state.v_odom = R * state.v_odom;
@@ -238,6 +241,7 @@ void Vio::advance(const Held& held, VioResult& result) {
   if (!plausible(*result.smoother) || unlocated_images_ > kMostUnlocatedImages) {
     ++statistics_.divergences;
     result.problem = VioProblem::kDiverged;
+    last_->v_odom.setZero();  // is worth nothing
     restart(held);
     return;
   }
@@ -296,6 +300,11 @@ bool Vio::due(const OdometryState& state, const StereoFrame& frame) const {
   return is_keyframe_due(config_, dt, previous->state.T_odom_body.inverse() * state.T_odom_body);
 }
 
+// A clock may have been set back since an earlier process.
+double Vio::unseen_s(Stamp stamp) const {
+  return std::max(seconds_between(last_->stamp, stamp), 0.0);
+}
+
 // Since the last keyframe, without rests.
 double Vio::moved_s(Stamp stamp) const {
   return seconds_between(last_keyframe_->stamp, stamp) - rested_s_;
@@ -334,7 +343,10 @@ void Vio::hand_on_first(const OdometryState& state, VioResult& result) {
   if (last_keyframe_) {  // a new start
     keyframe.id.index = last_keyframe_->id.index + 1;
     keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * keyframe.T_odom_kf;
-    keyframe.covariance = restart_covariance();
+    keyframe.covariance = restart_covariance(
+        {.lasts_s = unseen_s(state.stamp),
+         .speed_mps = std::max(last_->v_odom.norm(), state.v_odom.norm()),
+         .up_body = state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ()});
   }
   keyframe.state_covariance = state_covariance_at(state);
   keyframe.calibration = known_calibration();

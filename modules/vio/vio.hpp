@@ -99,6 +99,7 @@ class Vio {
   void continue_from_last_pose(std::vector<OdometryState>& states) const;
   void take_up_or_hand_on_first(VioResult& result);
   [[nodiscard]] double moved_s(Stamp stamp) const;
+  [[nodiscard]] double unseen_s(Stamp stamp) const;
   void hand_on_first(const OdometryState& state, VioResult& result);
   void hand_on(const OdometryState& state, VioResult& result);
   [[nodiscard]] std::optional<StateCovariance> state_covariance_at(

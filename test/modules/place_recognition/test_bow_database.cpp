@@ -233,6 +233,10 @@ TEST_CASE("Neighbours in time inside one robot are no candidates", "[place_recog
   CHECK(filter.search_own(view, at_s(10)).candidates.size() == 1);  // the gap itself counts
   CHECK(filter.search_own(view, at_s(13)).candidates.size() == 4);
   CHECK(filter.search(view, &view).candidates.size() == 13);  // another robot: no such rule
+  filter.lose_way();
+  CHECK(filter.search_own(view, at_s(13)).candidates.size() == 13);
+  filter.add(view, at_s(13));
+  CHECK(filter.search_own(view, at_s(14)).candidates.size() == 13);
 }
 
 TEST_CASE("The best candidates are kept, one per place", "[place_recognition]") {

@@ -128,6 +128,21 @@ TEST_CASE("A return to a place after the gap is a candidate inside one robot",
   CHECK(robot.candidates.received[0].match == KeyframeId{kSelf, 0});
 }
 
+TEST_CASE("What was seen before the way was lost is a candidate at once",
+          "[place_recognition][node]") {
+  Robot robot(kSelf, {.min_gap_s = 10.0});
+  for (std::uint32_t i = 0; i < 3; ++i) robot.node.step(keyframe({kSelf, i}, {1, 2, 3, 4}));
+  CHECK(robot.candidates.received.empty());
+  Keyframe after = keyframe({kSelf, 3}, {1, 2, 3, 4});
+  after.odometry.covariance.diagonal().tail<3>().setConstant(1.0);
+  robot.node.step(after);
+  CHECK(robot.candidates.received.size() == 3);
+  after.odometry.id.index = 4;
+  robot.node.step(after);  // the step to this one is known
+  for (std::size_t k = 3; k < robot.candidates.received.size(); ++k)
+    CHECK(robot.candidates.received[k].match.index < 3);
+}
+
 TEST_CASE("A history that arrives backwards gives the candidates of one in order",
           "[place_recognition][node]") {
   const auto candidates_of = [](bool backwards) {

@@ -113,6 +113,30 @@ TEST_CASE("MH_01_easy: half a second without inertial samples does not lose it",
   CHECK(errors.max_m < 0.05);
 }
 
+TEST_CASE("MH_01_easy: over a second that nobody saw the body goes on as it did", "[vio]") {
+  const Recording* const data = recording();
+  if (data == nullptr) return;
+  Recording gap = *data;
+  const Stamp before = gap.packets[40].frame->stamp, after = gap.packets[61].frame->stamp;
+  gap.packets.erase(gap.packets.begin() + 41, gap.packets.begin() + 61);
+  gap.T_world_body.erase(gap.T_world_body.begin() + 41, gap.T_world_body.begin() + 61);
+  const OdometryRun run = run_odometry(gap, 0, gap.packets.size(), TrackerConfig{}, {});
+  CHECK(run.statistics.starts == 2);
+  REQUIRE(run.states.size() == gap.packets.size());
+  REQUIRE(run.states[40].stamp == before);
+  REQUIRE(run.states[41].stamp == after);
+  const SE3 truth = run.truth[40].inverse() * run.truth[41];
+  const SE3 found = run.states[40].T_odom_body.inverse() * run.states[41].T_odom_body;
+  const double way_m = truth.translation().norm();
+  const double error_m = (found.translation() - truth.translation()).norm();
+  CAPTURE(way_m, error_m);
+  CHECK(way_m > 0.15);
+  CHECK(error_m < 0.5 * way_m);
+  const auto next = std::ranges::find(run.keyframes, after, &KeyframeOdometry::stamp);
+  REQUIRE(next != run.keyframes.end());
+  CHECK(error_m < 2.0 * std::sqrt(next->covariance(3, 3)));
+}
+
 // The velocity that is left after them fits nothing of what is seen then, if the stamps are
 // believed.
 TEST_CASE("MH_01_easy: after five seconds of black images with late stamps odometry sees again",
