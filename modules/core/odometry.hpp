@@ -53,6 +53,8 @@ struct LocatedFrame {
   std::shared_ptr<const StereoFrame> frame;
   KeyframeIndex keyframe = 0;         ///< The last one at or before it.
   SE3 T_odom_body = SE3::Identity();  ///< T_odom_kf of that keyframe, then odometry's motion since.
+  SE3 T_body_rig = SE3::Identity();   ///< Where the cameras are, by which that was found: see
+                                      ///< CameraCalibration.
 };
 
 }  // namespace km

@@ -66,7 +66,8 @@ void DenseSensingNode::step(const LocatedFrame& located) {
     ++progress_.frames;
     progress_.without_labels += wants_labels_ && images.labels == nullptr ? 1 : 0;
     topics_.frames.publish({stamp, images.depth, images.labels,
-                            located.T_odom_body * sensor_.camera().T_body_cam, located.keyframe});
+                            located.T_odom_body * located.T_body_rig * sensor_.camera().T_body_cam,
+                            located.keyframe});
   }
   topics_.progress.publish(progress_);
 }

@@ -47,6 +47,7 @@ void KeyframeFeaturesNode::step(const KeyframeOdometry& odometry) {
 void KeyframeFeaturesNode::step(const LocatedFrame& located) {
   if (without_images_.empty() || without_images_.front().stamp != located.frame->stamp) return;
   KeyframeFeatures features = extractor_.extract(*located.frame);
+  features.T_body_cam = located.T_body_rig * features.T_body_cam;
   Keyframe keyframe = std::move(without_images_.front());
   without_images_.pop_front();
   keyframe.features = std::move(features);

@@ -285,7 +285,8 @@ void Vio::restart(Held held) {
 void Vio::locate(const OdometryState& state, const Frame& frame, VioResult& result) {
   if (const WindowFrame* keyframe = smoother_.frame_at(last_keyframe_->stamp))
     T_chain_odom_ = last_keyframe_->T_odom_kf * keyframe->state.T_odom_body.inverse();
-  result.frames.push_back({frame, last_keyframe_->id.index, T_chain_odom_ * state.T_odom_body});
+  result.frames.push_back({frame, last_keyframe_->id.index, T_chain_odom_ * state.T_odom_body,
+                           smoother_.window().calibration.T_body_rig});
 }
 
 bool Vio::locates_points(const StereoFrame& frame) const {

@@ -1,5 +1,6 @@
 #include <catch2/catch.hpp>
 
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -61,6 +62,19 @@ TEST_CASE("Frames are handed on at the rate, with the camera's pose", "[dense_se
   }
   CHECK(bench.last.frames == 11);
   CHECK(bench.last.without_labels == 11);
+}
+
+TEST_CASE("The camera's pose is by the mounting that was found", "[dense_sensing_node]") {
+  Bench bench;
+  LocatedFrame frame = bench.frame(1, true);
+  frame.T_body_rig =
+      make_pose(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()).toRotationMatrix(), {0, 0.2, 0});
+  bench.node->step(frame);
+  REQUIRE(bench.published.size() == 1);
+  const Camera& camera = bench.rig.cameras[0];
+  const SE3 expected = frame.T_odom_body * frame.T_body_rig * camera.T_body_cam;
+  CHECK(bench.published[0].T_odom_cam.isApprox(expected));
+  CHECK(expected.translation().y() == Approx(0.2 - 0.5 * std::sin(0.1)));
 }
 
 TEST_CASE("A due frame without depth is made up for by the next one", "[dense_sensing_node]") {

@@ -86,6 +86,18 @@ TEST_CASE("a keyframe has the features of the image with its stamp, through the 
   CHECK_FALSE(chain.published[1].features.keypoints.empty());
 }
 
+TEST_CASE("features are seen from where the cameras were found to be", "[keyframe_features_node]") {
+  std::mt19937 rng(2);
+  Chain chain;
+  chain.node.step(KeyframeOdometry{.id = {4, 0}, .stamp = 10});
+  LocatedFrame frame = tiled(10);
+  frame.T_body_rig = random_pose(rng);
+  chain.node.step(frame);
+  REQUIRE(chain.published.size() == 1);
+  CHECK(chain.published[0].features.T_body_cam.isApprox(frame.T_body_rig *
+                                                        small_rig().cameras[0].T_body_cam));
+}
+
 TEST_CASE("keyframes out of order, and images that do not fit the rig, are misuse",
           "[keyframe_features_node]") {
   Chain chain;
