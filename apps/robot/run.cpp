@@ -438,6 +438,11 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
   summary.name = options.name;
   summary.frames = end.images.value_or(ImageCounts{}).read;
   summary.frames_skipped = end.images.value_or(ImageCounts{}).skipped;
+  if (const SensorsNode* sensors = robot.sensors()) {
+    const ReaderReport faults = sensors->faults();
+    for (const auto& [fault, entry] : faults.entries())
+      summary.sensor_faults[to_string(fault)] = entry.count;
+  }
   summary.traffic = sent_bytes(robot);
   if (config.budget.is_limited()) summary.held_back = held_back(robot);
   summary.process = watch->process();

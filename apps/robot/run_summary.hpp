@@ -180,6 +180,8 @@ struct RunSummary {
   std::uint64_t keypoints = 0;       ///< Of all keyframes.
   std::uint64_t frames = 0;          ///< Stereo pairs played.
   std::uint64_t frames_skipped = 0;  ///< Pairs that odometry was too slow for.
+  /// What is wrong with the recording, or the live topics, and how often: see ReaderFault.
+  std::map<std::string, std::uint64_t> sensor_faults;
   ClosureCounts closures;            ///< That this robot found.
   OptimizerSummary pgo;
   std::optional<OdometrySummary> odometry;       ///< Absent with an odometry from outside.
@@ -205,6 +207,7 @@ struct RunSummary {
     visitor.field("keypoints", keypoints);
     visitor.field("frames", frames);
     visitor.field("frames_skipped", frames_skipped);
+    visitor.field("sensor_faults", sensor_faults);
     visitor.field("closures", closures);
     visitor.field("pgo", pgo);
     visitor.field("odometry", odometry);

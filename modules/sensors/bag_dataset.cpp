@@ -168,6 +168,8 @@ void BagDataset::take(Role role, BagMessage message) {
     take_pose(stamp, message);
     return;
   }
+  const std::size_t missing = missing_[static_cast<std::size_t>(role)].before(stamp);
+  if (missing > 0) report_.add(ReaderFault::kMissingBetween, place_of(message), missing);
   stamp += nanoseconds(rig_.camera_time_offset_s);
   const ImageRole image = role == Role::kLeft    ? ImageRole::kLeft
                           : role == Role::kRight ? ImageRole::kRight

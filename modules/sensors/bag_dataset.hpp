@@ -12,6 +12,7 @@
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/frame_joiner.hpp"
 #include "modules/sensors/imu_stream.hpp"
+#include "modules/sensors/missing_images.hpp"
 #include "modules/sensors/pose_stream.hpp"
 #include "modules/sensors/stamp_order.hpp"
 
@@ -90,6 +91,7 @@ class BagDataset final : public DatasetReader {
   BagWindow window_;
   std::vector<Role> role_of_;  // by channel
   StampOrder order_[kRoles];
+  MissingImages missing_[kRoles];
   std::size_t taken_[kRoles] = {};  // messages
   FrameJoiner joiner_;
   ImuStream imu_;

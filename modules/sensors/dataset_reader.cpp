@@ -46,6 +46,8 @@ const char* to_string(ReaderFault fault) {
       return "frames without a pose of the odometry from outside";
     case ReaderFault::kLostMessage:
       return "messages lost on the way";
+    case ReaderFault::kMissingBetween:
+      return "images missing between others";
   }
   return "unknown faults";
 }

@@ -11,7 +11,7 @@ namespace km {
 namespace {
 
 constexpr std::size_t kPose = 8, kPoseWithCovariance = 8 + 36;
-constexpr double kMaxNormError = 0.01;  // of a quaternion, as people round it
+constexpr double kMaxRounding = 0.01;  // of a quaternion, as people round it
 
 std::variant<Stamp, RowFault> stamp_of_seconds(const TextRow& row, std::size_t fields) {
   constexpr double kMost_s = 4e9;
@@ -38,7 +38,7 @@ std::variant<MeasuredPose, RowFault> parse_pose(const TextRow& row) {
     values.push_back(*value);
   }
   const Eigen::Quaterniond q(values[6], values[3], values[4], values[5]);
-  if (!(std::abs(q.norm() - 1.0) < kMaxNormError))
+  if (!(std::abs(q.norm() - 1.0) < kMaxRounding))
     return RowFault{ReaderFault::kMalformedRow, "the quaternion's norm is not 1"};
   Matrix6 covariance = Matrix6::Zero();
   if (count == kPoseWithCovariance) covariance = Eigen::Map<const Matrix6>(values.data() + 7);

@@ -66,7 +66,9 @@ void SensorsNode::stop() noexcept {
   reader_->stop();
   clock_.stop();
   worker_.stop();  // refuses further posts, so that the decoder ends too
-  if (decoder_.joinable()) decoder_.join();
+  if (!decoder_.joinable()) return;
+  decoder_.join();
+  take_faults();
 }
 
 void SensorsNode::decode() {
@@ -93,12 +95,16 @@ void SensorsNode::decode() {
   }
 }
 
-// What is live has no end at which to tell it.
 void SensorsNode::count_faults() {
   constexpr double kInterval_s = 5.0;
   const double now_s = steady_now_s();
   if (now_s - counted_s_ < kInterval_s) return;
   counted_s_ = now_s;
+  take_faults();
+}
+
+// What is live has no end at which to tell them.
+void SensorsNode::take_faults() {
   const ReaderReport report = reader_->report();
   {
     const std::lock_guard lock(faults_mutex_);

@@ -77,7 +77,7 @@ class SensorsNode final : public Node {
   /// Packets published and pairs skipped so far. Thread-safe.
   std::size_t published() const { return published_; }
   std::size_t skipped() const { return skipped_; }
-  /// Faults of the source, as counted up to 5 s ago. Thread-safe.
+  /// Faults of the source, as counted up to 5 s ago, and all of them after stop(). Thread-safe.
   ReaderReport faults() const {
     const std::lock_guard lock(faults_mutex_);
     return faults_;
@@ -97,6 +97,7 @@ class SensorsNode final : public Node {
 
   void decode();
   void count_faults();
+  void take_faults();
   [[nodiscard]] std::optional<double> lag_when_due_s(const Packet& packet);
   void step(const Packet& packet);
   void step(const EndOfData& end);

@@ -60,7 +60,7 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
   std::string keys;
   for (const auto& [key, value] : json.items()) keys += key + ' ';
   CHECK(keys ==
-        "/robot /name /keyframes /keypoints /frames /frames_skipped "
+        "/robot /name /keyframes /keypoints /frames /frames_skipped /sensor_faults/x "
         "/closures/candidates /closures/verified /closures/inliers "
         "/pgo/rounds /pgo/seconds /pgo/cost /pgo/gradient_norm /pgo/anchor /pgo/settled "
         "/pgo/members/0 /pgo/members/1 "

@@ -1,0 +1,43 @@
+#include <catch2/catch.hpp>
+#include <random>
+
+#include "modules/sensors/missing_images.hpp"
+
+namespace km {
+namespace {
+
+constexpr Stamp kInterval = 50'000'000;
+
+TEST_CASE("Images that are missing are counted, whatever the jitter", "[sensors]") {
+  const unsigned seed = GENERATE(range(0U, 5U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  std::uniform_int_distribution<Stamp> jitter(-kInterval / 10, kInterval / 10);
+  std::bernoulli_distribution is_lost(0.1);
+  MissingImages missing;
+  std::size_t lost = 0, counted = 0;
+  for (int k = 0; k < 1000; ++k) {
+    const bool can_be_lost = k > 2 * static_cast<int>(MissingImages::kFewest) && k < 999;
+    if (can_be_lost && is_lost(rng))
+      ++lost;
+    else
+      counted += missing.before(k * kInterval + jitter(rng));
+  }
+  CHECK(lost > 50);
+  CHECK(counted == lost);
+}
+
+TEST_CASE("What begins, or comes at a new rate, misses nothing for long", "[sensors]") {
+  MissingImages missing;
+  CHECK(missing.before(kInterval) == 0);
+  CHECK(missing.before(9 * kInterval) == 0);  // nothing says how often they come
+  Stamp stamp = 9 * kInterval;
+  for (int k = 0; k < 50; ++k) CHECK(missing.before(stamp += kInterval) == 0);
+  CHECK(missing.before(stamp += 41 * kInterval) == 40);  // a driver that restarts
+  std::size_t counted = 0;
+  for (int k = 0; k < 100; ++k) counted += missing.before(stamp += 2 * kInterval);
+  CHECK(counted <= MissingImages::kIntervals / 2 + 1);
+}
+
+}  // namespace
+}  // namespace km
