@@ -43,6 +43,19 @@ std::vector<std::string> robot_command(const fs::path& output,
   return command;
 }
 
+// On topics with EuRoC's names, of a driver in this domain, with the calibration of `dataset`.
+std::vector<std::string> live_command(const TemporaryFolder& folder, const fs::path& dataset,
+                                      const std::string& domain) {
+  const fs::path rig =
+      folder.write("rig.yaml",
+                   "left: {topic: /cam0/image_raw}\nright: {topic: /cam1/image_raw}\n"
+                   "imu: {topic: /imu0}\ncalibration: " +
+                       fs::absolute(dataset).string() + "\n");
+  return robot_command(
+      folder.path() / "live",
+      {"--live", rig.string(), "--set", "ros.domain=" + domain, "--set", "ros.interface=lo"});
+}
+
 }  // namespace
 
 TEST_CASE("On live topics of ROS 2 odometry is that of the recording they are played from",
@@ -50,15 +63,8 @@ TEST_CASE("On live topics of ROS 2 odometry is that of the recording they are pl
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
-  const fs::path rig =
-      folder.write("rig.yaml",
-                   "left: {topic: /cam0/image_raw}\nright: {topic: /cam1/image_raw}\n"
-                   "imu: {topic: /imu0}\ncalibration: " +
-                       fs::absolute(*dataset).string() + "\n");
   const std::string domain = std::to_string(random_domain());
-  Process robot(robot_command(
-      folder.path() / "live",
-      {"--live", rig.string(), "--set", "ros.domain=" + domain, "--set", "ros.interface=lo"}));
+  Process robot(live_command(folder, *dataset, domain));
   // Reliable and slower than real time: what is asked here is not whether a busy host keeps up.
   Process driver({KM_BIN_DIR "/kimera_multi_publish", dataset->string(), "--domain", domain,
                   "--interface", "lo", "--wait", "1", "--reliable", "--rate", "0.7"});
@@ -80,6 +86,29 @@ TEST_CASE("On live topics of ROS 2 odometry is that of the recording they are pl
   CHECK(replay.wait() == 0);
   CHECK(first_lines(folder.path() / "live/odometry.tum", kPoses) ==
         first_lines(folder.path() / "folder/odometry.tum", kPoses));
+}
+
+TEST_CASE("What a live robot has lost is in its summary", "[system][live]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const std::string domain = std::to_string(random_domain());
+  Process robot(live_command(folder, *dataset, domain));
+  Process driver({KM_BIN_DIR "/kimera_multi_publish", dataset->string(), "--domain", domain,
+                  "--interface", "lo", "--wait", "1", "--reliable", "--drop", "0.1"});
+  const auto has_poses = [](const std::string& line) {
+    double seconds = 0.0;
+    int images = 0;
+    return std::sscanf(line.c_str(), "%lf s, %d images", &seconds, &images) == 2 && images > 60;
+  };
+  REQUIRE(robot.wait_until(has_poses).has_value());
+  robot.kill(SIGINT);
+  CHECK(robot.wait() == 0);
+  driver.kill(SIGINT);
+  CHECK(driver.wait() == 0);
+  const auto faults = read_summary(folder.path() / "live/summary.json").sensor_faults;
+  CHECK(faults.contains("images missing between others"));
+  CHECK(faults.contains("left images without a right one"));
 }
 
 namespace {

@@ -288,6 +288,43 @@ TEST_CASE("What a run finds of its cameras is where the next one starts from", "
   CHECK(std::abs(second.rotation_x_rad) < 0.5 * 0.01);
 }
 
+TEST_CASE("What a run has found of its cameras is known when it is taken up", "[sensor_faults]") {
+  const auto recording = shared_data("euroc/MH_01_easy");
+  if (!recording) return;
+  constexpr double kLate_s = 0.02;
+  const TemporaryFolder folder;
+  EurocCopy copy = first_seconds(fs::absolute(*recording), 11.0);
+  for (auto& sample : copy.samples) sample.stamp += nanoseconds(kLate_s);
+  copy.write(folder.path() / "late");
+  const auto cameras = [&](const std::string& output, const std::string& options) {
+    const CommandResult run = run_robot(folder.path() / "late", folder.path() / output, options);
+    CAPTURE(run.output);
+    REQUIRE(run.exit_code == 0);
+    return read_summary(folder.path() / output / "summary.json").cameras.value();
+  };
+  const CamerasSummary before = cameras("run", "--to 10");
+  const auto resumed = [&](const std::string& as, const std::string& options) {
+    fs::copy(folder.path() / "run", folder.path() / as);
+    const CommandResult run = run_command(
+        KM_BIN_DIR
+        "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --rate max"
+        " --serve-limit 0 --interface lo --domain 99 --set dds.team=" +
+        folder.path().filename().string() + " --dataset " + (folder.path() / "late").string() +
+        " --resume " + (folder.path() / as).string() + ' ' + options);
+    CAPTURE(run.output);
+    REQUIRE(run.exit_code == 0);
+    return read_summary(folder.path() / as / "summary.json").cameras.value();
+  };
+  const CamerasSummary after = resumed("taken_up", "");
+  CHECK(after.offset_s == Approx(before.offset_s).margin(1e-3));
+  CHECK(after.offset_sigma_s < 1.05 * before.offset_sigma_s);
+  // By a rig that says so already there is nothing more to correct.
+  const CamerasSummary corrected =
+      resumed("corrected", "--rig " + (folder.path() / "run/rig_estimated.yaml").string());
+  CHECK(std::abs(corrected.offset_s) < 1e-3);
+  CHECK(corrected.offset_sigma_s < 1.05 * before.offset_sigma_s);
+}
+
 TEST_CASE("A robot without an inertial sensor goes by an odometry from outside",
           "[sensor_faults]") {
   const auto recording = shared_data("euroc/MH_01_easy");
