@@ -60,8 +60,8 @@ class CalibrationMap {
   [[nodiscard]] std::string place_of(const char* key) const;
 
  private:
-  CalibrationMap(std::shared_ptr<const std::filesystem::path> file, YAML::Node node)
-      : file_(std::move(file)), node_(std::move(node)) {}
+  CalibrationMap(std::shared_ptr<const std::filesystem::path> file, const YAML::Node& node)
+      : file_(std::move(file)), node_(node) {}
 
   [[nodiscard]] YAML::Node child(const char* key) const;
   [[noreturn]] void fail(const YAML::Node& node, const std::string& problem) const;

@@ -48,6 +48,7 @@ class Child {
  public:
   Child(const std::vector<std::string>& command, int output) {
     std::vector<char*> arguments;
+    arguments.reserve(command.size() + 1);
     for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
     arguments.push_back(nullptr);
     pid_ = fork();
@@ -100,7 +101,7 @@ inline std::filesystem::path long_walk(const std::filesystem::path& folder, Robo
     step.to = {robot, i + 1};
     graph.edges.push_back(step);
   }
-  const std::filesystem::path file = folder / ("walk" + std::to_string(robot) + ".g2o");
+  std::filesystem::path file = folder / ("walk" + std::to_string(robot) + ".g2o");
   write_g2o(file, graph);
   return file;
 }

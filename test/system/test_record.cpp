@@ -100,7 +100,7 @@ TEST_CASE("A robot's record has the poses of its results", "[system]") {
   CAPTURE(run.output);
   REQUIRE(run.exit_code == 0);
   Record record(folder.path() / "record.mcap");
-  CHECK(to_string(record.reader.report()) == "");
+  CHECK_THAT(to_string(record.reader.report()), Catch::Equals(""));
   const std::size_t rows = line_count(folder.path() / "odometry.tum");
   REQUIRE(rows > 200);
   CHECK(record.counts["/alice/odometry"] == rows);
@@ -146,7 +146,7 @@ TEST_CASE(
   CHECK(robot.wait() == 0);
   CHECK(fs::file_size(first) == size);
   const Record resumed(second);
-  CHECK(to_string(resumed.reader.report()) == "");
+  CHECK_THAT(to_string(resumed.reader.report()), Catch::Equals(""));
   check_equal(resumed.last<RosPath>("/alice/path"),
               read_trajectory(folder.path() / "optimized.tum"));
 }
@@ -192,7 +192,7 @@ TEST_CASE("A team's records become one", "[system]") {
   CAPTURE(run.result.output);
   REQUIRE(run.result.exit_code == 0);
   Record team(folder.path() / "team.mcap");
-  CHECK(to_string(team.reader.report()) == "");
+  CHECK_THAT(to_string(team.reader.report()), Catch::Equals(""));
   std::size_t messages = 1;  // where `map` is
   for (const char* name : {"a", "b"}) {
     const Record own(folder.path() / name / "record.mcap");

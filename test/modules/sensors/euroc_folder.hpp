@@ -130,7 +130,7 @@ class EurocFolder {
     std::string list = "#timestamp [ns],filename\n";
     for (int i = 0; i < kPairs; i += every) {
       const std::string stamp = std::to_string(image_stamp(i));
-      list += stamp + ',' + stamp + ".png\n";
+      list.append(stamp).append(",").append(stamp).append(".png\n");
     }
     write(sensor + "/data.csv", list);
   }
