@@ -78,7 +78,7 @@ using Take = std::function<void(const KeyframeId&, const cv::Mat&)>;
 
 void read_folder(const RobotPlan& plan, const Wanted& wanted, const Take& take) {
   const fs::path rig = argument(plan, "--rig");
-  const double offset_s = rig.empty() ? 0.0 : read_rig_correction(rig).camera_time_offset_s;
+  const double offset_s = rig.empty() ? 0.0 : read_rig_correction(rig).offset_s;
   ReaderReport report;
   for (const StereoPairFile& file : list_euroc_lefts(find_mav0(plan.dataset), report))
     if (const auto at = wanted.find(file.stamp + nanoseconds(offset_s)); at != wanted.end())
