@@ -63,6 +63,7 @@ if (told.whole) {
   assert.equal(reader.chunkIndexes.length, reader.statistics.chunkCount);
 }
 
+await file.close();  // else Node may warn of it, beside the JSON
 const path = Object.entries(told.last).find(([topic]) => topic.endsWith("/path"))?.[1];
 console.log(JSON.stringify({
   whole: told.whole, messages: told.messages, topics: told.topics,
