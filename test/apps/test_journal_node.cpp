@@ -27,53 +27,58 @@ JournalTopics journal_topics(Topics& topics, Topic<PeerEvent>& peer_events) {
           .restarts = topics.closure_restarts};
 }
 
-TEST_CASE("What is found while the journal stops is written and handed on", "[robot]") {
+// A node that writes a new journal, and what is in it.
+struct Journal {
+  explicit Journal(const CameraCalibration& correction = {})
+      : node(file, results, JournalStart{1, 1U << kResumeBits, "toy"}, nullptr, correction,
+             journal_topics(topics, peer_events)) {
+    node.start();
+  }
+
+  template <typename Entry>
+  [[nodiscard]] std::vector<Entry> written() const {
+    std::vector<Entry> entries;
+    (void)read_journal(file, [&](const JournalEntry& entry) {
+      if (const auto* found = std::get_if<Entry>(&entry)) entries.push_back(*found);
+    });
+    return entries;
+  }
+
   const TemporaryFolder folder;
   const std::filesystem::path file = folder.path() / kJournal;
   Topics topics;
   Topic<PeerEvent> peer_events;
   ResultWriter results;
-  JournalNode journal(file, results, JournalStart{1, 1U << kResumeBits, "toy"}, nullptr, {},
-                      journal_topics(topics, peer_events));
-  Inbox<Closure> handed_on(topics.own_closures);
-  journal.start();
+  JournalNode node;
+};
+
+TEST_CASE("What is found while the journal stops is written and handed on", "[robot]") {
+  Journal journal;
+  Inbox<Closure> handed_on(journal.topics.own_closures);
   Closure closure;
   closure.from.id = {1, 2};
   closure.to.id = {3, 4};
-  topics.new_closures.publish(closure);
-  journal.stop();
+  journal.topics.new_closures.publish(closure);
+  journal.node.stop();
   REQUIRE(handed_on.messages().size() == 1);
   CHECK(handed_on.messages()[0].id() == closure.id());
-  std::vector<ClosureId> written;
-  (void)read_journal(file, [&](const JournalEntry& entry) {
-    if (const auto* found = std::get_if<Closure>(&entry)) written.push_back(found->id());
-  });
-  CHECK(written == std::vector<ClosureId>{closure.id()});
+  const auto written = journal.written<Closure>();
+  REQUIRE(written.size() == 1);
+  CHECK(written[0].id() == closure.id());
 }
 
 TEST_CASE("A journal holds what all corrections of the cameras come to", "[robot]") {
-  const TemporaryFolder folder;
-  const std::filesystem::path file = folder.path() / kJournal;
-  Topics topics;
-  Topic<PeerEvent> peer_events;
-  ResultWriter results;
-  const CameraCalibration correction{0.02, make_pose(Eigen::Matrix3d::Identity(), {0.1, 0.0, 0.0})};
-  JournalNode journal(file, results, JournalStart{1, 1U << kResumeBits, "toy"}, nullptr, correction,
-                      journal_topics(topics, peer_events));
-  journal.start();
+  Journal journal({0.02, make_pose(Eigen::Matrix3d::Identity(), {0.1, 0.0, 0.0})});
   KeyframeOdometry keyframe;
   keyframe.id = {1, 0};
   keyframe.calibration = UncertainCalibration{{0.005, SE3::Identity()}, Matrix7::Identity()};
-  topics.keyframe_odometry.publish(keyframe);
-  journal.stop();
-  std::vector<CameraCalibration> written;
-  (void)read_journal(file, [&](const JournalEntry& entry) {
-    if (const auto* found = std::get_if<KeyframeOdometry>(&entry))
-      written.push_back(found->calibration.value().calibration);
-  });
+  journal.topics.keyframe_odometry.publish(keyframe);
+  journal.node.stop();
+  const auto written = journal.written<KeyframeOdometry>();
   REQUIRE(written.size() == 1);
-  CHECK(written[0].offset_s == Approx(0.025));
-  CHECK(written[0].T_body_rig.translation().x() == Approx(0.1));
+  const CameraCalibration& found = written[0].calibration.value().calibration;
+  CHECK(found.offset_s == Approx(0.025));
+  CHECK(found.T_body_rig.translation().x() == Approx(0.1));
 }
 
 // Nodes stop in this order.
