@@ -102,28 +102,35 @@ std::string table(const std::vector<PlayedTopic>& topics) {
   return align_columns(rows);
 }
 
-// True once there are enough readers; false after a signal.
-bool wait_for_readers(const MessagePlayer& player, std::size_t wanted, SignalWatch& signals) {
-  if (player.least_readers() < wanted)
-    log::info("publish") << "waiting until each topic has readers: " << wanted;
-  while (player.least_readers() < wanted)
-    if (signals.wait(0.05)) return false;
-  return true;
-}
-
 // Says how far it is, every few seconds.
 class Progress {
  public:
-  void tell(double played_s) {
+  [[nodiscard]] bool is_due() {
     constexpr double kInterval_s = 5.0;
-    if (steady_now_s() - told_s_ < kInterval_s) return;
+    if (steady_now_s() - told_s_ < kInterval_s) return false;
     told_s_ = steady_now_s();
-    log::info("publish") << fixed(played_s, 1) << " s played";
+    return true;
   }
 
  private:
   double told_s_ = steady_now_s();
 };
+
+// True once there are enough readers; false after a signal.
+bool wait_for_readers(const MessagePlayer& player, std::size_t wanted, SignalWatch& signals) {
+  Progress progress;
+  while (true) {
+    const std::vector<std::string> topics = player.topics_short_of(wanted);
+    if (topics.empty()) return true;
+    if (progress.is_due()) {
+      std::string names;
+      for (const std::string& topic : topics) names += (names.empty() ? "" : ", ") + topic;
+      log::info("publish") << "waiting for readers of " << names << ": " << wanted
+                           << " of each (--topics plays only those that are read)";
+    }
+    if (signals.wait(0.05)) return false;
+  }
+}
 
 void play(const Options& options, SignalWatch& signals) {
   const auto network = std::make_shared<const RosNetwork>(options.ros);
@@ -144,7 +151,8 @@ void play(const Options& options, SignalWatch& signals) {
     player.stop();
   });
   Progress progress;
-  while (player.step()) progress.tell(player.played_s());
+  while (player.step())
+    if (progress.is_due()) log::info("publish") << fixed(player.played_s(), 1) << " s played";
   ended = true;
   std::cout << table(player.topics());
   if (!answers) return;

@@ -1,7 +1,6 @@
 #include "apps/publish/message_player.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -81,10 +80,11 @@ MessagePlayer::MessagePlayer(std::unique_ptr<BagReader> recording,
       throw std::invalid_argument("the recording has no topic " + readable(topic, 80));
 }
 
-std::size_t MessagePlayer::least_readers() const {
-  std::size_t least = std::numeric_limits<std::size_t>::max();
-  for (const auto& publisher : publishers_) least = std::min(least, publisher->reader_count());
-  return publishers_.empty() ? 0 : least;
+std::vector<std::string> MessagePlayer::topics_short_of(std::size_t readers) const {
+  std::vector<std::string> topics;
+  for (std::size_t k = 0; k < publishers_.size(); ++k)
+    if (publishers_[k]->reader_count() < readers) topics.push_back(topics_[k].topic);
+  return topics;
 }
 
 void MessagePlayer::schedule(BagMessage message) {

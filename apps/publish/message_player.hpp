@@ -44,8 +44,8 @@ class MessagePlayer {
   MessagePlayer(std::unique_ptr<BagReader> recording,
                 const std::shared_ptr<const RosNetwork>& network, const PlayOptions& options);
 
-  /// Readers of the topic that the fewest have.
-  [[nodiscard]] std::size_t least_readers() const;
+  /// The topics that fewer than so many read.
+  [[nodiscard]] std::vector<std::string> topics_short_of(std::size_t readers) const;
 
   /// Publishes the next message when it is due; false after the last one, and after stop().
   bool step();

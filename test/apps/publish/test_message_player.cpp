@@ -39,7 +39,8 @@ std::vector<Stamp> played(std::unique_ptr<BagReader> bag, const std::string& top
   options.reliable = true;
   MessagePlayer player(std::move(bag), network(), options);
   RosSubscription reader(network(), {{topic, "sensor_msgs/Imu", RosQos::kReliable, kMessages}});
-  while (player.least_readers() == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  while (!player.topics_short_of(1).empty())
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   while (player.step()) {
   }
   played = player.topics().at(0);
