@@ -158,12 +158,10 @@ void FixedLagSmoother::clear() {
   window_.frames.clear();
   window_.landmarks.clear();
   window_.prior = {};
-  information_.reset();
 }
 
 SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
   SmootherUpdate update;
-  information_.reset();
   if (!slide(rests) || !append(frame, window_.frames.back().state, next_offset_s(frame)))
     return update;
   WindowFrame& newest = window_.frames.back();
@@ -401,19 +399,13 @@ double FixedLagSmoother::next_offset_s(const InertialFrame& frame) const {
 
 // Sigma = D H^-1 D^T = |L^-1 D^T|^2.
 std::optional<Eigen::MatrixXd> FixedLagSmoother::covariance_of(Eigen::MatrixXd D_T) const {
-  const Eigen::LLT<Eigen::MatrixXd>& llt = information();
+  WindowEquations equations(window_, 0.0);
+  equations.add_all();
+  Eigen::MatrixXd H = equations.H();
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(H);
   if (llt.info() != Eigen::Success) return std::nullopt;
   llt.matrixL().solveInPlace(D_T);
   return D_T.transpose() * D_T;
-}
-
-const Eigen::LLT<Eigen::MatrixXd>& FixedLagSmoother::information() const {
-  if (!information_) {
-    WindowEquations equations(window_, 0.0);
-    equations.add_all();
-    information_.emplace(equations.H());
-  }
-  return *information_;
 }
 
 void FixedLagSmoother::hold_first() {

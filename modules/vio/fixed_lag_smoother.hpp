@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <optional>
 #include <span>
 #include <vector>
@@ -118,7 +117,6 @@ class FixedLagSmoother {
   [[nodiscard]] Eigen::Index variables() const;
   // Of D times the error of all frames, from its transpose.
   [[nodiscard]] std::optional<Eigen::MatrixXd> covariance_of(Eigen::MatrixXd D_T) const;
-  [[nodiscard]] const Eigen::LLT<Eigen::MatrixXd>& information() const;
   [[nodiscard]] std::size_t keyframes() const;
 
   VioConfig config_;
@@ -129,8 +127,6 @@ class FixedLagSmoother {
   Window window_;
   Matrix7 calibration_covariance_;  // As known when the window was started.
   std::uint64_t next_id_ = 0;
-  // Of the window as it is, once something was asked of it: a keyframe asks three times.
-  mutable std::optional<Eigen::LLT<Eigen::MatrixXd>> information_;
 };
 
 }  // namespace km
