@@ -12,8 +12,7 @@
 #include "apps/evaluate/commands.hpp"
 #include "apps/evaluate/inputs.hpp"
 #include "apps/evaluate/recorded_poses.hpp"
-#include "apps/output_file.hpp"
-#include "modules/charts/chart_page.hpp"
+#include "apps/report_files.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/evaluation/trajectory_report.hpp"
@@ -27,8 +26,7 @@ struct TrajectoryCommand {
   double from_s = -std::numeric_limits<double>::infinity();
   double to_s = std::numeric_limits<double>::infinity();
   TrajectoryErrorOptions options;
-  std::filesystem::path json;  // Not written if empty.
-  std::filesystem::path plot;  // Not written if empty.
+  ReportFiles files;
 };
 
 constexpr double kAbsoluteFrom_s = 1e6;  // larger times are stamps, not seconds since the start
@@ -47,6 +45,7 @@ TimeWindow window_of(const TrajectoryCommand& command, const std::vector<Stamped
 }
 
 void run(TrajectoryCommand command) {
+  command.files.check();
   command.estimates = expand_records(command.estimates);
   if (command.truths.size() != 1 && command.truths.size() != command.estimates.size())
     throw std::invalid_argument("give one --truth, or as many as there are --estimate");
@@ -64,10 +63,8 @@ void run(TrajectoryCommand command) {
   const TeamError team = trajectory_error(inputs, command.options);
   std::cout << to_table(team);
   if (command.options.with_scale) std::cout << "scale " << team.alignment.scale << '\n';
-  write_output(command.json, [&](std::ostream& out) { out << json_text(team); });
-  write_output(command.plot, [&](std::ostream& out) {
-    out << chart_page("Truth and estimates", {plot_from_above(inputs, team)});
-  });
+  command.files.write([&](std::ostream& out) { out << json_text(team); }, "Truth and estimates",
+                      [&] { return std::vector{plot_from_above(inputs, team)}; });
 }
 
 constexpr const char* kTrajectoryDetails =
@@ -109,9 +106,7 @@ void define(CLI::App& app, TrajectoryCommand& command) {
                  "Poses further apart leave the time between uncovered [s]")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app.add_option("--json", command.json, "Also write the numbers to this file, as JSON");
-  app.add_option("--plot", command.plot,
-                 "Also draw truth and estimates from above, as a page for a browser");
+  command.files.define(app, "the numbers", "truth and estimates from above");
 }
 
 }  // namespace

@@ -163,10 +163,6 @@ std::vector<fs::path> true_poses(const WorldConfig& world, const WorldFiles& fil
   return truths;
 }
 
-bool all_exist(const std::vector<fs::path>& files) {
-  return std::all_of(files.begin(), files.end(), [](const fs::path& f) { return fs::exists(f); });
-}
-
 // A run that was made elsewhere is not repeated: its tables are.
 bool made_elsewhere(const Step& step, const std::vector<fs::path>& summaries,
                     const ExperimentPaths& paths) {

@@ -91,11 +91,11 @@ std::string without_folders(const std::string& text) {
   return names;
 }
 
+}  // namespace
+
 bool all_exist(const std::vector<fs::path>& files) {
   return std::all_of(files.begin(), files.end(), [](const fs::path& f) { return fs::exists(f); });
 }
-
-}  // namespace
 
 Machine this_machine() {
   Machine machine;

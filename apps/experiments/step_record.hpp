@@ -25,6 +25,8 @@ struct Step {
   std::string missing = {};  ///< Why it cannot be run; empty if it can.
 };
 
+[[nodiscard]] bool all_exist(const std::vector<std::filesystem::path>& files);
+
 /// The computer a step was run on.
 struct Machine {
   std::string processor;  ///< "AMD EPYC".

@@ -5,8 +5,7 @@
 #include <filesystem>
 #include <string>
 
-#include "apps/output_file.hpp"
-#include "modules/charts/chart_page.hpp"
+#include "apps/report_files.hpp"
 #include "modules/pgo_study/team_graph.hpp"
 
 namespace km {
@@ -16,29 +15,6 @@ namespace km {
 void add_solve(CLI::App& app);
 void add_pcm(CLI::App& app);
 void add_outliers(CLI::App& app);
-
-/// Files that a subcommand writes beside its table.
-struct ReportFiles {
-  std::filesystem::path json, plot;
-
-  /// Defines --json and --plot, with what they have in them.
-  void define(CLI::App& app, const std::string& in_json, const std::string& in_plot) {
-    app.add_option("--json", json, "Also write " + in_json + " to this file, as JSON");
-    app.add_option("--plot", plot, "Also draw " + in_plot + ", as a page for a browser");
-  }
-
-  /// As check_output_folder(), before the work.
-  void check() const {
-    check_output_folder(json);
-    check_output_folder(plot);
-  }
-
-  /// `write_json(std::ostream&)`; `draw()` makes the plots of the page called `title`.
-  void write(const auto& write_json, const std::string& title, const auto& draw) const {
-    write_output(json, write_json);
-    write_output(plot, [&](std::ostream& out) { out << chart_page(title, draw()); });
-  }
-};
 
 /// The pose graph of a team, as the command line names it.
 struct GraphInput {

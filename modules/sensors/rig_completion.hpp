@@ -28,9 +28,9 @@ struct PartialRig {
   /// The inertial sensor's; empty: that of its messages, or the odometry's child frame where there
   /// is no inertial sensor.
   std::string body_frame;
-  SE3 T_body_rig =
-      SE3::Identity();  ///< Of the complete rig, see CameraCalibration; not applied here.
-  std::filesystem::path pose_file;   ///< Of an odometry from outside, see read_pose_file().
+  /// Of the complete rig, see CameraCalibration; not applied here.
+  SE3 T_body_rig = SE3::Identity();
+  std::filesystem::path pose_file;  ///< Of an odometry from outside, see read_pose_file().
 
   [[nodiscard]] bool is_complete() const { return has_cameras && is_placed; }
 };

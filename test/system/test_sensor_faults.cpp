@@ -174,7 +174,7 @@ bool is_wanted(const SensorFault& fault) {
 
 }  // namespace
 
-TEST_CASE("A robot survives what happens to its sensors", "[sensor_faults]") {
+TEST_CASE("A robot survives what happens to its sensors", "[faults]") {
   std::vector<std::vector<std::string>> rows = {{"recording", "fault", "lasts [s]", "poses",
                                                  "worst [mm]", "last 3 s [mm]", "back after [s]",
                                                  "starts", "blind [s]", "exit"}};
@@ -199,7 +199,7 @@ TEST_CASE("A robot survives what happens to its sensors", "[sensor_faults]") {
   std::cout << align_columns(rows);
 }
 
-TEST_CASE("A driver that restarts does not end a live robot", "[sensor_faults][live]") {
+TEST_CASE("A driver that restarts does not end a live robot", "[faults][live]") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;
   const TemporaryFolder folder;
@@ -264,7 +264,7 @@ TEST_CASE("A driver that restarts does not end a live robot", "[sensor_faults][l
   CHECK(summary.odometry->inertial_gaps >= 1);
 }
 
-TEST_CASE("What a run finds of its cameras is where the next one starts from", "[sensor_faults]") {
+TEST_CASE("What a run finds of its cameras is where the next one starts from", "[faults]") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;
   constexpr double kLate_s = 0.02;
@@ -288,7 +288,7 @@ TEST_CASE("What a run finds of its cameras is where the next one starts from", "
   CHECK(std::abs(second.rotation_x_rad) < 0.5 * 0.01);
 }
 
-TEST_CASE("What a run has found of its cameras is known when it is taken up", "[sensor_faults]") {
+TEST_CASE("What a run has found of its cameras is known when it is taken up", "[faults]") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;
   constexpr double kLate_s = 0.02;
@@ -325,8 +325,7 @@ TEST_CASE("What a run has found of its cameras is known when it is taken up", "[
   CHECK(corrected.offset_sigma_s < 1.05 * before.offset_sigma_s);
 }
 
-TEST_CASE("A robot without an inertial sensor goes by an odometry from outside",
-          "[sensor_faults]") {
+TEST_CASE("A robot without an inertial sensor goes by an odometry from outside", "[faults]") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;
   const TemporaryFolder folder;

@@ -51,6 +51,15 @@ TEST_CASE("trajectory prints a table and writes JSON and a plot", "[evaluate]") 
   CHECK(plots[0]["series"].size() == 3);
 }
 
+TEST_CASE("A plot is a page: another name is refused", "[evaluate]") {
+  const Files files;
+  const auto refused = run_command(kTool + "trajectory --truth " + files.truth + " --estimate " +
+                                   files.a + " --plot " + files.folder.path().string() + "/x.svg");
+  CHECK(refused.exit_code != 0);
+  CHECK_THAT(refused.output, Catch::Contains("x.svg: --plot writes *.html"));
+  CHECK_FALSE(std::filesystem::exists(files.folder.path() / "x.svg"));
+}
+
 TEST_CASE("trajectory judges a window, in seconds or stamps", "[evaluate]") {
   const Files files;
   const std::string command =

@@ -7,7 +7,7 @@
 namespace km {
 namespace {
 
-constexpr double kGap = 1e-9;  // relative to the cost
+constexpr double kRelativeGap = 1e-9;  // relative to the cost
 
 auto newton(TreeNewtonOptions options) {
   return [options](SessionGraph graph, TreePlace place) {
@@ -30,8 +30,8 @@ TEST_CASE("A team finds the optimum of its graph, whatever the tree", "[pose_gra
     SolverTeam team = solver_team(problem, tree, {}, newton(kTrusting));
     REQUIRE(team.run());
     CHECK(team.refused() == 0);
-    CHECK(central.cost(team.poses()) == Approx(optimum).epsilon(kGap));
-    CHECK(team.member(0).state().cost == Approx(optimum).epsilon(kGap));
+    CHECK(central.cost(team.poses()) == Approx(optimum).epsilon(kRelativeGap));
+    CHECK(team.member(0).state().cost == Approx(optimum).epsilon(kRelativeGap));
   }
 }
 
@@ -54,7 +54,7 @@ TEST_CASE("Verticals are part of the cost", "[pose_graph]") {
   const CentralProblem central(problem);
   SolverTeam team = solver_team(problem, chain(problem.members()), {}, newton(kTrusting));
   REQUIRE(team.run());
-  CHECK(central.cost(team.poses()) == Approx(central.optimum(problem.start)).epsilon(kGap));
+  CHECK(central.cost(team.poses()) == Approx(central.optimum(problem.start)).epsilon(kRelativeGap));
 }
 
 TEST_CASE("Robots that have gone hold the others where they were", "[pose_graph]") {
@@ -65,7 +65,7 @@ TEST_CASE("Robots that have gone hold the others where they were", "[pose_graph]
   SolverTeam team = solver_team(problem, chain(problem.members()), {}, newton(kTrusting));
   REQUIRE(team.run());
   for (const RobotId robot : problem.members()) CHECK(team.member(robot).state().held);
-  CHECK(central.cost(team.poses()) == Approx(central.optimum(problem.start)).epsilon(kGap));
+  CHECK(central.cost(team.poses()) == Approx(central.optimum(problem.start)).epsilon(kRelativeGap));
 }
 
 TEST_CASE("A recorded graph is solved to its certified optimum", "[pose_graph]") {
@@ -132,7 +132,7 @@ TEST_CASE("Verdicts that cannot follow are refused, and the true one is taken af
   }
   const CentralProblem central(problem);
   const TeamPoses poses{{1, root.poses()}, {2, leaf.poses()}};
-  CHECK(central.cost(poses) == Approx(central.optimum(problem.start)).epsilon(kGap));
+  CHECK(central.cost(poses) == Approx(central.optimum(problem.start)).epsilon(kRelativeGap));
 }
 
 }  // namespace

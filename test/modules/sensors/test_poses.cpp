@@ -1,14 +1,13 @@
 #include <catch2/catch.hpp>
 
 #include "modules/core/lie.hpp"
+#include "modules/core/stamp.hpp"
 #include "modules/sensors/pose_file.hpp"
 #include "modules/sensors/pose_stream.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {
-
-constexpr Stamp kSecond = 1'000'000'000;
 
 const SE3 kStart = se3_exp((Vector6() << 0.1, 0.2, 0.3, 1, 2, 3).finished());
 const Vector6 kTwist = (Vector6() << 0.2, -0.1, 0.4, 0.5, 0.2, -0.3).finished();  // [1/s]
@@ -94,7 +93,7 @@ TEST_CASE("A file of poses is read row by row", "[sensors][poses]") {
   REQUIRE(at);
   CHECK(at->T_odom_body.translation().isApprox(Eigen::Vector3d(1, 2, 3.5)));
   CHECK(at->covariance.isApprox(0.25 * Matrix6::Identity()));
-  CHECK(poses.at(11 * kSecond)->T_odom_body.translation().z() == 5.0);
+  CHECK(poses.at(nanoseconds(11.0))->T_odom_body.translation().z() == 5.0);
   CHECK(report.count(ReaderFault::kMalformedRow) == 4);
   CHECK(report.count(ReaderFault::kUnorderedStamp) == 1);
   CHECK_THAT(report.entries().at(ReaderFault::kMalformedRow).first,
@@ -109,7 +108,7 @@ class Frames final : public DatasetReader {
   std::optional<SensorPacket> next() override {
     if (next_ == 5) return std::nullopt;
     StereoFrame frame;
-    frame.stamp = (10 + next_++) * kSecond;
+    frame.stamp = nanoseconds(10.0 + next_++);
     return SensorPacket{std::make_shared<const StereoFrame>(std::move(frame)), {}};
   }
   ReaderReport report() const override { return {}; }
