@@ -8,7 +8,7 @@ namespace km {
 namespace {
 
 // From a good start the preconditioner need not stay clear of the constraints as far as from any.
-constexpr double kRotationShift = 1e-4;
+constexpr double kShiftFromStart = 1e-4;
 // Convergence is superlinear: after a step that gains less than the first the poses are certified;
 // if that fails, further steps are tried, down to the second, before the rank is blamed.
 constexpr double kRelativeDecrease = 3e-6;
@@ -23,7 +23,7 @@ Staircase::Staircase(std::vector<BlockEdge> edges, LiftedPoses start,
     : options_(options),
       problem_(start.rows(), pose_count(start), std::move(edges), {}, std::move(verticals)),
       X_(std::move(start)) {
-  problem_.set_rotation_shift(kRotationShift);
+  problem_.set_rotation_shift(kShiftFromStart);
   restart();
 }
 
@@ -75,7 +75,7 @@ bool Staircase::resume() {
 void Staircase::climb() {
   QuadraticProblem higher(X_.rows() + 1, problem_.poses(), problem_.edges(), {},
                           problem_.verticals());
-  higher.set_rotation_shift(kRotationShift);
+  higher.set_rotation_shift(kShiftFromStart);
   X_ = escape(higher, X_, certificate_->direction);
   problem_ = std::move(higher);
   restart();
