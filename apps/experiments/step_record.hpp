@@ -25,6 +25,7 @@ struct Step {
   std::string missing = {};  ///< Why it cannot be run; empty if it can.
 };
 
+/// True if each is there, also if there are none.
 [[nodiscard]] bool all_exist(const std::vector<std::filesystem::path>& files);
 
 /// The computer a step was run on.
