@@ -3,6 +3,8 @@
 #include <chrono>
 #include <stdexcept>
 
+#include "modules/core/input_file.hpp"
+
 namespace km {
 namespace {
 
@@ -34,9 +36,11 @@ JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
           "journal"),
       ticks_(
           kSyncPeriod, [this] { worker_.post(Tick()); }, "journal tick") {
-  if (restored != nullptr)
+  if (restored != nullptr) {
     for (const Closure& closure : restored->closures)
       known_closures_.emplace(closure.from.id, closure.to.id);
+    places_ = restored->places;
+  }
   add(start);
   const auto post = [this](const auto& message) { worker_.post(message); };
   topics.states.subscribe(post);
@@ -71,9 +75,26 @@ std::exception_ptr JournalNode::error() const {
   return worker_.error() != nullptr ? worker_.error() : ticks_.error();
 }
 
-void JournalNode::add(const JournalEntry& entry) {
-  journal_.add(entry);
+std::optional<JournalPlace> JournalNode::add(const JournalEntry& entry) {
   added_ = true;
+  return journal_.add(entry);
+}
+
+std::shared_ptr<const Keyframe> JournalNode::recall(KeyframeIndex keyframe) const {
+  JournalPlace place;
+  {
+    const std::lock_guard lock(mutex_);
+    if (keyframe >= places_.size()) return nullptr;
+    place = places_[keyframe];
+  }
+  try {
+    JournalEntry entry = read_journal_entry(file_, place);
+    auto* const read = std::get_if<Keyframe>(&entry);
+    if (read == nullptr || read->odometry.id.index != keyframe) return nullptr;
+    return std::make_shared<const Keyframe>(std::move(*read));
+  } catch (const InputFileError&) {
+    return nullptr;  // not written yet, or the disk is gone
+  }
 }
 
 void JournalNode::step(Tick /*tick*/) {
@@ -108,7 +129,10 @@ void JournalNode::step(const Message<KeyframeOdometry>& odometry) {
 }
 
 void JournalNode::step(const Message<Keyframe>& keyframe) {
-  add(*keyframe);
+  if (const auto place = add(*keyframe)) {
+    const std::lock_guard lock(mutex_);
+    places_.push_back(*place);
+  }
   held_back_.push_back(keyframe);
 }
 

@@ -5,6 +5,8 @@
 #include <exception>
 #include <filesystem>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -60,6 +62,9 @@ class JournalNode final : public Node {
   /// Call before start().
   void take_up() { step(Tick()); }
 
+  /// A keyframe of this run as it was written; null where it is not on the disk. Thread-safe.
+  [[nodiscard]] std::shared_ptr<const Keyframe> recall(KeyframeIndex keyframe) const;
+
   /// True while a keyframe waits for the disk. Thread-safe.
   [[nodiscard]] bool holds_back() const { return new_keyframes_ > 0; }
 
@@ -93,7 +98,7 @@ class JournalNode final : public Node {
   void step(const Message<Closure>& closure);
   void step(const Message<ClosureOutcome>& outcome);
   void step(const Message<PeerEvent>& event);
-  void add(const JournalEntry& entry);
+  std::optional<JournalPlace> add(const JournalEntry& entry);
   void hand_on(const Message<Keyframe>& keyframe);
   void hand_on(const Message<Closure>& closure) { topics_.closures.publish(closure); }
   void hand_on(const Message<PeerEvent>& restart) { topics_.restarts.publish(restart); }
@@ -109,6 +114,8 @@ class JournalNode final : public Node {
   bool added_ = false;                          // since the last sync
   std::atomic<std::size_t> new_keyframes_ = 0;  // that are not handed on
   std::vector<HeldBack> held_back_;
+  mutable std::mutex mutex_;          // guards places_
+  std::vector<JournalPlace> places_;  // of keyframes 0, 1, ..., as far as the journal is whole
   Worker<Input> worker_;
   Periodic ticks_;  // last member: stops before the worker it posts to
 };

@@ -32,7 +32,7 @@ const char* to_string(ClosureStage stage) {
 
 void write_keyframes(std::ostream& out, const RunRecord& record) {
   out << "robot,keyframe,stamp_ns,median_depth_m\n";
-  for (const KeyframeOdometry& keyframe : record.keyframes())
+  for (const RunRecord::RecordedKeyframe& keyframe : record.keyframes())
     out << keyframe.id.robot << ',' << keyframe.id.index << ',' << keyframe.stamp << ','
         << record.median_depth_m(keyframe.id.index) << '\n';
 }
@@ -42,8 +42,8 @@ std::optional<SE3> measured_pose(const RunRecord& record, const ClosureOutcome& 
   const auto closure = record.closures().find(outcome.id);
   if (outcome.stage < ClosureStage::kVerified || closure == record.closures().end())
     return std::nullopt;
-  const Closure& measured = closure->second;
-  const bool same_way = measured.from.id == outcome.id.from;
+  const RelativePose& measured = closure->second;
+  const bool same_way = measured.from == outcome.id.from;
   return same_way ? measured.T_from_to : measured.T_from_to.inverse();
 }
 
@@ -83,8 +83,7 @@ G2oGraph graph_of(const RunRecord& record) {
       graph.edges.push_back({keyframes[i - 1].id, keyframes[i].id, keyframes[i].T_previous_kf,
                              keyframes[i].covariance});
   }
-  for (const Closure& closure : record.inlier_closures())
-    graph.edges.push_back(closure.relative_pose());
+  for (RelativePose& closure : record.inlier_closures()) graph.edges.push_back(std::move(closure));
   return graph;
 }
 

@@ -20,7 +20,13 @@ void RunRecord::add(const OdometryState& state) {
 
 void RunRecord::add(const KeyframeOdometry& keyframe) {
   ++activity_;
-  keyframes_.push_back(keyframe);
+  calibration_ = keyframe.calibration;
+  keyframes_.push_back({.id = keyframe.id,
+                        .stamp = keyframe.stamp,
+                        .T_odom_kf = keyframe.T_odom_kf,
+                        .T_previous_kf = keyframe.T_previous_kf,
+                        .covariance = keyframe.covariance,
+                        .vertical = keyframe.vertical});
 }
 
 void RunRecord::add(const Keyframe& keyframe) {
@@ -37,16 +43,16 @@ void RunRecord::add(const Keyframe& keyframe) {
 void RunRecord::add(const Closure& closure) {
   ++activity_;
   if (closure.from.id.robot != robot_ && closure.to.id.robot != robot_) return;
-  const auto edge = pose_edge(closure.relative_pose());
+  const RelativePose measured = closure.relative_pose();
+  const auto edge = pose_edge(measured);
   if (!edge) return;  // the optimiser refuses it, too
   const ClosureId id = closure.id();
   const RobotId other = id.from.robot == robot_ ? id.to.robot : id.from.robot;
   if (other != robot_ && closures_to_[other] >= OwnGraph::kMaxClosures && !closures_.contains(id))
     return;
-  const auto [known, is_new] = closures_.try_emplace(id, closure);
+  const auto [known, is_new] = closures_.try_emplace(id, measured);
   closures_to_[other] += is_new ? 1 : 0;
-  if (!is_new && is_better(*edge, *pose_edge(known->second.relative_pose())))
-    known->second = closure;
+  if (!is_new && is_better(*edge, *pose_edge(known->second))) known->second = measured;
 }
 
 void RunRecord::add(const InlierSet& set) {
@@ -117,8 +123,8 @@ bool RunRecord::is_inlier(const ClosureId& id) const {
          std::binary_search(set->second.closures.begin(), set->second.closures.end(), id);
 }
 
-std::vector<Closure> RunRecord::inlier_closures() const {
-  std::vector<Closure> result;
+std::vector<RelativePose> RunRecord::inlier_closures() const {
+  std::vector<RelativePose> result;
   for (const auto& [id, closure] : closures_)
     if (is_inlier(id)) result.push_back(closure);
   return result;

@@ -62,7 +62,15 @@ class RunRecord {
   [[nodiscard]] std::uint64_t activity() const { return activity_; }
 
   [[nodiscard]] const std::vector<StampedPose>& odometry() const { return odometry_; }
-  [[nodiscard]] const std::vector<KeyframeOdometry>& keyframes() const { return keyframes_; }
+  /// What stays of a KeyframeOdometry: of the rest, which is larger, only the last counts.
+  struct RecordedKeyframe {
+    KeyframeId id;
+    Stamp stamp = 0;
+    SE3 T_odom_kf = SE3::Identity(), T_previous_kf = SE3::Identity();
+    Matrix6 covariance = Matrix6::Zero();
+    std::optional<Vertical> vertical = {};
+  };
+  [[nodiscard]] const std::vector<RecordedKeyframe>& keyframes() const { return keyframes_; }
   /// Median depth of a keyframe's keypoints in its left camera [m]; 0: unknown.
   [[nodiscard]] double median_depth_m(std::uint32_t keyframe) const;
 
@@ -74,8 +82,8 @@ class RunRecord {
     return odometry_statistics_;
   }
   /// Of the cameras, as known last; absent where it is not estimated.
-  [[nodiscard]] std::optional<UncertainCalibration> calibration() const {
-    return keyframes_.empty() ? std::nullopt : keyframes_.back().calibration;
+  [[nodiscard]] const std::optional<UncertainCalibration>& calibration() const {
+    return calibration_;
   }
 
   /// Absent where mapping is off, or no frame has come yet.
@@ -101,10 +109,10 @@ class RunRecord {
 
   /// Closures that touch this robot, with what was measured, by whichever of its ends: to each
   /// other robot as many as the optimiser keeps.
-  [[nodiscard]] const std::map<ClosureId, Closure>& closures() const { return closures_; }
+  [[nodiscard]] const std::map<ClosureId, RelativePose>& closures() const { return closures_; }
 
   /// Closures of this robot that are inliers, with its own and its peers' measurements.
-  [[nodiscard]] std::vector<Closure> inlier_closures() const;
+  [[nodiscard]] std::vector<RelativePose> inlier_closures() const;
 
   /// Every candidate of this robot in the order of ids, the stage raised to kInlier, or the reason
   /// filled in, by the newest inlier sets and by what the optimiser has rejected of them.
@@ -129,11 +137,12 @@ class RunRecord {
 
   RobotId robot_;
   std::vector<StampedPose> odometry_;
-  std::vector<KeyframeOdometry> keyframes_;
+  std::vector<RecordedKeyframe> keyframes_;
+  std::optional<UncertainCalibration> calibration_;
   std::optional<VioStatistics> odometry_statistics_;
   std::map<std::uint32_t, double> median_depths_m_;  // by keyframe
   std::size_t keypoints_ = 0;
-  std::map<ClosureId, Closure> closures_;
+  std::map<ClosureId, RelativePose> closures_;
   std::map<RobotId, std::size_t> closures_to_;  // by the other robot; of `closures_`
   std::map<std::pair<RobotId, RobotId>, InlierSet> inlier_sets_;
   std::set<ClosureId> rejected_;  // by the optimiser, of the inlier sets

@@ -281,7 +281,10 @@ void Robot::add_loop_closure(const RobotConfig& config) {
                                          .own_replies = topics_.own_replies,
                                          .own_closures = topics_.new_closures,
                                          .own_restarts = topics_.new_closure_restarts,
-                                         .outcomes = topics_.outcomes});
+                                         .outcomes = topics_.outcomes},
+                       [this](KeyframeIndex keyframe) -> std::shared_ptr<const Keyframe> {
+                         return journal_ == nullptr ? nullptr : journal_->recall(keyframe);
+                       });
 }
 
 void Robot::add_back_end(const RobotConfig& config) {
@@ -362,8 +365,8 @@ void Robot::add_network(CrossingEnds meshes) {
   };
   t.closure_restarts.subscribe(meet);
   t.own_inlier_sets.subscribe(
-      [to = Out<Addressed<InlierSet>>(t.told_inlier_sets)](const auto& set) {
-        if (set->a != set->b) to.publish(Addressed<InlierSet>{set->b, set});
+      [this, to = Out<Addressed<InlierSet>>(t.told_inlier_sets)](const auto& set) {
+        if (set->a != set->b) to.publish(Addressed<InlierSet>{set->b, set, lives_.of(set->b)});
       });
   dds.peers().events().subscribe([this, meet](const auto& event) {
     if (event->kind == PeerEventKind::kJoined || event->kind == PeerEventKind::kTold) meet(event);

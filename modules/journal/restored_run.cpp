@@ -22,7 +22,7 @@ bool is_final(const ClosureOutcome& outcome) {
 class RunRestorer {
  public:
   // Throws std::invalid_argument for an entry that cannot follow those before.
-  void take(JournalEntry entry);
+  void take(JournalEntry entry, JournalPlace place);
 
   // Call once, after the last entry.
   [[nodiscard]] RestoredRun finish();
@@ -39,13 +39,15 @@ class RunRestorer {
   void forget_closures(const std::function<bool(const KeyframeId&)>& with);
 
   RestoredRun run_;
+  JournalPlace place_;  // of the entry that is being taken
   bool started_ = false;
   bool first_state_ = true;                                        // of its process
   std::map<std::pair<KeyframeId, KeyframeId>, Closure> closures_;  // by the ends as measured
   std::map<ClosureId, ClosureOutcome> outcomes_;
 };
 
-void RunRestorer::take(JournalEntry entry) {
+void RunRestorer::take(JournalEntry entry, JournalPlace place) {
+  place_ = place;
   if (!started_ && !std::holds_alternative<JournalStart>(entry))
     throw std::invalid_argument("nothing says whose run it is");
   std::visit([this](auto& value) { add(std::move(value)); }, entry);
@@ -82,6 +84,7 @@ void RunRestorer::add(Keyframe keyframe) {
   if (id != KeyframeId{run_.robot, static_cast<KeyframeIndex>(run_.keyframes.size())})
     throw std::invalid_argument("features of keyframe " + to_string(id) + " do not follow");
   run_.keyframes.push_back(std::move(keyframe));
+  run_.places.push_back(place_);
 }
 
 void RunRestorer::add(Closure closure) {
@@ -96,6 +99,7 @@ void RunRestorer::cut_to_full_keyframes() {
   const std::size_t full = std::min(run_.odometry.size(), run_.keyframes.size());
   run_.odometry.resize(full);
   run_.keyframes.resize(full);
+  run_.places.resize(full);
   forget_closures([&](const KeyframeId& id) { return id.robot == run_.robot && id.index >= full; });
 }
 
@@ -161,10 +165,10 @@ RestoredRun alone_as(RobotId robot, RestoredRun run) {
 RestoredRun restore_run(const std::filesystem::path& file) {
   RunRestorer restorer;
   std::size_t entry = 0;
-  const JournalExtent read = read_journal(file, [&](JournalEntry taken) {
+  const JournalExtent read = read_journal(file, [&](JournalEntry taken, JournalPlace place) {
     ++entry;
     try {
-      restorer.take(std::move(taken));
+      restorer.take(std::move(taken), place);
     } catch (const std::invalid_argument& error) {
       throw InputFileError(file.string() + ": entry " + std::to_string(entry) + ": " +
                            error.what());

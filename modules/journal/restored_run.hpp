@@ -20,6 +20,7 @@ struct RestoredRun {
 
   std::vector<KeyframeOdometry> odometry;  ///< Index i is keyframe i.
   std::vector<Keyframe> keyframes;         ///< Likewise, equally many.
+  std::vector<JournalPlace> places;        ///< Of these in the journal.
   /// Of all images: those behind the last keyframe's stand until they are estimated anew.
   std::vector<OdometryState> states;
   std::vector<Closure> closures;  ///< Own and of the others, each once from either side.

@@ -27,7 +27,7 @@ struct LoopClosureConfig {
   int attempt_separation = 2;
   double failure_patience = 2.0;
   int reply_keypoints = 200;
-  int full_keyframes = 500;
+  int full_keyframes = 50;
   int cached_keyframes = 500;
   std::uint32_t seed = 1;
 
@@ -78,9 +78,11 @@ struct LoopClosureConfig {
                   "of a keyframe that a peer is sent at most, 40 B each: those most likely to "
                   "correspond, as far down as a quarter of it, see chosen_by_words(); up to three "
                   "times as many in the first dozen replies to a robot");
-    visitor.field("full_keyframes", full_keyframes, {1, 1000000},
-                  "newest own ones kept with all keypoints, 48 B each; older ones keep twice "
-                  "reply_keypoints, see reduced()");
+    visitor.field(
+        "full_keyframes", full_keyframes, {1, 1000000},
+        "newest own ones in memory with all keypoints, 48 B each; older ones are read from "
+        "the run's journal when needed, or keep twice reply_keypoints where it is not "
+        "on the disk");
     visitor.field("cached_keyframes", cached_keyframes, {1, 1000000},
                   "of peers, kept for further candidates; about 10 kB each");
     visitor.field("seed", seed, {0U, ~0U}, "of the sampling");

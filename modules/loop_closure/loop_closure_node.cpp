@@ -72,11 +72,12 @@ KeyframeFeatures chosen_by_words(const KeyframeFeatures& features, const Keypoin
 
 LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
                                  std::shared_ptr<const Vocabulary> vocabulary,
-                                 const LoopClosureTopics& topics)
+                                 const LoopClosureTopics& topics, Recall recall)
     : self_(self),
       vocabulary_(std::move(vocabulary)),
       topics_(topics),
       verifier_(config),
+      recall_(std::move(recall)),
       peers_(static_cast<std::size_t>(config.cached_keyframes)),
       requests_(config.request_timeout_s, config.max_outstanding_requests),
       economy_(config),
@@ -120,15 +121,17 @@ std::exception_ptr LoopClosureNode::error() const {
 
 void LoopClosureNode::step(const std::shared_ptr<const Keyframe>& own_keyframe) {
   own_[own_keyframe->odometry.id] = own_keyframe;
-  thin_out_before(own_keyframe->odometry.id.index);
+  put_away_before(own_keyframe->odometry.id.index);
   arrived(own_keyframe);
 }
 
-// Of the keyframe that is no longer among the newest only part of the keypoints stays.
-void LoopClosureNode::thin_out_before(KeyframeIndex newest) {
+// The keyframe that is no longer among the newest is read again when it is asked for. Whether it
+// can be is tried once: of one that is not on the disk part of the keypoints stays.
+void LoopClosureNode::put_away_before(KeyframeIndex newest) {
   if (newest < full_keyframes_) return;
   const auto old = own_.find({self_, newest - full_keyframes_});
   if (old == own_.end()) return;
+  if (recall_ && recall_(old->first.index) != nullptr) return old->second.reset();
   auto thinned = std::make_shared<Keyframe>(*old->second);
   thinned->features = reduced(thinned->features, 2 * reply_keypoints_);
   thinned->features.keypoints.shrink_to_fit();
@@ -153,12 +156,11 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeRequest>& request
   }
   KeyframeReply reply{.number = request->number, .found = false, .keyframe = {}};
   reply.keyframe.odometry.id = request->keyframe;
-  if (const auto own = own_.find(request->keyframe); own != own_.end()) {
+  if (const KeyframePtr asked = own(request->keyframe)) {
     reply.found = true;
-    reply.keyframe.odometry = own->second->odometry;
-    reply.keyframe.stamp = own->second->stamp;
-    reply.keyframe.features =
-        worth_sending(own->second->features, {request->requester, request->own});
+    reply.keyframe.odometry = asked->odometry;
+    reply.keyframe.stamp = asked->stamp;
+    reply.keyframe.features = worth_sending(asked->features, {request->requester, request->own});
   }
   topics_.own_replies.publish(Addressed<KeyframeReply>{
       request->requester, std::make_shared<const KeyframeReply>(std::move(reply))});
@@ -237,9 +239,17 @@ void LoopClosureNode::accept(const Work& work) {
 }
 
 LoopClosureNode::KeyframePtr LoopClosureNode::find(const KeyframeId& id) {
-  if (id.robot != self_) return peers_.get(id);
-  const auto own = own_.find(id);
-  return own == own_.end() ? nullptr : own->second;
+  return id.robot == self_ ? own(id) : peers_.get(id);
+}
+
+LoopClosureNode::KeyframePtr LoopClosureNode::own(const KeyframeId& id) const {
+  const auto found = own_.find(id);
+  if (found == own_.end() || found->second) return found == own_.end() ? nullptr : found->second;
+  KeyframePtr keyframe = recall_(id.index);
+  if (!keyframe)
+    log::limited(log::Level::kWarn, name(), "not read")
+        << "keyframe " << to_string(id) << " cannot be read from the disk any more: not compared";
+  return keyframe;
 }
 
 KeyframeFeatures LoopClosureNode::worth_sending(const KeyframeFeatures& features,
@@ -261,6 +271,8 @@ bool LoopClosureNode::advance(const Work& work) {
   const KeyframeId& missing = from ? work.id.to : work.id.from;
   if (missing.robot != self_) {
     ask_for(missing, work);
+  } else if (own_.contains(missing)) {
+    report(work, ClosureStage::kCandidate, "cannot be read from the disk any more");
   } else {
     waiting_[missing].push_back(work);
   }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <exception>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -63,10 +64,14 @@ struct LoopClosureTick {
 /// measured ones, too, and begins anew.
 class LoopClosureNode final : public Node {
  public:
-  /// `vocabulary` may be null: then keypoints are sent without regard to their words. Throws
-  /// ConfigError if `config` is out of bounds.
+  /// An own keyframe as it was given, from the disk; null where it is not there. Any thread.
+  using Recall = std::function<std::shared_ptr<const Keyframe>(KeyframeIndex)>;
+
+  /// `vocabulary` may be null: then keypoints are sent without regard to their words. Without
+  /// `recall` all stays in memory that is kept. Throws ConfigError if `config` is out of bounds.
   LoopClosureNode(const LoopClosureConfig& config, RobotId self,
-                  std::shared_ptr<const Vocabulary> vocabulary, const LoopClosureTopics& topics);
+                  std::shared_ptr<const Vocabulary> vocabulary, const LoopClosureTopics& topics,
+                  Recall recall = {});
 
   std::string_view name() const override { return "loop_closure"; }
   void start() override;
@@ -104,7 +109,8 @@ class LoopClosureNode final : public Node {
     bool requested = false;                     ///< The other end has been asked for.
   };
 
-  void thin_out_before(KeyframeIndex newest);
+  void put_away_before(KeyframeIndex newest);
+  [[nodiscard]] KeyframePtr own(const KeyframeId& id) const;
   void forget(RobotId peer);
   void accept(const Work& work);
   bool advance(const Work& work);
@@ -122,7 +128,8 @@ class LoopClosureNode final : public Node {
   const std::shared_ptr<const Vocabulary> vocabulary_;
   const LoopClosureTopics topics_;
   const Verifier verifier_;
-  std::map<KeyframeId, KeyframePtr> own_;
+  const Recall recall_;
+  std::map<KeyframeId, KeyframePtr> own_;  // null: on the disk
   std::map<RobotId, int> replies_;  // sent
   PeerWords words_;
   KeyframeCache peers_;

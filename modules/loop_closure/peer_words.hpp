@@ -13,7 +13,7 @@ namespace km {
 /// the newest keyframes are kept, as many as have kMaxWordsPerRobot words. Not thread-safe.
 class PeerWords {
  public:
-  static constexpr std::size_t kMaxWordsPerRobot = 4U << 20U;  ///< 16 MB
+  static constexpr std::size_t kMaxWordsPerRobot = 2U << 20U;  ///< 8 MB
 
   /// `words` ascending; those of a keyframe that is known already are replaced.
   void put(const KeyframeId& id, std::vector<std::uint32_t> words);

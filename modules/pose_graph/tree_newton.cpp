@@ -478,10 +478,10 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
       break;
     case Next::kDone:
       accept();
-      phase_ = Phase::kDone;
+      finish();
       break;
     case Next::kStop:
-      phase_ = Phase::kDone;
+      finish();
       break;
   }
   const bool set_aside = state_.set_aside || (v.next == Next::kStart && v.set_aside);
@@ -499,6 +499,12 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
   for (const RobotId child : place_.children)
     letters.push_back(letter_to(child, encode(DownLetter{v, step_of_child[child]})));
   return letters;
+}
+
+// Factors are most of a robot's memory, and it stays in this session until the next one begins.
+void TreeNewton::finish() {
+  phase_ = Phase::kDone;
+  front_.reset();
 }
 
 ClosureVerdicts TreeNewton::verdicts() const {

@@ -89,6 +89,7 @@ class TreeNewton final : public MemberSolver {
   void take_step(const Eigen::VectorXd& step, const TreeVerdict& verdict,
                  std::map<RobotId, Eigen::VectorXd>& children);
   void accept();
+  void finish();
 
   SessionGraph graph_;
   TreePlace place_;

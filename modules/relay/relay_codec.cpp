@@ -23,6 +23,7 @@ Codec<RelayParcel>::Encoded Codec<RelayParcel>::encode(const RelayParcel& parcel
   wire.boot = message.origin.boot;
   wire.number = message.number;
   borrow(wire.content, encoded.content);
+  wire.to_boot = message.to_boot;
   return encoded;
 }
 
@@ -42,6 +43,7 @@ Decoded<RelayParcel> Codec<RelayParcel>::decode(const Wire& wire, const TeamPeer
                                            .kind = kind,
                                            .origin = {wire.origin, wire.boot},
                                            .to = wire.to,
+                                           .to_boot = wire.to_boot,
                                            .number = wire.number,
                                            .hops = wire.hops,
                                            .content = {content->begin(), content->end()}})});

@@ -21,7 +21,7 @@ template <>
 struct Codec<RelayParcel> {
   using Wire = km_wire_RelayParcel;
   static constexpr const char* kTopic = "relay_parcels";
-  static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::uint16_t kVersion = 2;
   static constexpr std::size_t kMaxBytes = kMaxRelayContent + 64;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_RelayParcel_desc; }
 

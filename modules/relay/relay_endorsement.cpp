@@ -15,11 +15,12 @@ constexpr char kSeparator = ';';  // which no name has
 Octets statement_of(const RelayMessage& message, OctetView content) {
   const bool is_lasting = message.kind == RelayKind::kBag || message.kind == RelayKind::kReply;
   const std::uint64_t boot = message.origin.boot;
-  ByteWriter writer = statement("kimera_multi message handed on 1");
+  ByteWriter writer = statement("kimera_multi message handed on 2");
   writer.u8(static_cast<std::uint8_t>(message.kind));
   writer.u16(message.origin.robot);
   writer.u64(is_lasting ? boot >> kResumeBits << kResumeBits : boot);
   writer.u16(is_lasting ? RobotId{0} : message.to);
+  writer.u64(is_lasting ? 0 : message.to_boot);
   writer.u32(message.number);
   writer.bytes(content);
   return writer.release();

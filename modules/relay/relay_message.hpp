@@ -22,7 +22,8 @@ enum class RelayKind : std::uint8_t {
 struct RelayMessage {
   RelayKind kind = RelayKind::kIntroduction;
   TeamPeer origin;
-  RobotId to = 0;  ///< Not of kIntroduction and kBag.
+  RobotId to = 0;             ///< Not of kIntroduction and kBag.
+  std::uint64_t to_boot = 0;  ///< Of a letter: only for the life of this process; 0: for any.
   std::uint32_t number = 0;
   std::uint8_t hops = 0;  ///< Of a request or an answer: robots that have passed it on.
   /// The topic's own type, serialised; of a letter that nobody needs any more, empty. In a team

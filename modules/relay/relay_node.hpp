@@ -156,7 +156,8 @@ void RelayNode::join_letters(RelayKind kind, const RelayedTopics<T>& topics) {
     direct.publish(letter);
     const T& message = *letter->message;
     act([&](RelayStore& store) {
-      store.wrote(kind, letter->to, Codec<T>::key_of(message), bytes_of(message), now_s_());
+      store.wrote(kind, {letter->to, letter->boot}, Codec<T>::key_of(message), bytes_of(message),
+                  now_s_());
     });
   });
 }

@@ -101,7 +101,22 @@ void RelayStore::become(Origin& origin, const RobotIdentity& identity, Membershi
   origin.membership = std::move(membership);
   if (former == identity.boot) return;
   origin.letters = {};
-  if (other_key || !is_same_life(former, identity.boot)) origin.bags = origin.replies = {};
+  const bool other_life = !is_same_life(former, identity.boot);
+  if (other_key || other_life) origin.bags = origin.replies = {};
+  if (other_life) end_letters_to_former_lives({identity.robot, identity.boot});
+}
+
+void RelayStore::end_letters_to_former_lives(const TeamPeer& peer) {
+  const auto is_over = [&](const RelayMessage& message) {
+    return message.to == peer.robot && message.to_boot != 0 &&
+           !is_same_life(message.to_boot, peer.boot);
+  };
+  std::erase_if(recent_, [&](const Recent& recent) { return is_over(recent.message); });
+  std::erase_if(own_slots_, [&](const auto& slot) {
+    const bool ends = is_over(*own_letters_.find(slot.second));
+    if (ends) empty_letter(slot.second);
+    return ends;
+  });
 }
 
 void RelayStore::heard(const RobotIdentity& peer) {
@@ -168,12 +183,16 @@ RelayArrival RelayStore::keep(Stream Origin::*stream, std::size_t max_bytes, Rel
   return RelayArrival::kNoRoom;
 }
 
-void RelayStore::wrote(RelayKind kind, RobotId to, std::uint64_t slot,
+void RelayStore::wrote(RelayKind kind, const TeamPeer& to, std::uint64_t slot,
                        std::vector<std::uint8_t> content, double now_s) {
-  RelayMessage message{.kind = kind, .origin = self_, .to = to, .content = std::move(content)};
+  RelayMessage message{.kind = kind,
+                       .origin = self_,
+                       .to = to.robot,
+                       .to_boot = to.boot,
+                       .content = std::move(content)};
   while (!recent_.empty() && now_s - recent_.front().sent_s > kDoubt_s) recent_.pop_front();
-  if (hears(to)) return recent_.push_back({now_s, slot, std::move(message)});
-  if (origins_.contains(to)) return write_letter(slot, std::move(message));
+  if (hears(to.robot)) return recent_.push_back({now_s, slot, std::move(message)});
+  if (origins_.contains(to.robot)) return write_letter(slot, std::move(message));
   unmet_.push_back({now_s, slot, std::move(message)});
   if (unmet_.size() <= kMaxUnmet) return;
   unmet_.pop_back();
@@ -195,18 +214,19 @@ void RelayStore::write_letter(std::uint64_t slot, RelayMessage message) {
   message.number = own_letters_.whole();
   const auto [last, first] =
       own_slots_.try_emplace({message.kind, message.to, slot}, message.number);
-  if (!first) {
-    RelayMessage emptied{.kind = message.kind,
-                         .origin = self_,
-                         .to = message.to,
-                         .number = std::exchange(last->second, message.number)};
-    sign(emptied);
-    (void)own_letters_.put(std::move(emptied), kMaxLetterBytes);  // fits where there was more
-  }
+  if (!first) empty_letter(std::exchange(last->second, message.number));
   sign(message);
   if (own_letters_.put(std::move(message), kMaxLetterBytes)) return;
   ++given_up_;
   own_slots_.erase(last);
+}
+
+// Its number stays: those behind it are handed on in order.
+void RelayStore::empty_letter(std::uint32_t number) {
+  RelayMessage emptied = *own_letters_.find(number);
+  emptied.content.clear();
+  sign(emptied);
+  (void)own_letters_.put(std::move(emptied), kMaxLetterBytes);  // fits where there was more
 }
 
 void RelayStore::call(RelayKind kind, RobotId to, std::uint32_t number,
@@ -247,7 +267,8 @@ RelayArrival RelayStore::receive(const RelayParcel& parcel) {
     if (message.kind == RelayKind::kReply) hold_reply(message);
     if (!is_mine) return route(message, from);
   }
-  const bool is_for_self = message.kind == RelayKind::kBag || is_mine;
+  const bool is_this_life = message.to_boot == 0 || is_same_life(message.to_boot, self_.boot);
+  const bool is_for_self = message.kind == RelayKind::kBag || (is_mine && is_this_life);
   if (arrival == RelayArrival::kNew && is_for_self) deliver(parcel.message);
   return arrival;
 }

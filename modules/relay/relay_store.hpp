@@ -109,9 +109,10 @@ class RelayStore {
 
   /// This robot has told `to` a closure or inlier set, directly if that is heard: a letter if not,
   /// or if it falls silent soon; of a robot that has not been met yet that is seen then. Of one
-  /// kind and `slot` to one robot the last counts.
-  void wrote(RelayKind kind, RobotId to, std::uint64_t slot, std::vector<std::uint8_t> content,
-             double now_s);
+  /// kind and `slot` to one robot the last counts. It is for the life of the process `to` alone,
+  /// of boot 0 for any.
+  void wrote(RelayKind kind, const TeamPeer& to, std::uint64_t slot,
+             std::vector<std::uint8_t> content, double now_s);
   /// Sends a request or an answer to a robot that ways_to() says to be reached so.
   void call(RelayKind kind, RobotId to, std::uint32_t number, std::vector<std::uint8_t> content);
 
@@ -182,7 +183,7 @@ class RelayStore {
   /// Null if there is one too many.
   Origin* know(const RobotIdentity& identity);
   [[nodiscard]] Membership membership_of(const RobotIdentity& identity) const;
-  static void become(Origin& origin, const RobotIdentity& identity, Membership membership);
+  void become(Origin& origin, const RobotIdentity& identity, Membership membership);
   [[nodiscard]] bool is_known(const TeamPeer& peer) const;
   [[nodiscard]] bool is_forged(const RelayMessage& message);
   void sign(RelayMessage& message) const;
@@ -194,6 +195,8 @@ class RelayStore {
   RelayArrival keep(Stream Origin::*stream, std::size_t max_bytes, RelayMessage message);
   void settle_unmet(RobotId robot, bool heard);
   void write_letter(std::uint64_t slot, RelayMessage message);
+  void empty_letter(std::uint32_t number);
+  void end_letters_to_former_lives(const TeamPeer& peer);
   void hand_on(RobotId to, double now_s);
   void hand_on(RobotId to, const Origin& origin, double now_s);
   void hand_on(RobotId to, const Origin& origin, bool letters, std::uint32_t told, double now_s);

@@ -168,8 +168,11 @@ void BagDataset::take(Role role, BagMessage message) {
     take_pose(stamp, message);
     return;
   }
-  const std::size_t missing = missing_[static_cast<std::size_t>(role)].before(stamp);
-  if (missing > 0) report_.add(ReaderFault::kMissingBetween, place_of(message), missing);
+  const ImageGap gap = missing_[static_cast<std::size_t>(role)].before(stamp);
+  if (gap.missing > 0) report_.add(ReaderFault::kMissingBetween, place_of(message), gap.missing);
+  if (gap.pause_s > 0.0)
+    report_.add(ReaderFault::kPause,
+                place_of(message) + ": " + fixed(gap.pause_s, 1) + " s after the one before");
   stamp += nanoseconds(rig_.camera_time_offset_s);
   const ImageRole image = role == Role::kLeft    ? ImageRole::kLeft
                           : role == Role::kRight ? ImageRole::kRight

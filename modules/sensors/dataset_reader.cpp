@@ -48,6 +48,8 @@ const char* to_string(ReaderFault fault) {
       return "messages lost on the way";
     case ReaderFault::kMissingBetween:
       return "images missing between others";
+    case ReaderFault::kPause:
+      return "pauses of a camera";
   }
   return "unknown faults";
 }

@@ -14,8 +14,8 @@ namespace km {
 
 /// What can be wrong with a piece of a recording without making the rest useless. Each is a skip of
 /// the row, sample or frame concerned, with two exceptions: a depth or label image that cannot be
-/// used leaves its frame without one, and after kImuGap, kUnknownColor and kMissingBetween reading
-/// goes on.
+/// used leaves its frame without one, and after kImuGap, kUnknownColor, kMissingBetween and kPause
+/// reading goes on.
 enum class ReaderFault {
   kMalformedRow,       ///< Too few fields, or a stamp or value that is not a number.
   kNotFinite,          ///< NaN or infinity in an inertial sample.
@@ -39,6 +39,7 @@ enum class ReaderFault {
   kFrameWithoutPose,   ///< An odometry from outside has no pose for the frame.
   kLostMessage,        ///< Of a live topic: it came faster than it was taken.
   kMissingBetween,     ///< An image that is not there, by the stamps of those around it.
+  kPause,              ///< No image for more than MissingImages::kPause_s.
 };
 
 /// A short plural for tables and log lines: "malformed rows".

@@ -191,7 +191,9 @@ void OutgoingTopic::refresh_readers(Writer& writer) {
     const auto guid = participant_of_subscription(writer.writer.handle(), handle);
     if (!guid) continue;
     writer.readers.push_back(*guid);
-    if (std::ranges::find(former, *guid) == former.end()) writer.sent_to[*guid].add(writer.history);
+    if (std::ranges::find(former, *guid) != former.end()) continue;
+    writer.sent_to[*guid].add(writer.history);
+    newcomers_ |= writer.history.bytes > 0;
   }
   if (spec_.kind == TopicKind::kRequest && !writer.readers.empty()) writer.history = {};
 }

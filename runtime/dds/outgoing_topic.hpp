@@ -10,6 +10,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "runtime/dds/codec.hpp"
@@ -51,8 +52,8 @@ struct Addressee {
 /// is not what DDS keeps, sealed as it is for the former process: events and states for one robot
 /// are kept here in clear as well, and sealed anew for the next one.
 ///
-/// write(), catch_up(), notice_readers(), readers_of() and wait_for_acks() belong to one thread;
-/// the rest is thread-safe.
+/// write(), catch_up(), notice_readers(), take_newcomers(), readers_of() and wait_for_acks() belong
+/// to one thread; the rest is thread-safe.
 class OutgoingTopic {
  public:
   OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec);
@@ -74,6 +75,9 @@ class OutgoingTopic {
 
   /// Counts what DDS sends by itself to robots that have come since: all that it keeps for them.
   void notice_readers();
+
+  /// Whether such have been noticed since the last call, by whatever was done here.
+  [[nodiscard]] bool take_newcomers() { return std::exchange(newcomers_, false); }
 
   /// So far: once per reader, and what was sent again.
   [[nodiscard]] std::uint64_t sent_bytes() const;
@@ -120,6 +124,7 @@ class OutgoingTopic {
   const Peers& peers_;
   TopicSpec spec_;
   DdsEntity topic_;
+  bool newcomers_ = false;
   mutable std::mutex mutex_;  // guards the map and all counts; never held while writing
   std::map<std::optional<RobotId>, Writer> writers_;
 };

@@ -135,11 +135,16 @@ std::optional<std::vector<RobotId>> Sender::readers_of(const Schedule::Entry& en
   return readers;
 }
 
+// What newcomers are sent at once counts before anything else goes.
 void Sender::settle(double now_s) {
-  if (now_s - settled_s_ < kTick_s) return;
-  settled_s_ = now_s;
-  for (const auto& topic : topics_) topic->notice_readers();
-  if (!schedule_.is_limited()) return;
+  const bool is_due = now_s - settled_s_ >= kTick_s;
+  if (is_due) {
+    settled_s_ = now_s;
+    for (const auto& topic : topics_) topic->notice_readers();
+  }
+  bool have_come = false;
+  for (const auto& topic : topics_) have_come |= topic->take_newcomers();
+  if (!schedule_.is_limited() || (!is_due && !have_come)) return;
   std::uint64_t sent_bytes = 0;
   for (const auto& topic : topics_) sent_bytes += topic->sent_bytes();
   schedule_.settle(sent_bytes, now_s);

@@ -38,7 +38,7 @@ struct Journal {
   template <typename Entry>
   [[nodiscard]] std::vector<Entry> written() const {
     std::vector<Entry> entries;
-    (void)read_journal(file, [&](const JournalEntry& entry) {
+    (void)read_journal(file, [&](const JournalEntry& entry, JournalPlace) {
       if (const auto* found = std::get_if<Entry>(&entry)) entries.push_back(*found);
     });
     return entries;
@@ -65,6 +65,25 @@ TEST_CASE("What is found while the journal stops is written and handed on", "[ro
   const auto written = journal.written<Closure>();
   REQUIRE(written.size() == 1);
   CHECK(written[0].id() == closure.id());
+}
+
+TEST_CASE("A keyframe that was handed on is known by the journal as long as that is there",
+          "[robot]") {
+  Journal journal;
+  Inbox<Keyframe> handed_on(journal.topics.keyframes);
+  Keyframe keyframe;
+  keyframe.odometry.id = {1, 0};
+  keyframe.stamp = 17;
+  CHECK(journal.node.recall(0) == nullptr);
+  journal.topics.new_keyframes.publish(keyframe);
+  journal.node.stop();
+  REQUIRE(handed_on.messages().size() == 1);
+  const auto recalled = journal.node.recall(0);
+  REQUIRE(recalled != nullptr);
+  CHECK(recalled->stamp == 17);
+  CHECK(journal.node.recall(1) == nullptr);
+  std::filesystem::remove(journal.file);
+  CHECK(journal.node.recall(0) == nullptr);
 }
 
 TEST_CASE("A journal holds what all corrections of the cameras come to", "[robot]") {

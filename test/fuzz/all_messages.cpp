@@ -135,6 +135,12 @@ std::vector<MessageReader> all_messages() {
            relayed({.kind = RelayKind::kIntroduction,
                     .origin = {9, 1},
                     .content = to_octets({"c", std::string(kCredentialsLength, 'A')})}),
+           relayed({.kind = RelayKind::kClosure,
+                    .origin = {9, 1},
+                    .to = kReader,
+                    .to_boot = 70,
+                    .number = 8,
+                    .content = {4, 5}}),
            relayed({.kind = RelayKind::kRequest,
                     .origin = {9, 1},
                     .to = kReader,
@@ -150,6 +156,7 @@ std::vector<MessageReader> all_messages() {
   all.push_back({"letters down",
                  [](std::span<const std::uint8_t> bytes) { return decode_down(bytes).has_value(); },
                  {encode(down)}});
+  all.push_back(envelope_messages());
   return all;
 }
 

@@ -16,7 +16,11 @@ struct MessageReader {
   std::vector<std::vector<std::uint8_t>> samples;  ///< That are accepted.
 };
 
-/// One for each topic between robots, and for each form of letter that solvers send in parcels.
+/// What travels on every topic (idl/envelope.idl), as DDS itself reads it, whoever has sent it.
+[[nodiscard]] MessageReader envelope_messages();
+
+/// That, and one for each topic between robots, and for each form of letter that solvers send in
+/// parcels.
 [[nodiscard]] std::vector<MessageReader> all_messages();
 
 /// Checks that `reader` does not harm the process with these bytes: run it under a sanitizer or

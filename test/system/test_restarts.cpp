@@ -108,9 +108,9 @@ TEST_CASE("A robot that is killed and started again is in its team again, in its
   REQUIRE(restarts > 0);
   std::printf("restart  robot  place    killed_at  joint  late_s  closures  of_former_life\n");
   for (int k = 0; k < restarts; ++k) {
-    const Restart restart{.robot = static_cast<RobotId>(k % 2),
+    const Restart restart{.robot = static_cast<RobotId>((k + 1) % 2),
                           .elsewhere = (k + k / 2) % 2 == 1,
-                          .killed = 30 + 8 * static_cast<std::uint32_t>(k % 7)};
+                          .killed = 30 + 8 * static_cast<std::uint32_t>((k + 3) % 7)};
     const Outcome outcome = Trial(restart).run();
     std::printf("%7d  %5d  %-7s  %9u  %-5s  %6.1f  %8zu  %14zu\n", k + 1, restart.robot,
                 restart.elsewhere ? "another" : "same", restart.killed,

@@ -110,8 +110,8 @@ std::vector<std::vector<std::uint8_t>> bytes_of(const std::vector<JournalEntry>&
 
 std::pair<JournalExtent, std::vector<JournalEntry>> read(const std::filesystem::path& file) {
   std::vector<JournalEntry> entries;
-  const JournalExtent extent =
-      read_journal(file, [&](JournalEntry entry) { entries.push_back(std::move(entry)); });
+  const JournalExtent extent = read_journal(
+      file, [&](JournalEntry entry, JournalPlace) { entries.push_back(std::move(entry)); });
   return {extent, std::move(entries)};
 }
 
@@ -268,6 +268,30 @@ TEST_CASE("A journal taken up loses its torn end and goes on", "[journal]") {
   CHECK(whole.cut_bytes == 0);
   REQUIRE(all.size() == run.size() + 1);
   CHECK(std::get<JournalStart>(all[run.size() - 1]).boot == 0x123450001);
+}
+
+TEST_CASE("An entry is read again from where the journal says that it is", "[journal]") {
+  const TemporaryFolder folder;
+  const std::vector<JournalEntry> run = some_run();
+  const std::filesystem::path file = written(folder, run);
+  std::vector<JournalPlace> places;
+  const JournalExtent extent =
+      read_journal(file, [&](const JournalEntry&, JournalPlace place) { places.push_back(place); });
+  JournalFile again(file, extent);
+  for (const JournalEntry& entry : run) places.push_back(again.add(entry).value());
+  CHECK_THROWS_WITH(read_journal_entry(file, places.back()), Catch::Contains("run.journal"));
+  again.sync();
+  for (std::size_t i = 0; i < places.size(); ++i)
+    CHECK(encode_journal_entry(read_journal_entry(file, places[i])) ==
+          encode_journal_entry(run[i % run.size()]));
+  const RestoredRun restored = restore_run(written(folder, run));
+  REQUIRE(restored.places.size() == restored.keyframes.size());
+  for (std::size_t k = 0; k < restored.places.size(); ++k)
+    CHECK(encode_journal_entry(read_journal_entry(file, restored.places[k])) ==
+          encode_journal_entry(restored.keyframes[k]));
+  places.front().bytes += 1;
+  CHECK_THROWS_AS(read_journal_entry(file, places.front()), InputFileError);
+  CHECK_THROWS_AS(read_journal_entry(folder.path() / "missing", places[1]), InputFileError);
 }
 
 TEST_CASE("A disk that is full for a while costs nothing", "[journal]") {

@@ -14,7 +14,8 @@ constexpr RobotId kPeer = 9;
 
 // A robot's node with its channels; what it sends is kept.
 struct Robot {
-  explicit Robot(RobotId self, const LoopClosureConfig& config = {})
+  explicit Robot(RobotId self, const LoopClosureConfig& config = {},
+                 LoopClosureNode::Recall recall = {})
       : node(config, self, std::make_shared<const Vocabulary>(toy_vocabulary(200)),
              {.keyframes = keyframes,
               .candidates = candidates,
@@ -29,7 +30,8 @@ struct Robot {
               .own_replies = own_replies,
               .own_closures = own_closures,
               .own_restarts = own_restarts,
-              .outcomes = outcomes}) {
+              .outcomes = outcomes},
+             std::move(recall)) {
     own_requests.subscribe([this](const auto& m) { requests.push_back(*m); });
     own_replies.subscribe([this](const auto& m) { replies.push_back(*m); });
     own_closures.subscribe([this](const auto& m) { closures.push_back(*m); });
@@ -362,10 +364,23 @@ TEST_CASE("a candidate that fails verification says why", "[loop_closure_node]")
   CHECK(robot.reports.back().reason == "too few matches");
 }
 
-TEST_CASE("candidates inside one robot need no request, in whatever order things arrive",
-          "[loop_closure_node]") {
+// Keyframes 0 and 50 of the robot itself see the same place.
+Scene scene_of_one_robot() {
   Scene scene(8);
   scene.peer.odometry.id = {kSelf, 50};
+  return scene;
+}
+
+LoopClosureConfig with_full_keyframes(int count) {
+  LoopClosureConfig config;
+  config.reply_keypoints = 50;
+  config.full_keyframes = count;
+  return config;
+}
+
+TEST_CASE("candidates inside one robot need no request, in whatever order things arrive",
+          "[loop_closure_node]") {
+  const Scene scene = scene_of_one_robot();
   Robot robot(kSelf);
   const bool candidate_first = GENERATE(false, true);
   CAPTURE(candidate_first);
@@ -382,21 +397,52 @@ TEST_CASE("candidates inside one robot need no request, in whatever order things
 
 TEST_CASE("an old keyframe of the robot itself keeps a part of its keypoints",
           "[loop_closure_node]") {
-  Scene scene(8);
-  scene.peer.odometry.id = {kSelf, 50};
-  LoopClosureConfig config;
-  config.reply_keypoints = 50;
-  config.full_keyframes = GENERATE(50, 51);
-  CAPTURE(config.full_keyframes);
-  Robot robot(kSelf, config);
+  const Scene scene = scene_of_one_robot();
+  const int full = GENERATE(50, 51);
+  CAPTURE(full);
+  Robot robot(kSelf, with_full_keyframes(full));
   robot.give(scene.own);
   robot.give(scene.peer);
   robot.give(scene.candidate());
   REQUIRE(robot.closures.size() == 1);
-  if (config.full_keyframes == 50)  // keyframe 0 is the 51st
+  if (full == 50)  // keyframe 0 is the 51st
     CHECK(robot.closures[0].inliers <= 100);
   else
     CHECK(robot.closures[0].inliers > 100);
+}
+
+TEST_CASE("an old keyframe of the robot itself is read from the disk with all its keypoints",
+          "[loop_closure_node]") {
+  const Scene scene = scene_of_one_robot();
+  bool is_there = true;
+  int recalled = 0;
+  const auto recall = [&](KeyframeIndex index) -> std::shared_ptr<const Keyframe> {
+    CHECK(index == 0);
+    ++recalled;
+    return is_there ? std::make_shared<const Keyframe>(scene.own) : nullptr;
+  };
+  Robot robot(kSelf, with_full_keyframes(50), recall);
+  const bool is_full = GENERATE(false, true);
+  is_there = !is_full;
+  robot.give(scene.own);
+  CHECK(recalled == 0);
+  robot.give(scene.peer);
+  CHECK(recalled == 1);
+  SECTION("or stays in part where the disk has not taken it") {
+    robot.give(scene.candidate());
+    REQUIRE(robot.closures.size() == 1);
+    CHECK((robot.closures[0].inliers > 100) == !is_full);
+    CHECK(recalled == (is_full ? 1 : 2));
+  }
+  SECTION("and is missed once the disk is gone") {
+    is_there = false;
+    robot.give(scene.candidate());
+    robot.give(KeyframeRequest{kPeer, 1, {kSelf, 0}, 3});
+    REQUIRE(robot.replies.size() == 1);
+    CHECK(robot.replies[0].message->found == is_full);
+    CHECK(robot.closures.size() == (is_full ? 1 : 0));
+    if (!is_full) CHECK(robot.reports.back().reason == "cannot be read from the disk any more");
+  }
 }
 
 TEST_CASE("a measured closure needs only the odometry of the other end", "[loop_closure_node]") {

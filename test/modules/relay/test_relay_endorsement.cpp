@@ -87,6 +87,9 @@ TEST_CASE("A signature is for one message of one robot", "[relay]") {
   SECTION("its addressee but for what goes to all that ask") {
     message.to = kD;
     CHECK(holds() == lasts);
+    message.to = kB;
+    message.to_boot = 5;
+    CHECK(holds() == lasts);
   }
   SECTION("not how far it has come") {
     message.hops = 9;
@@ -247,7 +250,7 @@ TEST_CASE("A neighbour that changes what it hands on is not believed and harms n
   network.link(kA, kC);
   network.link(kC, kB);
   for (std::uint32_t i = 0; i < 20; ++i) network.tell_bag(kA, i);
-  network.at(kA).wrote(RelayKind::kClosure, kB, 1, octets(700), 0.0);
+  network.at(kA).wrote(RelayKind::kClosure, {kB}, 1, octets(700), 0.0);
   network.tamper([](RelayMessage& message) {
     if (message.kind != RelayKind::kIntroduction) message.content.back() ^= 1U;
   });

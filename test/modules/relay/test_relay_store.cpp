@@ -28,7 +28,7 @@ TEST_CASE("Robots that all hear each other hand nothing on and hold nothing to t
   network.run(2.0);
   for (std::uint32_t i = 0; i < 50; ++i) {
     network.tell_bag(kA, i);
-    network.at(kA).wrote(RelayKind::kClosure, kB, i, octets(700), i);
+    network.at(kA).wrote(RelayKind::kClosure, {kB}, i, octets(700), i);
     network.run(kPeriod_s);
   }
   CHECK(network.parcels() == 0);
@@ -110,7 +110,7 @@ TEST_CASE("What is lost on the way is handed over again, and taken once", "[rela
   network.link(kC, kB);
   for (std::uint32_t i = 0; i < 100; ++i) network.tell_bag(kA, i);
   for (std::uint32_t i = 0; i < 20; ++i)
-    network.at(kB).wrote(RelayKind::kClosure, kA, i, octets(700), 0.0);
+    network.at(kB).wrote(RelayKind::kClosure, {kA}, i, octets(700), 0.0);
   network.run(400.0);
   std::vector<std::uint32_t> bags = network.read(kB, RelayKind::kBag);
   std::vector<std::uint32_t> letters = network.read(kA, RelayKind::kClosure);
@@ -131,9 +131,9 @@ TEST_CASE("A closure reaches a robot that is met again later, once", "[relay]") 
   const bool met_before = GENERATE(true, false);
   CAPTURE(met_before);
   if (met_before) network.run(8.0);
-  network.at(kB).wrote(RelayKind::kClosure, kA, 5, octets(700, 1), 9.0);
-  network.at(kB).wrote(RelayKind::kInlierSet, kA, 0, octets(20, 2), 9.0);
-  network.at(kB).wrote(RelayKind::kInlierSet, kA, 0, octets(30, 3), 9.0);
+  network.at(kB).wrote(RelayKind::kClosure, {kA}, 5, octets(700, 1), 9.0);
+  network.at(kB).wrote(RelayKind::kInlierSet, {kA}, 0, octets(20, 2), 9.0);
+  network.at(kB).wrote(RelayKind::kInlierSet, {kA}, 0, octets(30, 3), 9.0);
   network.run(10.0);
   SECTION("by who carries it, the writer being gone") {
     network.cut(kB, kC);
@@ -152,7 +152,8 @@ TEST_CASE("A closure reaches a robot that is met again later, once", "[relay]") 
 
 TEST_CASE("Nothing is handed to robots that soon hear each other", "[relay]") {
   Network network(3);
-  for (std::uint32_t i = 0; i < 20; ++i) network.at(kB).wrote(RelayKind::kClosure, kA, i, {1}, 0.0);
+  for (std::uint32_t i = 0; i < 20; ++i)
+    network.at(kB).wrote(RelayKind::kClosure, {kA}, i, {1}, 0.0);
   network.link(kA, kC);
   network.tell_bag(kA, 0);
   network.link(kB, kC);
@@ -171,13 +172,50 @@ TEST_CASE("What was told just before a link fell silent becomes a letter", "[rel
   network.link(kA, kB);
   network.link(kA, kC);
   network.link(kB, kC);
-  network.at(kB).wrote(RelayKind::kClosure, kA, 1, octets(700), 0.0);
+  network.at(kB).wrote(RelayKind::kClosure, {kA}, 1, octets(700), 0.0);
   network.run(40.0);
-  network.at(kB).wrote(RelayKind::kClosure, kA, 2, octets(700), 39.0);
+  network.at(kB).wrote(RelayKind::kClosure, {kA}, 2, octets(700), 39.0);
   CHECK(network.parcels() == 0);
   network.cut(kA, kB);
   network.run(20.0);
   CHECK(network.read(kA, RelayKind::kClosure).size() == 1);
+}
+
+TEST_CASE("What was told to a robot in its former life does not reach the next", "[relay]") {
+  const bool has_keys = GENERATE(false, true);
+  CAPTURE(has_keys);
+  Network network(3, has_keys);
+  const std::uint64_t former = Network::first_boot(kA), next = former << 8U;
+  network.link(kA, kB);
+  network.link(kB, kC);
+  network.run(1.0);
+  const auto tell = [&](std::uint64_t slot, std::uint64_t boot, std::uint8_t what) {
+    network.at(kB).wrote(RelayKind::kClosure, {kA, boot}, slot, octets(700, what), 1.0);
+  };
+  tell(1, former, 1);
+  tell(2, former, 1);
+  network.cut(kA, kB);
+  SECTION("by its writer") {
+    network.start(kA, next);
+    network.link(kA, kB);
+  }
+  SECTION("by who carries it and does not know") {
+    network.run(8.0);
+    network.cut(kB, kC);
+    network.start(kA, next);
+    network.link(kA, kC);
+    network.run(8.0);
+    CHECK(network.all_read(kA).empty());
+    network.link(kA, kB);
+  }
+  network.run(8.0);
+  network.cut(kA, kB);
+  tell(2, next, 2);
+  network.link(kA, kB);
+  network.run(8.0);
+  const auto& read = network.all_read(kA);
+  REQUIRE(read.size() == 1);
+  CHECK(read.front()->content.front() == 2);
 }
 
 TEST_CASE("A request goes to its addressee and the answer comes back", "[relay]") {

@@ -21,7 +21,7 @@ TEST_CASE("Images that are missing are counted, whatever the jitter", "[sensors]
     if (can_be_lost && is_lost(rng))
       ++lost;
     else
-      counted += missing.before(k * kInterval + jitter(rng));
+      counted += missing.before(k * kInterval + jitter(rng)).missing;
   }
   CHECK(lost > 50);
   CHECK(counted == lost);
@@ -29,13 +29,16 @@ TEST_CASE("Images that are missing are counted, whatever the jitter", "[sensors]
 
 TEST_CASE("What begins, or comes at a new rate, misses nothing for long", "[sensors]") {
   MissingImages missing;
-  CHECK(missing.before(kInterval) == 0);
-  CHECK(missing.before(9 * kInterval) == 0);  // nothing says how often they come
+  CHECK(missing.before(kInterval).missing == 0);
+  CHECK(missing.before(9 * kInterval).missing == 0);  // nothing says how often they come
   Stamp stamp = 9 * kInterval;
-  for (int k = 0; k < 50; ++k) CHECK(missing.before(stamp += kInterval) == 0);
-  CHECK(missing.before(stamp += 41 * kInterval) == 40);  // a driver that restarts
+  for (int k = 0; k < 50; ++k) CHECK(missing.before(stamp += kInterval).missing == 0);
+  CHECK(missing.before(stamp += 40 * kInterval).missing == 39);
+  const ImageGap restart = missing.before(stamp += 41 * kInterval);
+  CHECK(restart.missing == 0);
+  CHECK(restart.pause_s == Approx(2.05));
   std::size_t counted = 0;
-  for (int k = 0; k < 100; ++k) counted += missing.before(stamp += 2 * kInterval);
+  for (int k = 0; k < 100; ++k) counted += missing.before(stamp += 2 * kInterval).missing;
   CHECK(counted <= MissingImages::kIntervals / 2 + 1);
 }
 

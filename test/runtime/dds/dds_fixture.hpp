@@ -1,6 +1,5 @@
 #pragma once
 
-#include <unistd.h>
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <chrono>
@@ -19,6 +18,7 @@
 #include "runtime/dds/qos.hpp"
 #include "runtime/dds/robot_status.hpp"
 #include "test/support/inbox.hpp"
+#include "test/support/loopback_config.hpp"
 #include "test/support/patience.hpp"
 
 namespace km {
@@ -58,18 +58,6 @@ struct Codec<Ping> {
     return Decoded<Ping>::accept({writer.robot, wire.index, {data, data + size}});
   }
 };
-
-/// Loopback, a domain and a team of this process alone: tests that run side by side never meet.
-inline DdsConfig loopback_config() {
-  static int count = 0;
-  DdsConfig config;
-  config.domain =
-      static_cast<int>((static_cast<unsigned>(getpid()) * 7919U) % kLastQuietDomain) + 1;
-  config.team = "test-" + std::to_string(getpid()) + '-' + std::to_string(++count);
-  config.interface = "lo";
-  config.spdp_interval_s = 0.2;
-  return config;
-}
 
 /// Asks until `condition` holds; false if it never does. For counters that nobody announces.
 inline bool eventually(const std::function<bool()>& condition) {
