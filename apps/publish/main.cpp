@@ -116,12 +116,13 @@ class Progress {
   double told_s_ = steady_now_s();
 };
 
-// True once there are enough readers; false after a signal.
+// True once there are enough readers, which have a moment to find the topics for their part; false
+// after a signal.
 bool wait_for_readers(const MessagePlayer& player, std::size_t wanted, SignalWatch& signals) {
   Progress progress;
   while (true) {
     const std::vector<std::string> topics = player.topics_short_of(wanted);
-    if (topics.empty()) return true;
+    if (topics.empty()) return !signals.wait(0.3);
     if (progress.is_due()) {
       std::string names;
       for (const std::string& topic : topics) names += (names.empty() ? "" : ", ") + topic;

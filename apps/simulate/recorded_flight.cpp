@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "modules/core/text_rows.hpp"
+#include "modules/simulation/motion/steady_rotations.hpp"
 
 namespace km {
 namespace {
@@ -135,9 +136,21 @@ std::string bridging(const BridgedPoses& motion) {
   return text.data();
 }
 
+// In words what was done.
+std::string steady(RecordedFlight& flight) {
+  const SteadiedPoses steadied = steady_rotations(poses_of(flight.truth), flight.imu);
+  for (std::size_t k = 0; k < flight.truth.size(); ++k)
+    flight.truth[k].T_world_body = steadied.poses[k].T;
+  std::array<char, 100> text{};
+  std::snprintf(text.data(), text.size(),
+                ", rotations steadied by the gyroscope: %.2f mrad rms, %.1f mrad at most",
+                1e3 * steadied.rms_rad, 1e3 * steadied.max_rad);
+  return text.data();
+}
+
 }  // namespace
 
-RecordedFlight read_recorded_flight(const fs::path& truth, const fs::path& imu) {
+RecordedFlight read_recorded_flight(const fs::path& truth, const fs::path& imu, bool steady_too) {
   const Table states(truth);
   const Table samples(imu);
   RecordedFlight flight;
@@ -154,6 +167,7 @@ RecordedFlight read_recorded_flight(const fs::path& truth, const fs::path& imu) 
   if (flight.imu.back().stamp <= flight.truth.front().stamp ||
       flight.truth.back().stamp <= flight.imu.front().stamp)
     throw std::runtime_error(truth.string() + " and " + imu.string() + " do not overlap in time");
+  if (steady_too) flight.fingerprint += steady(flight);
   flight.motion = bridge_gaps(poses_of(flight.truth), flight.imu);
   flight.fingerprint += bridging(flight.motion);
   return flight;

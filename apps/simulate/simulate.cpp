@@ -447,7 +447,7 @@ SimulationOutcome simulate(const SimulationOptions& options, SignalWatch& signal
   record.parameters = parameters(options);
   std::vector<RecordedFlight> flights;
   for (std::size_t i = 0; i < options.truths.size(); ++i) {
-    flights.push_back(read_recorded_flight(options.truths[i], options.imus[i]));
+    flights.push_back(read_recorded_flight(options.truths[i], options.imus[i], options.steady));
     record.parameters.emplace_back("recording " + options.names[i], flights.back().fingerprint);
   }
   if (options.rig)

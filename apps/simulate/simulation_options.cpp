@@ -159,9 +159,9 @@ SimulationOptions completed(SimulationOptions options) {
     complete_recorded(options);
   } else {
     if (!options.imus.empty() || !options.calibrations.empty() || !options.names.empty() ||
-        options.start_s > 0.0 || options.end_s > 0.0)
+        options.start_s > 0.0 || options.end_s > 0.0 || options.steady)
       throw std::invalid_argument(
-          "--imu, --calibration, --names, --start and --end need --trajectory");
+          "--imu, --steady, --calibration, --names, --start and --end need --trajectory");
     for (int i = 0; i < options.robots; ++i) options.names.push_back("robot" + std::to_string(i));
   }
   complete_names(options);
@@ -192,6 +192,7 @@ ParameterList parameters(const SimulationOptions& options) {
   if (options.is_recorded()) {
     list.emplace_back("start", number_text(options.start_s));
     list.emplace_back("end", number_text(options.end_s));
+    if (options.steady) list.emplace_back("steady", "yes");
   } else {
     list.emplace_back("duration", number_text(options.duration_s));
   }

@@ -44,6 +44,7 @@ struct SimulationOptions {
   ImageFormat format = ImageFormat::kJpeg;
   std::vector<std::filesystem::path> truths;
   std::vector<std::filesystem::path> imus;
+  bool steady = false;
   std::vector<std::filesystem::path> calibrations;
   std::vector<std::string> names;
   double start_s = 0.0;
@@ -80,6 +81,9 @@ struct SimulationOptions {
                   "Recorded motion: true poses of flights, one file per robot: EuRoC's state CSV "
                   "or TUM text, also gzipped; in the frame of the world");
     visitor.field("imu", imus, Input{}, "The recorded inertial data, one CSV per --trajectory");
+    visitor.field("steady", steady,
+                  "Recorded rotations turn as the gyroscope did: motion capture trembles by "
+                  "milliradians, which images along it would show and a gyroscope denies");
     visitor.field("calibration", calibrations, Input{},
                   "The sensors of recorded motion: a folder of EuRoC, one or two files of Kalibr, "
                   "or one of Basalt (default: EuRoC's, its cameras scaled to the resolution)");

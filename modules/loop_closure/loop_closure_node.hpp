@@ -130,7 +130,7 @@ class LoopClosureNode final : public Node {
   const Verifier verifier_;
   const Recall recall_;
   std::map<KeyframeId, KeyframePtr> own_;  // null: on the disk
-  std::map<RobotId, int> replies_;  // sent
+  std::map<RobotId, int> replies_;         // sent
   PeerWords words_;
   KeyframeCache peers_;
   KeyframeRequests requests_;

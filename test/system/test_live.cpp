@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
 #include "modules/recordings/ros_messages.hpp"
 #include "runtime/dds/ros_publisher.hpp"
@@ -56,22 +57,27 @@ std::vector<std::string> live_command(const TemporaryFolder& folder, const fs::p
       {"--live", rig.string(), "--set", "ros.domain=" + domain, "--set", "ros.interface=lo"});
 }
 
-}  // namespace
+constexpr std::size_t kPoses = 100;
 
-TEST_CASE("On live topics of ROS 2 odometry is that of the recording they are played from",
-          "[system][live]") {
-  const auto dataset = shared_data("euroc/MH_01_easy");
-  if (!dataset) return;
+// The stamps of poses.
+std::vector<std::string> stamps_of(const std::string& poses) {
+  std::istringstream lines(poses);
+  std::vector<std::string> stamps;
+  for (std::string line; std::getline(lines, line);)
+    stamps.push_back(line.substr(0, line.find(' ')));
+  return stamps;
+}
+
+// Poses of a robot on live topics that are played at `rate`; nullopt if it says that messages were
+// lost on the way: a robot's sensors are best effort, and a busy host loses some.
+std::optional<std::string> live_poses(const fs::path& dataset, double rate) {
   const TemporaryFolder folder;
   const std::string domain = std::to_string(random_domain());
-  // Reliable, slower than real time, and nothing too late: what is asked here is not whether a busy
-  // host keeps up.
-  std::vector<std::string> live = live_command(folder, *dataset, domain);
+  std::vector<std::string> live = live_command(folder, dataset, domain);
   live.insert(live.end(), {"--set", "sensors.max_lag_s=30"});
   Process robot(live);
-  Process driver({KM_BIN_DIR "/kimera_multi_publish", dataset->string(), "--domain", domain,
-                  "--interface", "lo", "--wait", "1", "--reliable", "--rate", "0.7"});
-  constexpr std::size_t kPoses = 100;
+  Process driver({KM_BIN_DIR "/kimera_multi_publish", dataset.string(), "--domain", domain,
+                  "--interface", "lo", "--wait", "1", "--rate", std::to_string(rate)});
   const auto has_poses = [](const std::string& line) {  // "5.6 s, 112 images, ..."
     double seconds = 0.0;
     int images = 0;
@@ -83,12 +89,32 @@ TEST_CASE("On live topics of ROS 2 odometry is that of the recording they are pl
   CHECK(driver.wait() == 0);
   robot.kill(SIGINT);
   CHECK(robot.wait() == 0);
+  const RunSummary summary = read_summary(folder.path() / "live/summary.json");
+  if (summary.sensor_faults.contains("messages lost on the way")) return std::nullopt;
+  return first_lines(folder.path() / "live/odometry.tum", kPoses);
+}
 
+}  // namespace
+
+TEST_CASE("On live topics of ROS 2 odometry is that of the recording they are played from",
+          "[system][live]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
   Process replay(robot_command(folder.path() / "folder",
                                {"--dataset", dataset->string(), "--to", "6", "--rate", "max"}));
   CHECK(replay.wait() == 0);
-  CHECK(first_lines(folder.path() / "live/odometry.tum", kPoses) ==
-        first_lines(folder.path() / "folder/odometry.tum", kPoses));
+  const std::string expected = first_lines(folder.path() / "folder/odometry.tum", kPoses);
+  REQUIRE(std::ranges::count(expected, '\n') == static_cast<std::ptrdiff_t>(kPoses));
+
+  // Slower where the host is too busy: what is asked here is not whether it keeps up.
+  std::optional<std::string> poses;
+  for (const double rate : {0.7, 0.35, 0.17}) {
+    poses = live_poses(*dataset, rate);
+    if (poses && stamps_of(*poses) == stamps_of(expected)) break;  // it had all images
+  }
+  REQUIRE(poses.has_value());
+  CHECK(*poses == expected);
 }
 
 TEST_CASE("What a live robot has lost is in its summary", "[system][live]") {

@@ -1,10 +1,12 @@
 #include <zlib.h>
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <filesystem>
 #include <string>
 
 #include "apps/simulate/recorded_flight.hpp"
+#include "modules/core/lie.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -109,6 +111,37 @@ TEST_CASE("A published flight is read whole", "[simulate]") {
   const RecordedFlight flight = read_recorded_flight(*truth, *imu);
   CHECK(flight.imu.size() == 17100);  // as its description says
   CHECK(flight.truth.front().stamp == 1403715524907143168);
+}
+
+TEST_CASE(
+    "Motion capture is steadied by the gyroscope, less so poses that were fused with its samples",
+    "[simulate]") {
+  struct Row {
+    const char *truth, *imu;
+    double least_mrad, most_mrad;
+  };
+  const auto [truth_name, imu_name, least_mrad, most_mrad] =
+      GENERATE(Row{"tumvi_rooms/groundtruth/dataset-room1_512_16.txt.gz",
+                   "tumvi_rooms/imu/room1.txt.gz", 5.0, 8.0},
+               Row{"euroc/groundtruth_only/V1_02_medium.csv.gz",
+                   "euroc/imu_only/V1_02_medium.imu.csv.gz", 0.0, 3.0});
+  const auto truth = shared_data(truth_name);
+  const auto imu = shared_data(imu_name);
+  if (!truth || !imu) return;
+  const RecordedFlight as_is = read_recorded_flight(*truth, *imu);
+  const RecordedFlight steadied = read_recorded_flight(*truth, *imu, true);
+  CHECK_THAT(steadied.fingerprint, Catch::Contains("rotations steadied by the gyroscope"));
+  REQUIRE(steadied.truth.size() == as_is.truth.size());
+  double squares = 0.0;
+  for (std::size_t k = 0; k < as_is.truth.size(); ++k) {
+    const SE3 &a = as_is.truth[k].T_world_body, &b = steadied.truth[k].T_world_body;
+    REQUIRE(a.translation() == b.translation());
+    squares += std::pow(angle_of(a.linear().transpose() * b.linear()), 2);
+  }
+  const double rms_mrad = 1e3 * std::sqrt(squares / static_cast<double>(as_is.truth.size()));
+  CAPTURE(truth_name, rms_mrad);
+  CHECK(rms_mrad >= least_mrad);
+  CHECK(rms_mrad <= most_mrad);
 }
 
 }  // namespace km

@@ -1,0 +1,151 @@
+#include "modules/simulation/motion/steady_rotations.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "modules/core/lie.hpp"
+
+namespace km {
+namespace {
+
+using Rows = std::vector<Eigen::Vector3d>;
+
+// How the body has turned since the first inertial sample, by a gyroscope without bias.
+class Turns {
+ public:
+  Turns(std::span<const ImuSample> imu, const Eigen::Vector3d& bias) {
+    for (std::size_t k = 0; k < imu.size(); ++k) {
+      State next{imu[k].stamp, Eigen::Matrix3d::Identity(), 0};
+      if (k > 0) {
+        const double dt = seconds_between(imu[k - 1].stamp, imu[k].stamp);
+        const Eigen::Vector3d rate = 0.5 * (imu[k - 1].gyro + imu[k].gyro) - bias;
+        next.R = states_.back().R * so3_exp(dt * rate);
+        next.gaps = states_.back().gaps + (dt > kMaxStep_s ? 1 : 0);
+      }
+      states_.push_back(next);
+    }
+  }
+
+  // From one instant to another; nullopt if the samples do not span it.
+  [[nodiscard]] std::optional<Eigen::Matrix3d> between(Stamp from, Stamp to) const {
+    if (states_.size() < 2 || from < states_.front().stamp || to > states_.back().stamp)
+      return std::nullopt;
+    const auto a = at(from), b = at(to);
+    if (!a || !b || a->gaps != b->gaps) return std::nullopt;
+    return a->R.transpose() * b->R;
+  }
+
+ private:
+  static constexpr double kMaxStep_s = 0.05;
+
+  struct State {
+    Stamp stamp = 0;
+    Eigen::Matrix3d R;
+    int gaps = 0;  // of the samples up to here
+  };
+
+  // Nullopt within a gap of the samples.
+  [[nodiscard]] std::optional<State> at(Stamp stamp) const {
+    const auto after = std::lower_bound(states_.begin() + 1, states_.end() - 1, stamp,
+                                        [](const State& s, Stamp t) { return s.stamp < t; });
+    const State &a = *(after - 1), &b = *after;
+    if (stamp == b.stamp) return b;
+    if (a.gaps != b.gaps) return std::nullopt;
+    const double u = seconds_between(a.stamp, stamp) / seconds_between(a.stamp, b.stamp);
+    return State{stamp, a.R * so3_exp(u * so3_log(a.R.transpose() * b.R)), b.gaps};
+  }
+
+  std::vector<State> states_;
+};
+
+// w_k; nullopt where the gyroscope does not tell.
+std::vector<std::optional<Eigen::Vector3d>> excess_turns(std::span<const StampedPose> poses,
+                                                         std::span<const ImuSample> imu,
+                                                         const Eigen::Vector3d& bias) {
+  const Turns turns(imu, bias);
+  std::vector<std::optional<Eigen::Vector3d>> excess;
+  for (std::size_t k = 0; k + 1 < poses.size(); ++k) {
+    excess.emplace_back();
+    if (const auto G = turns.between(poses[k].stamp, poses[k + 1].stamp))
+      excess.back() = so3_log(poses[k + 1].T.linear() * (poses[k].T.linear() * *G).transpose());
+  }
+  return excess;
+}
+
+// The mean, in the body, of what poses turn beyond the gyroscope, which feels its bias less.
+Eigen::Vector3d mean_bias(std::span<const StampedPose> poses, std::span<const ImuSample> imu) {
+  const auto excess = excess_turns(poses, imu, Eigen::Vector3d::Zero());
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double span_s = 0.0;
+  for (std::size_t k = 0; k < excess.size(); ++k) {
+    if (!excess[k]) continue;
+    sum -= poses[k].T.linear().transpose() * *excess[k];
+    span_s += seconds_between(poses[k].stamp, poses[k + 1].stamp);
+  }
+  return span_s > 0.0 ? Eigen::Vector3d(sum / span_s) : Eigen::Vector3d::Zero();
+}
+
+// A symmetric tridiagonal system with one matrix for three right sides.
+struct Chain {
+  std::vector<double> diagonal;
+  std::vector<double> beside;  // of k and k + 1
+  Rows right;
+};
+
+// By elimination from front to back (Thomas's algorithm); the chain is positive definite.
+Rows solve(Chain chain) {
+  const std::size_t n = chain.diagonal.size();
+  for (std::size_t k = 1; k < n; ++k) {
+    const double factor = chain.beside[k - 1] / chain.diagonal[k - 1];
+    chain.diagonal[k] -= factor * chain.beside[k - 1];
+    chain.right[k] -= factor * chain.right[k - 1];
+  }
+  for (std::size_t k = n; k-- > 0;) {
+    if (k + 1 < n) chain.right[k] -= chain.beside[k] * chain.right[k + 1];
+    chain.right[k] /= chain.diagonal[k];
+  }
+  return std::move(chain.right);
+}
+
+}  // namespace
+
+SteadiedPoses steady_rotations(std::span<const StampedPose> poses, std::span<const ImuSample> imu,
+                               double noise_rad, double gyro_noise) {
+  constexpr int kReweightings = 10;
+  SteadiedPoses result{{poses.begin(), poses.end()}};
+  if (poses.size() < 2) return result;
+  result.gyro_bias_radps = mean_bias(poses, imu);
+  const auto excess = excess_turns(poses, imu, result.gyro_bias_radps);
+
+  Rows turns(poses.size(), Eigen::Vector3d::Zero());
+  for (int step = 0; step < kReweightings; ++step) {
+    Chain chain{std::vector<double>(poses.size()), std::vector<double>(poses.size() - 1),
+                Rows(poses.size(), Eigen::Vector3d::Zero())};
+    for (std::size_t k = 0; k < poses.size(); ++k)  // Cauchy's weight
+      chain.diagonal[k] = 1.0 / (noise_rad * noise_rad + turns[k].squaredNorm());
+    for (std::size_t k = 0; k < excess.size(); ++k) {
+      if (!excess[k]) continue;
+      const double weight =
+          1.0 / (gyro_noise * gyro_noise * seconds_between(poses[k].stamp, poses[k + 1].stamp));
+      chain.diagonal[k] += weight;
+      chain.diagonal[k + 1] += weight;
+      chain.beside[k] = -weight;
+      chain.right[k] += weight * *excess[k];
+      chain.right[k + 1] -= weight * *excess[k];
+    }
+    turns = solve(std::move(chain));
+  }
+
+  double squares = 0.0;
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    result.poses[k].T.linear() = so3_exp(turns[k]) * poses[k].T.linear();
+    squares += turns[k].squaredNorm();
+    result.max_rad = std::max(result.max_rad, turns[k].norm());
+  }
+  result.rms_rad = std::sqrt(squares / static_cast<double>(poses.size()));
+  return result;
+}
+
+}  // namespace km
