@@ -51,12 +51,13 @@ DdsBridge::~DdsBridge() {
   stop();
 }
 
+// Beside the sender and its budget: half a kilobyte for each robot, now and then.
 void DdsBridge::exchange_keys() {
   const TopicSpec spec{.name = "team_keys",
                        .max_bytes = kMaxKeyMessageBytes,
                        .kind = TopicKind::kState,
                        .carries_keys = true};
-  keys_ = &add_outgoing(spec);
+  keys_ = std::make_unique<OutgoingTopic>(participant_, peers_, spec);
   add_incoming(
       spec, true, {},
       [seal = participant_.seal()](const TeamPeer& sender, auto content, const auto&) {
@@ -100,6 +101,7 @@ void DdsBridge::add_incoming(TopicSpec spec, bool addressed, Pace pace,
 TrafficSnapshot DdsBridge::traffic() const {
   TrafficSnapshot snapshot;
   const auto held = sender_.held_back();
+  if (keys_ != nullptr) keys_->add_to(snapshot);
   for (const auto& topic : outgoing_) {
     topic->add_to(snapshot);
     if (const auto found = held.find(topic.get()); found != held.end())
@@ -176,10 +178,12 @@ void DdsBridge::receive_until_stopped() try {
 void DdsBridge::await_acknowledgements() noexcept {
   const auto deadline = std::chrono::steady_clock::now() + kAcknowledgementTime;
   bool complete = true;
-  for (const auto& topic : outgoing_) {
+  const auto await = [&](OutgoingTopic& topic) {
     const auto left = deadline - std::chrono::steady_clock::now();
-    complete &= topic->wait_for_acks(std::max(left, decltype(left)::zero()));
-  }
+    complete &= topic.wait_for_acks(std::max(left, decltype(left)::zero()));
+  };
+  if (keys_ != nullptr) await(*keys_);
+  for (const auto& topic : outgoing_) await(*topic);
   if (!complete) log::warn("dds") << "closing before every peer has acknowledged every message";
 }
 

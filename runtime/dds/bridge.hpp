@@ -145,10 +145,10 @@ class DdsBridge final : public Node {
 
   const DdsParticipant& participant_;
   Peers peers_;
-  std::vector<std::unique_ptr<OutgoingTopic>> outgoing_;
+  std::vector<std::unique_ptr<OutgoingTopic>> outgoing_;  // the sender's
   std::vector<std::unique_ptr<IncomingTopic>> incoming_;
-  OutgoingTopic* keys_ = nullptr;  // where the team has keys; key_teller_ writes it
-  double told_keys_s_ = 0.0;       // receive thread only
+  std::unique_ptr<OutgoingTopic> keys_;  // where the team has keys; key_teller_'s
+  double told_keys_s_ = 0.0;             // receive thread only
   DdsEntity waitset_;
   DdsEntity stop_request_;  // guard condition
   bool stopped_ = false;

@@ -80,8 +80,11 @@ double rms_m(const std::vector<PosePair>& pairs, const Alignment& alignment, Acc
   return std::sqrt(sum / count);
 }
 
-// From then on it is right: over no second the motion errs by more than this.
-std::optional<double> back_after_s(const std::vector<PosePair>& pairs, Stamp end) {
+// From then on it is right: over no second the motion errs by more than this, beyond what it makes
+// good of the position. A smoother that learns from new images how fast the body was in the dark
+// moves it to where that leads.
+std::optional<double> back_after_s(const std::vector<PosePair>& pairs, const Alignment& alignment,
+                                   Stamp end) {
   constexpr double kRight_m = 0.03, kOver_s = 1.0;
   std::optional<Stamp> back;
   for (std::size_t i = 0, j = 0; i < pairs.size(); ++i) {
@@ -90,7 +93,8 @@ std::optional<double> back_after_s(const std::vector<PosePair>& pairs, Stamp end
     if (j == pairs.size()) break;
     const SE3 truth = pairs[i].T_truth_body.inverse() * pairs[j].T_truth_body;
     const SE3 estimate = pairs[i].T_estimate_body.inverse() * pairs[j].T_estimate_body;
-    if ((truth.inverse() * estimate).translation().norm() > kRight_m)
+    const double mended_m = error_m(pairs[i], alignment) - error_m(pairs[j], alignment);
+    if ((truth.inverse() * estimate).translation().norm() - std::max(mended_m, 0.0) > kRight_m)
       back.reset();
     else if (!back)
       back = pairs[i].stamp;
@@ -127,7 +131,7 @@ Outcome meet(const Stage& stage, const SensorFault& fault) {
       outcome.worst_m = std::max(outcome.worst_m, error_m(pair, alignment));
   const Stamp last = pairs.back().stamp - nanoseconds(3.0);
   outcome.last_m = rms_m(pairs, alignment, [last](Stamp stamp) { return stamp >= last; });
-  outcome.back_s = back_after_s(pairs, end);
+  outcome.back_s = back_after_s(pairs, alignment, end);
   return outcome;
 }
 
