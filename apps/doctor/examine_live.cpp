@@ -83,9 +83,12 @@ std::string plain(const std::string& type) {
 Finding silent(const ListenedTopic& wanted, const std::vector<TopicPublisher>& publishers) {
   Finding finding{.id = "live.silent", .severity = Severity::kError};
   const auto same = std::ranges::find(publishers, wanted.topic, &TopicPublisher::topic);
-  const auto similar = std::ranges::find_if(publishers, [&](const TopicPublisher& other) {
-    return plain(other.type) == plain(wanted.type);
-  });
+  // The one of that type whose name begins most alike.
+  const auto alike = [&](const TopicPublisher& other) {
+    const auto [end, rest] = std::ranges::mismatch(wanted.topic, other.topic);
+    return plain(other.type) == plain(wanted.type) ? 1 + (end - wanted.topic.begin()) : 0;
+  };
+  const auto similar = std::ranges::max_element(publishers, {}, alike);
   finding.what = "nothing on " + wanted.topic + " (" + wanted.type + ')';
   finding.means = "the robot waits for it";
   if (same != publishers.end() && plain(same->type) != plain(wanted.type)) {
@@ -97,7 +100,7 @@ Finding silent(const ListenedTopic& wanted, const std::vector<TopicPublisher>& p
     finding.to_do =
         "see whether the driver has data; large images need net.core.rmem_max of "
         "megabytes";
-  } else if (similar != publishers.end()) {
+  } else if (similar != publishers.end() && alike(*similar) > 0) {
     finding.id = "live.similar_name";
     finding.what += ": nobody publishes it, but " + similar->topic + " is of that type";
     finding.to_do = "name the topic in the rig file as the driver does";

@@ -35,6 +35,8 @@ TEST_CASE("Why a live topic is silent is told from who publishes", "[doctor]") {
   CHECK_THAT(why({{"/left", kImage, true}}).what, Contains("though somebody publishes it"));
   CHECK(why({{"/left", "sensor_msgs/msg/CompressedImage", true}}).id == "live.other_type");
   CHECK(why({{"/cam/left", "sensor_msgs/Image", true}}).id == "live.similar_name");
+  const auto begins_most_alike = why({{"/cam/left", kImage, true}, {"/left/image", kImage, true}});
+  CHECK_THAT(begins_most_alike.what, Contains("but /left/image is of that type"));
   CHECK_THAT(why({{"/cam/left", kImage, true}}).what, Contains("/cam/left is of that type"));
 }
 
