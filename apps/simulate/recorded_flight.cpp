@@ -137,7 +137,7 @@ std::string bridging(const BridgedPoses& motion) {
 }
 
 // In words what was done.
-std::string steady(RecordedFlight& flight) {
+std::string take_tremble_out(RecordedFlight& flight) {
   const SteadiedPoses steadied = steady_rotations(poses_of(flight.truth), flight.imu);
   for (std::size_t k = 0; k < flight.truth.size(); ++k)
     flight.truth[k].T_world_body = steadied.poses[k].T;
@@ -150,7 +150,7 @@ std::string steady(RecordedFlight& flight) {
 
 }  // namespace
 
-RecordedFlight read_recorded_flight(const fs::path& truth, const fs::path& imu, bool steady_too) {
+RecordedFlight read_recorded_flight(const fs::path& truth, const fs::path& imu, bool steady) {
   const Table states(truth);
   const Table samples(imu);
   RecordedFlight flight;
@@ -167,7 +167,7 @@ RecordedFlight read_recorded_flight(const fs::path& truth, const fs::path& imu, 
   if (flight.imu.back().stamp <= flight.truth.front().stamp ||
       flight.truth.back().stamp <= flight.imu.front().stamp)
     throw std::runtime_error(truth.string() + " and " + imu.string() + " do not overlap in time");
-  if (steady_too) flight.fingerprint += steady(flight);
+  if (steady) flight.fingerprint += take_tremble_out(flight);
   flight.motion = bridge_gaps(poses_of(flight.truth), flight.imu);
   flight.fingerprint += bridging(flight.motion);
   return flight;

@@ -1,16 +1,17 @@
 #include "modules/simulation/motion/steady_rotations.hpp"
 
+#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <utility>
 
 #include "modules/core/lie.hpp"
 
 namespace km {
 namespace {
 
-using Rows = std::vector<Eigen::Vector3d>;
+using SparseMatrix = Eigen::SparseMatrix<double>;
+using Excess = std::vector<std::optional<Eigen::Vector3d>>;
 
 // How the body has turned since the first inertial sample, by a gyroscope without bias.
 class Turns {
@@ -61,11 +62,10 @@ class Turns {
 };
 
 // w_k; nullopt where the gyroscope does not tell.
-std::vector<std::optional<Eigen::Vector3d>> excess_turns(std::span<const StampedPose> poses,
-                                                         std::span<const ImuSample> imu,
-                                                         const Eigen::Vector3d& bias) {
+Excess excess_turns(std::span<const StampedPose> poses, std::span<const ImuSample> imu,
+                    const Eigen::Vector3d& bias) {
   const Turns turns(imu, bias);
-  std::vector<std::optional<Eigen::Vector3d>> excess;
+  Excess excess;
   for (std::size_t k = 0; k + 1 < poses.size(); ++k) {
     excess.emplace_back();
     if (const auto G = turns.between(poses[k].stamp, poses[k + 1].stamp))
@@ -87,26 +87,30 @@ Eigen::Vector3d mean_bias(std::span<const StampedPose> poses, std::span<const Im
   return span_s > 0.0 ? Eigen::Vector3d(sum / span_s) : Eigen::Vector3d::Zero();
 }
 
-// A symmetric tridiagonal system with one matrix for three right sides.
-struct Chain {
-  std::vector<double> diagonal;
-  std::vector<double> beside;  // of k and k + 1
-  Rows right;
+// Of the second sum of steady_rotations(), which reweighting leaves as it is.
+struct NormalEquations {
+  SparseMatrix matrix;
+  Eigen::MatrixX3d right;
 };
 
-// By elimination from front to back (Thomas's algorithm); the chain is positive definite.
-Rows solve(Chain chain) {
-  const std::size_t n = chain.diagonal.size();
-  for (std::size_t k = 1; k < n; ++k) {
-    const double factor = chain.beside[k - 1] / chain.diagonal[k - 1];
-    chain.diagonal[k] -= factor * chain.beside[k - 1];
-    chain.right[k] -= factor * chain.right[k - 1];
+NormalEquations equations_of(std::span<const StampedPose> poses, const Excess& excess,
+                             double gyro_noise) {
+  const auto n = static_cast<Eigen::Index>(poses.size());
+  NormalEquations equations{{n, n}, Eigen::MatrixX3d::Zero(n, 3)};
+  std::vector<Eigen::Triplet<double>> entries;
+  for (Eigen::Index k = 0; k + 1 < n; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    if (!excess[i]) continue;
+    const double weight =
+        1.0 / (gyro_noise * gyro_noise * seconds_between(poses[i].stamp, poses[i + 1].stamp));
+    for (const Eigen::Index row : {k, k + 1})
+      for (const Eigen::Index column : {k, k + 1})
+        entries.emplace_back(row, column, row == column ? weight : -weight);
+    equations.right.row(k) += weight * excess[i]->transpose();
+    equations.right.row(k + 1) -= weight * excess[i]->transpose();
   }
-  for (std::size_t k = n; k-- > 0;) {
-    if (k + 1 < n) chain.right[k] -= chain.beside[k] * chain.right[k + 1];
-    chain.right[k] /= chain.diagonal[k];
-  }
-  return std::move(chain.right);
+  equations.matrix.setFromTriplets(entries.begin(), entries.end());
+  return equations;
 }
 
 }  // namespace
@@ -119,32 +123,24 @@ SteadiedPoses steady_rotations(std::span<const StampedPose> poses, std::span<con
   result.gyro_bias_radps = mean_bias(poses, imu);
   const auto excess = excess_turns(poses, imu, result.gyro_bias_radps);
 
-  Rows turns(poses.size(), Eigen::Vector3d::Zero());
+  const NormalEquations joints = equations_of(poses, excess, gyro_noise);
+  Eigen::MatrixX3d turns = Eigen::MatrixX3d::Zero(joints.right.rows(), 3);
+  Eigen::SimplicialLDLT<SparseMatrix> solver;
   for (int step = 0; step < kReweightings; ++step) {
-    Chain chain{std::vector<double>(poses.size()), std::vector<double>(poses.size() - 1),
-                Rows(poses.size(), Eigen::Vector3d::Zero())};
-    for (std::size_t k = 0; k < poses.size(); ++k)  // Cauchy's weight
-      chain.diagonal[k] = 1.0 / (noise_rad * noise_rad + turns[k].squaredNorm());
-    for (std::size_t k = 0; k < excess.size(); ++k) {
-      if (!excess[k]) continue;
-      const double weight =
-          1.0 / (gyro_noise * gyro_noise * seconds_between(poses[k].stamp, poses[k + 1].stamp));
-      chain.diagonal[k] += weight;
-      chain.diagonal[k + 1] += weight;
-      chain.beside[k] = -weight;
-      chain.right[k] += weight * *excess[k];
-      chain.right[k + 1] -= weight * *excess[k];
-    }
-    turns = solve(std::move(chain));
+    const Eigen::VectorXd weights =  // Cauchy's
+        (noise_rad * noise_rad + turns.rowwise().squaredNorm().array()).inverse();
+    const SparseMatrix normal = joints.matrix + SparseMatrix(weights.asDiagonal());
+    if (step == 0) solver.analyzePattern(normal);
+    solver.factorize(normal);
+    turns = solver.solve(joints.right);
   }
 
-  double squares = 0.0;
-  for (std::size_t k = 0; k < poses.size(); ++k) {
-    result.poses[k].T.linear() = so3_exp(turns[k]) * poses[k].T.linear();
-    squares += turns[k].squaredNorm();
-    result.max_rad = std::max(result.max_rad, turns[k].norm());
-  }
-  result.rms_rad = std::sqrt(squares / static_cast<double>(poses.size()));
+  for (std::size_t k = 0; k < poses.size(); ++k)
+    result.poses[k].T.linear() =
+        so3_exp(turns.row(static_cast<Eigen::Index>(k))) * poses[k].T.linear();
+  const Eigen::VectorXd angles = turns.rowwise().norm();
+  result.rms_rad = std::sqrt(angles.squaredNorm() / static_cast<double>(poses.size()));
+  result.max_rad = angles.maxCoeff();
   return result;
 }
 
