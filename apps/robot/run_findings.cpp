@@ -113,6 +113,16 @@ void add_apart(std::span<const RunFacts> runs, const Names& names, std::vector<F
   }
 }
 
+void add_unseen(const RunSummary& run, std::vector<Finding>& findings) {
+  if (run.frames + run.frames_skipped + run.keyframes > 0) return;
+  findings.push_back({.id = "frames.none",
+                      .severity = Severity::kError,
+                      .what = run.name + ": 0 frames, 0 keyframes",
+                      .means = "odometry never began: nothing of this robot is in the results",
+                      .to_do = "see sensor_faults in summary.json; of live topics "
+                               "kimera_multi_doctor --live RIG tells which is silent"});
+}
+
 void add_skipped(const RunSummary& run, std::vector<Finding>& findings) {
   if (run.frames_skipped == 0) return;
   const auto skipped = static_cast<double>(run.frames_skipped);
@@ -276,6 +286,7 @@ std::vector<Finding> findings_of(std::span<const RunFacts> runs) {
   for (const RunFacts& run : runs) {
     add_vocabularies(run.summary, findings);
     add_lost(run.summary, findings);
+    add_unseen(run.summary, findings);
     add_skipped(run.summary, findings);
     add_rejected(run, findings);
     add_cameras(run.summary, findings);

@@ -161,7 +161,8 @@ std::optional<Stamp> RosOutputNode::time() const {
 template <typename Message>
 std::size_t RosOutputNode::tell(std::size_t topic, const Message& message) {
   const auto bytes = encode_ros(message);
-  sink_->put(topic, time(), bytes);
+  if (const auto now = time()) latest_ = std::max(latest_.value_or(*now), *now);
+  sink_->put(topic, latest_, bytes);
   return bytes.size();
 }
 

@@ -47,8 +47,8 @@ struct RosOutputOptions {
   int mesh_points = 0;  ///< Of a mesh, at most; 0: it is not told.
   int mesh_faces = 0;   ///< Likewise, in pieces: for those who are not to be held up.
   double mesh_bytes_per_s = std::numeric_limits<double>::infinity();  ///< Of these pieces.
-  bool draws = false;   ///< The mesh's faces and the closures, for those who have time for them.
-  bool logs = false;    ///< What is logged in this process.
+  bool draws = false;  ///< The mesh's faces and the closures, for those who have time for them.
+  bool logs = false;   ///< What is logged in this process.
   /// Paths, meshes and closures are told again once what they took last is paid at this rate.
   double state_bytes_per_s = std::numeric_limits<double>::infinity();
   std::size_t queue =
@@ -159,9 +159,10 @@ class RosOutputNode final : public Node {
   State path_, mesh_, closures_;
   LiveFrames frames_;
   std::size_t poses_ = 0;
-  std::optional<Stamp> stamp_;  // of the last image or keyframe
-  double speed_mps_ = 0.0;      // then
-  double told_s_ = 0.0;         // when it came; steady clock
+  std::optional<Stamp> stamp_;   // of the last image or keyframe
+  std::optional<Stamp> latest_;  // of the messages told: they never go back
+  double speed_mps_ = 0.0;       // then
+  double told_s_ = 0.0;          // when it came; steady clock
   Topic<Trajectory>::Message trajectory_ = std::make_shared<const Trajectory>();
   std::shared_ptr<const LabelledMesh> newest_mesh_;
   SurfacePieces pieces_;

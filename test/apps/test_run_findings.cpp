@@ -115,6 +115,12 @@ TEST_CASE("What stands out of a run is told with its number", "[robot][findings]
     CHECK(finding.severity == severity);
     CHECK_THAT(finding.what, Catch::Contains(number));
   };
+  SECTION("no frame at all") {
+    summary.frames = 0;
+    told("frames.none", Severity::kError, "0 frames, 0 keyframes");
+    summary.keyframes = 30;  // of a pose graph that is played
+    CHECK(findings_of_one(run).empty());
+  }
   SECTION("frames skipped") {
     summary.frames_skipped = 500;
     told("frames.skipped", Severity::kWarning, "500 frames skipped, 50 %");
