@@ -24,6 +24,20 @@ QueueQuota quota_of(TopicKind kind, Pace pace) {
   return quota;
 }
 
+TopicSpec key_topic() {
+  return {.name = "team_keys",
+          .max_bytes = kMaxKeyMessageBytes,
+          .kind = TopicKind::kState,
+          .carries_keys = true};
+}
+
+// Null where the team has no keys.
+std::unique_ptr<OutgoingTopic> make_key_topic(const DdsParticipant& participant,
+                                              const Peers& peers) {
+  if (participant.seal() == nullptr) return nullptr;
+  return std::make_unique<OutgoingTopic>(participant, peers, key_topic());
+}
+
 // Attachment numbers of the wait set; incoming topics follow.
 constexpr dds_attach_t kOther = 0;
 constexpr dds_attach_t kFirstTopic = 1;
@@ -33,17 +47,18 @@ constexpr dds_attach_t kFirstTopic = 1;
 DdsBridge::DdsBridge(const DdsParticipant& participant, const BudgetConfig& budget)
     : participant_(participant),
       peers_(participant),
+      keys_(make_key_topic(participant, peers_)),
       waitset_(dds_create_waitset(participant.handle()), "wait set"),
       stop_request_(dds_create_guardcondition(participant.handle()), "guard condition"),
       key_teller_(
           kMaxAdmitted, Overflow::kDropOldest, [this](const TeamPeer& peer) { tell_key(peer); },
           "dds_keys"),
-      sender_(budget, participant.config().lease_s, outgoing_) {
+      sender_(budget, participant.config().lease_s, outgoing_, keys_.get()) {
   for (const dds_entity_t condition :
        {stop_request_.handle(), peers_.discovery_condition(), peers_.liveliness_condition()})
     check_dds(dds_waitset_attach(waitset_.handle(), condition, kOther), "cannot wait");
-  if (participant_.seal() == nullptr) return;
-  exchange_keys();
+  if (keys_ == nullptr) return;
+  hear_keys();
   peers_.events().subscribe([this](const auto& event) { catch_up(*event); });
 }
 
@@ -51,15 +66,9 @@ DdsBridge::~DdsBridge() {
   stop();
 }
 
-// Beside the sender and its budget: half a kilobyte for each robot, now and then.
-void DdsBridge::exchange_keys() {
-  const TopicSpec spec{.name = "team_keys",
-                       .max_bytes = kMaxKeyMessageBytes,
-                       .kind = TopicKind::kState,
-                       .carries_keys = true};
-  keys_ = std::make_unique<OutgoingTopic>(participant_, peers_, spec);
+void DdsBridge::hear_keys() {
   add_incoming(
-      spec, true, {},
+      key_topic(), true, {},
       [seal = participant_.seal()](const TeamPeer& sender, auto content, const auto&) {
         return seal->with([&](TeamSeal& team) { return team.accept_key_message(sender, content); });
       });

@@ -137,7 +137,7 @@ class DdsBridge final : public Node {
  private:
   OutgoingTopic& add_outgoing(TopicSpec spec);
   void add_incoming(TopicSpec spec, bool addressed, Pace pace, IncomingTopic::Handler handler);
-  void exchange_keys();
+  void hear_keys();
   void tell_key(const TeamPeer& peer);
   void catch_up(const PeerEvent& event);
   void receive_until_stopped();
@@ -147,8 +147,8 @@ class DdsBridge final : public Node {
   Peers peers_;
   std::vector<std::unique_ptr<OutgoingTopic>> outgoing_;  // the sender's
   std::vector<std::unique_ptr<IncomingTopic>> incoming_;
-  std::unique_ptr<OutgoingTopic> keys_;  // where the team has keys; key_teller_'s
-  double told_keys_s_ = 0.0;             // receive thread only
+  const std::unique_ptr<OutgoingTopic> keys_;  // where the team has keys; key_teller_'s
+  double told_keys_s_ = 0.0;                   // receive thread only
   DdsEntity waitset_;
   DdsEntity stop_request_;  // guard condition
   bool stopped_ = false;

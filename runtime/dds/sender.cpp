@@ -18,9 +18,11 @@ constexpr std::size_t kHeldForNobody = 4096;
 }  // namespace
 
 Sender::Sender(const BudgetConfig& budget, double lease_s,
-               const std::vector<std::unique_ptr<OutgoingTopic>>& topics)
+               const std::vector<std::unique_ptr<OutgoingTopic>>& topics,
+               const OutgoingTopic* beside)
     : lease_s_(lease_s),
       topics_(topics),
+      beside_(beside),
       posted_(kQueue, Overflow::kBlock),
       schedule_(budget),
       heartbeat_([this] { posted_.close(); }) {}
@@ -145,7 +147,7 @@ void Sender::settle(double now_s) {
   bool have_come = false;
   for (const auto& topic : topics_) have_come |= topic->take_newcomers();
   if (!schedule_.is_limited() || (!is_due && !have_come)) return;
-  std::uint64_t sent_bytes = 0;
+  std::uint64_t sent_bytes = beside_ == nullptr ? 0 : beside_->sent_bytes();
   for (const auto& topic : topics_) sent_bytes += topic->sent_bytes();
   schedule_.settle(sent_bytes, now_s);
 }

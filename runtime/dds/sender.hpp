@@ -38,9 +38,11 @@ class Sender {
   static constexpr std::size_t kQueue = 8192;
 
   /// `topics` are all that it may be given messages of, and outlive it; the list may grow until
-  /// start(). Requests wait no longer than `lease_s`. Throws ConfigError.
+  /// start(). What goes over `beside`, which somebody else writes, counts against the budget, too;
+  /// null: there is no such topic. Requests wait no longer than `lease_s`. Throws ConfigError.
   Sender(const BudgetConfig& budget, double lease_s,
-         const std::vector<std::unique_ptr<OutgoingTopic>>& topics);
+         const std::vector<std::unique_ptr<OutgoingTopic>>& topics,
+         const OutgoingTopic* beside = nullptr);
   ~Sender() { stop(); }
   Sender(const Sender&) = delete;
   Sender& operator=(const Sender&) = delete;
@@ -87,6 +89,7 @@ class Sender {
 
   const double lease_s_;
   const std::vector<std::unique_ptr<OutgoingTopic>>& topics_;
+  const OutgoingTopic* beside_;
   BoundedQueue<Outgoing> posted_;
   Schedule schedule_;  // the thread's own, as what follows
   double settled_s_ = 0.0;
