@@ -118,7 +118,7 @@ struct TreeVerdict {
   /// better_placement(). Ascending.
   std::vector<std::pair<RobotId, SinglePose>> moves = {};
   /// kStart: how strong a pair of robots is as a rule, see usual_strength(). While closures are
-  /// weighed, no pair is much stronger.
+  /// weighed, no pair is much stronger, nor later if the rest contradicts it.
   Precision usual_pair = kUnlimited;
   double cost = 0.0;  ///< Of the team at the accepted poses.
   double gradient = 0.0;

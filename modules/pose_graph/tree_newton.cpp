@@ -25,8 +25,11 @@ constexpr double kJoint = 1e-6;
 // Where numbers are not what they should be, for single precision overflows beyond.
 constexpr double kOutOfTheWorld_m = 1e15;
 // How strong a pair may be while closures are weighed, in that of the usual one: no pair outvotes
-// others. In the end, what is kept has its own weight.
+// others. In the end what is kept has its own weight, but for pairs that the rest contradicts: by
+// so many standard deviations of the mean of its closures, and of a single one.
 constexpr double kStrongest = 1.25;
+constexpr double kTorn = 6.0;
+constexpr double kTornOfOne = 1.0;
 // Cycles of a pair that count for the noise; fewer where one robot is not to say it for all.
 constexpr std::size_t kEnoughLengths = 300;
 constexpr std::size_t kShareOfLengths = 60;
@@ -86,11 +89,13 @@ void TreeNewton::classify() {
 // Places of closures, by the other robot of the pair; own ones by this one.
 std::map<RobotId, std::vector<std::size_t>> TreeNewton::by_peer() const {
   std::map<RobotId, std::vector<std::size_t>> closures;
-  for (std::size_t k = graph_.odometry; k < known_.size(); ++k) {
-    const PoseEdge& e = known_[k].edge;
-    closures[e.from.robot == graph_.self ? e.to.robot : e.from.robot].push_back(k);
-  }
+  for (std::size_t k = graph_.odometry; k < known_.size(); ++k)
+    closures[peer_of(known_[k])].push_back(k);
   return closures;
+}
+
+RobotId TreeNewton::peer_of(const Known& k) const {
+  return k.edge.from.robot == graph_.self ? k.edge.to.robot : k.edge.from.robot;
 }
 
 // Of what both robots of a pair know, one speaks.
@@ -150,11 +155,9 @@ std::map<RobotId, double> TreeNewton::shares_of_pairs() const {
   std::map<RobotId, Precision> sums;
   for (std::size_t k = graph_.own.size(); k < known_.size(); ++k) {
     if (!takes_part(known_[k])) continue;
-    const PoseEdge& e = known_[k].edge;
-    Precision& sum =
-        sums.try_emplace(e.other(graph_.self).robot, Precision{0.0, 0.0}).first->second;
-    sum.kappa += e.precision.kappa;
-    sum.tau += e.precision.tau;
+    Precision& sum = sums.try_emplace(peer_of(known_[k]), Precision{0.0, 0.0}).first->second;
+    sum.kappa += known_[k].edge.precision.kappa;
+    sum.tau += known_[k].edge.precision.tau;
   }
   std::map<RobotId, double> shares;
   for (const auto& [robot, sum] : sums)
@@ -177,8 +180,7 @@ void TreeNewton::build_front() {
     if (!takes_part(known_[k]) || !known_[k].own) continue;
     front.edges.push_back(known_[k].edge);
     front_edge_.push_back(k);
-    if (k >= graph_.own.size())
-      known_[k].share = shares.at(known_[k].edge.other(graph_.self).robot);
+    if (k >= graph_.own.size()) known_[k].limit = known_[k].share = shares.at(peer_of(known_[k]));
   }
   for (const PoseEdge& e : graph_.to_absent) {
     const auto decided = graph_.decided.find(e.id());
@@ -199,9 +201,8 @@ std::vector<double> TreeNewton::front_weights(bool candidate) const {
   std::vector<double> weights;
   for (const std::size_t k : front_edge_) {
     const Known& known = known_[k];
-    const bool unlimited = candidate ? candidate_unlimited_ : unlimited_;
     const double weight =
-        (candidate ? known.candidate : known.weight) * (unlimited ? 1.0 : known.share);
+        candidate ? known.candidate * known.candidate_share : known.weight * known.share;
     weights.push_back(known.trust == Trust::kOpen ? std::max(weight, kFloor) : weight);
   }
   weights.resize(weights.size() + front_->graph().held.size(), 1.0);
@@ -285,7 +286,6 @@ const SE3& TreeNewton::pose_at(const KeyframeId& id, const std::vector<SE3>& pos
 void TreeNewton::weigh_candidates(TreeSums& sums) {
   const double c2 = told_.barc * told_.barc;
   const bool decided = told_.weighing == Weighing::kDecided;
-  candidate_unlimited_ = decided;
   for (const std::size_t k : front_edge_) {
     Known& known = known_[k];
     known.candidate = known.weight;
@@ -301,6 +301,50 @@ void TreeNewton::weigh_candidates(TreeSums& sums) {
     if ((decided ? weight : known.candidate) != known.weight) ++sums.changed;
     if (known.candidate != least && known.candidate != 1.0) ++sums.fractional;
   }
+  limit_candidates(decided);
+}
+
+// Which pairs have their own weight is settled in the first round in which all is decided.
+void TreeNewton::limit_candidates(bool decided) {
+  candidate_released_ = decided;
+  if (decided && released_) return;
+  const std::set<RobotId> torn = decided ? torn_pairs() : std::set<RobotId>{};
+  for (const std::size_t k : front_edge_) {
+    Known& known = known_[k];
+    const bool free = decided && !torn.contains(peer_of(known));
+    known.candidate_share = free ? 1.0 : known.limit;
+  }
+}
+
+// The limited pairs whose closures all pull one way at the poses at hand, further than noise would
+// their mean.
+std::set<RobotId> TreeNewton::torn_pairs() const {
+  struct Pull {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    double weight = 0.0;
+    double closures = 0.0;  // each as much as it counts
+  };
+  std::map<RobotId, Pull> pulls;
+  for (const std::size_t k : front_edge_) {
+    const Known& known = known_[k];
+    const PoseEdge& edge = known.edge;
+    if (known.limit == 1.0) continue;
+    const SE3& T_from = pose_at(edge.from, at_hand_);
+    const Eigen::Vector3d off =
+        pose_at(edge.to, at_hand_).translation() - T_from * edge.T_from_to.translation();
+    Pull& pull = pulls[peer_of(known)];
+    const double counts = known.candidate * known.limit;
+    const double weight = counts * edge.precision.tau;
+    pull.sum += (edge.from.robot == graph_.self ? weight : -weight) * off;
+    pull.weight += weight;
+    pull.closures += counts;
+  }
+  std::set<RobotId> torn;
+  for (const auto& [robot, pull] : pulls) {
+    const double most = std::max(kTorn, kTornOfOne * std::sqrt(pull.closures));
+    if (pull.sum.norm() > most * told_.noise_scale * std::sqrt(pull.weight)) torn.insert(robot);
+  }
+  return torn;
 }
 
 UpLetter TreeNewton::equations() {
@@ -422,8 +466,11 @@ std::vector<SolverLetter> TreeNewton::go_up() {
 void TreeNewton::accept() {
   base_ = at_hand_;
   accepted_.assign(base_.begin(), base_.begin() + static_cast<Index>(accepted_.size()));
-  for (Known& k : known_) k.weight = k.candidate;
-  unlimited_ = candidate_unlimited_;
+  for (Known& k : known_) {
+    k.weight = k.candidate;
+    k.share = k.candidate_share;
+  }
+  released_ = candidate_released_;
 }
 
 void TreeNewton::take_step(const VectorXd& step, const TreeVerdict& verdict,

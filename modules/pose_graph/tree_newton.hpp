@@ -60,15 +60,19 @@ class TreeNewton final : public MemberSolver {
     Trust trust = Trust::kIn;
     bool aside = false;  ///< Stands alone: out for this session.
     bool odometry = false;
-    bool own = true;         ///< Among this robot's edges.
-    double weight = 1.0;     ///< At the accepted poses.
-    double candidate = 1.0;  ///< At those at hand.
-    double share = 1.0;      ///< Left of the weight until all is decided: its pair is limited.
+    bool own = true;               ///< Among this robot's edges.
+    double weight = 1.0;           ///< At the accepted poses.
+    double candidate = 1.0;        ///< At those at hand.
+    double limit = 1.0;            ///< Left of the weight while its pair is limited.
+    double share = 1.0;            ///< Left of the weight at the accepted poses.
+    double candidate_share = 1.0;  ///< At those at hand.
   };
 
   void classify();
   [[nodiscard]] bool takes_part(const Known& k) const { return k.trust != Trust::kOut && !k.aside; }
   [[nodiscard]] bool speaks_for(const Known& k) const;
+  /// The other robot of the edge; itself, of an own one.
+  [[nodiscard]] RobotId peer_of(const Known& k) const;
   [[nodiscard]] const SE3& start_of(const KeyframeId& id) const;
   [[nodiscard]] std::map<RobotId, std::vector<std::size_t>> by_peer() const;
   void find_isolated(double barc);
@@ -83,6 +87,8 @@ class TreeNewton final : public MemberSolver {
   void move_robots(const std::vector<std::pair<RobotId, SinglePose>>& moves);
   [[nodiscard]] UpLetter equations();
   void weigh_candidates(TreeSums& sums);
+  void limit_candidates(bool decided);
+  [[nodiscard]] std::set<RobotId> torn_pairs() const;
   [[nodiscard]] std::vector<SolverLetter> go_up();
   [[nodiscard]] bool can_follow(const DownLetter& letter) const;
   [[nodiscard]] std::vector<SolverLetter> go_down(const DownLetter& letter);
@@ -97,9 +103,9 @@ class TreeNewton final : public MemberSolver {
   std::vector<Known> known_;  // as SessionGraph::own, then ::between
   std::optional<TreeFront> front_;
   std::vector<std::size_t> front_edge_;  // which of known_ the front's edges are
-  // Pairs are no longer limited: at the accepted poses, at those at hand.
-  bool unlimited_ = false;
-  bool candidate_unlimited_ = false;
+  // Pairs that agree with the rest are no longer limited: at the accepted poses, at those at hand.
+  bool released_ = false;
+  bool candidate_released_ = false;
 
   Phase phase_ = Phase::kUp;
   std::uint32_t round_ = 0;

@@ -238,6 +238,8 @@ TEST_CASE("one liar of four costs the others little", "[pose_graph][liars]") {
       Lie{.liar = 4, .offset_m = 1000.0, .closures = 1000},
       Lie{.liar = 1, .offset_m = 5.0, .closures = 1000},
       Lie{.liar = 4, .offset_m = 5.0, .closures = 1000, .only_lies = true},
+      Lie{.liar = 1, .offset_m = 0.5, .closures = 1000, .only_lies = true},
+      Lie{.liar = 4, .offset_m = 0.5, .closures = 1000, .only_lies = true},
       Lie{.liar = 1, .offset_m = 50.0, .closures = 1000, .consistent = false},
       Lie{.liar = 4, .offset_m = 1000.0, .closures = 1000, .consistent = false, .variance = kHuge},
       Lie{.liar = 1, .offset_m = 5.0, .closures = 100, .variance = kTiny},
