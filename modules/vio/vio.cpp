@@ -23,6 +23,11 @@ constexpr std::ptrdiff_t kSeenFeatures = 40;
 constexpr std::ptrdiff_t kFewOfSeen = 4;  // a quarter
 constexpr int kMostUnlocatedImages = 10;
 
+// After so long without vision what the dark has left is forgotten, so long after vision is back:
+// what it tells of the way through the dark has been told by then.
+constexpr double kLongDark_s = 3.0;
+constexpr double kMended_s = 0.8;
+
 // Features, and time, with which images alone carry the pose over a gap of inertial samples.
 constexpr int kLeastTracked = 30;
 constexpr double kLongestBridge_s = 3.0;
@@ -152,14 +157,19 @@ bool Vio::goes_on_at(const Held& held) const {
 
 // The state of this image has been given out, and its keyframe handed on.
 void Vio::go_on(const Held& held, VioResult& result) {
-  InertialFrame frame = held.data;
-  frame.samples = samples_;  // also from before the image
-  smoother_.start(frame, *last_, *last_keyframe_->state_covariance);
+  start_on(held, *last_, *last_keyframe_->state_covariance);
   ++statistics_.start_attempts;
   ++statistics_.starts;
   result.start = StartStatus::kGoesOn;
   running_ = true;
   locate(*last_, held.frame, result);
+}
+
+void Vio::start_on(const Held& held, const OdometryState& state,
+                   const StateCovariance& covariance) {
+  InertialFrame frame = held.data;
+  frame.samples = samples_;  // also from before the image
+  smoother_.start(frame, state, covariance);
 }
 
 void Vio::try_start(VioResult& result) {
@@ -247,9 +257,24 @@ void Vio::advance(const Held& held, VioResult& result) {
   }
   result.states.push_back(result.smoother->state);
   const bool last_chance = last_keyframe_ && smoother_.leaving(last_keyframe_->stamp);
-  if (result.smoother->keyframe && (last_chance || due(result.smoother->state, *held.frame)))
+  const bool mended = has_mended(*held.frame);
+  if (mended ||
+      (result.smoother->keyframe && (last_chance || due(result.smoother->state, *held.frame))))
     hand_on(result.smoother->state, result);
+  if (mended) forget_dark(held, result.smoother->state);
   locate(result.smoother->state, held.frame, result);
+}
+
+bool Vio::has_mended(const StereoFrame& frame) const {
+  return back_since_ && seconds_between(*back_since_, frame.stamp) >= kMended_s &&
+         locates_points(frame) && !smoother_.window().frames.back().rests;
+}
+
+// States from the dark are far off, and so are the derivatives at them that the window's prior has:
+// with those it would learn for seconds, moving the pose, what images tell at once.
+void Vio::forget_dark(const Held& held, const OdometryState& state) {
+  back_since_.reset();
+  if (last_keyframe_->state_covariance) start_on(held, state, *last_keyframe_->state_covariance);
 }
 
 // A start is made on what is seen.
@@ -259,6 +284,10 @@ void Vio::watch_vision(Stamp stamp, int features, VioResult& result) {
                    : result.smoother && running_ ? result.smoother->seen
                                                  : 0;
   result.vision = vision_.add(stamp, features, seen);
+  if (has_started || vision_.is_lost())
+    back_since_.reset();
+  else if (result.vision && result.vision->lasted_s >= kLongDark_s)
+    back_since_ = stamp;
   statistics_.vision_losses = vision_.losses();
   statistics_.blind_s = vision_.lost_s();
 }

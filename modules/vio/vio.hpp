@@ -91,9 +91,12 @@ class Vio {
                                      Stamp to) const;
   [[nodiscard]] bool goes_on_at(const Held& held) const;
   void go_on(const Held& held, VioResult& result);
+  void start_on(const Held& held, const OdometryState& state, const StateCovariance& covariance);
   void try_start(VioResult& result);
   void advance(const Held& held, VioResult& result);
   void restart(Held held);
+  [[nodiscard]] bool has_mended(const StereoFrame& frame) const;
+  void forget_dark(const Held& held, const OdometryState& state);
   void watch_vision(Stamp stamp, int features, VioResult& result);
   [[nodiscard]] bool plausible(const SmootherUpdate& update) const;
   void continue_from_last_pose(std::vector<OdometryState>& states) const;
@@ -117,6 +120,7 @@ class Vio {
   FixedLagSmoother smoother_;
   RestDetector rest_detector_;
   VisionWatch vision_;
+  std::optional<Stamp> back_since_;  // Vision; until what came before is forgotten.
   VioStatistics statistics_;
   std::vector<ImuSample> samples_;  // From the last one not after the last image on.
   std::optional<Stamp> last_image_;

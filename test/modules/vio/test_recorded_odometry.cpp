@@ -162,6 +162,27 @@ TEST_CASE("MH_01_easy: after five seconds of black images with late stamps odome
   CHECK(errors.ate_m < 0.01);
 }
 
+// What the dark has left would move the pose for seconds more.
+TEST_CASE("MH_01_easy: a second after five of black images odometry is as good as ever", "[vio]") {
+  const auto folder = shared_data("euroc/MH_01_easy");
+  if (!folder) return;
+  const Recording light = read_recording(*folder, 0.0, 15.0);
+  constexpr std::size_t kBack = 200;
+  const auto errors_after = [](const Recording& data) {
+    const OdometryRun run = run_odometry(data, 0, data.packets.size(), TrackerConfig{}, {});
+    REQUIRE(run.states.size() == data.packets.size());
+    CHECK(run.statistics.starts == 1);
+    CHECK(run.statistics.divergences == 0);
+    constexpr std::size_t kSecond = 20;
+    return odometry_errors(std::span(run.states).subspan(kBack + kSecond),
+                           std::span(run.truth).subspan(kBack + kSecond));
+  };
+  const OdometryErrors undisturbed = errors_after(light);
+  const OdometryErrors after = errors_after(darkened(light, kBack - 100, kBack));
+  INFO(after.ate_m << " m, undisturbed " << undisturbed.ate_m << " m");
+  CHECK(after.ate_m < 1.2 * undisturbed.ate_m);
+}
+
 TEST_CASE("MH_01_easy: stamps of images that are 20 ms late are found out", "[vio][calibration]") {
   const Recording* const data = recording();
   if (data == nullptr) return;
