@@ -1,9 +1,13 @@
 #pragma once
 
+#include <unistd.h>
+
+#include <cerrno>
 #include <filesystem>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 #include "modules/core/write_file.hpp"
 
@@ -18,8 +22,21 @@ inline void write_output(const std::filesystem::path& file, const auto& writer) 
   write_file(file, out.view());
 }
 
-/// Throws std::runtime_error if there is no folder to write `file` to, or if it is one (empty: none
-/// asked for): told before the work is done, not after.
+/// Makes the folder where it is absent. Throws std::runtime_error that names it and why nothing can
+/// be written there: told before the work is done, not after.
+inline void make_output_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error)
+    throw std::runtime_error(folder.string() + ": cannot be made: " + error.message() +
+                             "; choose another folder");
+  if (access(folder.c_str(), W_OK | X_OK) != 0)
+    throw std::runtime_error(folder.string() + ": cannot be written to: " +
+                             std::generic_category().message(errno) + "; choose another folder");
+}
+
+/// Likewise throws if there is no folder to write `file` to, or if it is one (empty: none asked
+/// for).
 inline void check_output_folder(const std::filesystem::path& file) {
   if (file.empty()) return;
   const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
@@ -28,6 +45,9 @@ inline void check_output_folder(const std::filesystem::path& file) {
                              folder.string());
   if (std::filesystem::is_directory(file))
     throw std::runtime_error(file.string() + ": cannot be written, it is a folder");
+  if (access(folder.c_str(), W_OK | X_OK) != 0)
+    throw std::runtime_error(file.string() + ": cannot be written: " + folder.string() + ": " +
+                             std::generic_category().message(errno));
 }
 
 }  // namespace km

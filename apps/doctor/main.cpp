@@ -138,7 +138,10 @@ std::string conclusion(const std::vector<Finding>& findings) {
     return std::ranges::count(findings, severity, &Finding::severity);
   };
   const auto errors = count(Severity::kError), warnings = count(Severity::kWarning);
-  if (errors + warnings == 0) return "sound\n";
+  const auto notes = count(Severity::kNote);
+  if (errors + warnings + notes == 0) return "sound\n";
+  if (errors + warnings == 0)
+    return "sound, with " + std::to_string(notes) + (notes == 1 ? " note\n" : " notes\n");
   return std::to_string(errors) + (errors == 1 ? " error, " : " errors, ") +
          std::to_string(warnings) + (warnings == 1 ? " warning\n" : " warnings\n");
 }

@@ -187,6 +187,11 @@ void examine_buffers(const NetworkFacts& facts, Examination& result) {
 struct Robots {
   std::vector<Announced> of_team, of_other_team, on_other_domain, other_protocol;
   std::size_t other_programs = 0;
+
+  [[nodiscard]] bool are_none() const {
+    return of_team.empty() && of_other_team.empty() && on_other_domain.empty() &&
+           other_protocol.empty();
+  }
 };
 
 Robots sorted(const NetworkFacts& facts) {
@@ -269,6 +274,15 @@ void examine_robots(const NetworkFacts& facts, Examination& result) {
     result.findings.push_back(warning("network.nobody", "no robot of the team is heard",
                                       "none runs, or it is kept out by what stands here",
                                       "start it, and see its log for the interface it uses"));
+  else if (robots.are_none())
+    result.findings.push_back(
+        {.id = "network.nobody",
+         .severity = Severity::kNote,
+         .what =
+             "nobody else was seen: no robot on any domain in " + fixed(facts.listened_s, 1) + " s",
+         .means = "this host is ready; whether others reach it is not told",
+         .to_do =
+             "start a robot on another host and look again; of one that runs, --peers ADDRESS"});
 }
 
 void examine_echo(const PeerEcho& peer, Examination& result) {

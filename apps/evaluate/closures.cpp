@@ -1,6 +1,8 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -54,22 +56,79 @@ Found found_in(const fs::path& results) {
   return all;
 }
 
+// When a robot was there, as far as its keyframes tell, and what was given of it.
+struct RobotSpan {
+  RobotId robot = 0;
+  Stamp first = 0, last = 0;
+  std::size_t keyframes = 0, placed = 0;
+  fs::path results, truth;
+};
+
+std::vector<RobotSpan> spans_of(const std::vector<KeyframeRecord>& keyframes,
+                                const std::vector<TrueKeyframe>& placed, const fs::path& results,
+                                const fs::path& truth) {
+  std::map<RobotId, RobotSpan> spans;
+  for (const KeyframeRecord& keyframe : keyframes) {
+    auto& span = spans
+                     .try_emplace(keyframe.id.robot, RobotSpan{.robot = keyframe.id.robot,
+                                                               .first = keyframe.stamp,
+                                                               .results = results,
+                                                               .truth = truth})
+                     .first->second;
+    span.first = std::min(span.first, keyframe.stamp);
+    span.last = std::max(span.last, keyframe.stamp);
+    ++span.keyframes;
+  }
+  for (const TrueKeyframe& keyframe : placed) ++spans.at(keyframe.id.robot).placed;
+  std::vector<RobotSpan> all;
+  for (const auto& [robot, span] : spans) all.push_back(span);
+  return all;
+}
+
+// Why numbers may be of no use: true poses that are those of another robot, or of nobody.
+std::string notes_on(const std::vector<RobotSpan>& spans) {
+  const auto name = [](const RobotSpan& span) {
+    return "robot " + std::to_string(span.robot) + " (" + span.results.string() + ')';
+  };
+  const std::string way_out =
+      "give one --truth for each of --results, in their order: its robot's own true poses\n";
+  std::string notes;
+  for (std::size_t i = 0; i < spans.size(); ++i) {
+    const RobotSpan& a = spans[i];
+    if (a.placed == 0)
+      notes += "note: none of the " + std::to_string(a.keyframes) + " keyframes of " + name(a) +
+               " lies within " + a.truth.string() + ": " + way_out;
+    for (std::size_t j = i + 1; j < spans.size(); ++j) {
+      const RobotSpan& b = spans[j];
+      if (a.truth == b.truth && a.robot != b.robot && a.first <= b.last && b.first <= a.last)
+        notes += "note: " + a.truth.string() + " is taken for the true poses of " + name(a) +
+                 " and of " + name(b) + " at the same times. Unless both are parts of one " +
+                 "recording, " + way_out;
+    }
+  }
+  return notes;
+}
+
 void run(const ClosuresCommand& command) {
+  check_output_folder(command.json);
   if (command.truths.size() != 1 && command.truths.size() != command.results.size())
     throw std::invalid_argument("give one --truth, or as many as there are --results");
   std::vector<TrueKeyframe> keyframes;
   std::vector<ClosureRecord> closures;
+  std::vector<RobotSpan> spans;
   for (std::size_t i = 0; i < command.results.size(); ++i) {
-    const auto truth = read_trajectory(command.truths[command.truths.size() == 1 ? 0 : i]);
+    const fs::path& truth = command.truths[command.truths.size() == 1 ? 0 : i];
     const Found found = found_in(command.results[i]);
-    const auto placed = place_keyframes(found.keyframes, truth);
+    const auto placed = place_keyframes(found.keyframes, read_trajectory(truth));
+    const auto robots = spans_of(found.keyframes, placed, command.results[i], truth);
+    spans.insert(spans.end(), robots.begin(), robots.end());
     keyframes.insert(keyframes.end(), placed.begin(), placed.end());
     closures.insert(closures.end(), found.closures.begin(), found.closures.end());
   }
   const SensorRig rig = read_euroc_rig(find_mav0(command.dataset));
   const ClosureScores scores =
       score_closures(keyframes, closures, rig.stereo.cameras[0], command.options);
-  std::cout << to_table(scores);
+  std::cout << to_table(scores) << notes_on(spans);
   write_output(command.json, [&](std::ostream& out) { out << json_text(scores); });
 }
 
@@ -85,13 +144,19 @@ constexpr const char* kClosuresDetails =
     "Recall counts pairs of keyframes of two robots that see the same place, and, as a system "
     "needs\n"
     "only one match per keyframe, keyframes that are part of such a pair.\n\n"
-    "Example:\n"
+    "One --truth is that of robots on parts of one recording; else each robot needs its own, in "
+    "the\norder of --results.\n\n"
+    "Examples:\n"
     "  kimera_multi_evaluate closures --dataset MH_01_easy --truth groundtruth_tum.txt \\\n"
-    "      --results results/two/a results/two/b";
+    "      --results results/two/a results/two/b\n"
+    "  kimera_multi_evaluate closures --dataset room/robot0 \\\n"
+    "      --truth room/robot{0,1}/mav0/state_groundtruth_estimate0/data.csv \\\n"
+    "      --results results/robot{0,1}";
 
 void define(CLI::App& app, ClosuresCommand& command) {
   app.add_option("--truth", command.truths,
-                 "True poses in one common world: one file for all robots or one for each")
+                 "True poses in one common world: one file for each of --results, or one for "
+                 "all, where they are parts of one recording")
       ->required();
   app.add_option(
          "--results", command.results,

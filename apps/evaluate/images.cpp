@@ -96,6 +96,7 @@ std::vector<ImageFigure> figures_of_other(const ImagesCommand& command) {
 }
 
 void run(const ImagesCommand& command) {
+  check_output_folder(command.json);
   // Opened for its errors alone: they come now, not after the minutes the first one takes.
   if (!command.compare.empty())
     static_cast<void>(open_euroc(command.compare, options_of(window_of_other(command))));

@@ -58,6 +58,7 @@ MeshReport compared(const LabelledMesh& truth, std::span<const MeshInput> inputs
 }
 
 void run(const MeshCommand& command) {
+  check_output_folder(command.json);
   MeshErrorOptions options = command.options;
   options.T_truth_estimate = placed_by(command);
   StageProgress progress;

@@ -103,6 +103,7 @@ void run(const RenderCommand& command) {
   const auto [width, height] = size_of(command.size);
   if (command.output.extension() != ".png")
     throw std::invalid_argument(command.output.string() + ": pictures are PNG, named *.png");
+  check_output_folder(command.output);
   const SE3 T_picture_mesh = placed_by(command);
   std::vector<LabelledMesh> meshes;
   PictureScene scene;

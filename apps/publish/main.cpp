@@ -32,6 +32,8 @@ Examples
   A robot on live topics, on one host; the rig file names the topics:
     kimera_multi_publish MH_01_easy --wait 1
     kimera_multi_robot --robot 0 --live rig.yaml --output results/a
+  Seconds 10 to 40 of it:
+    kimera_multi_publish MH_01_easy --wait 1 --from 10 --to 40
   The same with a bad driver: up to 20 ms late, one message in ten lost:
     kimera_multi_publish recording.bag --jitter 0.02 --drop 0.1
 
@@ -53,6 +55,11 @@ Options parse_options(int argc, char** argv) {
   app.add_option("--rate", options.play.rate, "Speed: 1 real time, 2 twice as fast")
       ->check(CLI::Range(1e-3, 1e3))
       ->capture_default_str();
+  app.add_option("--from", options.play.from_s,
+                 "Start of the part to play [s since the first message]")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--to", options.play.to_s, "End of the part to play [s since the first message]")
+      ->check(CLI::NonNegativeNumber);
   app.add_option("--topics", options.play.topics, "Only these")->delimiter(',');
   app.add_option("--wait", options.wait, "Begin when each topic has so many readers")
       ->capture_default_str();
@@ -71,7 +78,8 @@ Options parse_options(int argc, char** argv) {
   const char* const domain = std::getenv("ROS_DOMAIN_ID");
   options.ros.domain = domain != nullptr ? std::atoi(domain) : 0;
   app.add_option("--domain", options.ros.domain,
-                 "ROS_DOMAIN_ID, by default that of the environment")
+                 "ROS_DOMAIN_ID, by default that of the environment: a robot hears it with --set "
+                 "ros.domain=N (its --domain is the team's)")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
   app.add_option("--interface", options.ros.interface, "Network interface, e.g. lo");
@@ -79,6 +87,8 @@ Options parse_options(int argc, char** argv) {
       ->delimiter(',');
   try {
     app.parse(argc, argv);
+    if (options.play.from_s >= options.play.to_s)
+      throw CLI::ValidationError("--from is not before --to");
   } catch (const CLI::ParseError& error) {
     std::exit(app.exit(error) == 0 ? 0 : kBadCommandLine);
   }

@@ -11,6 +11,7 @@ namespace km {
 namespace {
 
 constexpr int kKeptMessages = 100;
+constexpr const char* kLatchedTopic = "/tf_static";
 
 template <typename... Messages>
 std::optional<std::vector<std::uint8_t>> as_ros_2(const BagChannel& channel,
@@ -65,9 +66,9 @@ MessagePlayer::MessagePlayer(std::unique_ptr<BagReader> recording,
     topic_of_.back() = static_cast<std::size_t>(known - topics_.begin());
     if (known != topics_.end()) continue;
     topics_.push_back({channel.topic, channel.type});
-    const RosQos qos = channel.topic == "/tf_static" ? RosQos::kLatched
-                       : options.reliable            ? RosQos::kReliable
-                                                     : RosQos::kSensorData;
+    const RosQos qos = channel.topic == kLatchedTopic ? RosQos::kLatched
+                       : options.reliable             ? RosQos::kReliable
+                                                      : RosQos::kSensorData;
     const std::string type = is_of_type(channel, RosTransforms::kType)
                                  ? std::string(RosTransforms::kType)
                                  : channel.type;
@@ -85,6 +86,21 @@ std::vector<std::string> MessagePlayer::topics_short_of(std::size_t readers) con
   for (std::size_t k = 0; k < publishers_.size(); ++k)
     if (publishers_[k]->reader_count() < readers) topics.push_back(topics_[k].topic);
   return topics;
+}
+
+// False behind the end of the part to play.
+bool MessagePlayer::take(BagMessage message) {
+  const Stamp begin = first_.value_or(message.log_time) + nanoseconds(options_.from_s);
+  if (!first_) {
+    first_ = message.log_time;
+    static_cast<void>(clock_.due(begin, ReplayClock::TimePoint::clock::now()));
+  }
+  if (seconds_between(*first_, message.log_time) >= options_.to_s) return false;
+  const bool is_latched = recording_->channels()[message.channel].topic == kLatchedTopic;
+  if (message.log_time < begin && !is_latched) return true;
+  message.log_time = std::max(message.log_time, begin);
+  schedule(std::move(message));
+  return true;
 }
 
 void MessagePlayer::schedule(BagMessage message) {
@@ -117,12 +133,7 @@ void MessagePlayer::tell_image(const Due& due) const {
 bool MessagePlayer::step() {
   while (!ended_ && (due_.empty() || *newest_ <= due_.top().stamp)) {
     auto message = recording_->next();
-    ended_ = !message;
-    if (!message) break;
-    if (!first_)
-      static_cast<void>(
-          clock_.due(first_.emplace(message->log_time), ReplayClock::TimePoint::clock::now()));
-    schedule(std::move(*message));
+    ended_ = !message || !take(std::move(*message));
   }
   if (due_.empty() || !clock_.wait_until(due_.top().stamp)) return false;
   const Due& due = due_.top();

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <queue>
@@ -25,6 +26,8 @@ struct PlayOptions {
   bool reliable = false;    ///< Else best effort, as drivers of sensors are.
   unsigned seed = 0;
   std::vector<std::string> topics = {};  ///< Those to play; all without any.
+  /// The part to play [s since the first message]; of the time before it only what is latched.
+  double from_s = 0.0, to_s = std::numeric_limits<double>::infinity();
 };
 
 /// What became of one topic.
@@ -58,7 +61,7 @@ class MessagePlayer {
 
   [[nodiscard]] const std::vector<PlayedTopic>& topics() const { return topics_; }
   [[nodiscard]] const std::vector<std::string>& left_out() const { return left_out_; }
-  /// Of what was published last, in the recording's time.
+  /// Of what was published last, in the recording's time since its first message.
   [[nodiscard]] double played_s() const { return played_s_; }
 
  private:
@@ -72,6 +75,7 @@ class MessagePlayer {
     }
   };
 
+  [[nodiscard]] bool take(BagMessage message);
   void schedule(BagMessage message);
   void tell_image(const Due& due) const;
 

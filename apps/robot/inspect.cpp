@@ -122,6 +122,11 @@ std::string inspect_recording(const fs::path& path) {
 
 std::string inspect_recording(const fs::path& path, const fs::path& rig) {
   if (!is_absent(rig)) throw InputFileError(rig.string() + ": is there already: name another file");
+  if (is_folder(path / "mav0") || is_folder(path / "cam0"))
+    throw InputFileError(rig.string() + ": not written: " + path.string() +
+                         " is a EuRoC folder, whose calibration is its own sensor.yaml files; play "
+                         "it with --dataset " +
+                         path.string() + ", without --rig");
   const auto reader = open_bag(path);
   const auto topics = summarise_topics(*reader);
   const RigFile proposal = propose_rig(topics);

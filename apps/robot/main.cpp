@@ -49,9 +49,10 @@ optimizer.csv, traffic.csv, process.csv, timing.csv, config.yaml, summary.json, 
 the next run), run.journal (for --resume and --session); with mapping.mode on also mesh.ply,
 mesh_optimized.ply and label_palette.csv; with --record record.mcap.
 Ctrl-C, SIGTERM and SIGHUP end the run in order with everything written; a second Ctrl-C or SIGTERM ends it at once.
-Exit codes: 0 done; 1 bad input or configuration, or a recording that gave no pose; 2 bad command line;
-3 a module failed while running, or another robot claimed this robot's id; 4 results could not be written: the log
-names each and why; 5 a module did not get on (see run.patience): what the others recorded is written.)";
+Exit codes: 0 done; 1 bad input or configuration, a recording that gave no pose, or live sensors that gave no image;
+2 bad command line; 3 a module failed while running, or another robot claimed this robot's id; 4 results could not
+be written: the log names each and why; 5 a module did not get on (see run.patience): what the others recorded is
+written.)";
 
 double parse_rate(const std::string& text) {
   if (text == "max") return std::numeric_limits<double>::infinity();
@@ -130,7 +131,9 @@ void check_window(const RobotOptions& options) {
 }
 
 void add_network(CLI::App& app, RobotOptions& options) {
-  app.add_option("--domain", options.domain, "DDS domain: robots of one team use the same")
+  app.add_option(
+         "--domain", options.domain,
+         "DDS domain of the team: its robots use the same; drivers of ROS are on ros.domain")
       ->check(CLI::Range(0, 230));
   app.add_option("--link", options.link, "Link profile: wired, wifi, intermittent, or a file");
   app.add_option("--peers", options.peers, "Addresses of the other hosts, where multicast is off")
@@ -144,14 +147,21 @@ void add_network(CLI::App& app, RobotOptions& options) {
 void add_output(CLI::App& app, RobotOptions& options) {
   auto* group = app.add_option_group("Output", "Where the results go");
   group->add_option("--output", options.output, "Folder of the results, made if absent");
-  group->add_option_function<std::string>(
-      "--resume",
-      [&options](const std::string& folder) {
-        options.output = folder;
-        options.resume = true;
-      },
-      "In place of --output: the folder of a run that was killed; goes on where it ended (all "
-      "other options as before)");
+  group
+      ->add_option_function<std::string>(
+          "--resume",
+          [&options](const std::string& folder) {
+            options.output = folder;
+            options.resume = true;
+          },
+          "In place of --output: the folder of a run that was killed; goes on where it ended (all "
+          "other options as before)")
+      ->check([](const std::string& folder) {
+        return std::filesystem::is_directory(folder)
+                   ? ""
+                   : folder + ": there is no such folder, so no run to go on with; --output " +
+                         folder + " begins one there";
+      });
   group->require_option(1);
   app.add_option_function<std::vector<std::string>>(
          "--record", [&options](const std::vector<std::string>& file) { options.record = file[0]; },
@@ -170,8 +180,8 @@ RobotOptions parse_options(int argc, char** argv) {
   app.add_option("--config", options.configs, "Configuration files; later ones override earlier")
       ->check(CLI::ExistingFile);
   app.add_option("--set", options.settings, "One setting over all files: section.key=value");
-  app.add_option("--robot", options.robot,
-                 "Id of this robot, any number 0..65535, unique in the team")
+  app.add_option("--robot", options.robot, "Id of this robot, any number, unique in the team")
+      ->check(CLI::Range(0, 65535))
       ->required();
   app.add_option("--name", options.name, "Name shown to people (default robot<id>)");
   add_input(app, options);

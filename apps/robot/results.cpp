@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "apps/output_file.hpp"
+#include "apps/robot/pose_holes.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/pose_graph/g2o_io.hpp"
 
@@ -138,6 +139,19 @@ OdometrySummary odometry_of(const VioStatistics& met) {
           .blind_seconds = met.blind_s};
 }
 
+std::optional<HolesSummary> holes_of(const std::vector<StampedPose>& path) {
+  HolesSummary summary;
+  for (const PoseHole& hole : pose_holes(path)) {
+    const double hole_s = seconds_between(hole.from, hole.to);
+    ++summary.count;
+    summary.seconds += hole_s;
+    if (hole_s <= summary.longest_s) continue;
+    summary.longest_s = hole_s;
+    summary.longest_from_s = seconds_between(path.front().stamp, hole.from);
+  }
+  return summary.count == 0 ? std::nullopt : std::optional(summary);
+}
+
 // TUM: "time[s] tx ty tz qx qy qz qw", nine decimals of seconds.
 void write_poses(std::ostream& out, const std::vector<StampedPose>& poses) {
   for (const StampedPose& pose : poses) {
@@ -198,6 +212,7 @@ RunSummary summary_of(const RunRecord& record) {
                  .settled = progress.settled,
                  .members = progress.members};
   if (record.odometry_statistics()) summary.odometry = odometry_of(*record.odometry_statistics());
+  summary.holes = holes_of(record.odometry());
   if (record.calibration()) summary.cameras = cameras_of(*record.calibration());
   if (record.dense_sensing()) summary.mapping = map_counts(record);
   return summary;

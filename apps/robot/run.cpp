@@ -327,6 +327,7 @@ std::string timings(const Robot& robot) {
 RunEnd end_of(const RobotOptions& options, const Robot& robot, const RunResult& result,
               const char* departure, const RunRecord& record) {
   RunEnd end{options.robot, result, robot.id_taken(), departure};
+  end.is_live = options.is_live;
   if (const SensorsNode* sensors = robot.sensors()) {
     // The last image of those before comes once more.
     const std::size_t before = std::max<std::size_t>(robot.restored_images(), 1) - 1;

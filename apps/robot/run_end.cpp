@@ -123,6 +123,9 @@ Verdict verdict_of_run(const RunEnd& end) {
   if (end.id_taken)
     return {kFailed, "another robot has this robot's id " + std::to_string(end.robot) +
                          ": give every robot its own --robot, and run again"};
+  if (end.is_live && end.images && end.images->read + end.images->skipped == 0)
+    return {kNothingEstimated,
+            "no image came: kimera_multi_doctor --live RIG tells which topic is silent, and why"};
   if (end.result.interrupted) return {0, "interrupted"};
   if (end.images && end.images->with_pose == 0)
     return {kNothingEstimated, why_no_pose(*end.images)};

@@ -112,6 +112,7 @@ struct RunEnd {
   bool id_taken = false;                   ///< Another living robot had the same id first.
   const char* departure = nullptr;         ///< Why the robot left its team, if it did.
   std::optional<ImageCounts> images = {};  ///< Absent for a robot without sensors.
+  bool is_live = false;                    ///< A signal is the usual end of live sensors.
   /// Why each result that could not be written is lost, by file.
   std::map<std::string, std::string> lost_results = {};
   std::vector<MissedPeer> missed = {};  ///< Whom the robot left without.
@@ -124,9 +125,9 @@ struct Verdict {
 };
 
 /// 5 if a module hung. 3 if one failed, or another robot claimed the id: whose data the team then
-/// used is anybody's guess. 1 if the run came to its end and not one image has a pose. 4 if results
-/// could not be written. 0 otherwise. A robot that left without others of its team says whom, why,
-/// and for how long it had missed them.
+/// used is anybody's guess. 1 if the run came to its end and not one image has a pose, or live
+/// sensors gave no image. 4 if results could not be written. 0 otherwise. A robot that left without
+/// others of its team says whom, why, and for how long it had missed them.
 [[nodiscard]] Verdict verdict_of(const RunEnd& end);
 
 /// "2910 of 2912 images have a pose".

@@ -137,6 +137,26 @@ void add_skipped(const RunSummary& run, std::vector<Finding>& findings) {
                                "vio.window_keyframes, or a faster computer"});
 }
 
+void add_holes(const RunSummary& run, std::vector<Finding>& findings) {
+  if (!run.holes) return;
+  const HolesSummary& holes = *run.holes;
+  std::string what = run.name + ": no pose for " + fixed(holes.longest_s, 1) + " s, from " +
+                     fixed(holes.longest_from_s, 1) + " s on";
+  if (holes.count > 1)
+    what += ", the longest of " + std::to_string(holes.count) + " holes of " +
+            fixed(holes.seconds, 1) + " s in all";
+  findings.push_back({.id = "trajectory.hole",
+                      .severity = Severity::kWarning,
+                      .what = what,
+                      .means = "how it went there is not known: charts leave the line out, and "
+                               "the poses behind it are known less well",
+                      .to_do = run.frames_skipped > 0
+                                   ? "frames were skipped: a lower --rate (max waits), or fewer "
+                                     "robots on this computer"
+                                   : "see sensor_faults in summary.json for images that are "
+                                     "missing, and the log for when odometry began anew"});
+}
+
 void add_rejected(const RunFacts& run, std::vector<Finding>& findings) {
   ClosureTally all;
   for (const auto& [other, tally] : run.closures) all += tally;
@@ -288,6 +308,7 @@ std::vector<Finding> findings_of(std::span<const RunFacts> runs) {
     add_lost(run.summary, findings);
     add_unseen(run.summary, findings);
     add_skipped(run.summary, findings);
+    add_holes(run.summary, findings);
     add_rejected(run, findings);
     add_cameras(run.summary, findings);
     add_budget(run.summary, findings);

@@ -170,6 +170,22 @@ struct OdometrySummary {
   bool operator==(const OdometrySummary&) const = default;
 };
 
+/// Times without a pose: see pose_holes().
+struct HolesSummary {
+  std::uint64_t count = 0;
+  double seconds = 0.0;  ///< Of all.
+  double longest_s = 0.0;
+  double longest_from_s = 0.0;  ///< Where the longest begins, since the first pose.
+
+  void visit_fields(auto& visitor) {
+    visitor.field("count", count);
+    visitor.field("seconds", seconds);
+    visitor.field("longest_s", longest_s);
+    visitor.field("longest_from_s", longest_from_s);
+  }
+  bool operator==(const HolesSummary&) const = default;
+};
+
 /// What a robot's run came to: summary.json, and the robot's part of a team's --json. The names in
 /// visit_fields are the keys; they are written and read in this order. An absent optional has no
 /// key; NaN is written as null.
@@ -182,9 +198,10 @@ struct RunSummary {
   std::uint64_t frames_skipped = 0;  ///< Pairs that odometry was too slow for.
   /// What is wrong with the recording, or the live topics, and how often: see ReaderFault.
   std::map<std::string, std::uint64_t> sensor_faults;
-  ClosureCounts closures;            ///< That this robot found.
+  ClosureCounts closures;  ///< That this robot found.
   OptimizerSummary pgo;
   std::optional<OdometrySummary> odometry;       ///< Absent with an odometry from outside.
+  std::optional<HolesSummary> holes;             ///< Of the live trajectory; absent without any.
   std::optional<CamerasSummary> cameras;         ///< Absent without vio.calibrate.
   std::optional<MappingSummary> mapping;         ///< Absent where mapping is off.
   std::map<std::string, std::uint64_t> traffic;  ///< Bytes sent, by category.
@@ -211,6 +228,7 @@ struct RunSummary {
     visitor.field("closures", closures);
     visitor.field("pgo", pgo);
     visitor.field("odometry", odometry);
+    visitor.field("holes", holes);
     visitor.field("cameras", cameras);
     visitor.field("mapping", mapping);
     visitor.field("traffic", traffic);

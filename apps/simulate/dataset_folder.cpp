@@ -10,6 +10,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "apps/output_file.hpp"
 #include "modules/simulation/dataset/recording_files.hpp"
 
 namespace km {
@@ -34,18 +35,10 @@ DatasetRecord read_record(const fs::path& file) try {
                            "); choose another --output, or remove the folder");
 }
 
-void make_folder(const fs::path& path) {
-  std::error_code error;
-  fs::create_directories(path, error);
-  if (error) throw std::runtime_error(path.string() + ": cannot be made: " + error.message());
-  if (access(path.c_str(), W_OK | X_OK) != 0)
-    throw std::runtime_error(path.string() + ": cannot be written: " + std::strerror(errno));
-}
-
 }  // namespace
 
 DatasetFolder::DatasetFolder(const fs::path& path, const DatasetRecord& wanted) : path_(path) {
-  make_folder(path_);
+  make_output_folder(path_);
   lock();
   try {
     open_record(wanted);

@@ -204,6 +204,8 @@ void write_results(const TeamOptions& options, const km::TeamPlan& plan, const k
 
 int run(const TeamOptions& options) {
   const km::TeamPlan plan = make_plan(options);
+  if (!options.report) km::make_output_folder(plan.output);  // where the files below may be
+  km::check_output_folder(options.json);
   if (options.record) km::check_output_folder(*options.record);
   km::ResultWriter results;
   const km::TeamResult team = km::collect_results(

@@ -10,6 +10,7 @@
 #include <span>
 
 #include "apps/output_file.hpp"
+#include "apps/robot/pose_holes.hpp"
 #include "apps/robot/run_tables.hpp"
 #include "apps/team/closure_images.hpp"
 #include "apps/team/team_report.hpp"
@@ -51,12 +52,19 @@ Stamp first_stamp(const RobotPaths& paths) {
   return first;
 }
 
+// Behind a hole comes a point of nulls, at which lines end.
 Json from_above(const std::vector<StampedPose>& path, Stamp first) {
+  const std::vector<PoseHole> holes = pose_holes(path);
+  auto hole = holes.begin();
   Json points = Json::array();
-  for (const StampedPose& pose : thinned(path))
+  for (const StampedPose& pose : thinned(path)) {
+    if (hole != holes.end() && pose.stamp >= hole->to)
+      points.push_back({nullptr, nullptr, nullptr});
+    while (hole != holes.end() && pose.stamp >= hole->to) ++hole;
     points.push_back({in_thousandths(pose.T.translation().x()),
                       in_thousandths(pose.T.translation().y()),
                       in_thousandths(seconds_between(first, pose.stamp))});
+  }
   return points;
 }
 

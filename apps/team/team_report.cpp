@@ -189,7 +189,7 @@ std::string skipped_remark(const RobotResult& robot) {
   const double share = skipped / std::max(1.0, skipped + static_cast<double>(summary.frames));
   if (share <= kManySkipped) return "";
   return "note: " + robot.plan.name + " skipped " + fixed(100.0 * share, 0) +
-         " % of its frames: use a lower --rate, or max\n";
+         " % of its frames: use a lower --rate, or max, which waits, or fewer robots\n";
 }
 
 // A robot that left nothing has one reason for all that is missing: how it failed.

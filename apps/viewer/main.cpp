@@ -65,6 +65,17 @@ struct ViewerOptions {
   std::optional<double> rate;
 };
 
+// ADDRESS:PORT is both; an address of IPv6 has more colons.
+void split_port(PageServerOptions& server) {
+  const std::size_t colon = server.address.find(':');
+  if (colon == std::string::npos || colon != server.address.rfind(':')) return;
+  std::string port = server.address.substr(colon + 1);
+  if (!CLI::Range(0, 65535)(port).empty())
+    throw CLI::ValidationError("--listen", server.address + ": the port is not from 0 to 65535");
+  server.port = std::stoi(port);
+  server.address.resize(colon);
+}
+
 void define(CLI::App& app, ViewerOptions& options) {
   app.footer(kFooter);
   auto* const results = app.add_option("RESULTS", options.results, "Results of a run");
@@ -92,9 +103,10 @@ void define(CLI::App& app, ViewerOptions& options) {
   app.add_option("--port", options.server.port, "Of the page; 0: any that is free")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
-  app.add_option("--listen", options.server.address,
-                 "Address of this host to listen on, 0.0.0.0 for all; other than loopback, the "
-                 "URL has a token")
+  app.add_option(
+         "--listen", options.server.address,
+         "Address of this host to listen on, 0.0.0.0 for all, also ADDRESS:PORT; other than "
+         "loopback, the URL has a token")
       ->capture_default_str();
   app.add_option("--memory", options.memory_MB,
                  "What is kept at most [MB]: beyond, images, then meshes that newer ones have "
@@ -104,7 +116,8 @@ void define(CLI::App& app, ViewerOptions& options) {
   app.add_option("--page", options.server.page_folder,
                  "Serve the page's files from this folder, for work on them")
       ->check(CLI::ExistingDirectory);
-  app.callback([results, domain] {
+  app.callback([&options, results, domain] {
+    split_port(options.server);
     if (results->empty() && domain->empty())
       throw CLI::RequiredError("--domain of a team that runs, or RESULTS of one that has ended");
   });
@@ -180,6 +193,10 @@ void show_team(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
   if (!options.dds.peers.empty()) options.dds.discovery = Discovery::kPeers;
   ViewListener listener(options.dds);
   ImageRequests images(listener);
+  const std::string title = "domain " + std::to_string(options.dds.domain);
+  options.server.greeting = page_greeting(true, title, palette_of(options));
+  options.server.on_images = [&](const std::set<RobotId>& robots) { images.show(robots); };
+  const PageServer server(store, options.server);
   std::optional<ViewRecorder> recorder;
   if (!options.record.empty()) recorder.emplace(options.record, palette_of(options));
   std::jthread teller([&](const std::stop_token& stop) {
@@ -191,10 +208,6 @@ void show_team(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
       store.add(*std::move(update));
     }
   });
-  const std::string title = "domain " + std::to_string(options.dds.domain);
-  options.server.greeting = page_greeting(true, title, palette_of(options));
-  options.server.on_images = [&](const std::set<RobotId>& robots) { images.show(robots); };
-  const PageServer server(store, options.server);
   log::info("viewer") << title << " on " << listener.interface().name << " ("
                       << listener.interface().address << ")";
   tell_address(server);

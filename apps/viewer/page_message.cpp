@@ -15,6 +15,10 @@ double rounded_to(double value, double scale) {
   return std::round(value * scale) / scale;
 }
 
+double seconds_of(Stamp stamp) {
+  return rounded_to(1e-9 * static_cast<double>(stamp), 1e3);
+}
+
 Json json_of(const SE3& T) {
   const Eigen::Quaterniond q(T.linear());
   Json json = Json::array();
@@ -71,6 +75,7 @@ struct Writer {
 
   void operator()(const ViewPose& pose) const {
     json["kind"] = "pose";
+    json["stamp_s"] = seconds_of(pose.stamp);
     json["T_odom_body"] = json_of(pose.T_odom_body);
   }
 
@@ -81,6 +86,8 @@ struct Writer {
     json["first"] = keyframes.first;
     json["T_world_kf"] = Json::array();
     for (const SE3& T : keyframes.T_world_kf) json["T_world_kf"].push_back(json_of(T));
+    json["stamps_s"] = Json::array();
+    for (const Stamp stamp : keyframes.stamps) json["stamps_s"].push_back(seconds_of(stamp));
   }
 
   // Each [robot, keyframe, robot, keyframe, verdict, matches, inliers, reason].

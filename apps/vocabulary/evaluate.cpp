@@ -160,6 +160,7 @@ void define(CLI::App& app, EvaluateCommand& command) {
 }
 
 void run(const EvaluateCommand& command) {
+  check_output_folder(command.json);
   const Vocabulary vocabulary = load_vocabulary(command.vocabulary);
   const std::vector<StampedPose> truth = read_trajectory(command.truth);
   const std::vector<View> known = views_of(command.known, vocabulary, truth, command);

@@ -106,6 +106,7 @@ void define(CLI::App& app, InspectCommand& command) {
 }
 
 void run(const InspectCommand& command) {
+  check_output_folder(command.json);
   const Vocabulary vocabulary = load_vocabulary(command.vocabulary);
   print(vocabulary, command.vocabulary);
   Usage usage;

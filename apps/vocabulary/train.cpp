@@ -33,6 +33,8 @@ void define(CLI::App& app, TrainCommand& command) {
 }
 
 void run(const TrainCommand& command) {
+  check_output_folder(command.vocabulary);
+  check_output_folder(command.json);
   const VocabularyTrainingConfig config = checked(VocabularyTrainingConfig{
       .branching = command.branching, .depth = command.depth, .seed = command.seed});
   const auto images = list_images(command.images, command.every);

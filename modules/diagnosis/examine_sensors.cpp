@@ -43,15 +43,24 @@ Finding fault_finding(ReaderFault fault, const ReaderReport::Entry& entry, doubl
           .to_do = "repair or record it anew, where there are many"};
 }
 
-bool concerns_samples(ReaderFault fault) {
+// How many of what a fault counts there are without it. Images missing between others are counted
+// camera by camera, lost messages topic by topic.
+double sound_ones(ReaderFault fault, const SensorSample& sample) {
+  const auto frames = static_cast<double>(sample.frames.size());
+  const auto samples = static_cast<double>(sample.imu.size());
+  const double images = sample.right_size.width > 0 ? 2.0 * frames : frames;
   switch (fault) {
     case ReaderFault::kNotFinite:
     case ReaderFault::kImplausible:
     case ReaderFault::kNoAcceleration:
     case ReaderFault::kImuGap:
-      return true;
+      return samples;
+    case ReaderFault::kMissingBetween:
+      return images;
+    case ReaderFault::kLostMessage:
+      return images + samples;
     default:
-      return false;
+      return frames;
   }
 }
 
@@ -326,18 +335,15 @@ void examine_gravity(const SensorSample& sample, Examination& result) {
 
 Examination examine_streams(const SensorSample& sample, const ReaderReport& report) {
   Examination result;
-  const auto frames = static_cast<double>(sample.frames.size());
-  const auto samples = static_cast<double>(sample.imu.size());
   if (sample.frames.empty())
     result.findings.push_back({.id = "recording.no_frames",
                                .severity = Severity::kError,
                                .what = "0 frames could be read",
                                .means = "there is nothing to estimate a motion from",
                                .to_do = "see the findings below for what was skipped"});
-  for (const auto& [fault, entry] : report.entries()) {
-    const double of = concerns_samples(fault) ? samples : frames;
-    result.findings.push_back(fault_finding(fault, entry, of + static_cast<double>(entry.count)));
-  }
+  for (const auto& [fault, entry] : report.entries())
+    result.findings.push_back(
+        fault_finding(fault, entry, sound_ones(fault, sample) + static_cast<double>(entry.count)));
   constexpr double kFrames_hz = 8.0, kFrameGap_s = 0.25, kSamples_hz = 80.0, kSampleGap_s = 0.05;
   if (sample.frames.size() > 1)
     examine_rate("images", "frames", sample.frames, kFrames_hz, kFrameGap_s, result);

@@ -14,7 +14,11 @@ constexpr double kMaxMisalignment_px = 0.05;  // of their intrinsics, and of the
 constexpr const char* kCoefficients = "distortion_coefficients";
 
 CalibrationMap sensor_yaml(const std::filesystem::path& mav0, const char* sensor) {
-  return CalibrationMap(mav0 / sensor / "sensor.yaml");
+  const std::filesystem::path file = mav0 / sensor / "sensor.yaml";
+  if (is_absent(file))
+    throw DatasetError(file.string() + ": no such file: a EuRoC folder has the calibration of " +
+                       sensor + " there, beside data.csv (see Inputs in apps/robot/README.md)");
+  return CalibrationMap(file);
 }
 
 SE3 extrinsics(const CalibrationMap& yaml) {

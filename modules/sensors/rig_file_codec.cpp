@@ -123,10 +123,17 @@ PartialRig read_rig_file(const std::filesystem::path& path, bool has_poses) {
 }
 
 CameraCalibration read_rig_correction(const std::filesystem::path& path) {
+  const YAML::Node root = load_yaml(path);
+  for (const char* key : {"left", "right", "imu", "depth", "odometry", "calibration"})
+    if (root.IsMap() && root[key])
+      throw ConfigError(path.string() + ": " + key +
+                        " is for a bag or live topics: a EuRoC folder has its own calibration, in "
+                        "its sensor.yaml files; leave --rig out, or name one of "
+                        "camera_time_offset_s and T_body_rig alone (rig_estimated.yaml of a run)");
   ConfigProblems problems;
   const ConfigContext context{problems, std::filesystem::absolute(path).parent_path()};
   RigCorrectionFile file;
-  fill_config(read_section(load_yaml(path), "", path.string(), context), "", context, file);
+  fill_config(read_section(root, "", path.string(), context), "", context, file);
   problems.finish();
   return {file.camera_time_offset_s.value_or(0.0),
           transform_of(path, "T_body_rig", file.T_body_rig)};

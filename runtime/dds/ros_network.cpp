@@ -53,7 +53,7 @@ std::string cyclone_xml(const RosConfig& config, const NetworkInterface& interfa
 
 }  // namespace
 
-RosNetwork::RosNetwork(const RosConfig& config) {
+RosNetwork::RosNetwork(const RosConfig& config) : ros_domain_(config.domain) {
   check_hosts(checked(config).peers);
   const NetworkInterface interface = select_interface(network_interfaces(), config.interface);
   interface_ = interface.name;

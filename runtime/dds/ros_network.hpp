@@ -26,6 +26,8 @@ class RosNetwork {
 
   [[nodiscard]] dds_entity_t participant() const { return participant_.handle(); }
   [[nodiscard]] const std::string& interface() const { return interface_; }
+  /// ROS_DOMAIN_ID.
+  [[nodiscard]] int domain() const { return ros_domain_; }
 
   /// A type of messages, as DDS has it, by ROS 1's or ROS 2's name of it: "sensor_msgs/Image",
   /// "sensor_msgs/msg/Image". Throws std::invalid_argument for others than known_ros_types().
@@ -35,6 +37,7 @@ class RosNetwork {
   [[nodiscard]] DdsEntity create_topic(std::string_view topic, std::string_view type) const;
 
  private:
+  int ros_domain_;
   std::string interface_;
   DdsEntity domain_;
   DdsEntity participant_;

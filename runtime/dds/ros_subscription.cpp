@@ -87,7 +87,10 @@ void RosSubscription::tell_silence() {
     dds_get_subscription_matched_status(readers_[topic].handle(), &status);
     log::warn("ros") << "nothing on " << topics_[topic].topic << " (" << topics_[topic].type
                      << ") for " << std::lround(now_s - heard_s_[topic]) << " s; "
-                     << status.current_count << " publish it";
+                     << status.current_count << " publish it on ROS domain " << network_->domain()
+                     << (status.current_count > 0
+                             ? ""
+                             : " (ROS_DOMAIN_ID of its driver: --set ros.domain=N)");
   }
 }
 

@@ -59,6 +59,17 @@ TEST_CASE("The lists of a EuRoC folder are its topics", "[robot]") {
         Words{"cam0", "cam1", "2", "2", "0.000", "0.000", "0", "0"});
 }
 
+TEST_CASE("A EuRoC folder needs no rig file: what to do instead is said", "[robot]") {
+  const TemporaryFolder folder;
+  folder.write("mav0/cam0/data.csv", "1000000000,a\n");
+  const auto rig = folder.path() / "rig.yaml";
+  CHECK_THROWS_WITH(
+      inspect_recording(folder.path(), rig),
+      Catch::Contains("is a EuRoC folder, whose calibration is its own sensor.yaml") &&
+          Catch::Contains("--dataset " + folder.path().string()));
+  CHECK_FALSE(std::filesystem::exists(rig));
+}
+
 TEST_CASE("What was skipped of a recording is told with its place", "[robot]") {
   const auto file = shared_data("ros_recordings/mcap/nav2_turtlebot.mcap");
   if (!file) return;

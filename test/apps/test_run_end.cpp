@@ -146,6 +146,23 @@ TEST_CASE("Without sensors, or interrupted, no pose is no failure", "[run_end]")
   CHECK(verdict_of(interrupted).reason == "interrupted");
 }
 
+TEST_CASE("Live sensors that gave no image make a failure of a run, however it ends", "[run_end]") {
+  RunEnd end = usual_end();
+  end.is_live = true;
+  end.result.interrupted = true;
+  end.images = ImageCounts{};
+  CHECK(verdict_of(end).exit_code == 1);
+  CHECK_THAT(verdict_of(end).reason,
+             Catch::StartsWith("no image came: kimera_multi_doctor --live"));
+  end.images->read = 1;
+  CHECK(verdict_of(end).exit_code == 0);
+  end = usual_end();
+  end.is_live = true;
+  end.id_taken = true;  // a graver reason comes first
+  end.images = ImageCounts{};
+  CHECK(verdict_of(end).exit_code == 3);
+}
+
 TEST_CASE("A robot that leaves without others has a verdict of its own that names them",
           "[run_end]") {
   RunEnd end = usual_end();

@@ -127,6 +127,19 @@ TEST_CASE("What stands out of a run is told with its number", "[robot][findings]
     summary.frames_skipped = 1;
     told("frames.skipped", Severity::kNote, "1 frames skipped, 0.2 %");
   }
+  SECTION("a hole of the trajectory") {
+    summary.holes =
+        HolesSummary{.count = 1, .seconds = 6.3, .longest_s = 6.3, .longest_from_s = 12.06};
+    told("trajectory.hole", Severity::kWarning, "no pose for 6.3 s, from 12.1 s on");
+    CHECK_THAT(the_finding_of(run).to_do, Catch::Contains("sensor_faults"));
+    summary.holes->count = 3;
+    summary.holes->seconds = 9.0;
+    told("trajectory.hole", Severity::kWarning, "the longest of 3 holes of 9.0 s in all");
+    summary.frames_skipped = 1;
+    const auto findings = findings_of_one(run);
+    REQUIRE(findings.size() == 2);
+    CHECK_THAT(findings[0].to_do, Catch::Contains("a lower --rate"));
+  }
   SECTION("closures rejected") {
     run.closures[2].rejected = 2;
     told("closures.rejected", Severity::kNote, "2 of 10 verified");

@@ -185,6 +185,23 @@ TEST_CASE("What is no recording ends --inspect as bad input with one line", "[sy
   CHECK(std::count(result.output.begin(), result.output.end(), '\n') == 1);
 }
 
+TEST_CASE("Mistakes on a robot's command line are told by value, and what to do", "[system]") {
+  const TemporaryFolder folder;
+  const std::string robot = KM_BIN_DIR "/kimera_multi_robot --dataset " + folder.path().string();
+  const auto refusal = [&](const std::string& options) {
+    const CommandResult result = run_command(robot + ' ' + options);
+    CHECK(result.exit_code == 2);
+    return result.output;
+  };
+  CHECK_THAT(refusal("--output x --robot 70000"),
+             Catch::Contains("--robot: Value 70000 not in range") && Catch::Contains("65535"));
+  const fs::path mistyped = folder.path() / "alcie";
+  CHECK_THAT(refusal("--robot 1 --resume " + mistyped.string()),
+             Catch::Contains(mistyped.string() + ": there is no such folder, so no run to go on") &&
+                 Catch::Contains("--output"));
+  CHECK_FALSE(fs::exists(mistyped));
+}
+
 TEST_CASE("Noise that no sensor has is refused before the run", "[system]") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;

@@ -202,7 +202,28 @@ TEST_CASE("A robot reads all topics of its sensors while it waits for its calibr
   CHECK(robot.wait_until(is_complete));
   CHECK(driver.wait() == 0);
   robot.kill(SIGINT);
-  CHECK(robot.wait() == 0);
+  const int exit_code = robot.wait();
+  CHECK((exit_code == 0 || exit_code == 1));  // 1: the signal came before the first image
+}
+
+TEST_CASE("A live robot whose topics are silent says where it listens, and ends as failed",
+          "[system][live]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");  // of which the calibration is used
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const std::string domain = std::to_string(random_domain());
+  Process robot(logged(live_command(folder, *dataset, domain)));
+  const auto says_where = [&domain](const std::string& line) {
+    return line.find("nothing on /cam0/image_raw") != line.npos &&
+           line.find("0 publish it on ROS domain " + domain + " (ROS_DOMAIN_ID") != line.npos &&
+           line.find("--set ros.domain=") != line.npos;
+  };
+  REQUIRE(robot.wait_until(says_where).has_value());
+  robot.kill(SIGINT);
+  CHECK(robot.wait() == 1);
+  const RunSummary summary = read_summary(folder.path() / "live/summary.json");
+  CHECK_THAT(summary.exit_reason, Catch::StartsWith("no image came"));
+  CHECK(std::ranges::count(summary.findings, "frames.none", &Finding::id) == 1);
 }
 
 }  // namespace km

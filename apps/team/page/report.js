@@ -75,7 +75,9 @@ function showFindings() {
     const root = element('div', 'finding', section);
     element('span', `badge ${badge}`, root, label);
     const words = element('div', '', root);
-    element('b', '', words, `${who}: ${finding.what}`);
+    // Findings of a robot begin with its name.
+    const what = String(finding.what);
+    element('b', '', words, what.startsWith(`${who}: `) ? what : `${who}: ${what}`);
     if (finding.id) element('span', 'muted', words, `  ${finding.id}`);
     if (finding.means) element('p', '', words, finding.means);
     if (finding.to_do) element('p', 'to-do', words, finding.to_do);
@@ -152,18 +154,21 @@ function closureLines() {
   return lines;
 }
 
+// At a hole, nulls in JSON, the line ends.
+const lineOf = (points) => points.map((point) => point.map((n) => n ?? NaN));
+
 function showTrajectories() {
   if (!run.robots.some((robot) => robot.optimized.length)) return;
   const known = run.robots.some((robot) => robot.truth.length);
   const section = addSection(
       'Trajectories', 'trajectories',
-      `From above, in the frame of the ${known ? 'truth' : 'team'}. Drag to move, Ctrl and the ` +
-          'wheel or the buttons to zoom, double click to see all; a name hides its line.');
+      `From above, in the frame of the ${known ? 'truth' : 'team'}. A line ends where no ` +
+          'pose is known. Drag to move, Ctrl and the wheel or the buttons to zoom, double click to see all; a name hides its line.');
   const chart =
       mapChart(element('div', '', section), {title: 'From above', unit: 'm', height: 520});
   const at = (what) => (p) => `${what}, ${duration(p[2])}`;
   const series = [];
-  const truths = run.robots.flatMap((robot) => [...robot.truth, [NaN, NaN]]);
+  const truths = run.robots.flatMap((robot) => [...lineOf(robot.truth), [NaN, NaN]]);
   if (known) series.push({name: 'truth', color: GREY, points: truths, width: 3, tell: () => ''});
   const links = closureLines();
   if (links.length)
@@ -179,7 +184,7 @@ function showTrajectories() {
     series.push({
       name: robot.name,
       color: robotColor(robot.id),
-      points: robot.optimized,
+      points: lineOf(robot.optimized),
       tell: at('optimised')
     });
   if (known)
@@ -187,7 +192,7 @@ function showTrajectories() {
       series.push({
         name: `${robot.name}, odometry`,
         color: robotColor(robot.id),
-        points: robot.odometry,
+        points: lineOf(robot.odometry),
         dashed: true,
         width: 1,
         tell: at('aligned alone')

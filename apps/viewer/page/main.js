@@ -23,6 +23,7 @@ const timeline = new Timeline(
 let changed = true, chartsChanged = true, caughtUp = false, live = false;
 let pointed = null;  // where the pointer is in the scene
 let camera = null;   // robot whose images are shown
+let heardAt = 0;     // when something came [ms since 1970]
 let waiting = [];    // what has come and is not in the scene
 let showing = [];    // what is, and has not been drawn
 const delays = [];   // {kind, ms}: from told to drawn
@@ -35,15 +36,19 @@ const connection = new Connection({
     caughtUp = false;
     setLink('loading', 'warn');
   },
-  closed() { setLink('viewer gone', 'bad'); },
+  closed() {
+    caughtUp = false;
+    setLink('viewer gone', 'bad');
+  },
   message(message) {
     if (message.kind === 'hello') return greet(message);
     if (message.kind === 'forgotten') return model.forgetNumbers(message.numbers);
     if (message.kind === 'caught_up') {
       caughtUp = true;
       if (camera !== null) connection.wantImages(camera, true);
-      setLink(live ? 'live' : 'finished run', live ? 'good' : '');
+      showLink();
     } else {
+      heardAt = Date.now();
       model.add(message);
       if (caughtUp && timeline.follows) waiting.push(message);
     }
@@ -63,6 +68,21 @@ function setLink(text, className) {
   $('link').textContent = text;
   $('link').className = `badge ${className}`;
 }
+
+// Live, or since when no longer.
+function showLink() {
+  if (!caughtUp) return;
+  if (!live) return setLink('finished run', '');
+  const over = model.over((Date.now() - heardAt) / 1000);
+  const at = over && new Date(over.at_ms).toLocaleTimeString();
+  if (!over)
+    setLink('live', 'good');
+  else if (over.ended)
+    setLink(`run ended at ${at}`, '');
+  else
+    setLink(`no robot heard since ${at}`, 'bad');
+}
+setInterval(showLink, 1000);
 
 // ---- what is shown
 

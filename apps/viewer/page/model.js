@@ -3,6 +3,11 @@
 // Of a piece of mesh: the newest with a key counts.
 const keyOf = ({of, cell, part}) => `${of} ${cell} ${part}`;
 
+const GONE_S = 10;
+const HOLE_S = 1, HOLE_INTERVALS = 5;  // as in pose_holes.hpp
+
+const median = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];
+
 /** What one robot told: everything in order, and what that comes to at the time last asked for. */
 export class Robot {
   constructor(id) {
@@ -24,7 +29,11 @@ export class Robot {
     this.state = null;
     this.pose = null;
     this.trail = [];        // poses in odom
+    this.trailStamps = [];  // of the images [s]
+    this.intervals = [];    // between the newest of them [s]
+    this.holes = [];        // the middles of times without a pose, far longer than usual [s]
     this.odometry = [];     // T_odom_kf by keyframe
+    this.keyframeStamps = [];
     this.optimized = [];    // T_world_kf by keyframe
     this.anchor = this.id;  // whose frame those are in
     this.closures = new Map();
@@ -56,12 +65,25 @@ export class Robot {
 
   apply_state(message) { this.state = message; }
 
-  apply_pose(message) {
-    this.pose = message.T_odom_body;
+  apply_pose({stamp_s, T_odom_body}) {
+    this.pose = T_odom_body;
+    const last = this.trailStamps[this.trailStamps.length - 1];
+    if (this.intervals.length >= 5 &&
+        stamp_s - last > Math.max(HOLE_S, HOLE_INTERVALS * median(this.intervals)))
+      this.holes.push((last + stamp_s) / 2);
+    if (last !== undefined) this.intervals.push(stamp_s - last);
+    if (this.intervals.length > 31) this.intervals.shift();
     this.trail.push(this.pose);
+    this.trailStamps.push(stamp_s);
   }
 
-  apply_keyframes({optimized, anchor, first, T_world_kf}) {
+  /** Whether it is not known how the robot went from one instant to another [s]. */
+  hasHole(from, to) { return this.holes.some((middle) => from < middle && middle < to); }
+
+  apply_keyframes({optimized, anchor, first, T_world_kf, stamps_s}) {
+    stamps_s?.forEach((stamp, i) => {
+      this.keyframeStamps[first + i] = stamp;
+    });
     if (optimized && anchor !== this.anchor) {
       this.optimized = [];  // those of another frame
       this.anchor = anchor;
@@ -173,6 +195,18 @@ export class Model {
     return [...frames]
         .map(([anchor, robots]) => ({anchor, robots}))
         .sort((a, b) => b.robots.length - a.robots.length || a.anchor - b.anchor);
+  }
+
+  /**
+   * Of a live team: {ended, at_ms} once all robots have said that they leave, or nothing has come
+   * for GONE_S; `ended`: none was still running. Null before. `silent_s`: since something came.
+   */
+  over(silent_s) {
+    const phases = [...this.robots.values()].map(({states}) => states[states.length - 1]?.phase);
+    const left = phases.every((phase) => phase === 'leaving');
+    if (!phases.length || (!left && silent_s < GONE_S)) return null;
+    const ended = phases.every((phase) => phase && phase !== 'running');
+    return {ended, at_ms: this.start_ms + 1000 * this.end};
   }
 
   faces() {

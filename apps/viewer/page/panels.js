@@ -95,6 +95,7 @@ export class Panels {
     const lost = silent > SILENT_S[1] && !over;
     card.phase.textContent = robot.heard === null ? 'not there yet' :
         lost                                      ? 'silent' :
+        shown?.phase === 'leaving'                ? 'left' :
                                                     shown?.phase ?? 'starting';
     card.phase.className = `badge ${
         lost                              ? 'bad' :

@@ -3,8 +3,6 @@ import {robotColor} from './charts.js';
 import {MeshLayer} from './mesh_layer.js';
 import * as THREE from './three/build/three.module.js';
 import {OrbitControls} from './three/examples/jsm/controls/OrbitControls.js';
-import {Line2} from './three/examples/jsm/lines/Line2.js';
-import {LineGeometry} from './three/examples/jsm/lines/LineGeometry.js';
 import {LineMaterial} from './three/examples/jsm/lines/LineMaterial.js';
 import {LineSegments2} from './three/examples/jsm/lines/LineSegments2.js';
 import {LineSegmentsGeometry} from './three/examples/jsm/lines/LineSegmentsGeometry.js';
@@ -26,14 +24,27 @@ function matrixOf([x, y, z, qx, qy, qz, qw], matrix = new THREE.Matrix4()) {
       new THREE.Vector3(x, y, z), new THREE.Quaternion(qx, qy, qz, qw), new THREE.Vector3(1, 1, 1));
 }
 
-// A polyline that is wide on every screen; its points may change.
+// From each pose to the next, but over holes. Poses may be missing.
+function linesOf(robot, poses, stamps_s, matrix) {
+  const points = [], a = new THREE.Vector3(), b = new THREE.Vector3();
+  let last = -1;
+  poses.forEach((pose, i) => {
+    b.fromArray(pose);
+    if (matrix) b.applyMatrix4(matrix);
+    if (last >= 0 && !robot.hasHole(stamps_s[last], stamps_s[i]))
+      points.push(a.x, a.y, a.z, b.x, b.y, b.z);
+    a.copy(b);
+    last = i;
+  });
+  return points;
+}
+
+// Lines between pairs of points, wide on every screen; they may change.
 class WideLine {
-  constructor(settings, segments = false) {
+  constructor(settings) {
     this.material = new LineMaterial(settings);
     this.material.uniforms.opacity.value = settings.opacity ?? 1;
-    this.segments = segments;
-    this.object = segments ? new LineSegments2(undefined, this.material) :
-                             new Line2(undefined, this.material);
+    this.object = new LineSegments2(undefined, this.material);
     this.object.frustumCulled = false;
     this.object.visible = false;
     this.shown = true;
@@ -45,7 +56,7 @@ class WideLine {
     this.enough = enough;
     if (!enough) return;
     this.object.geometry.dispose();
-    this.object.geometry = this.segments ? new LineSegmentsGeometry() : new LineGeometry();
+    this.object.geometry = new LineSegmentsGeometry();
     this.object.geometry.setPositions(positions);
   }
 
@@ -107,20 +118,17 @@ export class Scene {
     this.lines = {};  // of closures, by verdict
     for (const verdict of Object.keys(VERDICTS)) {
       const {color} = VERDICTS[verdict];
-      this.lines[verdict] = new WideLine(
-          {
-            color,
-            linewidth: 1.2,
-            resolution: this.resolution,
-            transparent: true,
-            opacity: {kept: 0.7, verified: 0.7}[verdict] ?? 0.3
-          },
-          true);
+      this.lines[verdict] = new WideLine({
+        color,
+        linewidth: 1.2,
+        resolution: this.resolution,
+        transparent: true,
+        opacity: {kept: 0.7, verified: 0.7}[verdict] ?? 0.3
+      });
       this.scene.add(this.lines[verdict].object);
     }
-    this.hovered =
-        new WideLine({color: '#ffffff', linewidth: 3.5, resolution: this.resolution}, true);
-    this.ruler = new WideLine({color: '#ffffff', linewidth: 2, resolution: this.resolution}, true);
+    this.hovered = new WideLine({color: '#ffffff', linewidth: 3.5, resolution: this.resolution});
+    this.ruler = new WideLine({color: '#ffffff', linewidth: 2, resolution: this.resolution});
     for (const line of [this.hovered, this.ruler]) {
       line.material.depthTest = false;
       line.material.transparent = true;  // and so drawn behind all that is not
@@ -309,23 +317,17 @@ export class Scene {
     if (!figure.here) return;
     if (figure.group.parent !== frame.group) frame.group.add(figure.group);
     const T = this.correction(robot);
-    const along = (poses, matrix) => {
-      const points = [];
-      const v = new THREE.Vector3();
-      for (const p of poses) {
-        if (!p) continue;
-        v.set(p[0], p[1], p[2]);
-        if (matrix) v.applyMatrix4(matrix);
-        points.push(v.x, v.y, v.z);
-      }
-      return points;
-    };
-    figure.trail = along(robot.trail, T);
-    const optimized = along(robot.optimized);
-    const now = figure.trail.slice(-3);
-    figure.odometry.set(figure.trail);
-    figure.optimized.set(optimized.length ? [...optimized, ...now] : []);
-    const keyframes = optimized.length ? optimized : along(robot.odometry);
+    figure.odometry.set(linesOf(robot, robot.trail, robot.trailStamps, T));
+    const optimized = linesOf(robot, robot.optimized, robot.keyframeStamps);
+    const newest = robot.optimized.length - 1;  // from there on to where the robot is
+    if (newest >= 0 && robot.pose &&
+        !robot.hasHole(robot.keyframeStamps[newest], robot.trailStamps[robot.trail.length - 1]))
+      optimized.push(
+          ...robot.optimized[newest].slice(0, 3),
+          ...new THREE.Vector3().fromArray(robot.pose).applyMatrix4(T).toArray());
+    figure.optimized.set(optimized);
+    const keyframes =
+        (robot.optimized.length ? robot.optimized : robot.odometry).flatMap((p) => p.slice(0, 3));
     figure.keyframes.geometry.dispose();
     figure.keyframes.geometry = new THREE.BufferGeometry();
     figure.keyframes.geometry.setAttribute(

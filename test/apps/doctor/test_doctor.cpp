@@ -7,6 +7,7 @@
 #include <string>
 
 #include "modules/core/json.hpp"
+#include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/command.hpp"
 #include "test/support/network.hpp"
 #include "test/support/process.hpp"
@@ -126,6 +127,22 @@ TEST_CASE("The doctor listens to the topics of a rig file, and looks at what the
     CAPTURE(sound, part);
     CHECK(sound.find(part) == sound.npos);
   }
+}
+
+TEST_CASE("Live topics that nobody publishes are not sound: the doctor's exit code is 2",
+          "[doctor]") {
+  const EurocFolder recording;
+  const TemporaryFolder folder;
+  const fs::path rig =
+      folder.write("rig.yaml",
+                   "left: {topic: /cam0/image_raw}\nright: {topic: /cam1/image_raw}\n"
+                   "imu: {topic: /imu0}\ncalibration: " +
+                       fs::absolute(recording.root()).string() + "\n");
+  const CommandResult run = run_command(
+      kDoctor + " --live " + rig.string() +
+      " --set ros.interface=lo --set ros.domain=" + std::to_string(std::random_device()() % 90));
+  CHECK(run.exit_code == 2);
+  CHECK_THAT(run.output, Catch::Contains("live.nobody") && !Catch::Contains("sound"));
 }
 
 namespace {

@@ -14,18 +14,6 @@ namespace {
 const NetworkInterface kEthernet{
     .name = "eth0", .address = "10.0.0.1", .multicast = true, .loopback = false};
 
-// A host where all is well, with another robot of the team in reach.
-NetworkFacts sound() {
-  NetworkFacts facts;
-  facts.config.domain = 42;
-  facts.interfaces = {kEthernet};
-  facts.chosen = kEthernet;
-  facts.mtu = 1500;
-  facts.largest_receive_buffer = facts.config.receive_buffer_bytes;
-  facts.listened_s = 5.0;
-  return facts;
-}
-
 Announced robot(RobotId id, const std::string& name, int domain = 42,
                 const std::string& team = "kimera-multi") {
   const RobotIdentity identity{.robot = id, .name = name, .boot = 0x10000U + id};
@@ -34,6 +22,19 @@ Announced robot(RobotId id, const std::string& name, int domain = 42,
           .from = "10.0.0.2",
           .user_data = to_user_data(identity),
           .identity = identity};
+}
+
+// A host where all is well, with another robot of the team in reach.
+NetworkFacts sound() {
+  NetworkFacts facts;
+  facts.config.domain = 42;
+  facts.interfaces = {kEthernet};
+  facts.chosen = kEthernet;
+  facts.mtu = 1500;
+  facts.largest_receive_buffer = facts.config.receive_buffer_bytes;
+  facts.announced = {robot(3, "carol")};
+  facts.listened_s = 5.0;
+  return facts;
 }
 
 std::string ids_of(const NetworkFacts& facts) {
@@ -117,7 +118,8 @@ TEST_CASE("What keeps robots apart on a network is named", "[doctor]") {
     CHECK(ids_of(facts) == "error network.same_id ");
   }
   SECTION("other programs") {
-    facts.announced = {{.domain = 42, .from = "10.0.0.9"}, {.domain = 0, .from = "10.0.0.9"}};
+    facts.announced.push_back({.domain = 42, .from = "10.0.0.9"});
+    facts.announced.push_back({.domain = 0, .from = "10.0.0.9"});
     CHECK(ids_of(facts) == "note network.other_programs ");
     CHECK_THAT(examine_network(facts).findings[0].what, Catch::StartsWith("1 other DDS"));
   }
@@ -132,7 +134,16 @@ TEST_CASE("What keeps robots apart on a network is named", "[doctor]") {
     CHECK(ids_of(facts) == "warning network.slow ");
     facts.echoes[0] = {.host = "10.0.0.2", .may_ask = false};
     facts.heard.clear();
+    facts.announced.clear();
     CHECK(ids_of(facts) == "warning network.nobody ");
+  }
+  SECTION("nobody else") {
+    facts.announced.clear();
+    CHECK(ids_of(facts) == "note network.nobody ");
+    CHECK(examine_network(facts).findings[0].what ==
+          "nobody else was seen: no robot on any domain in 5.0 s");
+    facts.announced = {robot(7, "alice", 43)};  // that is what is wrong
+    CHECK(ids_of(facts) == "warning network.other_domain ");
   }
   SECTION("a clock") {
     facts.clocks = {{"alice", 3600.0}};

@@ -163,6 +163,14 @@ TEST_CASE("closures judges the folders of a run", "[evaluate]") {
   CHECK_THAT(files.folder.read("closures.json"), Catch::Contains("\"pair_recall\": 1"));
   CHECK_THAT(run_command(command + a + ' ' + b + " --max-translation 1").output,
              Catch::Contains("inliers          2     2     100.0%"));
+  CHECK_THAT(result.output,
+             Catch::Contains("note: " + files.truth + " is taken for the true poses of robot 1 (" +
+                             a + ") and of robot 2 (" + b + ") at the same times"));
+  const auto own = files.folder.write("own.tum", "1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n").string();
+  const auto apart = run_command(command + a + ' ' + b + " --truth " + own);
+  CHECK_THAT(apart.output, Catch::Contains("note: none of the 1 keyframes of robot 2 (" + b +
+                                           ") lies within " + own) &&
+                               !Catch::Contains("at the same times"));
   const auto missing = run_command(command + "/none");
   CHECK(missing.exit_code == 1);
   CHECK(missing.output == "kimera_multi_evaluate: /none/keyframes.csv: no such file\n");

@@ -64,6 +64,17 @@ TEST_CASE("A recording is played in its order and pace", "[publish]") {
   CHECK(std::ranges::is_sorted(stamps));
 }
 
+TEST_CASE("A part of a recording is played, and at once", "[publish]") {
+  PlayedTopic topic;
+  const auto begin = std::chrono::steady_clock::now();
+  const auto stamps =
+      played(samples("/part"), "/part", {.rate = 1e-1, .from_s = 0.15, .to_s = 0.16}, topic);
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(1));  // 1.5 s up to there
+  REQUIRE(stamps.size() == 10);
+  CHECK(stamps.front() == kFirst + 150 * kPeriod);
+  CHECK(stamps.back() == kFirst + 159 * kPeriod);
+}
+
 TEST_CASE("A bad driver loses and delays messages, the same ones for a seed", "[publish]") {
   const PlayOptions bad{.rate = 10.0, .jitter_s = 0.002, .drop_share = 0.3, .seed = 7};
   PlayedTopic topic;

@@ -20,6 +20,7 @@ TEST_CASE("The demo joins three robots of a simulated world into one frame", "[d
   CAPTURE(demo.output);
   REQUIRE(demo.exit_code == 0);
   CHECK_THAT(demo.output, Catch::Contains("480 of 480 frames, 100 %") &&
+                              Catch::Contains("8 s of recording each, as fast as this") &&
                               Catch::Contains("team, one frame") &&
                               Catch::Contains("To look at, in " + folder.path().string()));
 
@@ -42,6 +43,12 @@ TEST_CASE("The demo joins three robots of a simulated world into one frame", "[d
     CHECK(std::filesystem::exists(folder.path() / file));
 }
 
+TEST_CASE("The demo says how long its world is", "[demo]") {
+  const auto help = run_command("apps/demo --help");
+  CHECK(help.exit_code == 0);
+  CHECK_THAT(help.output, Catch::Contains("The simulated world is 25 s long, with --short 8 s"));
+}
+
 TEST_CASE("The demo refuses what it cannot use", "[demo]") {
   const auto refusal = [](const std::string& arguments) {
     const auto result = run_command("apps/demo " + arguments);
@@ -50,6 +57,9 @@ TEST_CASE("The demo refuses what it cannot use", "[demo]") {
   };
   CHECK_THAT(refusal("/no/such/folder"), Catch::Contains("no such folder: /no/such/folder"));
   CHECK_THAT(refusal("--robots none"), Catch::Contains("--robots none is not a number"));
+  for (const std::string rate : {"fast", "0", "-1", "1.0x", ""})
+    CHECK_THAT(refusal("--rate '" + rate + "'"),
+               Catch::StartsWith("demo: --rate " + rate + " is neither a positive number nor max"));
   CHECK_THAT(refusal("--output"), Catch::Contains("--output needs a value"));
   CHECK_THAT(refusal("--fast"), Catch::Contains("unknown option --fast"));
   CHECK_THAT(refusal("--programs /nope"),
@@ -57,6 +67,8 @@ TEST_CASE("The demo refuses what it cannot use", "[demo]") {
   CHECK_THAT(refusal("--programs config"),
              Catch::StartsWith("demo: --programs: no kimera_multi_robot in "));
   CHECK_THAT(refusal("--short config"), Catch::Contains("--short is for the simulated world"));
+  CHECK_THAT(refusal("--output /proc/none --programs " KM_BIN_DIR),
+             Catch::Contains("demo: --output /proc/none: cannot be written to"));
   CHECK_THAT(refusal("config --programs " KM_BIN_DIR), Catch::Contains("cam0/data.csv is missing"));
 }
 

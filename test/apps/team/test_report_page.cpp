@@ -98,6 +98,19 @@ TEST_CASE("Where there is a truth, the report has it and the error over time", "
   }
 }
 
+TEST_CASE("The line of a trajectory is broken where no pose is known", "[report_page]") {
+  const ReportedRun reported;
+  std::string poses;
+  for (const double t : {500.0, 500.1, 500.2, 500.3, 506.6, 506.7})
+    poses += std::to_string(t) + " 1 0 0 0 0 0 1\n";
+  reported.run.folder.write("r0/optimized.tum", poses);
+  const Json line = reported.data()["robots"][0]["optimized"];
+  REQUIRE(line.size() == 7);
+  CHECK(line[3] == Json::parse("[1, 0, 0.3]"));
+  CHECK(line[4] == Json::parse("[null, null, null]"));
+  CHECK(line[5] == Json::parse("[1, 0, 6.6]"));
+}
+
 TEST_CASE("Long series are thinned, with both ends", "[report_page]") {
   const ReportedRun reported;
   std::string rounds = "seconds,round,members,cost,gradient_norm\n";

@@ -64,7 +64,7 @@ struct Team {
 
 TEST_CASE("A team runs its robots, shows their lines and prints the table", "[team]") {
   const Team team("exit 0");
-  const std::string json = (team.folder.path() / "team.json").string();
+  const std::string json = (team.folder.path() / "out/team.json").string();
   const auto result =
       run_command(team.command + " --rate max --domain 5 --json " + json + " -- --set a.b=1");
   CAPTURE(result.output);
@@ -74,7 +74,7 @@ TEST_CASE("A team runs its robots, shows their lines and prints the table", "[te
   CHECK_THAT(result.output, Catch::Contains("--set a.b=1"));
   CHECK_THAT(result.output, Catch::Contains("bob   | status of bob"));
   CHECK_THAT(result.output, Catch::Contains("77") && Catch::Contains("finished"));
-  CHECK_THAT(team.folder.read("team.json"), Catch::Contains("\"frames\": 77"));
+  CHECK_THAT(team.folder.read("out/team.json"), Catch::Contains("\"frames\": 77"));
   CHECK_THAT(team.folder.read("out/bob/robot.log"), Catch::Contains("status of bob"));
 }
 
@@ -315,6 +315,14 @@ TEST_CASE("What cannot be run is refused with code 1", "[team]") {
   const auto report = run_command(team.command + " --report");
   CHECK(report.exit_code == 1);
   CHECK_THAT(report.output, Catch::EndsWith("out: no such folder\n"));
+  for (const char* option : {" --output /proc/none", " --json /none/team.json"}) {
+    const auto unwritable =
+        run_command(team.command.substr(0, team.command.find(" --output")) + option);
+    CAPTURE(unwritable.output);
+    CHECK(unwritable.exit_code == 1);
+    CHECK_THAT(unwritable.output, Catch::Contains("cannot be") && Catch::Contains("/none") &&
+                                      !Catch::Contains("status of alice"));
+  }
   const std::string tool = std::string(KM_BIN_DIR) + "/kimera_multi_team";
   CHECK(run_command(tool).exit_code == 1);
   const auto missing = run_command(tool + " --config /nowhere.yaml");

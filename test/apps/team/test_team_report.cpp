@@ -151,8 +151,11 @@ TEST_CASE("A robot that skipped many frames is told of", "[team]") {
   CHECK_THAT(to_table(team), !Contains("of its frames"));
   team.robots[0].summary->frames = 20;
   team.robots[0].summary->frames_skipped = 80;
-  CHECK_THAT(to_table(team),
-             Contains("note: a skipped 80 % of its frames: use a lower --rate, or max"));
+  CHECK_THAT(
+      to_table(team),
+      Contains(
+          "note: a skipped 80 % of its frames: use a lower --rate, or max, which waits, or fewer "
+          "robots"));
 }
 
 TEST_CASE("The JSON of a run holds every robot, with all of its summary", "[team]") {

@@ -60,6 +60,40 @@ test('keyframes of a former frame go with it', (model) => {
   assert.deepEqual(model.robots.get(1).optimized, [at(7)]);
 });
 
+test('a time without a pose, far longer than usual, is a hole', (model) => {
+  const pose = (stamp_s) => ({kind: 'pose', stamp_s, T_odom_body: at(stamp_s)});
+  for (let i = 0; i <= 20; ++i) tell(model, 0, 0.1 * i, pose(500 + 0.1 * i));
+  tell(model, 0, 2.1, {...keyframes(0, [0, 1]), stamps_s: [500, 501.9]});
+  tell(model, 0, 8.3, pose(508.3));
+  tell(model, 0, 8.4, pose(508.4));
+  tell(model, 0, 8.5, {...keyframes(2, [3]), stamps_s: [508.4]});
+  model.seek(9);
+  const robot = model.robots.get(0);
+  assert.equal(robot.holes.length, 1);
+  assert.equal(robot.hasHole(robot.trailStamps[20], robot.trailStamps[21]), true);
+  assert.equal(robot.hasHole(robot.trailStamps[19], robot.trailStamps[20]), false);
+  assert.deepEqual(robot.keyframeStamps, [500, 501.9, 508.4]);
+  assert.equal(robot.hasHole(501.9, 508.4), true);
+  model.seek(3);
+  assert.equal(robot.hasHole(500, 600), false);
+});
+
+test('a live run is over when all robots have left, or none is heard any more', (model) => {
+  const state = (phase) => ({kind: 'state', phase});
+  assert.equal(model.over(99), null);
+  tell(model, 0, 0, state('running'));
+  tell(model, 1, 1, state('leaving'));
+  assert.equal(model.over(3), null);
+  assert.deepEqual(model.over(11), {ended: false, at_ms: 101000});
+  tell(model, 0, 4, state('settled'));
+  assert.equal(model.over(3), null);
+  assert.deepEqual(model.over(11), {ended: true, at_ms: 104000});
+  tell(model, 0, 5, state('leaving'));
+  assert.deepEqual(model.over(0), {ended: true, at_ms: 105000});
+  tell(model, 0, 9, state('running'), 'b');  // started again
+  assert.equal(model.over(0), null);
+});
+
 test('with another process goes what the former told', (model) => {
   tell(model, 0, 0, keyframes(0, [0, 1]));
   tell(model, 0, 0, mesh([0, 0, 0], 10));

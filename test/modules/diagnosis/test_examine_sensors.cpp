@@ -57,6 +57,14 @@ TEST_CASE("Rates and gaps of a recording are found", "[diagnosis]") {
     sample.imu.erase(sample.imu.begin() + 500, sample.imu.begin() + 520);
     CHECK(ids_of(examine_streams(sample, {})) == "warning imu.gap ");
   }
+  SECTION("images missing between others") {
+    sample.right_size = {752, 480};
+    ReaderReport report;
+    report.add(ReaderFault::kMissingBetween, "here", 20);  // 10 of each of two cameras
+    const auto findings = examine_streams(sample, report).findings;
+    REQUIRE(findings.size() == 1);
+    CHECK_THAT(findings[0].what, Catch::Contains("20 images missing between others, 4.8 %"));
+  }
   SECTION("no images") {
     sample.frames.clear();
     CHECK(ids_of(examine_streams(sample, {})) == "error recording.no_frames ");

@@ -153,7 +153,7 @@ TEST_CASE("Missing files and folders are refused by name", "[sensors]") {
     const EurocFolder spoilt;
     fs::remove(spoilt.mav0() / file);
     CHECK_THROWS_WITH(open_euroc(spoilt.root()),
-                      (spoilt.mav0() / file).string() + ": no such file");
+                      Catch::StartsWith((spoilt.mav0() / file).string() + ": no such file"));
   }
   fs::remove_all(folder.mav0() / "cam1");
   CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::Contains("cam1/sensor.yaml: no such file") &&

@@ -144,7 +144,8 @@ TEST_CASE("A reader holds to the calibration that it is given", "[sensors]") {
 TEST_CASE("What is asked for must be there", "[sensors]") {
   const EurocFolder folder;
   CHECK_THROWS_WITH(open_euroc(folder.root(), {.depth = true}),
-                    Catch::EndsWith("depth0/sensor.yaml: no such file"));
+                    Catch::Contains("depth0/sensor.yaml: no such file: a EuRoC folder has the "
+                                    "calibration of depth0 there"));
   CHECK_THROWS_WITH(open_euroc(folder.root(), {.labels = true}),
                     Catch::EndsWith("label0/data.csv: no such file"));
   fs::remove_all(folder.mav0() / "cam1");

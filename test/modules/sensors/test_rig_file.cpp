@@ -150,7 +150,10 @@ TEST_CASE("A recording that tells its rig takes a correction alone", "[sensors]"
   CHECK(read.offset_s == kCorrection.offset_s);
   CHECK(read.T_body_rig.isApprox(kCorrection.T_body_rig, 1e-9));
   CHECK_THROWS_WITH(read_rig_correction(folder.write("topics.yaml", kTopics)),
-                    Contains("topics.yaml:1: unknown key left"));
+                    Contains("topics.yaml: left is for a bag or live topics: a EuRoC folder has "
+                             "its own calibration"));
+  CHECK_THROWS_WITH(read_rig_correction(folder.write("other.yaml", "lift: 1\n")),
+                    Contains("other.yaml:1: unknown key lift"));
   CHECK_THROWS_WITH(read_rig_correction(folder.write("short.yaml", "T_body_rig: [1, 0, 0]\n")),
                     Contains("has not 16 numbers"));
   const std::string scaled = "T_body_rig: [2,0,0,0, 0,2,0,0, 0,0,2,0, 0,0,0,1]\n";
