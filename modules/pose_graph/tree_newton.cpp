@@ -304,15 +304,14 @@ void TreeNewton::weigh_candidates(TreeSums& sums) {
   limit_candidates(decided);
 }
 
-// Which pairs have their own weight is settled in the first round in which all is decided.
+// Once all is decided, a pair is free from the round on in which it is not torn: poses have not
+// come to rest before, and pull at all of them.
 void TreeNewton::limit_candidates(bool decided) {
-  candidate_released_ = decided;
-  if (decided && released_) return;
   const std::set<RobotId> torn = decided ? torn_pairs() : std::set<RobotId>{};
   for (const std::size_t k : front_edge_) {
     Known& known = known_[k];
-    const bool free = decided && !torn.contains(peer_of(known));
-    known.candidate_share = free ? 1.0 : known.limit;
+    const bool free = known.share == 1.0 || !torn.contains(peer_of(known));
+    known.candidate_share = decided && free ? 1.0 : known.limit;
   }
 }
 
@@ -470,7 +469,6 @@ void TreeNewton::accept() {
     k.weight = k.candidate;
     k.share = k.candidate_share;
   }
-  released_ = candidate_released_;
 }
 
 void TreeNewton::take_step(const VectorXd& step, const TreeVerdict& verdict,

@@ -103,9 +103,6 @@ class TreeNewton final : public MemberSolver {
   std::vector<Known> known_;  // as SessionGraph::own, then ::between
   std::optional<TreeFront> front_;
   std::vector<std::size_t> front_edge_;  // which of known_ the front's edges are
-  // Pairs that agree with the rest are no longer limited: at the accepted poses, at those at hand.
-  bool released_ = false;
-  bool candidate_released_ = false;
 
   Phase phase_ = Phase::kUp;
   std::uint32_t round_ = 0;

@@ -237,9 +237,10 @@ TEST_CASE("A team's records become one", "[system]") {
 
   // So are closures: the same as from the folders.
   const auto scores = [&](const std::string& results) {
-    return run_command(std::string(KM_BIN_DIR) + "/kimera_multi_evaluate closures --dataset " +
-                       dataset->string() + " --truth " +
-                       (folder.path() / "a/optimized.tum").string() + " --results" + results);
+    return run_command(
+        std::string(KM_BIN_DIR) + "/kimera_multi_evaluate closures --dataset " + dataset->string() +
+        " --truth " + (*dataset / "mav0/state_groundtruth_estimate0/groundtruth_tum.txt").string() +
+        " --results" + results);
   };
   const CommandResult by_record = scores(' ' + (folder.path() / "team.mcap").string());
   CAPTURE(by_record.output);
