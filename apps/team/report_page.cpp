@@ -52,35 +52,40 @@ Stamp first_stamp(const RobotPaths& paths) {
   return first;
 }
 
-// Behind a hole comes a point of nulls, at which lines end.
-Json from_above(const std::vector<StampedPose>& path, Stamp first) {
-  const std::vector<PoseHole> holes = pose_holes(path);
-  auto hole = holes.begin();
+// A point for each item, and one of nulls, at which lines end, in each hole.
+template <typename Item, typename PointOf>
+Json broken_line(std::vector<Item> items, const std::vector<PoseHole>& holes, PointOf point_of) {
   Json points = Json::array();
-  for (const StampedPose& pose : thinned(path)) {
-    if (hole != holes.end() && pose.stamp >= hole->to)
-      points.push_back({nullptr, nullptr, nullptr});
-    while (hole != holes.end() && pose.stamp >= hole->to) ++hole;
-    points.push_back({in_thousandths(pose.T.translation().x()),
-                      in_thousandths(pose.T.translation().y()),
-                      in_thousandths(seconds_between(first, pose.stamp))});
+  auto hole = holes.begin();
+  for (const Item& item : thinned(std::move(items))) {
+    const auto open = hole;
+    while (hole != holes.end() && item.stamp >= hole->to) ++hole;
+    if (hole != open && !points.empty()) points.push_back(Json::array_t(points.back().size()));
+    points.push_back(point_of(item));
   }
   return points;
 }
 
+Json from_above(const std::vector<StampedPose>& path, const std::vector<PoseHole>& holes,
+                Stamp first) {
+  return broken_line(path, holes, [first](const StampedPose& pose) -> Json {
+    return {in_thousandths(pose.T.translation().x()), in_thousandths(pose.T.translation().y()),
+            in_thousandths(seconds_between(first, pose.stamp))};
+  });
+}
+
 // Distance from the truth over time, between the poses that trajectory_error() compares.
 Json position_error(const RobotPaths& paths, const std::vector<StampedPose>& estimate,
-                    Stamp first) {
-  Json points = Json::array();
-  if (paths.truth.empty() || estimate.empty()) return points;
+                    const std::vector<PoseHole>& holes, Stamp first) {
+  if (paths.truth.empty() || estimate.empty()) return Json::array();
   const TrajectoryErrorOptions options;
   const TimeWindow window{paths.truth.front().stamp, paths.truth.back().stamp};
-  for (const PosePair& pair : thinned(
-           associate(paths.truth, estimate, window, options.max_gap_s, options.max_difference_s)))
-    points.push_back(
-        {in_thousandths(seconds_between(first, pair.stamp)),
-         (pair.T_truth_body.translation() - pair.T_estimate_body.translation()).norm()});
-  return points;
+  return broken_line(
+      associate(paths.truth, estimate, window, options.max_gap_s, options.max_difference_s), holes,
+      [first](const PosePair& pair) -> Json {
+        return {in_thousandths(seconds_between(first, pair.stamp)),
+                (pair.T_truth_body.translation() - pair.T_estimate_body.translation()).norm()};
+      });
 }
 
 // Where the robot was at its keyframes; those of which that is not known are left out.
@@ -169,13 +174,14 @@ Json report_data(const TeamPlan& plan, const TeamResult& team) {
     const fs::path folder = plan.output / robot.plan.name;
     const RobotPaths& paths = robot.paths;
     const Stamp first = first_stamp(paths);
+    const std::vector<PoseHole> holes = pose_holes(paths.odometry);  // there are fewer keyframes
     robots.push_back({{"id", robot.plan.id},
                       {"name", robot.plan.name},
-                      {"truth", from_above(paths.truth, first)},
-                      {"odometry", from_above(paths.odometry, first)},
-                      {"optimized", from_above(paths.optimized, first)},
-                      {"odometry_error", position_error(paths, paths.odometry, first)},
-                      {"optimized_error", position_error(paths, paths.optimized, first)},
+                      {"truth", from_above(paths.truth, pose_holes(paths.truth), first)},
+                      {"odometry", from_above(paths.odometry, holes, first)},
+                      {"optimized", from_above(paths.optimized, holes, first)},
+                      {"odometry_error", position_error(paths, paths.odometry, holes, first)},
+                      {"optimized_error", position_error(paths, paths.optimized, holes, first)},
                       {"keyframes", keyframes_from_above(robot)},
                       {"closures", closures_of(robot, reasons)},
                       {"rounds", table(folder / "optimizer.csv", rounds_of, notes)},

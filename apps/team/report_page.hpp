@@ -14,9 +14,9 @@ namespace km {
 ///   {folder, team: as to_json(TeamResult), reasons: [text...], notes: [text...],
 ///    images: {"robot:keyframe": address with a small JPEG in it}, of closures, as closure_images()
 ///    has them,
-///    robots: [{id, name, truth, odometry, optimized: [[x, y, t]...], with a point of nulls in each
-///              of pose_holes(),
-///              odometry_error, optimized_error: [[t, m]...],
+///    robots: [{id, name, truth, odometry, optimized: [[x, y, t]...],
+///              odometry_error, optimized_error: [[t, m]...], with a point of nulls in each of
+///              pose_holes(): of the truth, else of the odometry,
 ///              keyframes: [[index, x, y]...],
 ///              closures: [[from_robot, from_keyframe, to_robot, to_keyframe, stage (number of the
 ///                          ClosureStage), matches, inliers, number of the reason]...],

@@ -217,12 +217,12 @@ function showErrors() {
   if (!run.robots.some((robot) => robot.optimized_error.length || robot.odometry_error.length))
     return;
   const section = addSection(
-      'Error over time', 'errors', 'Distance from the truth; time since each robot\'s first pose.');
+      'Error over time', 'errors', 'Distance from the truth; time since each robot\'s first pose. A line ends where no pose is known.');
   const grid = element('div', 'grid', section);
-  addLines(grid, {title: 'Optimised', unit: 'm'}, perRobot((robot) => robot.optimized_error));
+  addLines(grid, {title: 'Optimised', unit: 'm'}, perRobot((robot) => lineOf(robot.optimized_error)));
   addLines(
       grid, {title: 'Odometry, aligned robot by robot', unit: 'm'},
-      perRobot((robot) => robot.odometry_error));
+      perRobot((robot) => lineOf(robot.odometry_error)));
 }
 
 // ---- closures
