@@ -217,9 +217,11 @@ function showErrors() {
   if (!run.robots.some((robot) => robot.optimized_error.length || robot.odometry_error.length))
     return;
   const section = addSection(
-      'Error over time', 'errors', 'Distance from the truth; time since each robot\'s first pose. A line ends where no pose is known.');
+      'Error over time', 'errors',
+      'Distance from the truth; time since each robot\'s first pose. A line ends where no pose is known.');
   const grid = element('div', 'grid', section);
-  addLines(grid, {title: 'Optimised', unit: 'm'}, perRobot((robot) => lineOf(robot.optimized_error)));
+  addLines(
+      grid, {title: 'Optimised', unit: 'm'}, perRobot((robot) => lineOf(robot.optimized_error)));
   addLines(
       grid, {title: 'Odometry, aligned robot by robot', unit: 'm'},
       perRobot((robot) => lineOf(robot.odometry_error)));
@@ -300,7 +302,8 @@ function showImages(section, all) {
       element('span', `badge ${c[4] === KEPT ? 'good' : 'warn'}`, caption, STAGES[c[4]]);
       element('b', '', caption, ` ${sides.map(([id, k]) => `${nameOf(id)} ${k}`).join(' – ')} `);
       caption.append(
-          `${c[6]} inliers of ${c[5]} matches`, run.reasons[c[7]] && `; ${run.reasons[c[7]]}`);
+          `${c[5]} matches, ${c[6]} inliers found by their pose`,
+          run.reasons[c[7]] && `; ${run.reasons[c[7]]}`);
     }
     more.textContent = `${waiting.length} more`;
     more.hidden = !waiting.length;
