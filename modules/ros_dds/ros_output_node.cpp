@@ -247,7 +247,8 @@ std::vector<StampedPose> RosOutputNode::keyframe_poses() const {
 }
 
 std::size_t RosOutputNode::tell_path(std::span<const StampedPose> poses) {
-  RosPath path{{poses.empty() ? 0 : poses.back().stamp, map_}, {}};
+  if (poses.empty()) return 0;
+  RosPath path{{stamp_.value_or(poses.back().stamp), map_}, {}};
   for (const StampedPose& pose : poses)
     path.poses.push_back({{pose.stamp, map_}, message_of(pose.T)});
   return tell(path_.topic, path);

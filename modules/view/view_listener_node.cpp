@@ -65,10 +65,13 @@ std::optional<ViewUpdate> ViewListener::next(double patience_s) {
 
 // What is small first: it does not wait behind a mesh.
 void ViewListener::take_all() {
-  const auto keep = [this](ViewUpdate update) { taken_.push_back(std::move(update)); };
+  const double now_s = steady_now_s();
+  const auto count = [this](ViewUpdate update) { taken_.push_back(std::move(update)); };
+  const auto keep = [&](ViewUpdate update) { incumbents_.add(std::move(update), now_s, count); };
   refused_ += view_.take(keep);
   for (auto& [robot, reader] : images_) refused_ += reader.take(keep);
   refused_ += mesh_.take(keep);
+  incumbents_.serve(now_s, count);
 }
 
 // Wakes up anew for what comes after this: stop() is asked for behind it.

@@ -10,13 +10,15 @@
 #include <set>
 
 #include "modules/view/view_channel_codec.hpp"
+#include "modules/view/view_incumbents.hpp"
 #include "modules/view/view_update.hpp"
 #include "runtime/dds/participant.hpp"
 
 namespace km {
 
 /// One who watches a team: a participant of its DDS domain that says nothing, so that robots do not
-/// take it for one of them. It hears what they tell those who watch.
+/// take it for one of them. It hears what they tell those who watch; where two tell as one robot,
+/// the first, see ViewIncumbents.
 class ViewListener {
  public:
   /// Joins the domain. Throws ConfigError for an unusable `config`, DdsError if DDS refuses it.
@@ -49,6 +51,7 @@ class ViewListener {
   ViewReader view_, mesh_;
   std::map<RobotId, ViewReader> images_;
   DdsEntity waitset_;
+  ViewIncumbents incumbents_;
   std::deque<ViewUpdate> taken_;
   std::mutex mutex_;         // guards asked_
   std::set<RobotId> asked_;  // for images

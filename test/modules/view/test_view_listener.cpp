@@ -24,10 +24,11 @@ constexpr std::array kChannels = {ViewChannel::kView, ViewChannel::kMesh, ViewCh
 
 // The telling half of a robot.
 struct Teller {
-  Teller(const std::shared_ptr<const DdsDomain>& domain, RobotId robot)
-      : participant(domain, {.robot = robot, .name = robot_name(robot), .boot = 50U + robot}) {
+  Teller(const std::shared_ptr<const DdsDomain>& domain, RobotId robot, std::uint64_t boot = 0)
+      : participant(domain,
+                    {.robot = robot, .name = robot_name(robot), .boot = 50U + robot + boot}) {
     for (const ViewChannel channel : kChannels)
-      writers.emplace_back(participant.handle(), channel, TeamPeer{robot, 50U + robot});
+      writers.emplace_back(participant.handle(), channel, TeamPeer{robot, 50U + robot + boot});
   }
   ViewWriter& on(ViewChannel channel) { return writers[static_cast<std::size_t>(channel)]; }
   void tell(const ViewContent& content) { on(channel_of(content)).write(content); }
@@ -100,6 +101,21 @@ TEST_CASE("A robot knows who has come to watch", "[view]") {
   }
   REQUIRE(w.is_read(ViewChannel::kView, 1));
   CHECK(writer.newcomers() == 0);
+}
+
+TEST_CASE("Who watches hears nothing of a second robot with a taken id", "[view]") {
+  Watching w;
+  Teller twin(w.domain, 7, 1000);
+  REQUIRE(w.is_read(ViewChannel::kView));
+  w.teller.tell(ViewKeyframes{.first = 0, .T_world_kf = {}});
+  CHECK(w.heard().boot == 57);
+  REQUIRE(eventually([&] { return twin.on(ViewChannel::kView).readers() == 1; }));
+  twin.tell(ViewKeyframes{.first = 0, .T_world_kf = {}});
+  CHECK(twin.on(ViewChannel::kView).await_readers(kPatience_s));
+  w.teller.tell(ViewKeyframes{.first = 1, .T_world_kf = {}});
+  const ViewUpdate next = w.heard();
+  CHECK(next.boot == 57);
+  CHECK(std::get<ViewKeyframes>(next.content).first == 1);
 }
 
 TEST_CASE("Images come of the robots that are asked", "[view]") {
