@@ -42,18 +42,27 @@ bool is_fault_of_disk(const std::error_code& error) {
 }
 
 // A disk that fails does not keep a robot from its team; a mistake on the command line is told.
-void prepare_output(const RobotOptions& options, bool goes_on, ResultWriter& results) try {
-  const fs::path& folder = options.output;
-  fs::create_directories(folder);
-  remove_results(folder, goes_on);
-  if (!options.resume)
-    for (const char* file : {kJournal, kMap}) fs::remove(folder / file);
-  if (access(folder.c_str(), W_OK) != 0)
-    throw fs::filesystem_error("", std::error_code(errno, std::generic_category()));
+void change_output(const RobotOptions& options, ResultWriter& results,
+                   const std::function<void(const fs::path&)>& change) try {
+  change(options.output);
 } catch (const fs::filesystem_error& error) {
   if (!is_fault_of_disk(error.code()))
-    throw std::runtime_error(options.output.string() + ": " + error.code().message());
+    throw std::runtime_error(options.output.string() + ": cannot be written to: " +
+                             error.code().message() + "; choose another folder for the results");
   results.note(options.output, error.code().message());
+}
+
+void make_output(const fs::path& folder) {
+  fs::create_directories(folder);
+  if (access(folder.c_str(), W_OK | X_OK) != 0)
+    throw fs::filesystem_error("", std::error_code(errno, std::generic_category()));
+}
+
+// Not before all is sound that a run needs: results are lost with it.
+void remove_former(const fs::path& folder, bool goes_on, bool resume) {
+  remove_results(folder, goes_on);
+  if (resume) return;
+  for (const char* file : {kJournal, kMap}) fs::remove(folder / file);
 }
 
 void log_network(const RobotConfig& config, const NetworkInterface& interface) {
@@ -519,6 +528,7 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
   const bool goes_on = options.resume && input->restored;
   options.record = record_file(options, goes_on);
   ResultWriter results;
+  change_output(options, results, make_output);
   Robot robot(options, config, *std::move(input), mapping, results, signals);
   if (listen) listen(robot.topics());
   log_network(config, robot.interface());
@@ -526,7 +536,8 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
       !config.segmentation.palette.empty())
     log::warn("robot") << "segmentation.palette is not used: labels are recorded, and with them "
                           "their label_palette.csv";
-  prepare_output(options, goes_on, results);
+  change_output(options, results,
+                [&](const fs::path& folder) { remove_former(folder, goes_on, options.resume); });
   const auto write = [&](const char* name, const std::string& text) {
     results.write(options.output / name, [&text](const auto& file) { write_file(file, text); });
   };

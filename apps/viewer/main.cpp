@@ -7,6 +7,7 @@
 #include <set>
 #include <thread>
 
+#include "apps/output_file.hpp"
 #include "apps/viewer/page_message.hpp"
 #include "apps/viewer/page_server.hpp"
 #include "apps/viewer/run_playback.hpp"
@@ -190,6 +191,7 @@ class ImageRequests {
 };
 
 void show_team(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
+  check_output_folder(options.record);
   if (!options.dds.peers.empty()) options.dds.discovery = Discovery::kPeers;
   ViewListener listener(options.dds);
   ImageRequests images(listener);

@@ -202,6 +202,23 @@ TEST_CASE("Mistakes on a robot's command line are told by value, and what to do"
   CHECK_FALSE(fs::exists(mistyped));
 }
 
+TEST_CASE("A folder that results cannot go to is refused before anything else is said",
+          "[system]") {
+  const auto recording = shared_data("euroc/MH_01_easy");
+  if (!recording) return;
+  const TemporaryFolder folder;
+  const std::string output = (folder.write("file", "") / "results").string();
+  const CommandResult result =
+      run_command(KM_BIN_DIR
+                  "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 "
+                  "--interface lo --dataset " +
+                  recording->string() + " --output " + output);
+  CHECK(result.exit_code == 1);
+  CHECK(result.output == "kimera_multi_robot: " + output +
+                             ": cannot be written to: Not a directory; choose another folder for "
+                             "the results\n");
+}
+
 TEST_CASE("Noise that no sensor has is refused before the run", "[system]") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;

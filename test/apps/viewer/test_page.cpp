@@ -68,6 +68,11 @@ TEST_CASE("The viewer refuses what it cannot use", "[viewer]") {
     CHECK(listen.exit_code == exit_code);
     CHECK_FALSE(std::filesystem::exists(record));
   }
+  const auto nowhere =
+      run_command("timeout 20 " + kViewer + " --domain 7 --interface lo --record " +
+                  (empty.path() / "none/team.mcap").string());
+  CHECK(nowhere.exit_code == 1);
+  CHECK_THAT(nowhere.output, Catch::Contains("cannot be written, there is no folder"));
 }
 
 }  // namespace
