@@ -6,8 +6,8 @@
 #include <utility>
 #include <variant>
 
+#include "modules/core/waiting_rooms.hpp"
 #include "modules/view/view_update.hpp"
-#include "runtime/dds/waiting_rooms.hpp"
 
 namespace km {
 

@@ -15,10 +15,10 @@
 #include <thread>
 #include <vector>
 
+#include "modules/core/waiting_rooms.hpp"
 #include "runtime/dds/fair_queue.hpp"
 #include "runtime/dds/outgoing_topic.hpp"
 #include "runtime/dds/sequence_tracker.hpp"
-#include "runtime/dds/waiting_rooms.hpp"
 #include "runtime/heartbeat.hpp"
 
 namespace km {

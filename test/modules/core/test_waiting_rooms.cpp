@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/dds/waiting_rooms.hpp"
+#include "modules/core/waiting_rooms.hpp"
 
 namespace km {
 namespace {
