@@ -92,6 +92,9 @@ Options parse_options(int argc, char** argv) {
     const int asked =
         (options.path.empty() ? 0 : 1) + (options.live.empty() ? 0 : 1) + (options.network ? 1 : 0);
     if (asked != 1) throw CLI::ValidationError("name one of PATH, --live and --network");
+    if (!options.network && app.count("--domain") > 0)
+      throw CLI::ValidationError(
+          "--domain is that of the team: with --network; drivers are on --set ros.domain=N");
     if (robot.from_s && robot.to_s && *robot.from_s >= *robot.to_s)
       throw CLI::ValidationError("--from is not before --to");
   } catch (const CLI::ParseError& error) {

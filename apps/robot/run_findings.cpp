@@ -32,7 +32,8 @@ std::string commonest(const std::map<std::string, std::uint64_t>& reasons, std::
 }
 
 // Why closures did not join two robots, and what follows.
-Finding why_apart(const ClosureTally& tally, const PcmConfig& pcm, bool has_one_vocabulary) {
+Finding why_apart(const ClosureTally& tally, const PcmConfig& pcm, bool has_one_vocabulary,
+                  bool was_lost) {
   Finding finding{.id = "team.not_joined", .severity = Severity::kWarning};
   const std::string candidates = std::to_string(tally.candidates) + " candidates, ";
   const std::string verified =
@@ -71,6 +72,11 @@ Finding why_apart(const ClosureTally& tally, const PcmConfig& pcm, bool has_one_
                    " that agree at different places";
     finding.means = "too few closures agree to trust them";
     finding.to_do = "meet at a second place, or run longer than pcm.witness_wait_s";
+  } else if (was_lost) {
+    finding.what = verified + std::to_string(tally.inliers) +
+                   " kept, but one was not heard any more when the other ended";
+    finding.means = "what joined them, if they were joined before, ended with it";
+    finding.to_do = "see its log; killed, it goes on with --resume; out of reach, bring it back";
   } else {
     finding.what = verified + std::to_string(tally.inliers) + " kept: enough";
     finding.means = "the run ended, or the link, before their pose graphs were one";
@@ -80,9 +86,12 @@ Finding why_apart(const ClosureTally& tally, const PcmConfig& pcm, bool has_one_
 }
 
 Finding not_joined(const std::string& a, const std::string& b, const ClosureTally& tally,
-                   const PcmConfig& pcm, bool has_one_vocabulary) {
-  Finding finding = why_apart(tally, pcm, has_one_vocabulary);
-  finding.what = a + " and " + b + " did not join: " + finding.what;
+                   const PcmConfig& pcm, bool has_one_vocabulary, bool was_lost) {
+  Finding finding = why_apart(tally, pcm, has_one_vocabulary, was_lost);
+  finding.what =
+      a + " and " + b +
+      (was_lost && tally.inliers > 0 ? " are not in one frame in the end: " : " did not join: ") +
+      finding.what;
   return finding;
 }
 
@@ -108,7 +117,8 @@ void add_apart(std::span<const RunFacts> runs, const Names& names, std::vector<F
       const auto tally = tallies.find(pair);
       findings.push_back(not_joined(name_of(names, pair.first), name_of(names, pair.second),
                                     tally == tallies.end() ? ClosureTally{} : tally->second,
-                                    run.pcm, !run.summary.other_vocabulary.contains(name)));
+                                    run.pcm, !run.summary.other_vocabulary.contains(name),
+                                    run.summary.lost_peers.contains(name)));
     }
   }
 }
@@ -135,6 +145,27 @@ void add_skipped(const RunSummary& run, std::vector<Finding>& findings) {
                       .means = "odometry was too slow for the rate of the images",
                       .to_do = "a lower --rate (max waits), tracker.max_features or "
                                "vio.window_keyframes, or a faster computer"});
+}
+
+// Counts are of images, samples or messages: against the frames none of them seems rarer than it
+// is.
+void add_sensor_faults(const RunSummary& run, std::vector<Finding>& findings) {
+  constexpr double kFew = 0.01;
+  const double most = kFew * static_cast<double>(run.frames);
+  if (run.frames == 0 || std::ranges::none_of(run.sensor_faults, [most](const auto& fault) {
+        return static_cast<double>(fault.second) > most;
+      }))
+    return;
+  std::string faults;
+  for (const auto& [fault, count] : run.sensor_faults)
+    faults += (faults.empty() ? "" : ", ") + std::to_string(count) + ' ' + fault;
+  findings.push_back(
+      {.id = "sensors.faults",
+       .severity = Severity::kWarning,
+       .what = run.name + ": " + faults + "; " + std::to_string(run.frames) + " frames were whole",
+       .means = "odometry went without them: it is less exact, or has holes",
+       .to_do = "kimera_multi_doctor on the recording, or --live on the topics, "
+                "names the first of each"});
 }
 
 void add_holes(const RunSummary& run, std::vector<Finding>& findings) {
@@ -308,6 +339,7 @@ std::vector<Finding> findings_of(std::span<const RunFacts> runs) {
     add_lost(run.summary, findings);
     add_unseen(run.summary, findings);
     add_skipped(run.summary, findings);
+    add_sensor_faults(run.summary, findings);
     add_holes(run.summary, findings);
     add_rejected(run, findings);
     add_cameras(run.summary, findings);

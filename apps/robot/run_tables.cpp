@@ -49,10 +49,10 @@ std::vector<TrafficRow> read_traffic(const fs::path& file) {
   const std::string text = read_input_file(file);
   std::vector<TrafficRow> rows;
   for (const TextRow& row : rows_below_header(text)) {
-    check_fields(row, 7, file);
+    check_fields(row, 8, file);
     rows.push_back({number(row, 0, file), row.fields[1] == "out", std::string(row.fields[2]),
                     std::string(row.fields[3]), std::string(row.fields[4]), number(row, 5, file),
-                    number(row, 6, file)});
+                    number(row, 6, file) + number(row, 7, file)});
   }
   return rows;
 }
@@ -71,7 +71,6 @@ std::vector<ModuleTiming> read_timing(const fs::path& file) {
 void TrafficUntil::advance(double time_s) {
   for (; next_ < rows_.size() && rows_[next_].time_s <= time_s; ++next_) {
     const TrafficRow& row = rows_[next_];
-    if (row.peer == "*") continue;  // what DDS sent again, to all
     auto& known = sums_[{row.out, row.topic, row.peer}];
     if (row.out) sent_[row.category] += row.bytes - known.bytes;
     if (const auto peer = parse_int64(row.peer); !row.out && peer && row.messages > known.messages)

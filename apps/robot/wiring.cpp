@@ -396,13 +396,12 @@ void Robot::add_records() {
   recorder_->record(topics_.mapping_progress);
   recorder_->record(topics_.maps);
   recorder_->record(topics_.optimized_meshes);
-  // The first stamp is the origin of the dataset's time shown to people.
-  topics_.keyframe_odometry.subscribe(
-      [this, first = std::optional<Stamp>()](const auto& keyframe) mutable {
-        if (!first) first = keyframe->stamp;
-        dataset_time_s_ = seconds_between(*first, keyframe->stamp);
-        ++keyframes_;
-      });
+  topics_.packets.subscribe(
+      [this](const auto& packet) { input_time_.reach(packet->frame->stamp); });
+  topics_.keyframe_odometry.subscribe([this](const auto& keyframe) {
+    input_time_.reach(keyframe->stamp);  // a pose graph, or a former process, has no packets
+    ++keyframes_;
+  });
   status_ = &add<RobotStatusNode>(
       false, [this] { return own_status(); },
       RobotStatusTopics{.own = topics_.status.to_peers(), .peers = topics_.status.from_peers()});
@@ -503,7 +502,7 @@ ViewState Robot::view_state(ModuleLoads& loads) const {
   ViewState state;
   state.name = identity_.name;
   state.phase = to_string(phase_.load());
-  state.dataset_time_s = dataset_time_s_;
+  state.dataset_time_s = input_time_.seconds();
   state.keyframes = keyframes_;
   state.skipped_frames = sensors_ != nullptr ? static_cast<std::uint32_t>(sensors_->skipped()) : 0;
   state.cpu_s = usage.cpu_s;
@@ -520,7 +519,7 @@ ViewState Robot::view_state(ModuleLoads& loads) const {
 }
 
 RobotStatus Robot::own_status() const {
-  return {identity_.robot, identity_.name, phase_,         dataset_time_s_,
+  return {identity_.robot, identity_.name, phase_,         input_time_.seconds(),
           keyframes_,      settled_links_, identity_.boot, relay_->summary()};
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "apps/robot/diagnostics.hpp"
+#include "apps/robot/input_time.hpp"
 #include "apps/robot/journal_node.hpp"
 #include "apps/robot/lives_met.hpp"
 #include "apps/robot/mapping_plan.hpp"
@@ -141,7 +142,7 @@ class Robot {
   void expect_no_more_closures() { pcm_->expect_no_more(); }
   /// Nothing is recorded from now on, and the mesh is corrected by what is known now.
   void freeze_record();
-  [[nodiscard]] double dataset_time_s() const { return dataset_time_s_; }
+  [[nodiscard]] double dataset_time_s() const { return input_time_.seconds(); }
   /// For tests: what the nodes publish.
   [[nodiscard]] Topics& topics() { return topics_; }
   [[nodiscard]] const std::vector<const Node*>& nodes() const { return nodes_; }
@@ -186,7 +187,7 @@ class Robot {
   std::shared_ptr<const Vocabulary> vocabulary_;  // null where nothing is perceived
   std::atomic<bool> source_ended_ = false;
   std::atomic<bool> id_taken_ = false;
-  std::atomic<double> dataset_time_s_ = 0.0;
+  InputTime input_time_;
   std::atomic<std::uint32_t> keyframes_ = 0;
   std::atomic<RobotPhase> phase_ = RobotPhase::kRunning;
   std::atomic<std::uint8_t> settled_links_ = 0;

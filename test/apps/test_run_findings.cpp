@@ -63,6 +63,24 @@ TEST_CASE("Why two robots did not join is one sentence with the counts of both",
                     "loop_closures.csv), 2 kept: below pcm.min_inliers 3"));
 }
 
+TEST_CASE("Of robots that shared enough, one that was lost is named for why they are apart",
+          "[robot][findings]") {
+  RunFacts run = run_of(0, false, tally_of(400, 100, 30, 20));
+  const auto what = [&run] {
+    const auto findings = findings_of_one(run);
+    const auto found = std::ranges::find(findings, "team.not_joined", &Finding::id);
+    REQUIRE(found != findings.end());
+    return found->what;
+  };
+  CHECK_THAT(what(), Catch::StartsWith("alice and bob did not join: "));
+  run.summary.lost_peers = {{"bob", 12.0}};
+  CHECK_THAT(what(), Catch::StartsWith("alice and bob are not in one frame in the end: ") &&
+                         Catch::Contains("20 kept, but one was not heard any more"));
+  run.closures[2] = tally_of(400, 100, 0, 0);  // with nothing shared, that is why
+  CHECK_THAT(what(), Catch::StartsWith("alice and bob did not join: ") &&
+                         !Catch::Contains("not heard any more"));
+}
+
 TEST_CASE("Two robots did not join for the first stage that stopped their closures",
           "[robot][findings]") {
   const auto why = [](const ClosureTally& tally) {
@@ -126,6 +144,13 @@ TEST_CASE("What stands out of a run is told with its number", "[robot][findings]
     told("frames.skipped", Severity::kWarning, "500 frames skipped, 50 %");
     summary.frames_skipped = 1;
     told("frames.skipped", Severity::kNote, "1 frames skipped, 0.2 %");
+  }
+  SECTION("images that are missing") {
+    summary.sensor_faults = {{"images missing between others", 116}, {"pauses of a camera", 1}};
+    told("sensors.faults", Severity::kWarning,
+         "116 images missing between others, 1 pauses of a camera; 500 frames were whole");
+    summary.sensor_faults = {{"images missing between others", 5}};
+    CHECK(findings_of_one(run).empty());
   }
   SECTION("a hole of the trajectory") {
     summary.holes =

@@ -95,6 +95,9 @@ TEST_CASE("The doctor's exit code is 2 for what it cannot use, with a line that 
     CHECK(run_command(kDoctor + ' ' + options).exit_code == 2);
   }
   CHECK(run_command(kDoctor + " --help").exit_code == 0);
+  const CommandResult domain = run_command(kDoctor + " . --domain 7");
+  CHECK(domain.exit_code == 2);
+  CHECK_THAT(domain.output, Catch::Contains("--set ros.domain=N"));
 }
 
 TEST_CASE("The doctor listens to the topics of a rig file, and looks at what they show",

@@ -1,5 +1,6 @@
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
@@ -86,6 +87,23 @@ TEST_CASE("Of a robot alone the findings are those of its end", "[doctor]") {
   CHECK(result.findings.size() == 2);
   CHECK(result.findings[0].id == "run.failed");
   CHECK(exit_code_of(result.findings) == 2);
+}
+
+TEST_CASE("The folder of a robot that was killed is no recording: how it goes on is named",
+          "[doctor]") {
+  const Results results;
+  const auto bob = results.folder.path() / "bob";
+  std::filesystem::remove(bob / "summary.json");
+  results.folder.write("bob/process.csv", "seconds\n");
+  for (const auto& folder : {bob, results.folder.path()}) {
+    CAPTURE(folder);
+    REQUIRE(are_results(folder));
+    const Examination result = examine_results(folder);
+    const auto found = std::ranges::find(result.findings, "run.unfinished", &Finding::id);
+    REQUIRE(found != result.findings.end());
+    CHECK_THAT(found->to_do, Catch::Contains("--resume " + bob.string()));
+    CHECK(exit_code_of(result.findings) == 1);
+  }
 }
 
 TEST_CASE("Results with files that are missing or broken are looked at as far as they go",

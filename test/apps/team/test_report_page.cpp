@@ -66,7 +66,7 @@ TEST_CASE("The report has the numbers that the robots left", "[report_page]") {
   CHECK(robot["optimized_error"].empty());
   CHECK(robot["keyframes"] == Json::parse("[[0, 0, 0], [1, 4, 0], [2, 8, 0]]"));
   CHECK(robot["rounds"] == Json::parse("[[1, 5], [2, 7]]"));
-  CHECK(robot["sent"] == Json::parse(R"({"pgo": [[2, 100], [6, 200]]})"));
+  CHECK(robot["sent"] == Json::parse(R"({"pgo": [[2, 100], [6, 255]]})"));
   CHECK(robot["process"].size() == 12);
   CHECK(robot["process"][1] == Json::parse("[2, 1, 1e8]"));
   CHECK(robot["timing"] == Json::parse(R"([["vio", 9, 1, 1, 1, 3]])"));

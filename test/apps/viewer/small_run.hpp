@@ -57,7 +57,8 @@ class SmallRun {
                      ",1,100,0\n"
                      "6,out,parcels,pgo," +
                      other +
-                     ",2,200,0\n"
+                     ",2,200,40\n"
+                     "6,out,parcels,pgo,*,0,0,15\n"
                      "6,in,parcels,pgo," +
                      other + ",2,200,0\n");
     folder.write(at + "timing.csv",

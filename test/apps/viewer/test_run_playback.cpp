@@ -37,7 +37,7 @@ TEST_CASE("A run is told in the order of time, and as it ended in the end", "[ru
   REQUIRE(last.links.size() == 1);
   CHECK(last.links[0].silent_s == Approx(6.0F));
   REQUIRE(last.sent_bytes.size() == 1);
-  CHECK(last.sent_bytes[0].value == 200.0);
+  CHECK(last.sent_bytes[0].value == 255.0);  // of which 55 again
   REQUIRE(last.loads.size() == 1);
   CHECK(last.loads[0].value == Approx(0.25));
 }
@@ -100,7 +100,7 @@ TEST_CASE("What a run lacks is noted, and what is no run refused", "[run_playbac
   const RunPlayback run = read_run(files.folder.path(), kBegin);
   REQUIRE(run.notes.size() == 2);
   CHECK_THAT(run.notes[0], Catch::Contains("r0/timing.csv"));
-  CHECK_THAT(run.notes[1], Catch::Contains("r1/traffic.csv line 2: fewer than 7 fields"));
+  CHECK_THAT(run.notes[1], Catch::Contains("r1/traffic.csv line 2: fewer than 8 fields"));
   CHECK(told<ViewState>(run, 0).size() == 12);
   CHECK(read_run(files.folder.path() / "r0", kBegin).updates.size() > 10);  // one robot's
 
