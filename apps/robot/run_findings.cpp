@@ -147,8 +147,8 @@ void add_skipped(const RunSummary& run, std::vector<Finding>& findings) {
                                "vio.window_keyframes, or a faster computer"});
 }
 
-// Counts are of images, samples or messages: against the frames none of them seems rarer than it
-// is.
+// Samples and messages are more than frames: a share of the frames makes their faults look no
+// rarer.
 void add_sensor_faults(const RunSummary& run, std::vector<Finding>& findings) {
   constexpr double kFew = 0.01;
   const double most = kFew * static_cast<double>(run.frames);
@@ -163,7 +163,7 @@ void add_sensor_faults(const RunSummary& run, std::vector<Finding>& findings) {
       {.id = "sensors.faults",
        .severity = Severity::kWarning,
        .what = run.name + ": " + faults + "; " + std::to_string(run.frames) + " frames were whole",
-       .means = "odometry went without them: it is less exact, or has holes",
+       .means = "what is concerned was left out: odometry, or the map, had less to go by",
        .to_do = "kimera_multi_doctor on the recording, or --live on the topics, "
                 "names the first of each"});
 }
