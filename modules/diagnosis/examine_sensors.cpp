@@ -6,6 +6,7 @@
 
 #include "modules/core/lie.hpp"
 #include "modules/core/text_table.hpp"
+#include "modules/diagnosis/focal_fit.hpp"
 #include "modules/diagnosis/inertial_fit.hpp"
 #include "modules/diagnosis/seen_rotations.hpp"
 #include "modules/diagnosis/stereo_fit.hpp"
@@ -279,26 +280,25 @@ void examine_offset(const InertialFit& fit, Examination& result) {
                 " in the rig file, or stamp both at one instant"});
 }
 
-void examine_focal(const InertialFit& fit, bool has_depth, Examination& result) {
-  constexpr double kSlack = 0.02, kSure = 4.0, kToldSigma = 0.005;
-  if (!has_depth || !(fit.across_sigma < kToldSigma)) {
-    result.figures.push_back(
-        {"focal length by the gyroscope",
-         std::string("not told: ") + (has_depth ? "too little rotation across the optical axis"
-                                                : "no stereo depth that fits")});
+void examine_focal(const SensorSample& sample, const StereoRig& rig, const SeenRotations& seen,
+                   const InertialFit& inertial, Examination& result) {
+  constexpr double kSlack = 0.015, kSure = 2.0, kToldSigma = 0.01;
+  constexpr const char* kName = "focal length by the gyroscope";
+  const bool has_depth = 2 * seen.with_depth > seen.steps.size();
+  const auto fit = has_depth ? fit_focal(sample.steps, rig, sample.imu, inertial) : std::nullopt;
+  if (!fit || !(fit->sigma < kToldSigma)) {
+    result.figures.push_back({kName, std::string("not told: ") +
+                                         (has_depth ? "too little rotation across the optical axis"
+                                                    : "no stereo depth that fits")});
     return;
   }
-  result.figures.push_back({"focal length by the gyroscope",
-                            "times " + fixed(fit.across, 3) + " +- " + fixed(fit.across_sigma, 3) +
-                                " of the calibration's (along the optical axis " +
-                                fixed(fit.along, 3) + ")"});
-  if (std::abs(fit.across - 1.0) < std::max(kSlack, kSure * fit.across_sigma)) return;
+  const std::string factor = fixed(fit->factor, 3) + " +- " + fixed(fit->sigma, 3);
+  result.figures.push_back({kName, "times " + factor + " of the calibration's"});
+  if (std::abs(fit->factor - 1.0) < std::max(kSlack, kSure * fit->sigma)) return;
   result.findings.push_back(
       {.id = "camera.focal",
        .severity = Severity::kWarning,
-       .what = "images turn " + percent(std::abs(fit.across - 1.0)) +
-               (fit.across > 1.0 ? " more" : " less") +
-               " than the gyroscope: the focal length is " + fixed(fit.across, 3) +
+       .what = "images move as the gyroscope turns if the focal lengths are " + factor +
                " times the calibration's",
        .means = "distances and turns are off by as much",
        .to_do = "calibrate the cameras anew, at the resolution of the images; or the gyroscope's "
@@ -439,8 +439,7 @@ Examination examine_inertial(const SensorSample& sample, const StereoRig& rig) {
   else
     result.figures.push_back(
         {"camera to inertial sensor", "not told: the camera turns about one axis only"});
-  if (std::abs(fit->scale - 1.0) < 0.1)
-    examine_focal(*fit, 2 * seen.with_depth > seen.steps.size(), result);
+  if (std::abs(fit->scale - 1.0) < 0.1) examine_focal(sample, rig, seen, *fit, result);
   return result;
 }
 

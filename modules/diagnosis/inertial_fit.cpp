@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include "modules/diagnosis/gyro_integral.hpp"
+
 namespace km {
 namespace {
 
@@ -15,39 +17,6 @@ constexpr double kTrusted = 0.8;       // share of the steps that an offset is j
 constexpr double kMaxDeviation = 4.0;  // of a step, in medians
 
 using Rates = Eigen::Matrix3Xd;
-
-// The integral of the gyroscope's rates, linear between samples.
-class GyroIntegral {
- public:
-  explicit GyroIntegral(std::span<const ImuSample> samples) : samples_(samples) {
-    sums_.reserve(samples.size());
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (std::size_t k = 0; k < samples.size(); ++k) {
-      if (k > 0)
-        sum += 0.5 * (samples[k - 1].gyro + samples[k].gyro) *
-               seconds_between(samples[k - 1].stamp, samples[k].stamp);
-      sums_.push_back(sum);
-    }
-  }
-
-  [[nodiscard]] bool covers(Stamp from, Stamp to) const {
-    return !samples_.empty() && samples_.front().stamp <= from && to <= samples_.back().stamp;
-  }
-
-  // Precondition: covered.
-  [[nodiscard]] Eigen::Vector3d until(Stamp stamp) const {
-    const auto after = std::ranges::upper_bound(samples_, stamp, {}, &ImuSample::stamp);
-    const auto k =
-        static_cast<std::size_t>(std::min(after, samples_.end() - 1) - samples_.begin() - 1);
-    const ImuSample &a = samples_[k], &b = samples_[k + 1];
-    const double s = seconds_between(a.stamp, stamp), step_s = seconds_between(a.stamp, b.stamp);
-    return sums_[k] + s * (a.gyro + 0.5 * s / step_s * (b.gyro - a.gyro));
-  }
-
- private:
-  std::span<const ImuSample> samples_;
-  std::vector<Eigen::Vector3d> sums_;
-};
 
 Rates image_rates(std::span<const SeenRotation> seen) {
   Rates rates(3, static_cast<Eigen::Index>(seen.size()));
@@ -63,8 +32,7 @@ Rates gyro_rates(const GyroIntegral& gyro, std::span<const SeenRotation> seen, d
   Rates rates(3, static_cast<Eigen::Index>(seen.size()));
   for (Eigen::Index k = 0; k < rates.cols(); ++k) {
     const SeenRotation& step = seen[static_cast<std::size_t>(k)];
-    rates.col(k) = (gyro.until(step.to + offset) - gyro.until(step.from + offset)) /
-                   seconds_between(step.from, step.to);
+    rates.col(k) = gyro.mean(step.from + offset, step.to + offset);
   }
   return rates;
 }
@@ -167,19 +135,6 @@ void prefer_rotation(InertialFit& fit, const Rates& image, const Rates& gyro) {
   fit.mirror_gain = 0.0;
 }
 
-void fit_slopes(const Rates& image, const Rates& gyro, InertialFit& fit) {
-  const Rates turned = fit.Q * gyro;
-  const double across = turned.topRows<2>().squaredNorm(), along = turned.row(2).squaredNorm();
-  fit.across = turned.topRows<2>().cwiseProduct(image.topRows<2>()).sum() / across;
-  fit.along = turned.row(2).dot(image.row(2)) / along;
-  const auto n = static_cast<double>(image.cols());
-  const double error_across =
-      (image.topRows<2>() - fit.across * turned.topRows<2>()).squaredNorm() / (2.0 * n);
-  const double error_along = (image.row(2) - fit.along * turned.row(2)).squaredNorm() / n;
-  fit.across_sigma = std::sqrt(error_across / across);
-  fit.along_sigma = std::sqrt(error_along / along);
-}
-
 }  // namespace
 
 std::optional<InertialFit> fit_inertial(std::span<const SeenRotation> seen,
@@ -196,7 +151,8 @@ std::optional<InertialFit> fit_inertial(std::span<const SeenRotation> seen,
   InertialFit fit{.steps = kept.size()};
   const Rates all = image_rates(kept);
   refine_offset(gyro, kept, all, start_s, fit);
-  const Rates image = centred(all), turns = centred(gyro_rates(gyro, kept, fit.offset_s));
+  const Rates measured = gyro_rates(gyro, kept, fit.offset_s);
+  const Rates image = centred(all), turns = centred(measured);
   const auto n = static_cast<double>(kept.size());
   fit.image_rms = std::sqrt(image.squaredNorm() / n);
   const Eigen::Matrix3d covariance = turns * turns.transpose() / n;
@@ -208,7 +164,7 @@ std::optional<InertialFit> fit_inertial(std::span<const SeenRotation> seen,
   fit.explained = 1.0 - residuals(image, turns).sum() / std::max(image.squaredNorm(), 1e-12);
   fit_rotation(image, turns, fit);
   prefer_rotation(fit, image, turns);
-  fit_slopes(image, turns, fit);
+  fit.constant = (all - fit.scale * fit.Q * measured).rowwise().mean();
   return fit;
 }
 

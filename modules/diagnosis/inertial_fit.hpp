@@ -30,9 +30,7 @@ struct InertialFit {
   Eigen::Matrix3d Q =
       Eigen::Matrix3d::Identity();  ///< Orthogonal: R_cam_body, if no axis is mirrored.
   double mirror_gain = 0.0;  ///< Explained by Q less by the nearest rotation; 0 where Q is one.
-  /// Slope of the image's rates over Q times the gyroscope's, across the optical axis, where it
-  /// goes with one over the focal length, and along it, where it does not.
-  double across = 0.0, across_sigma = 0.0, along = 0.0, along_sigma = 0.0;
+  Eigen::Vector3d constant = Eigen::Vector3d::Zero();  ///< About the camera's axes [rad/s].
 };
 
 inline constexpr double kMaxOffset_s = 0.15;

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "modules/core/frame.hpp"
+
+namespace km {
+
+/// The integral of a gyroscope's rates, linear between samples. Keeps the span.
+class GyroIntegral {
+ public:
+  explicit GyroIntegral(std::span<const ImuSample> samples);
+
+  /// Whether until() knows it from `from` to `to`.
+  [[nodiscard]] bool covers(Stamp from, Stamp to) const;
+
+  /// From the first sample on [rad]. Precondition: covered.
+  [[nodiscard]] Eigen::Vector3d until(Stamp stamp) const;
+
+  /// Mean rate [rad/s]. Precondition: covered, from < to.
+  [[nodiscard]] Eigen::Vector3d mean(Stamp from, Stamp to) const {
+    return (until(to) - until(from)) / seconds_between(from, to);
+  }
+
+ private:
+  std::span<const ImuSample> samples_;
+  std::vector<Eigen::Vector3d> sums_;  // until each sample
+};
+
+}  // namespace km
