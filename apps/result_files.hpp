@@ -4,17 +4,23 @@
 #include <array>
 #include <filesystem>
 #include <string>
+#include <vector>
+
+#include "modules/core/input_file.hpp"
 
 namespace km {
 
 /// Names and colours of the labels, beside a mesh that has some.
 inline constexpr const char* kLabelPalette = "label_palette.csv";
 
+/// Written at the end of a run.
+inline constexpr const char* kSummary = "summary.json";
+
 /// What a robot leaves in its output folder.
 inline constexpr std::array kResultFiles = {
     "odometry.tum",  "optimized.tum", "pose_graph.g2o",     "keyframes.csv", "loop_closures.csv",
     "optimizer.csv", "traffic.csv",   "process.csv",        "timing.csv",    "config.yaml",
-    "summary.json",  "mesh.ply",      "mesh_optimized.ply", kLabelPalette};
+    kSummary,        "mesh.ply",      "mesh_optimized.ply", kLabelPalette};
 
 /// Those that grow during the run, and go on when it is taken up.
 inline constexpr std::array kGrowingFiles = {"optimizer.csv", "traffic.csv", "process.csv"};
@@ -31,6 +37,33 @@ inline constexpr const char* kMap = "run.map";
 
 /// What viewers open. A run that is taken up goes on in record_2.mcap, and so on.
 inline constexpr const char* kRecord = "record.mcap";
+
+/// The folders that robots write or have written to: `folder` itself, or those in it, by name.
+[[nodiscard]] inline std::vector<std::filesystem::path> robot_folders(
+    const std::filesystem::path& folder) {
+  const auto is_of_robot = [](const std::filesystem::path& one) {
+    return is_file(one / kSummary) || is_file(one / kGrowingFiles.back());
+  };
+  if (is_of_robot(folder)) return {folder};
+  std::vector<std::filesystem::path> found;
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error))
+    if (is_of_robot(entry->path())) found.push_back(entry->path());
+  std::ranges::sort(found);
+  return found;
+}
+
+/// What is wrong with the folder of a robot that has no summary yet.
+[[nodiscard]] inline std::string unfinished(const std::filesystem::path& folder) {
+  return folder.string() + ": no " + kSummary + ": the robot still runs, or was killed";
+}
+
+/// And the way out.
+[[nodiscard]] inline std::string way_on(const std::filesystem::path& folder) {
+  return "if it was killed: the same command with --resume " + folder.string() +
+         " in place of --output goes on with it";
+}
 
 /// "record_2.mcap" of "record.mcap".
 [[nodiscard]] inline std::filesystem::path numbered(const std::filesystem::path& file, int number) {

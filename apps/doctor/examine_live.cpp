@@ -117,19 +117,21 @@ Examination examine_topics(const std::vector<ListenedTopic>& topics,
                            const std::vector<TopicPublisher>& publishers, double listened_s,
                            int domain) {
   Examination result;
-  for (const ListenedTopic& topic : topics) {
+  for (const ListenedTopic& topic : topics)
     result.figures.push_back({topic.topic, std::to_string(topic.messages) + " messages of " +
                                                topic.type + " in " + fixed(listened_s, 1) + " s"});
-    if (topic.messages == 0) result.findings.push_back(silent(topic, publishers));
-  }
-  if (publishers.empty())
-    result.findings.insert(
-        result.findings.begin(),
+  const auto is_silent = [](const ListenedTopic& topic) { return topic.messages == 0; };
+  if (publishers.empty() && std::ranges::all_of(topics, is_silent)) {
+    result.findings.push_back(
         {.id = "live.nobody",
          .severity = Severity::kError,
          .what = "nobody publishes anything on domain " + std::to_string(domain) + " of ROS",
          .means = "drivers do not run, or on another domain or interface",
          .to_do = "ROS_DOMAIN_ID of the drivers is ros.domain here; ros.interface, ros.peers"});
+    return result;
+  }
+  for (const ListenedTopic& topic : topics)
+    if (is_silent(topic)) result.findings.push_back(silent(topic, publishers));
   return result;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "apps/result_files.hpp"
 #include "apps/robot/robot_config.hpp"
 #include "apps/robot/run_findings.hpp"
 #include "modules/core/input_file.hpp"
@@ -14,33 +15,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kSummary = "summary.json";  // written at the end
-constexpr const char* kProcess = "process.csv";   // from the beginning on
-
-bool is_of_robot(const fs::path& folder) {
-  return is_file(folder / kSummary) || is_file(folder / kProcess);
-}
-
-std::vector<fs::path> robot_folders(const fs::path& folder) {
-  if (is_of_robot(folder)) return {folder};
-  std::vector<fs::path> found;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error))
-    if (is_of_robot(entry->path())) found.push_back(entry->path());
-  std::ranges::sort(found);
-  return found;
-}
-
-Finding unfinished(const fs::path& folder) {
+Finding unfinished_run(const fs::path& folder) {
   return {.id = "run.unfinished",
           .severity = Severity::kWarning,
-          .what = folder.string() + ": no summary.json: the robot still runs, or was killed",
+          .what = unfinished(folder),
           .means =
               "its trajectory, closures and map are not written yet; up to its last second they "
               "are in run.journal",
-          .to_do = "if it was killed: the same command with --resume " + folder.string() +
-                   " in place of --output goes on with it"};
+          .to_do = way_on(folder)};
 }
 
 // What another program may have left out, or a run that was cut short.
@@ -102,7 +84,7 @@ Examination examine_results(const fs::path& folder) {
   std::vector<RunFacts> runs;
   for (const fs::path& robot : robot_folders(folder)) {
     if (!is_file(robot / kSummary)) {
-      result.findings.push_back(unfinished(robot));
+      result.findings.push_back(unfinished_run(robot));
       continue;
     }
     runs.push_back(facts_in(robot, result.findings));

@@ -81,7 +81,8 @@ Options parse_options(int argc, char** argv) {
   app.add_option("--from", robot.from_s, "Look from here on [s since the first image]");
   app.add_option("--to", robot.to_s, "Look up to here [s]; by default 120 s are looked at");
   app.add_option("--seconds", options.seconds,
-                 "How long to listen: by default 10 to sensors, 5 to the network")
+                 "How long to look at sensors once 3 s have shown that all are there, by default "
+                 "10; how long to listen to the network, by default 5")
       ->check(CLI::Range(0.5, 3600.0));
   app.add_option("--config", robot.configs, "Configuration files of the robots")
       ->check(CLI::ExistingFile);

@@ -1,5 +1,6 @@
 #include "apps/robot/robot_input.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <limits>
 #include <stdexcept>
@@ -178,6 +179,19 @@ std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const 
                                       config.sensors.stereo_tolerance_s, window);
 }
 
+[[noreturn]] void refuse_without_rig(const std::string& bag) {
+  const auto reader = open_bag(bag);  // says what is none
+  const auto is_image = [](const BagChannel& channel) {
+    return is_of_type(channel, RosImage::kType) || is_of_type(channel, RosCompressedImage::kType);
+  };
+  if (std::ranges::none_of(reader->channels(), is_image))
+    throw std::invalid_argument(bag +
+                                ": no topic of it has images: robots play recordings of "
+                                "sensors, not what a robot has told (--record)");
+  throw std::invalid_argument(bag + ": --rig FILE must tell which of its topics are the sensors; " +
+                              "--inspect " + bag + " rig.yaml writes one");
+}
+
 // Null: a signal came.
 std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const RobotConfig& config,
                                             const std::optional<MappingPlan>& mapping,
@@ -186,11 +200,8 @@ std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const R
                                             const std::optional<RestoredRun>& restored,
                                             SignalWatch& signals) {
   const auto not_before = restored ? std::optional(restored->odometry.back().stamp) : std::nullopt;
-  const std::string dataset = options.dataset.string();
   const bool is_bag = has_messages(options);
-  if (is_bag && !rig.messages)
-    throw std::invalid_argument(dataset + ": --rig FILE must tell which of its topics are the " +
-                                "sensors; --inspect " + dataset + " rig.yaml writes one");
+  if (is_bag && !rig.messages) refuse_without_rig(options.dataset.string());
   if (is_bag)
     return open_messages(options, config, mapping, rig, std::move(ros), not_before, signals);
   EurocOptions euroc{.from_s = options.from_s.value_or(0.0),

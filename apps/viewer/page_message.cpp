@@ -1,5 +1,6 @@
 #include "apps/viewer/page_message.hpp"
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
@@ -154,8 +155,13 @@ PageMessage page_message(const ViewUpdate& update, std::uint64_t number) {
   return {true, bytes + text + data};
 }
 
-std::string page_greeting(bool live, const std::string& title, const LabelPalette& palette) {
-  Json json = {{"kind", "hello"}, {"live", live}, {"title", title}, {"labels", Json::array()}};
+std::string page_greeting(PageSource source, const std::string& title,
+                          const LabelPalette& palette) {
+  constexpr std::array kNames = {"live", "replay", "run"};  // as in PageSource
+  Json json = {{"kind", "hello"},
+               {"source", kNames.at(static_cast<std::size_t>(source))},
+               {"title", title},
+               {"labels", Json::array()}};
   for (const LabelClass& one : palette.classes())
     json["labels"].push_back({{"id", one.id}, {"name", one.name}, {"color", one.color}});
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);

@@ -23,9 +23,16 @@ struct PageMessage {
 /// image features (f32) and JPEG.
 [[nodiscard]] PageMessage page_message(const ViewUpdate& update, std::uint64_t number);
 
-/// What the page is told first: whether it watches a team ("live") or a finished run ("run"), what
-/// of, and the colours of labels.
-[[nodiscard]] std::string page_greeting(bool live, const std::string& title,
+/// What a page shows.
+enum class PageSource {
+  kTeam,    ///< That runs: "live".
+  kReplay,  ///< A finished run, as if it were live: "replay".
+  kRun,     ///< All of a finished run: "run".
+};
+
+/// What the page is told first: what it shows (`source`), of what (`title`), and the colours of
+/// labels.
+[[nodiscard]] std::string page_greeting(PageSource source, const std::string& title,
                                         const LabelPalette& palette);
 
 }  // namespace km

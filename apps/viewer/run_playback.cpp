@@ -50,7 +50,7 @@ std::vector<ViewNumber> read_loads(const fs::path& file, double seconds) {
 // Reads what there is; what cannot be read is noted.
 RobotFiles read_robot(const fs::path& folder, std::vector<std::string>& notes) {
   RobotFiles robot;
-  robot.summary = read_summary(folder / "summary.json");
+  robot.summary = read_summary(folder / kSummary);
   robot.id = robot.summary.robot;
   const auto attempt = [&](auto& value, const char* name, const auto& read) {
     try {
@@ -344,18 +344,26 @@ class RobotPlayback {
   std::vector<double> round_times_s_;
 };
 
-// The folders below `folder`, or itself, that robots wrote to.
-std::vector<fs::path> robot_folders(const fs::path& folder) {
-  std::vector<fs::path> folders;
+// Those of robots that have ended; of others it is noted. Throws if there are none.
+std::vector<fs::path> ended_runs(const fs::path& folder, std::vector<std::string>& notes) {
+  if (is_file(folder))
+    throw std::runtime_error(
+        folder.string() +
+        ": a file, not the folder of a run; Foxglove and kimera_multi_evaluate "
+        "open records (.mcap)");
   if (!is_folder(folder)) throw std::runtime_error(folder.string() + ": no such folder");
-  if (is_there(folder / "summary.json")) return {folder};
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (is_there(entry.path() / "summary.json")) folders.push_back(entry.path());
+  std::vector<fs::path> folders = robot_folders(folder);
+  std::erase_if(folders, [&notes](const fs::path& one) {
+    if (is_file(one / kSummary)) return false;
+    notes.push_back(unfinished(one) + "; " + way_on(one));
+    return true;
+  });
   if (folders.empty())
-    throw std::runtime_error(folder.string() +
-                             ": no results in it: no summary.json, nor folders that have one; "
-                             "give the --output of kimera_multi_team or of a robot");
-  std::sort(folders.begin(), folders.end());
+    throw std::runtime_error(notes.empty()
+                                 ? folder.string() +
+                                       ": no results in it: no summary.json, nor folders that have "
+                                       "one; give the --output of kimera_multi_team or of a robot"
+                                 : notes.front());
   return folders;
 }
 
@@ -373,7 +381,7 @@ LabelPalette palette_in(const fs::path& folder, std::vector<std::string>& notes)
 RunPlayback read_run(const fs::path& folder, Stamp begin) {
   RunPlayback run;
   std::vector<RobotFiles> robots;
-  for (const fs::path& one : robot_folders(folder)) {
+  for (const fs::path& one : ended_runs(folder, run.notes)) {
     robots.push_back(read_robot(one, run.notes));
     if (run.palette.classes().empty()) run.palette = palette_in(one, run.notes);
   }

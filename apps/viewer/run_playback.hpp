@@ -13,7 +13,7 @@ namespace km {
 struct RunPlayback {
   std::vector<ViewUpdate> updates;
   LabelPalette palette;            ///< Of the first robot that has one.
-  std::vector<std::string> notes;  ///< Files that are missing or cannot be used, and why.
+  std::vector<std::string> notes;  ///< Files and robots that are missing, and why.
 };
 
 /// Reads the folder of a team's results, or of one robot's. The run begins at `begin`.
@@ -23,7 +23,8 @@ struct RunPlayback {
 /// the first closure of both that was kept; its rounds alone are before, those with others follow
 /// by what had been sent for them. Before it joins, what it has is in its own frame and as odometry
 /// made it, from then on as it ended. Loads of modules are means.
-/// Throws std::runtime_error if the folder has no results.
+/// Robots that still run or were killed are noted. Throws std::runtime_error if the folder has no
+/// results, or only theirs.
 [[nodiscard]] RunPlayback read_run(const std::filesystem::path& folder, Stamp begin);
 
 }  // namespace km

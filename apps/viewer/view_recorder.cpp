@@ -108,7 +108,7 @@ class ViewRecorder::Robot {
   }
 
   // From here on it is written, what is known already first.
-  void begin(const std::string& name, const std::shared_ptr<File>& file,
+  void begin(const std::string& name, const std::shared_ptr<File>& file, double gone_s,
              const std::function<std::string(RobotId)>& name_of) {
     images_ = std::make_unique<Sink>(file);
     image_topic_ = images_->open(
@@ -123,8 +123,9 @@ class ViewRecorder::Robot {
                          .draws = true,
                          .state_bytes_per_s = kState_bytes_per_s,
                          .queue = kQueue},
-        [this] {
+        [this, gone_s]() -> std::optional<std::vector<RosDiagnosticStatus>> {
           const std::lock_guard lock(mutex_);
+          if (has_left_ || steady_now_s() - heard_s_ > gone_s) return std::nullopt;
           return std::vector<RosDiagnosticStatus>{status_};
         },
         [this] {
@@ -138,9 +139,16 @@ class ViewRecorder::Robot {
   }
   [[nodiscard]] bool has_begun() const { return node_.has_value(); }
 
+  // It tells something, whatever it is.
+  void hear() {
+    const std::lock_guard lock(mutex_);
+    heard_s_ = steady_now_s();
+  }
+
   void hear(const ViewState& state) {
     const std::lock_guard lock(mutex_);
     status_ = status_of(state);
+    has_left_ = state.phase == "leaving";
   }
 
   void hear(const ViewPose& pose) { publish_state(pose.stamp, pose.T_odom_body); }
@@ -235,12 +243,15 @@ class ViewRecorder::Robot {
   std::string camera_;
   std::mutex mutex_;  // guards what the node asks for
   RosDiagnosticStatus status_;
+  double heard_s_ = 0.0;  // steady clock
+  bool has_left_ = false;
   std::optional<std::vector<ToldClosure>> closures_now_;
   std::optional<RosOutputNode> node_;  // last member: stops first
 };
 
-ViewRecorder::ViewRecorder(const std::filesystem::path& file, LabelPalette palette)
+ViewRecorder::ViewRecorder(const std::filesystem::path& file, LabelPalette palette, double gone_s)
     : palette_(std::move(palette)),
+      gone_s_(gone_s),
       file_(std::make_shared<File>(file)),
       worker_(
           kQueue, Overflow::kDropOldest, [this](const Input& update) { step(update); }, "record"),
@@ -257,21 +268,26 @@ ViewRecorder::~ViewRecorder() {
 
 void ViewRecorder::step(const Input& update) {
   if (!update) {
+    const bool changed = std::exchange(closures_changed_, false);
     for (auto& [id, robot] : robots_) {
-      robot->tell_closures(closures_of(*robot));
+      if (changed) robot->tell_closures(closures_of(*robot));
       robot->tell_mesh(palette_, steady_now_s());
     }
     return;
   }
   Robot& robot = robot_of(*update);
+  robot.hear();
   const auto* const state = std::get_if<ViewState>(&update->content);
   if (state != nullptr && !robot.has_begun()) {
     {
       const std::lock_guard lock(mutex_);
       names_[update->robot] = state->name;
     }
-    robot.begin(state->name, file_, [this](RobotId id) { return name_of(id); });
+    robot.begin(state->name, file_, gone_s_, [this](RobotId id) { return name_of(id); });
   }
+  const auto* const keyframes = std::get_if<ViewKeyframes>(&update->content);
+  closures_changed_ |= std::holds_alternative<ViewClosures>(update->content) ||
+                       (keyframes != nullptr && keyframes->optimized);
   std::visit([&](const auto& content) { robot.hear(content); }, update->content);
 }
 

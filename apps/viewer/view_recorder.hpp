@@ -24,8 +24,9 @@ namespace km {
 /// viewer that is killed leaves what came up to a second before.
 class ViewRecorder {
  public:
-  /// With the first message `file` is replaced. `palette`: colours of meshes.
-  ViewRecorder(const std::filesystem::path& file, LabelPalette palette);
+  /// With the first message `file` is replaced. `palette`: colours of meshes. Of a robot that has
+  /// left, or been silent for `gone_s`, nothing more is written until it tells something.
+  ViewRecorder(const std::filesystem::path& file, LabelPalette palette, double gone_s = 10.0);
   ~ViewRecorder();
 
   /// Thread-safe. Where the disk stands still for long, the oldest updates are left out.
@@ -48,11 +49,13 @@ class ViewRecorder {
   [[nodiscard]] std::vector<ToldClosure> closures_of(const Robot& robot) const;
 
   const LabelPalette palette_;
+  const double gone_s_;
   const std::shared_ptr<File> file_;
   mutable std::mutex mutex_;  // guards names_
   std::map<RobotId, std::string> names_;
   std::map<RobotId, std::unique_ptr<Robot>> robots_;
-  std::size_t lost_ = 0;  // messages for which there was no time
+  bool closures_changed_ = false;  // they, or the poses of their keyframes
+  std::size_t lost_ = 0;           // messages for which there was no time
   Worker<Input> worker_;
   Periodic clock_;  // last member: stops first
 };

@@ -295,21 +295,26 @@ RosDiagnosticStatus RosOutputNode::odometry_status() const {
   return status;
 }
 
-void RosOutputNode::step(const std::shared_ptr<const Tick>& /*tick*/) {
-  RosDiagnostics diagnostics{{stamp_.value_or(0), ""}, diagnose_()};
-  for (RosDiagnosticStatus& status : diagnostics.status) {
+void RosOutputNode::tell_diagnostics(std::vector<RosDiagnosticStatus> parts) {
+  for (RosDiagnosticStatus& status : parts) {
     status.name = name_ + ": " + status.name;
     status.hardware_id = name_;
   }
-  diagnostics.status.insert(diagnostics.status.begin(), odometry_status());
-  tell(diagnostics_, diagnostics);
+  parts.insert(parts.begin(), odometry_status());
+  tell(diagnostics_, RosDiagnostics{{stamp_.value_or(0), ""}, std::move(parts)});
+}
+
+void RosOutputNode::step(const std::shared_ptr<const Tick>& /*tick*/) {
+  auto parts = diagnose_();
+  const bool is_silent = !parts;
+  if (parts) tell_diagnostics(*std::move(parts));
   if (auto closures = options_.draws ? closures_of_() : std::nullopt) {
     newest_closures_ = *std::move(closures);
     closures_.changed = true;
   }
   tell_states(false);
   tell_pieces();
-  tell_link();
+  if (!is_silent) tell_link();
   sink_->flush();
 }
 

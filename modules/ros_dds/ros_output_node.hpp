@@ -76,8 +76,9 @@ struct RosOutputOptions {
 /// the robot in whose frame the team is. base_link is the inertial sensor's frame.
 class RosOutputNode final : public Node {
  public:
-  /// How the rest of the robot does, by the names of its parts. Called on the node's thread.
-  using Diagnose = std::function<std::vector<RosDiagnosticStatus>()>;
+  /// How the rest of the robot does, by the names of its parts; nullopt while it is silent: then
+  /// nothing is told each second. Called on the node's thread.
+  using Diagnose = std::function<std::optional<std::vector<RosDiagnosticStatus>>()>;
   /// All closures of the robot; nullopt: as before. Called on the node's thread.
   using Closures = std::function<std::optional<std::vector<ToldClosure>>()>;
 
@@ -127,6 +128,7 @@ class RosOutputNode final : public Node {
 
   void open_topics(bool has_images);
   void step(const std::shared_ptr<const Tick>& tick);
+  void tell_diagnostics(std::vector<RosDiagnosticStatus> parts);
   void step(const Topic<OdometryState>::Message& state);
   void step(const Topic<KeyframeOdometry>::Message& keyframe);
   void step(const Topic<Trajectory>::Message& trajectory);

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "modules/core/imu_limits.hpp"
 #include "modules/core/input_file.hpp"
@@ -45,6 +46,21 @@ bool is_rgbd(const SensorRig& rig) {
   return rig.stereo.depth_source == DepthSource::kDepthImage;
 }
 
+// Of a folder of recordings, for one who names it in place of one of them.
+std::string recordings_below(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error))
+    if (is_folder(entry->path() / "mav0")) names.push_back(entry->path().filename().string());
+  std::ranges::sort(names);
+  constexpr std::size_t kMost = 5;
+  std::string text;
+  for (std::size_t k = 0; k < std::min(names.size(), kMost); ++k)
+    text += (k == 0 ? ", but in it are " : ", ") + names[k];
+  return text + (names.size() > kMost ? " and others" : "");
+}
+
 }  // namespace
 
 std::filesystem::path find_mav0(const std::filesystem::path& folder) {
@@ -54,7 +70,7 @@ std::filesystem::path find_mav0(const std::filesystem::path& folder) {
   for (const char* sensor : {"cam0", "cam1"})
     if (!has(sensor) && !(sensor == std::string_view("cam1") && has("depth0")))
       throw DatasetError(folder.string() + ": neither a folder mav0 nor " + sensor +
-                         " in it: not a EuRoC recording");
+                         " in it: not a EuRoC recording" + recordings_below(folder));
   return folder;
 }
 

@@ -20,7 +20,8 @@ const timeline = new Timeline(
       changed = true;
     });
 
-let changed = true, chartsChanged = true, caughtUp = false, live = false;
+let changed = true, chartsChanged = true, caughtUp = false;
+let source = 'run';  // live, replay: as if it were; run: one that has ended
 let pointed = null;  // where the pointer is in the scene
 let camera = null;   // robot whose images are shown
 let heardAt = 0;     // when something came [ms since 1970]
@@ -56,10 +57,10 @@ const connection = new Connection({
   },
 });
 
-function greet({live: isLive, title, labels}) {
-  live = isLive;
+function greet({source: shown, title, labels}) {
+  source = shown;
   $('title').textContent = title;
-  $('live').textContent = live ? 'Live' : 'End';
+  $('live').textContent = {live: 'Live', replay: 'Newest', run: 'End'}[source];
   document.title = `${title} – kimera_multi`;
   scene.meshes.setPalette(labels);
 }
@@ -72,8 +73,9 @@ function setLink(text, className) {
 // Live, or since when no longer.
 function showLink() {
   if (!caughtUp) return;
-  if (!live) return setLink('finished run', '');
+  if (source === 'run') return setLink('finished run', '');
   const over = model.over((Date.now() - heardAt) / 1000);
+  if (source === 'replay') return setLink(over ? 'replay, at its end' : 'replay', '');
   const at = over && new Date(over.at_ms).toLocaleTimeString();
   if (!over)
     setLink('live', 'good');
@@ -180,7 +182,8 @@ async function drawCamera() {
   const caption = $('camera').querySelector('span');
   caption.textContent = image ?
       `${model.name(camera)}: ${image.features} features` :
-      `${model.name(camera)}: ${live ? 'no image yet' : 'results keep no images'}`;
+      `${model.name(camera)}: ${
+          source === 'live' ? 'no image yet' : 'results keep no images'}`;
   if (!image?.jpeg) return;
   const bitmap = await createImageBitmap(new Blob([image.jpeg], {type: 'image/jpeg'}));
   const canvas = $('camera').querySelector('canvas');
@@ -320,7 +323,7 @@ addEventListener('keydown', (event) => {
 
 window.kimera = {
   get ready() { return caughtUp && !changed && !scene.building && model.robots.size > 0; },
-  get live() { return live; },
+  get source() { return source; },
   get time() { return model.time; },
   get end() { return model.end; },
   get robots() {

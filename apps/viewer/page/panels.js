@@ -40,6 +40,17 @@ function rates(states, valueOf) {
   return points;
 }
 
+// Of its modules: what they take now, or of a robot whose run has ended took in the mean of it.
+function loads(robot) {
+  if (!robot.state || robot.state.phase === 'running') return Object.entries(robot.state?.loads ?? {});
+  const running = robot.states.slice(0, robot.statesShown).filter((s) => s.phase === 'running');
+  const sums = new Map();
+  for (const state of running)
+    for (const [name, load] of Object.entries(state.loads))
+      sums.set(name, (sums.get(name) ?? 0) + load / running.length);
+  return [...sums];
+}
+
 export class Panels {
   /** `actions`: follow(robot), camera(robot). */
   constructor(elements, actions) {
@@ -48,6 +59,8 @@ export class Panels {
     this.cards = new Map();
     this.totals =
         new Facts(elements.totals, ['Robots', 'Keyframes', 'Faces', 'Candidates', 'Kept', 'Sent']);
+    this.totals.values.get('Candidates').parentNode.title =
+        'Pairs of keyframes; one that two robots have found counts once';
     const chart = (kind, options) => kind(make('div', elements.charts), options);
     const overTime = {x: duration, height: 116};
     this.charts = {
@@ -57,7 +70,7 @@ export class Panels {
       cpu: chart(lineChart, {title: 'Processor', unit: '%', ...overTime}),
       memory: chart(lineChart, {title: 'Memory', unit: 'MB', ...overTime}),
       skipped: chart(lineChart, {title: 'Frames skipped', ...overTime}),
-      loads: chart(barChart, {title: 'Load of modules', unit: '%'}),
+      loads: chart(barChart, {title: 'Load of modules (of an ended run: means)', unit: '%'}),
     };
   }
 
@@ -102,7 +115,8 @@ export class Panels {
             shown?.phase === 'settled'    ? 'good' :
             silent > SILENT_S[0] && !over ? 'warn' :
                                             ''}`;
-    card.facts.set('Last told', Number.isFinite(silent) ? `${silent.toFixed(1)} s ago` : '–');
+    const lastTold = over ? `at ${duration(robot.heard)}` : `${silent.toFixed(1)} s ago`;
+    card.facts.set('Last told', Number.isFinite(silent) ? lastTold : '–');
     card.facts.set('Keyframes', String(shown?.keyframes ?? robot.odometry.length));
     card.facts.set('Recording', shown ? duration(shown.dataset_time_s) : '–');
     card.facts.set('Skipped', String(shown?.skipped_frames ?? '–'));
@@ -200,8 +214,7 @@ export class Panels {
         (robot) => ({
           name: model.name(robot.id),
           color: robotColor(robot.id),
-          values: Object.fromEntries(
-              Object.entries(robot.state?.loads ?? {}).map(([name, load]) => [name, 100 * load]))
+          values: Object.fromEntries(loads(robot).map(([name, load]) => [name, 100 * load]))
         })));
   }
 

@@ -7,6 +7,8 @@
 #include <string>
 
 #include "modules/core/json.hpp"
+#include "modules/recordings/ros_messages.hpp"
+#include "modules/ros_dds/mcap_sink.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/command.hpp"
 #include "test/support/network.hpp"
@@ -81,6 +83,21 @@ TEST_CASE("The doctor finds a recording sound, or names its fault", "[doctor]") 
     fs::create_directories(hall.mav0_ / "cam1/data");
     CHECK_THAT(hall.ids(2), Catch::StartsWith("recording."));
   }
+}
+
+TEST_CASE("The doctor says of a file why no robot can play it", "[doctor]") {
+  const TemporaryFolder folder;
+  const auto told = [&](const std::string& file) {
+    const CommandResult run = run_command(kDoctor + ' ' + (folder.path() / file).string());
+    CHECK(run.exit_code == 2);
+    return run.output;
+  };
+  folder.write("world.ply", "ply\nformat ascii 1.0\n");
+  CHECK_THAT(told("world.ply"), Catch::Contains("begins as none of .bag, .mcap and .db3 files do"));
+  McapSink record(folder.path() / "record.mcap", [](const std::string& why) { FAIL(why); });
+  record.put(record.open({"/rosout", RosLog::kType}), Stamp{1}, encode_ros(RosLog{}));
+  record.finish();
+  CHECK_THAT(told("record.mcap"), Catch::Contains("no topic of it has images"));
 }
 
 TEST_CASE("The doctor's exit code is 2 for what it cannot use, with a line that says why",

@@ -31,6 +31,13 @@ try {
   assert.equal(closures.kept, pairs.filter((stage) => stage === 'inlier').length);
   assert.equal(await page.evaluate('kimera.faces'), faces);
   assert.equal(await page.evaluate('kimera.drawnFaces'), await page.evaluate('kimera.faces'));
+  const badge = (page) => page.evaluate(`document.getElementById('link').textContent`);
+  assert.equal(await badge(page), 'finished run');
+  const told = await page.evaluate(
+      `[...document.querySelectorAll('#robots dd:first-of-type')].map((d) => d.textContent)`);
+  assert.ok(told[0].startsWith('at '), told[0]);
+  await page.until(  // charts come a little later
+      `/sensors|odometry|vio/.test([...document.querySelectorAll('#right > div')].at(-1).textContent)`);
   const anchors =
       new Set(summaries.map((s) => (s.pgo.members.length > 1 ? s.pgo.anchor : s.robot)));
   assert.equal(await page.evaluate('kimera.frames.length'), anchors.size);
@@ -81,6 +88,8 @@ try {
     await page.until(
         `kimera.faces === ${faces} && kimera.robots.every((r) => r.phase !== 'running')`);
     assert.equal(sum(Object.values(await page.evaluate('kimera.closures'))), pairs.length);
+    await page.until(
+        `document.getElementById('link').textContent === 'replay, at its end'`);
     assert.deepEqual(page.errors, []);
   }
 } finally {

@@ -34,7 +34,7 @@ TEST_CASE("What robots of a domain tell is shown in the page, and recorded", "[v
   REQUIRE(told);
   PageListener page(std::stoi(told->text.substr(std::string("Open http://127.0.0.1:").size())),
                     "/updates");
-  CHECK(page.hears(R"("live":true)"));
+  CHECK(page.hears(R"("source":"live")"));
 
   const DdsParticipant robot(loopback(domain), {.robot = 7, .name = "alpha", .boot = 57});
   ViewWriter writer(robot.handle(), ViewChannel::kView, TeamPeer{7, 57});

@@ -107,6 +107,20 @@ TEST_CASE("What a run lacks is noted, and what is no run refused", "[run_playbac
   const TemporaryFolder empty;
   CHECK_THROWS_WITH(read_run(empty.path(), 0), Catch::Contains("no results in it"));
   CHECK_THROWS_WITH(read_run(empty.path() / "none", 0), Catch::Contains("no such folder"));
+  CHECK_THROWS_WITH(read_run(files.folder.path() / "r0/summary.json", 0),
+                    Catch::Contains("a file, not the folder of a run"));
+}
+
+TEST_CASE("Robots that were killed are named, with the way on", "[run_playback]") {
+  const SmallRun files;
+  const std::filesystem::path killed = files.folder.path() / "r1";
+  std::filesystem::remove(killed / "summary.json");
+  const RunPlayback run = read_run(files.folder.path(), kBegin);
+  REQUIRE(run.notes.size() == 1);
+  CHECK_THAT(run.notes[0], Catch::Contains("r1: no summary.json: the robot still runs, or was") &&
+                               Catch::Contains("--resume " + killed.string()));
+  CHECK_FALSE(run.updates.empty());
+  CHECK_THROWS_WITH(read_run(killed, kBegin), Catch::Contains("--resume"));
 }
 
 }  // namespace

@@ -167,6 +167,33 @@ TEST_CASE("A robot that was started again begins its path anew", "[viewer]") {
   CHECK(path.poses[0].pose.position.x() == 7.0);
 }
 
+TEST_CASE("Of a robot that has left or is silent a record says nothing more", "[viewer]") {
+  constexpr double kGone_s = 0.3;
+  const TemporaryFolder folder;
+  const fs::path file = folder.path() / "team.mcap";
+  ViewRecorder recorder(file, {}, kGone_s);
+  const auto tell = [&recorder](RobotId robot, const std::string& name, const std::string& phase) {
+    recorder.add({robot, 9, 0, ViewState{.name = name, .phase = phase}});
+  };
+  for (const ViewUpdate& update : team()) recorder.add(update);
+  tell(2, "carol", "leaving");
+  for (int k = 0; k < 45; ++k) {
+    tell(0, "alice", "running");
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  recorder.finish();
+
+  std::map<std::string, int> told;
+  const Record record(file);
+  for (const ToldMessage& message : record.messages)
+    if (message.topic == "/diagnostics")
+      ++told[decode_ros<RosDiagnostics>("cdr", message.bytes).value.value().status[0].hardware_id];
+  CHECK(told["alice"] >= 3);
+  CHECK(told["bob"] <= 1);
+  CHECK(told["carol"] == 0);
+  CHECK(record.count("/bob/closures") <= 3);  // with the path, the closures, and at the end
+}
+
 TEST_CASE("A record that cannot be written says so", "[viewer]") {
   ViewRecorder recorder("/dev/full", {});
   for (const ViewUpdate& update : team()) recorder.add(update);

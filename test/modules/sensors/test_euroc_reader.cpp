@@ -159,7 +159,10 @@ TEST_CASE("Missing files and folders are refused by name", "[sensors]") {
   CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::Contains("cam1/sensor.yaml: no such file") &&
                                                    Catch::Contains("nor depth0"));
   fs::remove_all(folder.mav0());
-  CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::Contains("not a EuRoC recording"));
+  CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::EndsWith("not a EuRoC recording"));
+  for (const char* robot : {"robot1", "robot0", "robot2/none"})
+    fs::create_directories(folder.root() / robot / (robot[5] < '2' ? "mav0" : "cam0"));
+  CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::EndsWith("in it are robot0, robot1"));
 }
 
 TEST_CASE("Where there is another odometry, a recording needs no inertial sensor", "[sensors]") {
