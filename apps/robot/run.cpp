@@ -60,6 +60,8 @@ void make_output(const fs::path& folder) {
 
 // Not before all is sound that a run needs: results are lost with it.
 void remove_former(const fs::path& folder, bool goes_on, bool resume) {
+  if (!resume && is_file(folder / kSummary))
+    log::info("robot") << folder.string() << ": the results of an earlier run are replaced";
   remove_results(folder, goes_on);
   if (resume) return;
   for (const char* file : {kJournal, kMap}) fs::remove(folder / file);

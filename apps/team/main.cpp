@@ -129,6 +129,12 @@ void write_links(const km::TeamPlan& plan, km::EmulatedLinks& links, km::ResultW
   });
 }
 
+bool replaces_a_run(const km::TeamPlan& plan) {
+  return std::ranges::any_of(plan.robots, [&plan](const km::RobotPlan& robot) {
+    return !km::robot_folders(plan.output / robot.name).empty();
+  });
+}
+
 std::vector<km::RobotRun> run_robots(const TeamOptions& options, const km::TeamPlan& plan,
                                      km::ResultWriter& results) {
   if (access(options.robot_binary.c_str(), X_OK) != 0)
@@ -141,7 +147,8 @@ std::vector<km::RobotRun> run_robots(const TeamOptions& options, const km::TeamP
   for (const km::RobotPlan& robot : plan.robots) names.push_back(robot.name);
   std::ostream& out = km::unblocked_stdout();
   out << names.size() << " robots in DDS domain " << *plan.domain << ", results in "
-      << plan.output.string() << std::endl;
+      << plan.output.string() << (replaces_a_run(plan) ? ", in place of an earlier run's" : "")
+      << std::endl;
   km::TeamDisplay display(names);
   std::vector<km::RobotRun> runs =
       km::run_team(options.robot_binary, plan, signals, display, links ? &*links : nullptr);
