@@ -31,10 +31,11 @@ std::string commonest(const std::map<std::string, std::uint64_t>& reasons, std::
          ')';
 }
 
-// Why closures did not join two robots, and what follows.
-Finding why_apart(const ClosureTally& tally, const PcmConfig& pcm, bool has_one_vocabulary,
-                  bool was_lost) {
+// That closures did not join two robots, whose names go before it, why, and what follows.
+Finding not_joined(const ClosureTally& tally, const PcmConfig& pcm, bool has_one_vocabulary,
+                   bool was_lost) {
   Finding finding{.id = "team.not_joined", .severity = Severity::kWarning};
+  std::string outcome = " did not join: ";
   const std::string candidates = std::to_string(tally.candidates) + " candidates, ";
   const std::string verified =
       candidates + std::to_string(tally.verified) + " verified (see loop_closures.csv), ";
@@ -73,6 +74,7 @@ Finding why_apart(const ClosureTally& tally, const PcmConfig& pcm, bool has_one_
     finding.means = "too few closures agree to trust them";
     finding.to_do = "meet at a second place, or run longer than pcm.witness_wait_s";
   } else if (was_lost) {
+    outcome = " are not in one frame in the end: ";
     finding.what = verified + std::to_string(tally.inliers) +
                    " kept, but one was not heard any more when the other ended";
     finding.means = "what joined them, if they were joined before, ended with it";
@@ -82,16 +84,7 @@ Finding why_apart(const ClosureTally& tally, const PcmConfig& pcm, bool has_one_
     finding.means = "the run ended, or the link, before their pose graphs were one";
     finding.to_do = "let the robots stay within reach after their input has ended (--serve-limit)";
   }
-  return finding;
-}
-
-Finding not_joined(const std::string& a, const std::string& b, const ClosureTally& tally,
-                   const PcmConfig& pcm, bool has_one_vocabulary, bool was_lost) {
-  Finding finding = why_apart(tally, pcm, has_one_vocabulary, was_lost);
-  finding.what =
-      a + " and " + b +
-      (was_lost && tally.inliers > 0 ? " are not in one frame in the end: " : " did not join: ") +
-      finding.what;
+  finding.what = outcome + finding.what;
   return finding;
 }
 
@@ -115,10 +108,12 @@ void add_apart(std::span<const RunFacts> runs, const Names& names, std::vector<F
       const auto pair = std::minmax(self, other);
       if (!told.insert(pair).second) continue;
       const auto tally = tallies.find(pair);
-      findings.push_back(not_joined(name_of(names, pair.first), name_of(names, pair.second),
-                                    tally == tallies.end() ? ClosureTally{} : tally->second,
-                                    run.pcm, !run.summary.other_vocabulary.contains(name),
-                                    run.summary.lost_peers.contains(name)));
+      Finding finding = not_joined(tally == tallies.end() ? ClosureTally{} : tally->second, run.pcm,
+                                   !run.summary.other_vocabulary.contains(name),
+                                   run.summary.lost_peers.contains(name));
+      finding.what =
+          name_of(names, pair.first) + " and " + name_of(names, pair.second) + finding.what;
+      findings.push_back(std::move(finding));
     }
   }
 }

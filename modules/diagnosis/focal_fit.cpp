@@ -91,7 +91,7 @@ class FocalProblem {
     for (const Step& step : steps_) of_steps.push_back(linearize(step, rigs, scale_px));
     const Shared dx = -normal_.H.ldlt().solve(normal_.g);
     for (std::size_t k = 0; k < steps_.size(); ++k)
-      steps_[k].t_from_to -= of_steps[k].H.ldlt().solve(of_steps[k].g + of_steps[k].H_shared * dx);
+      steps_[k].t_from_to -= of_steps[k].H.inverse() * (of_steps[k].g + of_steps[k].H_shared * dx);
     Q_ = so3_exp(dx.head<3>()) * Q_;
     constant_ += dx.segment<3>(3);
     factor_ += dx[6];
@@ -101,7 +101,7 @@ class FocalProblem {
   [[nodiscard]] FocalFit result() const {
     const auto n = static_cast<double>(normal_.points);
     const double variance = normal_.weighted_squares / std::max(2.0 * normal_.weights, 1.0);
-    const double inverse = normal_.H.inverse()(6, 6);
+    const double inverse = normal_.H.ldlt().solve(Shared::Unit(6))[6];
     return {.steps = steps_.size(),
             .points = normal_.points,
             .factor = factor_,
@@ -177,9 +177,9 @@ class FocalProblem {
       own.H_shared += w * J_t.transpose() * J;
       own.g += w * J_t.transpose() * e;
     }
-    const auto solver = own.H.ldlt();
-    normal_.H -= own.H_shared.transpose() * solver.solve(own.H_shared);
-    normal_.g -= own.H_shared.transpose() * solver.solve(own.g);
+    const Eigen::Matrix<double, 7, 3> gain = own.H_shared.transpose() * own.H.inverse();
+    normal_.H -= gain * own.H_shared;
+    normal_.g -= gain * own.g;
     return own;
   }
 
