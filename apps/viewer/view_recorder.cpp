@@ -196,12 +196,12 @@ class ViewRecorder::Robot {
   }
 
   // Messages for which there was no time.
-  std::size_t finish(std::vector<ToldClosure> now, const LabelPalette& palette) {
+  std::size_t finish(const LabelPalette& palette) {
     if (!node_) return 0;
     mesh_due_s_ = 0.0;
     tell_mesh(palette, steady_now_s());
     node_->stop();
-    node_->finish({}, std::move(now), {});
+    node_->finish({}, std::exchange(closures_now_, std::nullopt), {});
     return node_->left_out();
   }
 
@@ -328,7 +328,8 @@ std::vector<ToldClosure> ViewRecorder::closures_of(const Robot& robot) const {
 }
 
 void ViewRecorder::finish_robot(Robot& robot) {
-  lost_ += robot.finish(closures_of(robot), palette_);
+  if (closures_changed_) robot.tell_closures(closures_of(robot));
+  lost_ += robot.finish(palette_);
 }
 
 void ViewRecorder::finish() {

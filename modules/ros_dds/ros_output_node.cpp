@@ -312,16 +312,19 @@ void RosOutputNode::step(const std::shared_ptr<const Tick>& /*tick*/) {
     newest_closures_ = *std::move(closures);
     closures_.changed = true;
   }
-  tell_states(false);
+  tell_states(is_silent);
   tell_pieces();
   if (!is_silent) tell_link();
   sink_->flush();
 }
 
-void RosOutputNode::finish(std::span<const StampedPose> poses, std::vector<ToldClosure> closures,
+void RosOutputNode::finish(std::span<const StampedPose> poses,
+                           std::optional<std::vector<ToldClosure>> closures,
                            const std::map<std::string, std::string>& files) {
-  newest_closures_ = std::move(closures);
-  closures_.changed = options_.draws;
+  if (closures && options_.draws) {
+    newest_closures_ = *std::move(closures);
+    closures_.changed = true;
+  }
   path_.changed = path_.changed && poses.empty();
   tell_states(true);
   if (!poses.empty()) tell_path(poses);

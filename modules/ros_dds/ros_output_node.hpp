@@ -77,7 +77,8 @@ struct RosOutputOptions {
 class RosOutputNode final : public Node {
  public:
   /// How the rest of the robot does, by the names of its parts; nullopt while it is silent: then
-  /// nothing is told each second. Called on the node's thread.
+  /// nothing is told each second, and states that have changed at once. Called on the node's
+  /// thread.
   using Diagnose = std::function<std::optional<std::vector<RosDiagnosticStatus>>()>;
   /// All closures of the robot; nullopt: as before. Called on the node's thread.
   using Closures = std::function<std::optional<std::vector<ToldClosure>>()>;
@@ -98,9 +99,9 @@ class RosOutputNode final : public Node {
   double step_limit_s() const override { return 300.0; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Call after stop(): the states as they are at the end, and as the path `poses`, in `map`, if
-  /// there are any: those of all images; and files. Nothing follows.
-  void finish(std::span<const StampedPose> poses, std::vector<ToldClosure> closures,
+  /// Call after stop(): the states as they are at the end, `closures` (nullopt: as before) and as
+  /// the path `poses`, in `map`, if there are any: those of all images; and files. Nothing follows.
+  void finish(std::span<const StampedPose> poses, std::optional<std::vector<ToldClosure>> closures,
               const std::map<std::string, std::string>& files);
 
   /// Inputs and images for which there was no time.

@@ -76,13 +76,13 @@ function showLink() {
   if (source === 'run') return setLink('finished run', '');
   const over = model.over((Date.now() - heardAt) / 1000);
   if (source === 'replay') return setLink(over ? 'replay, at its end' : 'replay', '');
-  const at = over && new Date(over.at_ms).toLocaleTimeString();
+  const at = over && new Date(over.at_ms).toTimeString().slice(0, 8);
   if (!over)
     setLink('live', 'good');
   else if (over.ended)
-    setLink(`run ended at ${at}`, '');
+    setLink(`ended ${at}`, '');
   else
-    setLink(`no robot heard since ${at}`, 'bad');
+    setLink(`silent since ${at}`, 'bad');
 }
 setInterval(showLink, 1000);
 
