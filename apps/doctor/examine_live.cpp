@@ -80,11 +80,13 @@ std::string plain(const std::string& type) {
   return type.substr(0, type.find('/')) + '/' + last_name(type);
 }
 
-Finding silent(const ListenedTopic& wanted, const std::vector<TopicPublisher>& publishers) {
+Finding silent(const ListenedTopic& wanted, const std::vector<ListenedTopic>& topics,
+               const std::vector<TopicPublisher>& publishers) {
   Finding finding{.id = "live.silent", .severity = Severity::kError};
   const auto same = std::ranges::find(publishers, wanted.topic, &TopicPublisher::topic);
-  // The one of that type whose name begins most alike.
+  // Of that type, and no other sensor's: the one whose name begins most alike.
   const auto alike = [&](const TopicPublisher& other) {
+    if (std::ranges::find(topics, other.topic, &ListenedTopic::topic) != topics.end()) return 0L;
     const auto [end, rest] = std::ranges::mismatch(wanted.topic, other.topic);
     return plain(other.type) == plain(wanted.type) ? 1 + (end - wanted.topic.begin()) : 0;
   };
@@ -131,7 +133,7 @@ Examination examine_topics(const std::vector<ListenedTopic>& topics,
     return result;
   }
   for (const ListenedTopic& topic : topics)
-    if (is_silent(topic)) result.findings.push_back(silent(topic, publishers));
+    if (is_silent(topic)) result.findings.push_back(silent(topic, topics, publishers));
   return result;
 }
 

@@ -38,6 +38,10 @@ TEST_CASE("Why a live topic is silent is told from who publishes", "[doctor]") {
   const auto begins_most_alike = why({{"/cam/left", kImage, true}, {"/left/image", kImage, true}});
   CHECK_THAT(begins_most_alike.what, Contains("but /left/image is of that type"));
   CHECK_THAT(why({{"/cam/left", kImage, true}}).what, Contains("/cam/left is of that type"));
+  // What is another camera's already is not proposed.
+  const auto result = examine_topics({{"/cam0", kImage, 60}, {"/cam2", kImage, 0}},
+                                     {{"/cam0", kImage, true}, {"/other1", kImage, true}}, 3.0, 0);
+  CHECK_THAT(the_finding(result).what, Contains("but /other1 is of that type"));
 }
 
 TEST_CASE("That nobody publishes at all is one finding, whatever topics are missing", "[doctor]") {
