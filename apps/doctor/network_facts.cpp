@@ -118,9 +118,12 @@ void examine_interface(const NetworkFacts& facts, Examination& result) {
          .means = "robots on another one are not heard",
          .to_do = "--interface chooses"});
   if (chosen.loopback)
-    result.findings.push_back(warning("network.loopback", "only loopback is up",
-                                      "robots on other hosts are out of reach",
-                                      "connect the host; on one host it will do"));
+    result.findings.push_back(
+        warning("network.loopback",
+                outward > 0 ? chosen.name + " is loopback" : std::string("only loopback is up"),
+                "robots on other hosts are out of reach",
+                outward > 0 ? "another --interface; on one host it will do"
+                            : "connect the host; on one host it will do"));
   constexpr int kLeastMtu = 1280;
   const bool is_wireless = chosen.name.starts_with("wl");
   if (facts.mtu && *facts.mtu < kLeastMtu)

@@ -70,6 +70,12 @@ TEST_CASE("What keeps robots apart on a network is named", "[doctor]") {
     facts.config.interface = "eth0";
     CHECK(ids_of(facts).empty());
   }
+  SECTION("loopback, chosen or the only one") {
+    facts.chosen = NetworkInterface{"lo", "127.0.0.1", true, true};
+    CHECK_THAT(examine_network(facts).findings.at(0).what, Catch::Equals("lo is loopback"));
+    facts.interfaces = {*facts.chosen};
+    CHECK_THAT(examine_network(facts).findings.at(0).what, Catch::Equals("only loopback is up"));
+  }
   SECTION("multicast") {
     facts.no_multicast = "an own datagram did not come back";
     CHECK(ids_of(facts) == "error network.multicast ");
