@@ -7,6 +7,7 @@
 
 #include "modules/core/geometry.hpp"
 #include "modules/core/text_table.hpp"
+#include "modules/diagnosis/figure_text.hpp"
 
 namespace km {
 namespace {
@@ -18,10 +19,6 @@ std::string name_of(const Names& names, RobotId robot) {
   const auto found = names.find(robot);
   return found != names.end() && !found->second.empty() ? found->second
                                                         : "robot " + std::to_string(robot);
-}
-
-std::string percent(double share) {
-  return fixed(100.0 * share, share < 0.1 ? 1 : 0) + " %";
 }
 
 // "matches do not agree on a pose" (300 of 412)

@@ -34,7 +34,15 @@ struct StereoFit {
 
 inline constexpr double kOnLine_px = 2.0;
 
+/// Fewer points say nothing.
+inline constexpr std::size_t kLeastStereoPoints = 100;
+
 [[nodiscard]] StereoFit fit_of(std::span<const StereoMatches> images, const StereoRig& rig);
+
+/// Enough points, half of them on their lines: sound pairs have 0.65 to 0.97.
+[[nodiscard]] inline bool is_sound(const StereoFit& fit) {
+  return fit.points >= kLeastStereoPoints && fit.on_line >= 0.5;
+}
 
 /// What may be wrong with the calibration of a pair, or with the images that it is taken to be of.
 enum class StereoFault {

@@ -1,0 +1,195 @@
+#include "modules/diagnosis/examine_sensors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "modules/core/lie.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/diagnosis/figure_text.hpp"
+#include "modules/diagnosis/focal_fit.hpp"
+#include "modules/diagnosis/inertial_fit.hpp"
+#include "modules/diagnosis/seen_rotations.hpp"
+#include "modules/diagnosis/stereo_fit.hpp"
+#include "modules/evaluation/statistics.hpp"
+
+namespace km {
+namespace {
+
+double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
+  return so3_log(a.transpose() * b).norm();
+}
+
+// What the fit to the gyroscope needs to say anything, and where it says more.
+constexpr double kToldRate_radps = 0.02;
+constexpr double kRelated = 0.6, kUnrelated = 0.3;  // share explained
+constexpr double kSecondAxis_radps = 0.02;          // about a second axis, for directions
+
+void examine_relation(const InertialFit& fit, Examination& result) {
+  if (fit.explained > kRelated) return;
+  result.findings.push_back(
+      {.id = "imu.unrelated",
+       .severity = fit.explained < kUnrelated ? Severity::kError : Severity::kWarning,
+       .what = "the gyroscope explains " + percent(std::max(fit.explained, 0.0)) +
+               " of the rotation that images show (" + fixed(kDegrees * fit.image_rms, 1) +
+               " degrees/s), at any offset within " + milliseconds(kMaxOffset_s),
+       .means = "it is not this camera's sensor, or stamps differ by more, or samples are broken",
+       .to_do = "see that both have one clock and are of one robot"});
+}
+
+void examine_scale(const InertialFit& fit, Examination& result) {
+  constexpr double kPerDegree = 1.0 / kDegrees, kSlack = 0.1;
+  const double off = std::abs(fit.scale - 1.0);
+  if (off < kSlack) return;
+  const bool in_degrees = std::abs(fit.scale / kPerDegree - 1.0) < kSlack;
+  result.findings.push_back(
+      {.id = in_degrees ? "imu.gyro_in_degrees" : "imu.gyro_scale",
+       .severity = Severity::kError,
+       .what = "images turn " + rounded(fit.scale, 4) + " times as fast as the gyroscope says" +
+               (in_degrees ? ", and 1 degree is 0.01745 rad" : ""),
+       .means = in_degrees ? "the gyroscope is in degrees/s: odometry takes it for rad/s"
+                           : "the gyroscope or the focal length is off by this factor",
+       .to_do = in_degrees ? "divide by 57.2958 where the samples are written"
+                           : "check the range that the gyroscope is set to"});
+}
+
+void examine_direction(const InertialFit& fit, const Camera& left, Examination& result) {
+  const Eigen::Matrix3d R_cam_body = left.T_body_cam.linear().transpose();
+  constexpr double kClose = 5.0 / kDegrees, kFar = 20.0 / kDegrees, kOff = 2.0 / kDegrees;
+  if (fit.Q.determinant() < 0.0) {
+    result.findings.push_back(
+        {.id = "imu.mirrored",
+         .severity = Severity::kError,
+         .what = "the gyroscope's axes are left-handed: with one of them the other way round, " +
+                 percent(fit.mirror_gain) + " more of the rotation of images are explained",
+         .means = "no mounting of the camera makes that good",
+         .to_do = "change the sign of the axis that is mirrored; see the sensor's data sheet"});
+    return;
+  }
+  const double angle = angle_between(R_cam_body, fit.Q);
+  result.figures.push_back({"camera to inertial sensor", "turned by " + fixed(kDegrees * angle, 1) +
+                                                             " degrees against T_body_cam"});
+  if (angle < kOff) return;
+  const bool is_inverse = angle > kFar && angle_between(R_cam_body.transpose(), fit.Q) < kClose;
+  result.findings.push_back(
+      {.id = is_inverse ? "extrinsics.inverted" : "extrinsics.rotation",
+       .severity = angle > kFar ? Severity::kError : Severity::kWarning,
+       .what = is_inverse ? "the rotation of T_body_cam (T_BS) is inverted: as it is, it is " +
+                                fixed(kDegrees * angle, 0) + " degrees off, its inverse " +
+                                fixed(kDegrees * angle_between(R_cam_body.transpose(), fit.Q), 1)
+                          : "the left camera is turned by " + fixed(kDegrees * angle, 1) +
+                                " degrees against what T_body_cam says",
+       .means = "odometry turns the wrong way, or drifts",
+       .to_do = is_inverse ? "write its inverse: T_BS maps the camera's points to the body's"
+                           : "calibrate cameras and inertial sensor together (Kalibr); "
+                             "vio.calibrate makes a few degrees good"});
+}
+
+void examine_offset(const InertialFit& fit, Examination& result) {
+  constexpr double kSmall_s = 3e-3, kLarge_s = 5e-3, kSure = 4.0;
+  if (fit.offset_at_limit) {
+    result.figures.push_back(
+        {"time offset", "not told: none within " + milliseconds(kMaxOffset_s) + " fits best"});
+    return;
+  }
+  result.figures.push_back({"time offset", milliseconds(fit.offset_s) + " +- " +
+                                               milliseconds(fit.offset_sigma_s) +
+                                               ", to be added to stamps of images"});
+  if (std::abs(fit.offset_s) < std::max(kSmall_s, kSure * fit.offset_sigma_s)) return;
+  result.findings.push_back(
+      {.id = "imu.time_offset",
+       .severity = std::abs(fit.offset_s) < kLarge_s ? Severity::kNote : Severity::kWarning,
+       .what = "stamps of the inertial sensor are " + milliseconds(std::abs(fit.offset_s)) +
+               " (+- " + milliseconds(fit.offset_sigma_s) +
+               (fit.offset_s > 0.0 ? ") later" : ") earlier") + " than those of the images",
+       .means = "odometry is worse by the motion in that time until vio.calibrate has found it",
+       .to_do = "camera_time_offset_s: " + rounded(fit.offset_s, 3) +
+                " in the rig file, or stamp both at one instant"});
+}
+
+void examine_focal(const SensorSample& sample, const StereoRig& rig, const SeenRotations& seen,
+                   const InertialFit& inertial, Examination& result) {
+  constexpr double kSlack = 0.015, kSure = 2.0, kToldSigma = 0.01;
+  constexpr const char* kName = "focal length by the gyroscope";
+  const bool has_depth = 2 * seen.with_depth > seen.steps.size();
+  const auto fit = has_depth ? fit_focal(sample.steps, rig, sample.imu, inertial) : std::nullopt;
+  if (!fit || !(fit->sigma < kToldSigma)) {
+    result.figures.push_back({kName, std::string("not told: ") +
+                                         (has_depth ? "too little rotation across the optical axis"
+                                                    : "no stereo depth that fits")});
+    return;
+  }
+  const std::string factor = fixed(fit->factor, 3) + " +- " + fixed(fit->sigma, 3);
+  result.figures.push_back({kName, "times " + factor + " of the calibration's"});
+  if (std::abs(fit->factor - 1.0) < std::max(kSlack, kSure * fit->sigma)) return;
+  result.findings.push_back(
+      {.id = "camera.focal",
+       .severity = Severity::kWarning,
+       .what = "images move as the gyroscope turns if the focal lengths are " + factor +
+               " times the calibration's",
+       .means = "distances and turns are off by as much",
+       .to_do = "calibrate the cameras anew, at the resolution of the images; or the gyroscope's "
+                "scale is off"});
+}
+
+void examine_gravity(const SensorSample& sample, Examination& result) {
+  std::vector<double> norms;
+  norms.reserve(sample.imu.size());
+  for (const ImuSample& measured : sample.imu) norms.push_back(measured.accel.norm());
+  constexpr double kGravity = 9.81;
+  const double found = quantile(std::move(norms), 0.5);
+  result.figures.push_back({"accelerometer", "median norm " + fixed(found, 2) + " m/s^2"});
+  const auto is_about = [found](double value) { return std::abs(found / value - 1.0) < 0.15; };
+  if (is_about(kGravity) || std::isnan(found)) return;
+  Finding finding{.id = "imu.gravity", .severity = Severity::kError};
+  finding.what = "the accelerometer measures " + rounded(found, 3) + " in the median, gravity is " +
+                 fixed(kGravity, 2) + " m/s^2";
+  finding.means = "odometry finds no gravity, or a wrong one";
+  finding.to_do = "samples are specific force in m/s^2, gravity included";
+  if (is_about(1.0) || is_about(1e3)) {
+    finding.id = "imu.accel_in_g";
+    finding.means = is_about(1.0) ? "it is in g" : "it is in thousandths of g";
+    finding.to_do = "multiply by " + std::string(is_about(1.0) ? "9.80665" : "0.00980665");
+  } else if (found < 0.3 * kGravity) {
+    finding.id = "imu.no_gravity";
+    finding.means = "gravity was taken off, or it is in another unit";
+    finding.to_do = "the driver has an option for raw acceleration";
+  }
+  result.findings.push_back(std::move(finding));
+}
+
+}  // namespace
+
+Examination examine_inertial(const SensorSample& sample, const StereoRig& rig) {
+  Examination result;
+  if (sample.imu.empty()) return result;
+  examine_gravity(sample, result);
+  const bool use_depth =
+      rig.depth_source == DepthSource::kRightImage && is_sound(fit_of(sample.stereo, rig));
+  const SeenRotations seen = seen_rotations(sample.steps, rig, use_depth);
+  const auto fit = fit_inertial(seen.steps, sample.imu);
+  if (!fit || fit->image_rms < kToldRate_radps) {
+    result.figures.push_back({"images against the gyroscope",
+                              fit ? "not told: the camera turns by " +
+                                        fixed(kDegrees * fit->image_rms, 2) + " degrees/s only"
+                                  : "not told: " + std::to_string(seen.steps.size()) +
+                                        " pairs of images close in time"});
+    return result;
+  }
+  result.figures.push_back({"images against the gyroscope",
+                            percent(fit->explained) + " explained, " + std::to_string(fit->steps) +
+                                " steps at " + fixed(kDegrees * fit->image_rms, 1) + " degrees/s"});
+  examine_relation(*fit, result);
+  if (fit->explained < kRelated) return result;
+  examine_scale(*fit, result);
+  examine_offset(*fit, result);
+  if (fit->gyro_rms[1] * fit->scale > kSecondAxis_radps)
+    examine_direction(*fit, rig.cameras[0], result);
+  else
+    result.figures.push_back(
+        {"camera to inertial sensor", "not told: the camera turns about one axis only"});
+  if (std::abs(fit->scale - 1.0) < 0.1) examine_focal(sample, rig, seen, *fit, result);
+  return result;
+}
+
+}  // namespace km

@@ -1,0 +1,108 @@
+#include "modules/diagnosis/examine_sensors.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "modules/core/text_table.hpp"
+#include "modules/diagnosis/figure_text.hpp"
+#include "modules/diagnosis/stereo_fit.hpp"
+
+namespace km {
+namespace {
+
+// Words for a fault of the pair.
+struct FaultWords {
+  const char* id;
+  const char* what;
+  const char* to_do;
+};
+
+FaultWords words_of(StereoFault fault) {
+  switch (fault) {
+    case StereoFault::kSwappedImages:
+      return {"stereo.swapped", "the left images are the right camera's",
+              "exchange the topics or folders of the two cameras' images"};
+    case StereoFault::kInvertedPair:
+      return {"stereo.inverted", "the pose of the right camera to the left one is inverted",
+              "write T_left_right^-1: a pose of b in a maps b to a"};
+    case StereoFault::kInvertedCameras:
+      return {"stereo.inverted_cameras", "both T_body_cam (T_BS) are inverted",
+              "write their inverses: T_BS maps the camera's points to the body's"};
+    case StereoFault::kInvertedLeft:
+      return {"stereo.inverted_left", "T_body_cam (T_BS) of the left camera is inverted",
+              "write its inverse"};
+    case StereoFault::kInvertedRight:
+      return {"stereo.inverted_right", "T_body_cam (T_BS) of the right camera is inverted",
+              "write its inverse"};
+    case StereoFault::kExchangedLenses:
+      return {"stereo.exchanged_lenses",
+              "focal lengths, centre and distortion of the two cameras are exchanged",
+              "exchange them"};
+    case StereoFault::kFocalLength:
+      return {"stereo.focal", "the focal lengths of the two cameras do not go together",
+              "calibrate them anew, at the resolution of the images"};
+    case StereoFault::kNone:
+      break;
+  }
+  return {"stereo.epipolar", "points lie far from their epipolar lines",
+          "calibrate the pair anew, at the resolution of the images, with its lens model"};
+}
+
+std::string fit_text(const StereoFit& fit) {
+  return percent(fit.on_line) + " of " + std::to_string(fit.points) + " points within " +
+         fixed(kOnLine_px, 0) + " px of their epipolar line, median " + fixed(fit.error_px, 2) +
+         " px";
+}
+
+void examine_pair(const StereoAlternative& found, const StereoFit& given, Examination& result) {
+  const bool is_named = found.fault != StereoFault::kNone;
+  if (!is_named && is_sound(given)) return;
+  const FaultWords words = words_of(found.fault);
+  std::string what = std::string(words.what) + ": " + fit_text(given);
+  if (is_named) what += "; with that undone " + percent(found.fit.on_line);
+  if (found.fault == StereoFault::kFocalLength)
+    what += " with the right one times " + fixed(found.focal_ratio, 3);
+  result.findings.push_back({.id = words.id,
+                             .severity = Severity::kError,
+                             .what = std::move(what),
+                             .means = "depth is wrong or missing: neither odometry nor closures "
+                                      "work",
+                             .to_do = words.to_do});
+}
+
+void examine_baseline(const StereoRig& rig, const StereoFit& fit, Examination& result) {
+  constexpr double kLeast_m = 0.02, kMost_m = 1.5;
+  const double baseline_m = rig.baseline_m();
+  const std::string depth = std::isfinite(fit.depth_m)
+                                ? "points at a median of " + fixed(fit.depth_m, 1) + " m by it"
+                                : "no depth by it";
+  result.figures.push_back(
+      {"baseline", fixed(baseline_m, 3) + " m, " + depth + " (images do not tell its length)"});
+  if (baseline_m < kLeast_m || baseline_m > kMost_m)
+    result.findings.push_back({.id = "stereo.baseline",
+                               .severity = Severity::kWarning,
+                               .what = "a baseline of " + rounded(baseline_m, 4) +
+                                       " m, where robots have " + fixed(kLeast_m, 2) + " to " +
+                                       fixed(kMost_m, 1) + " m; " + depth,
+                               .means = "all lengths are wrong by the same factor if its unit is",
+                               .to_do = "metres, not millimetres or inches"});
+}
+
+}  // namespace
+
+Examination examine_stereo(const SensorSample& sample, const StereoRig& rig) {
+  Examination result;
+  if (rig.depth_source != DepthSource::kRightImage) return result;
+  const StereoFit given = fit_of(sample.stereo, rig);
+  if (given.points < kLeastStereoPoints) {
+    result.figures.push_back(
+        {"stereo", "not told: " + std::to_string(given.points) + " points in both images"});
+    return result;
+  }
+  result.figures.push_back({"stereo", fit_text(given)});
+  examine_pair(best_alternative(sample.stereo, rig), given, result);
+  examine_baseline(rig, given, result);
+  return result;
+}
+
+}  // namespace km

@@ -1,0 +1,159 @@
+#include "modules/diagnosis/examine_sensors.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "modules/core/text_table.hpp"
+#include "modules/diagnosis/figure_text.hpp"
+#include "modules/evaluation/statistics.hpp"
+#include "modules/recordings/stamp_statistics.hpp"
+
+namespace km {
+namespace {
+
+// "missing images" -> "recording.missing_images"
+std::string id_of(ReaderFault fault) {
+  std::string id = std::string("recording.") + to_string(fault);
+  std::ranges::replace(id, ' ', '_');
+  return id;
+}
+
+Finding fault_finding(ReaderFault fault, const ReaderReport::Entry& entry, double of) {
+  constexpr double kFew = 0.01, kHalf = 0.5;
+  const double share = static_cast<double>(entry.count) / std::max(of, 1.0);
+  return {.id = id_of(fault),
+          .severity = share > kHalf  ? Severity::kError
+                      : share > kFew ? Severity::kWarning
+                                     : Severity::kNote,
+          .what = std::to_string(entry.count) + ' ' + to_string(fault) + ", " + percent(share) +
+                  ", first: " + entry.first,
+          .means = "what is concerned is skipped",
+          .to_do = "repair or record it anew, where there are many"};
+}
+
+// How many of what a fault counts there are without it. Images missing between others are counted
+// camera by camera, lost messages topic by topic.
+double sound_ones(ReaderFault fault, const SensorSample& sample) {
+  const auto frames = static_cast<double>(sample.frames.size());
+  const auto samples = static_cast<double>(sample.imu.size());
+  const double images = sample.right_size.width > 0 ? 2.0 * frames : frames;
+  switch (fault) {
+    case ReaderFault::kNotFinite:
+    case ReaderFault::kImplausible:
+    case ReaderFault::kNoAcceleration:
+    case ReaderFault::kImuGap:
+      return samples;
+    case ReaderFault::kMissingBetween:
+      return images;
+    case ReaderFault::kLostMessage:
+      return images + samples;
+    default:
+      return frames;
+  }
+}
+
+void examine_rate(const char* sensor, const std::string& id, const std::vector<Stamp>& stamps,
+                  double least_hz, double longest_gap_s, Examination& result) {
+  const StampStatistics found = stamp_statistics(stamps);
+  result.figures.push_back(
+      {std::string(sensor) + ", rate", fixed(found.rate_hz, 1) + " Hz, largest gap " +
+                                           fixed(found.largest_gap_s, 3) + " s, jitter " +
+                                           milliseconds(found.jitter_s)});
+  if (found.rate_hz < least_hz)
+    result.findings.push_back({.id = id + ".rate",
+                               .severity = Severity::kWarning,
+                               .what = std::string(sensor) + " at " + fixed(found.rate_hz, 1) +
+                                       " Hz, less than " + fixed(least_hz, 0) + " Hz",
+                               .means = "odometry may lose track between them in quick motion",
+                               .to_do = "record at a higher rate"});
+  if (found.largest_gap_s > longest_gap_s)
+    result.findings.push_back(
+        {.id = id + ".gap",
+         .severity = Severity::kWarning,
+         .what = std::string(sensor) + " with a gap of " + fixed(found.largest_gap_s, 2) + " s",
+         .means = "odometry may lose track there and start anew",
+         .to_do = "see why the driver or the disk stopped; --from and --to "
+                  "choose a part without it"});
+}
+
+Finding image_finding(const char* id, std::string what, const char* means, const char* to_do) {
+  return {.id = id,
+          .severity = Severity::kWarning,
+          .what = std::move(what),
+          .means = means,
+          .to_do = to_do};
+}
+
+std::vector<double> values_of(const std::vector<ImageLook>& looks, const auto& value) {
+  std::vector<double> values;
+  values.reserve(looks.size());
+  for (const ImageLook& look : looks) values.push_back(static_cast<double>(value(look)));
+  return values;
+}
+
+}  // namespace
+
+Examination examine_streams(const SensorSample& sample, const ReaderReport& report) {
+  Examination result;
+  if (sample.frames.empty())
+    result.findings.push_back({.id = "recording.no_frames",
+                               .severity = Severity::kError,
+                               .what = "0 frames could be read",
+                               .means = "there is nothing to estimate a motion from",
+                               .to_do = "see the findings below for what was skipped"});
+  for (const auto& [fault, entry] : report.entries())
+    result.findings.push_back(
+        fault_finding(fault, entry, sound_ones(fault, sample) + static_cast<double>(entry.count)));
+  constexpr double kFrames_hz = 8.0, kFrameGap_s = 0.25, kSamples_hz = 80.0, kSampleGap_s = 0.05;
+  if (sample.frames.size() > 1)
+    examine_rate("images", "frames", sample.frames, kFrames_hz, kFrameGap_s, result);
+  std::vector<Stamp> stamps;
+  stamps.reserve(sample.imu.size());
+  for (const ImuSample& measured : sample.imu) stamps.push_back(measured.stamp);
+  if (stamps.size() > 1)
+    examine_rate("inertial samples", "imu", stamps, kSamples_hz, kSampleGap_s, result);
+  return result;
+}
+
+Examination examine_images(const SensorSample& sample) {
+  Examination result;
+  if (sample.looks.empty()) return result;
+  const auto median = [&](const auto& value) {
+    return quantile(values_of(sample.looks, value), 0.5);
+  };
+  const double level = median([](const ImageLook& look) { return look.mean_level; });
+  const double saturated = median([](const ImageLook& look) { return look.saturated_share; });
+  const double sharpness = median([](const ImageLook& look) { return look.sharpness; });
+  const double corners =
+      quantile(values_of(sample.looks, [](const ImageLook& look) { return look.corners; }), 0.2);
+  result.figures.push_back({"exposure", "mean level " + fixed(level, 0) + " of 255, " +
+                                            percent(saturated) + " saturated"});
+  result.figures.push_back({"sharpness", fixed(sharpness, 2) + " (0.5 blurred, 1 sharp)"});
+  result.figures.push_back({"corners", fixed(corners, 0) + " in four images of five, or more"});
+  constexpr double kDark = 25.0, kBright = 225.0, kSaturated = 0.35, kBlurred = 0.58;
+  constexpr double kFewCorners = 100.0;
+  if (level < kDark)
+    result.findings.push_back(image_finding(
+        "images.dark", "a mean grey level of " + fixed(level, 0) + " of 255",
+        "few features, and noise among them", "a longer exposure, more gain, or light"));
+  if (level > kBright || saturated > kSaturated)
+    result.findings.push_back(image_finding(
+        "images.bright",
+        percent(saturated) + " of the pixels are saturated, mean level " + fixed(level, 0),
+        "what is saturated has no features", "a shorter exposure, or automatic exposure"));
+  if (sharpness < kBlurred)
+    result.findings.push_back(image_finding(
+        "images.blurred", "edges are blurred: sharpness " + fixed(sharpness, 2) + ", below 0.58",
+        "features are found less exactly, and fewer again",
+        "focus, a clean lens, or a shorter "
+        "exposure in motion"));
+  if (corners < kFewCorners)
+    result.findings.push_back(
+        image_finding("images.few_corners",
+                      "less than " + fixed(corners + 1.0, 0) + " corners in one image of five",
+                      "odometry may lose track where there is nothing to see",
+                      "more texture or light, or tracker.fast_threshold"));
+  return result;
+}
+
+}  // namespace km
