@@ -29,10 +29,7 @@ bool ReplayClock::wait_until(Stamp stamp) {
   std::unique_lock lock(mutex_);
   const TimePoint now = std::chrono::steady_clock::now();
   const auto due = due_locked(stamp, now);
-  if (due) {
-    lag_s_ = std::max(0.0, std::chrono::duration<double>(now - *due).count());
-    wake_.wait_until(lock, *due, [this] { return stopped_; });
-  }
+  if (due) wake_.wait_until(lock, *due, [this] { return stopped_; });
   return !stopped_;
 }
 
@@ -51,9 +48,15 @@ std::optional<ReplayClock::TimePoint> ReplayClock::due_locked(Stamp stamp, TimeP
   return first_time_ + steady_duration(seconds_between(first_stamp_, stamp) / rate_);
 }
 
-double ReplayClock::lag_s() const {
+std::optional<double> ReplayClock::due_s(Stamp stamp) {
+  const auto instant = due(stamp, std::chrono::steady_clock::now());
+  if (!instant) return std::nullopt;
+  return std::chrono::duration<double>(instant->time_since_epoch()).count();
+}
+
+void ReplayClock::pause(double s) {
   const std::lock_guard lock(mutex_);
-  return lag_s_;
+  first_time_ += steady_duration(s);
 }
 
 void ReplayClock::stop() {

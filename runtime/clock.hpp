@@ -33,9 +33,11 @@ class ReplayClock {
   /// When `stamp` is due; the first call, at `now`, fixes the origin. Nullopt: at once.
   [[nodiscard]] std::optional<TimePoint> due(Stamp stamp, TimePoint now);
 
-  /// How far wait_until() was behind when it was last called [s]: above zero, the robot does not
-  /// keep up.
-  [[nodiscard]] double lag_s() const;
+  /// The same now, as steady_now_s() counts.
+  [[nodiscard]] std::optional<double> due_s(Stamp stamp);
+
+  /// Everything that is not yet due is due later by `s`; a wait that has begun stays as it is.
+  void pause(double s);
 
   /// Ends every wait, now and later. Idempotent.
   void stop();
@@ -50,7 +52,6 @@ class ReplayClock {
   bool stopped_ = false;
   Stamp first_stamp_ = 0;
   TimePoint first_time_;
-  double lag_s_ = 0.0;
 };
 
 }  // namespace km

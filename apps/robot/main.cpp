@@ -12,10 +12,6 @@
 #include "runtime/log.hpp"
 #include "runtime/unblocked_output.hpp"
 
-#ifdef __GLIBC__  // known to the headers above
-#include <malloc.h>
-#endif
-
 namespace km {
 namespace {
 
@@ -61,7 +57,7 @@ double parse_rate(const std::string& text) {
   constexpr Bounds<double> kRate{1e-3, 1e6};  // a clock counts no longer waits
   if (end == text.c_str() || *end != '\0' || !kRate.contains(rate))
     throw CLI::ValidationError(
-        "--rate", text + " is neither a positive number nor max (" + kRate.text() + ")");
+        "--rate", text + " is neither a positive number nor max nor auto (" + kRate.text() + ")");
   return rate;
 }
 
@@ -117,8 +113,13 @@ void add_input(CLI::App& app, RobotOptions& options) {
   app.add_option("--from", options.from_s, "Start of the part to play [s since the first image]");
   app.add_option("--to", options.to_s, "End of the part to play [s since the first image]");
   app.add_option_function<std::string>(
-         "--rate", [&options](const std::string& text) { options.rate = parse_rate(text); },
-         "Speed of playing: 1.0 real time, 2 twice as fast, max as fast as it can")
+         "--rate",
+         [&options](const std::string& text) {
+           options.auto_rate = text == "auto";
+           if (!options.auto_rate) options.rate = parse_rate(text);
+         },
+         "Speed of playing: 1.0 real time, 2 twice as fast, max as fast as it can, auto 1.0 or "
+         "what this computer can do beside its other work, which takes 2 s to find out")
       ->default_str("1.0");
 }
 
@@ -220,22 +221,10 @@ log::Level level_of(const std::string& name) {
   return name == "debug" ? log::Level::kDebug : log::Level::kInfo;
 }
 
-// glibc raises the size from which it gives memory back to the system with every large block that
-// is freed, up to 32 MB: meshes and images then stay in the heaps of a dozen threads. Fixed, a
-// robot of 100 s without a map occupies 112 MB instead of 142.
-void give_memory_back() {
-#ifdef __GLIBC__
-  constexpr int kLarge_bytes = 96 << 10;
-  mallopt(M_MMAP_THRESHOLD, kLarge_bytes);
-  mallopt(M_TRIM_THRESHOLD, kLarge_bytes);
-#endif
-}
-
 }  // namespace
 }  // namespace km
 
 int main(int argc, char** argv) try {
-  km::give_memory_back();
   const km::RobotOptions options = km::parse_options(argc, argv);
   km::SignalWatch signals;  // before any thread: they inherit the blocked signals
   km::log::set_level(km::level_of(options.log_level));

@@ -17,7 +17,9 @@ ProcessUsage process_usage() {
     const auto seconds = [](const timeval& time) {
       return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
     };
-    usage.cpu_s = seconds(resources.ru_utime) + seconds(resources.ru_stime);
+    usage.system_s = seconds(resources.ru_stime);
+    usage.cpu_s = seconds(resources.ru_utime) + usage.system_s;
+    usage.page_faults = static_cast<std::uint64_t>(resources.ru_minflt);
     usage.peak_bytes = 1024 * static_cast<std::uint64_t>(resources.ru_maxrss);
   }
   std::uint64_t pages = 0, resident_pages = 0;
@@ -27,17 +29,22 @@ ProcessUsage process_usage() {
 }
 
 ProcessCsv::ProcessCsv(std::ostream& output, std::string_view former) : output_(output) {
-  if (former.empty()) output_ << "time_s,cpu_s,resident_bytes\n";
+  if (former.empty()) output_ << "time_s,cpu_s,resident_bytes,system_s,page_faults\n";
   for (const TextRow& row : split_rows(former)) {
     former_s_ = number_in(row, 0).value_or(former_s_);
-    former_cpu_s_ = number_in(row, 1).value_or(former_cpu_s_);
+    former_.cpu_s = number_in(row, 1).value_or(former_.cpu_s);
+    former_.system_s = number_in(row, 3).value_or(former_.system_s);
+    former_.page_faults = static_cast<std::uint64_t>(
+        number_in(row, 4).value_or(static_cast<double>(former_.page_faults)));
   }
 }
 
 void ProcessCsv::append(double time_s, const ProcessUsage& usage) {
-  char line[96];
-  std::snprintf(line, sizeof line, "%.3f,%.3f,%llu\n", time_s, former_cpu_s_ + usage.cpu_s,
-                static_cast<unsigned long long>(usage.resident_bytes));
+  char line[160];
+  std::snprintf(line, sizeof line, "%.3f,%.3f,%llu,%.3f,%llu\n", time_s,
+                former_.cpu_s + usage.cpu_s, static_cast<unsigned long long>(usage.resident_bytes),
+                former_.system_s + usage.system_s,
+                static_cast<unsigned long long>(former_.page_faults + usage.page_faults));
   output_ << line;
   samples_.push_back({time_s, usage});
 }
@@ -47,6 +54,8 @@ ProcessSummary ProcessCsv::summary() const {
   if (samples_.empty()) return {};
   const Sample &first = samples_.front(), &last = samples_.back();
   ProcessSummary process{.cpu_s = last.usage.cpu_s,
+                         .system_s = last.usage.system_s,
+                         .page_faults = last.usage.page_faults,
                          .peak_memory_bytes = last.usage.peak_bytes,
                          .memory_at_start_bytes = first.usage.resident_bytes,
                          .memory_at_end_bytes = last.usage.resident_bytes,

@@ -11,7 +11,9 @@ namespace km {
 
 /// What this process has taken of the machine, all its threads together.
 struct ProcessUsage {
-  double cpu_s = 0.0;
+  double cpu_s = 0.0;                ///< Processor time, user and system.
+  double system_s = 0.0;             ///< Processor time in the kernel.
+  std::uint64_t page_faults = 0;     ///< Without input from a disk (minor faults).
   std::uint64_t resident_bytes = 0;  ///< Now; shared libraries included.
   std::uint64_t peak_bytes = 0;      ///< Most there ever were resident.
 };
@@ -19,10 +21,11 @@ struct ProcessUsage {
 /// As the kernel has it; resident_bytes is 0 where /proc cannot be read.
 [[nodiscard]] ProcessUsage process_usage();
 
-/// Writes process.csv, a row for each sample: time_s, cpu_s, resident_bytes.
+/// Writes process.csv, a row for each sample: time_s, cpu_s, resident_bytes, system_s, page_faults.
 class ProcessCsv {
  public:
-  /// Writes the header line, or goes on behind the rows of `former` processes: cpu_s is of all.
+  /// Writes the header line, or continues after the rows of `former` processes: processor times
+  /// and page faults are sums over all processes.
   /// `output` outlives this.
   explicit ProcessCsv(std::ostream& output, std::string_view former = {});
 
@@ -42,7 +45,7 @@ class ProcessCsv {
   };
   std::ostream& output_;
   double former_s_ = 0.0;
-  double former_cpu_s_ = 0.0;
+  ProcessUsage former_;
   std::vector<Sample> samples_;
 };
 

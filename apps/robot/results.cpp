@@ -93,6 +93,7 @@ MappingSummary map_counts(const RunRecord& record) {
   const DenseSensingProgress sensing = record.dense_sensing().value_or(DenseSensingProgress{});
   const RunRecord::MeshCorrections& corrections = record.mesh_corrections();
   return {.frames = map.integrated,
+          .gave_way = sensing.gave_way,
           .skipped_wrong_size = sensing.wrong_size + map.wrong_size,
           .skipped_bad_pose = map.bad_pose,
           .skipped_too_late = map.too_late,

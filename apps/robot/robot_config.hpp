@@ -45,7 +45,8 @@ struct RobotOptions {
   std::filesystem::path session;   ///< Results of a run of the past; exclusive with both.
   std::optional<double> from_s;    ///< Part of the recording [s since its first image].
   std::optional<double> to_s;
-  double rate = 1.0;  ///< Times real time; infinity for as fast as possible.
+  double rate = 1.0;       ///< Times real time; infinity for as fast as possible.
+  bool auto_rate = false;  ///< In place of `rate`: what this computer can do, see playing_speed().
 
   std::optional<int> domain;  ///< DDS domain; from the configuration if absent.
   std::string link;           ///< Name or file of a link profile; from the configuration if empty.

@@ -15,6 +15,7 @@
 #include "apps/result_files.hpp"
 #include "apps/result_writer.hpp"
 #include "apps/robot/growing_file.hpp"
+#include "apps/robot/playing_speed.hpp"
 #include "apps/robot/process_usage.hpp"
 #include "apps/robot/results.hpp"
 #include "apps/robot/rounds_csv.hpp"
@@ -450,7 +451,9 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
   summary.name = options.name;
   summary.frames = end.images.value_or(ImageCounts{}).read;
   summary.frames_skipped = end.images.value_or(ImageCounts{}).skipped;
+  if (options.auto_rate) summary.rate = options.rate;
   if (const SensorsNode* sensors = robot.sensors()) {
+    summary.paused_s = sensors->paused_s();
     const ReaderReport faults = sensors->faults();
     for (const auto& [fault, entry] : faults.entries())
       summary.sensor_faults[to_string(fault)] = entry.count;
@@ -506,6 +509,25 @@ std::optional<fs::path> record_file(const RobotOptions& options, bool goes_on) {
   return numbered(file, number);
 }
 
+// Plays the beginning of the recording, which is opened once more for it. Nullopt where there is
+// nothing to measure.
+std::optional<double> chosen_rate(const RobotOptions& options, const RobotConfig& config,
+                                  const std::optional<MappingPlan>& mapping, const RigInput& rig,
+                                  SignalWatch& signals) {
+  if (!options.auto_rate || options.dataset.empty() || options.is_live) return std::nullopt;
+  RobotOptions fresh = options;
+  fresh.resume = false;
+  std::optional<RobotInput> input = open_robot_input(fresh, config, mapping, rig, signals);
+  if (!input) return std::nullopt;
+  const auto speed =
+      playing_speed(*std::get<std::unique_ptr<DatasetReader>>(input->source), config, mapping);
+  const double rate = rate_for(speed);
+  if (speed)
+    log::info("robot") << "beside its other work this computer can play the recording at "
+                       << fixed(*speed, 2) << " times real time: --rate " << fixed(rate, 2);
+  return rate;
+}
+
 std::optional<ImageSources> sources_of(const RobotOptions& options,
                                        const std::optional<PartialRig>& rig) {
   if (rig) return image_sources(rig->rig.topics, options.rig);
@@ -527,6 +549,8 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
     log::info("robot") << "interrupted before the calibration was complete: no results";
     return 0;
   }
+  const std::optional<double> rate = chosen_rate(options, config, mapping, rig, signals);
+  options.rate = rate.value_or(options.rate);
   const bool goes_on = options.resume && input->restored;
   options.record = record_file(options, goes_on);
   ResultWriter results;

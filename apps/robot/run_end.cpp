@@ -20,7 +20,7 @@ std::string why_no_pose(const ImageCounts& images) {
   const std::size_t unusable = images.listed > given ? images.listed - given : 0;
   return "no pose estimated: of " + std::to_string(images.listed) + " images, " +
          std::to_string(unusable) + " could not be used, " + std::to_string(images.skipped) +
-         " were skipped to keep the rate, " + std::to_string(images.read) +
+         " were skipped because processors were short, " + std::to_string(images.read) +
          " were read but odometry did not start on them";
 }
 

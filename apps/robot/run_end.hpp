@@ -101,7 +101,7 @@ class Absentees {
 struct ImageCounts {
   std::size_t listed = 0;     ///< Stereo pairs of the part that was to be played.
   std::size_t read = 0;       ///< Handed to odometry.
-  std::size_t skipped = 0;    ///< Given up because odometry lagged behind the rate.
+  std::size_t skipped = 0;    ///< Left out because processors were short.
   std::size_t with_pose = 0;  ///< That odometry estimated a pose of.
 };
 

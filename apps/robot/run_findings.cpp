@@ -134,9 +134,48 @@ void add_skipped(const RunSummary& run, std::vector<Finding>& findings) {
                       .severity = share < kFew ? Severity::kNote : Severity::kWarning,
                       .what = run.name + ": " + std::to_string(run.frames_skipped) +
                               " frames skipped, " + percent(share),
-                      .means = "odometry was too slow for the rate of the images",
+                      .means = "processors were short: odometry got fewer images, evenly spread",
                       .to_do = "a lower --rate (max waits), tracker.max_features or "
                                "vio.window_keyframes, or a faster computer"});
+}
+
+void add_slowed(const RunSummary& run, std::vector<Finding>& findings) {
+  if (run.rate.value_or(1.0) >= 1.0) return;
+  findings.push_back({.id = "frames.slowed",
+                      .severity = Severity::kNote,
+                      .what = run.name + ": its recording was played at " + fixed(*run.rate, 2) +
+                              " times its speed",
+                      .means = "this computer could do no more beside its other work when the run "
+                               "began: a live robot would have left images out",
+                      .to_do = "nothing for a recording; for a live robot fewer programs on its "
+                               "computer, or a faster one"});
+}
+
+void add_paused(const RunSummary& run, std::vector<Finding>& findings) {
+  if (run.paused_s <= 0.0) return;
+  findings.push_back(
+      {.id = "frames.paused",
+       .severity = Severity::kNote,
+       .what = run.name + ": its recording was paused for " + fixed(run.paused_s, 1) + " s in all",
+       .means = "processors were short: with every image that odometry could do "
+                "without left out, the recording still came too fast",
+       .to_do = "a lower --rate, fewer robots or programs on this computer; a "
+                "live robot would have dropped images here"});
+}
+
+void add_map_gave_way(const RunSummary& run, std::vector<Finding>& findings) {
+  if (!run.mapping || run.mapping->gave_way == 0) return;
+  const auto left_out = static_cast<double>(run.mapping->gave_way);
+  const double share = left_out / (left_out + static_cast<double>(run.mapping->frames));
+  constexpr double kFew = 0.05;
+  findings.push_back({.id = "map.gave_way",
+                      .severity = share < kFew ? Severity::kNote : Severity::kWarning,
+                      .what = run.name + ": " + std::to_string(run.mapping->gave_way) +
+                              " frames were left out of the map, " + percent(share),
+                      .means = "processors were short, and the map gives way to odometry: it may "
+                               "have holes",
+                      .to_do = "a lower --rate, mapping.rate_hz or stereo_depth.downscale, or a "
+                               "faster computer"});
 }
 
 // Samples and messages are more than frames: a share of the frames makes their faults look no
@@ -331,6 +370,9 @@ std::vector<Finding> findings_of(std::span<const RunFacts> runs) {
     add_lost(run.summary, findings);
     add_unseen(run.summary, findings);
     add_skipped(run.summary, findings);
+    add_slowed(run.summary, findings);
+    add_paused(run.summary, findings);
+    add_map_gave_way(run.summary, findings);
     add_sensor_faults(run.summary, findings);
     add_holes(run.summary, findings);
     add_rejected(run, findings);

@@ -51,7 +51,9 @@ struct OptimizerSummary {
 
 /// Frames that went into the map, why others did not, and the mesh in the end.
 struct MappingSummary {
-  std::uint64_t frames = 0, skipped_wrong_size = 0, skipped_bad_pose = 0, skipped_too_late = 0;
+  std::uint64_t frames = 0;
+  std::uint64_t gave_way = 0;  ///< Frames left out because processors were short.
+  std::uint64_t skipped_wrong_size = 0, skipped_bad_pose = 0, skipped_too_late = 0;
   std::uint64_t without_labels = 0, label_pixels_outside_palette = 0;
   std::uint64_t blocks_refused = 0;  ///< For want of semantic_mapping.max_blocks.
   std::uint64_t blocks = 0, vertices = 0, faces = 0, superseded_faces_dropped = 0;
@@ -61,6 +63,7 @@ struct MappingSummary {
 
   void visit_fields(auto& visitor) {
     visitor.field("frames", frames);
+    visitor.field("gave_way", gave_way);
     visitor.field("skipped_wrong_size", skipped_wrong_size);
     visitor.field("skipped_bad_pose", skipped_bad_pose);
     visitor.field("skipped_too_late", skipped_too_late);
@@ -104,7 +107,9 @@ struct HeldBackSums {
 
 /// What the process took of the machine.
 struct ProcessSummary {
-  double cpu_s = 0.0;
+  double cpu_s = 0.0;     ///< User and system.
+  double system_s = 0.0;  ///< In the kernel.
+  std::uint64_t page_faults = 0;
   std::uint64_t peak_memory_bytes = 0;
   std::uint64_t memory_at_start_bytes = 0;
   std::uint64_t memory_at_end_bytes = 0;
@@ -114,6 +119,8 @@ struct ProcessSummary {
 
   void visit_fields(auto& visitor) {
     visitor.field("cpu_s", cpu_s);
+    visitor.field("system_s", system_s);
+    visitor.field("page_faults", page_faults);
     visitor.field("peak_memory_bytes", peak_memory_bytes);
     visitor.field("memory_at_start_bytes", memory_at_start_bytes);
     visitor.field("memory_at_end_bytes", memory_at_end_bytes);
@@ -195,7 +202,9 @@ struct RunSummary {
   std::uint64_t keyframes = 0;
   std::uint64_t keypoints = 0;       ///< Of all keyframes.
   std::uint64_t frames = 0;          ///< Stereo pairs played.
-  std::uint64_t frames_skipped = 0;  ///< Pairs that odometry was too slow for.
+  std::uint64_t frames_skipped = 0;  ///< Pairs left out because processors were short.
+  std::optional<double> rate;        ///< Chosen by --rate auto; absent otherwise.
+  double paused_s = 0.0;             ///< That the recording's clock paused for the same reason.
   /// What is wrong with the recording, or the live topics, and how often: see ReaderFault.
   std::map<std::string, std::uint64_t> sensor_faults;
   ClosureCounts closures;  ///< That this robot found.
@@ -224,6 +233,8 @@ struct RunSummary {
     visitor.field("keypoints", keypoints);
     visitor.field("frames", frames);
     visitor.field("frames_skipped", frames_skipped);
+    visitor.field("rate", rate);
+    visitor.field("paused_s", paused_s);
     visitor.field("sensor_faults", sensor_faults);
     visitor.field("closures", closures);
     visitor.field("pgo", pgo);

@@ -160,16 +160,19 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
                         std::optional<ContinuedMap> map) {
   const SensorRig rig = reader->rig();
   const bool gives_poses = reader->gives_poses();
-  sensors_ =
-      &add<SensorsNode>(true, config.sensors, rate, std::move(reader),
-                        SensorsTopics{.packets = topics_.packets, .end = topics_.sensors_end});
+  sensors_ = &add<SensorsNode>(true, config.sensors, rate, std::move(reader),
+                               SensorsTopics{.processed = topics_.processed_frames,
+                                             .packets = topics_.packets,
+                                             .load = topics_.shed_load,
+                                             .end = topics_.sensors_end});
   add_restore();
   const VioTopics odometry{.packets = topics_.packets,
                            .odometry = topics_.odometry,
                            .keyframes = topics_.keyframe_odometry,
                            .frames = topics_.located_frames,
                            .statistics = topics_.odometry_statistics,
-                           .images = topics_.tracked_images};
+                           .images = topics_.tracked_images,
+                           .processed = topics_.processed_frames};
   if (gives_poses)
     add_odometry<OutsideOdometryNode>(rig.stereo.depth_source, config.vio, odometry);
   else
@@ -210,6 +213,7 @@ void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig&
   add<DenseSensingNode>(true, std::move(sensor), plan.sensor.labels, config.mapping.rate_hz,
                         overflow,
                         DenseSensingTopics{.located = topics_.located_frames,
+                                           .load = topics_.shed_load,
                                            .frames = topics_.dense_frames,
                                            .progress = topics_.dense_sensing_progress});
   auto& mapper = add<SemanticMappingNode>(

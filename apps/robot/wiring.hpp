@@ -20,6 +20,7 @@
 #include "modules/core/closure_verdicts.hpp"
 #include "modules/core/dense_frame.hpp"
 #include "modules/core/frame.hpp"
+#include "modules/core/processing_load.hpp"
 #include "modules/core/tracked_image.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
@@ -47,6 +48,8 @@ namespace km {
 struct Topics {
   Topic<SensorPacket> packets;
   Topic<SensorsEnd> sensors_end;
+  Topic<ProcessedFrame> processed_frames;
+  Topic<ShedLoad> shed_load;
   Topic<GraphPlaybackEnd> playback_end;
   Topic<OdometryState> odometry, restored_odometry;
   Topic<KeyframeOdometry> keyframe_odometry;

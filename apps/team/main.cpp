@@ -63,9 +63,11 @@ void define(CLI::App& app, TeamOptions& options) {
   options.robot_binary = km::program_folder() / "kimera_multi_robot";
   app.add_option("--config", options.config, "Team file")->required();
   app.add_option("--dataset", options.dataset, "What ${DATASET} stands for in the team file");
-  app.add_option("--rate", options.rate, "Times real time, or max (default: the file's, 1.0)")
+  app.add_option(
+         "--rate", options.rate,
+         "Times real time, max, or auto, see kimera_multi_robot --help (default: the file's, 1.0)")
       ->check([](const std::string& text) {
-        return km::is_rate(text) ? "" : text + " is neither a positive number nor max";
+        return km::is_rate(text) ? "" : text + " is neither a positive number nor max nor auto";
       });
   app.add_option("--domain", options.domain, "DDS domain (default: the file's, or random)")
       ->check(CLI::Range(0, 230));

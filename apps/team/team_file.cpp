@@ -25,7 +25,7 @@ fs::path find_truth(const fs::path& place, std::vector<std::string>& notes) {
 
 bool is_rate(const std::string& text) {
   constexpr Bounds<double> kRate{1e-3, 1e6};  // of kimera_multi_robot
-  if (text == "max") return true;
+  if (text == "max" || text == "auto") return true;
   char* end = nullptr;
   const double rate = std::strtod(text.c_str(), &end);
   return end != text.c_str() && *end == '\0' && kRate.contains(rate);

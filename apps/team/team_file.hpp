@@ -13,7 +13,7 @@
 
 namespace km {
 
-/// True for what --rate of a robot takes: a positive number, or max.
+/// True for what --rate of a robot takes: a positive number, max, or auto.
 [[nodiscard]] bool is_rate(const std::string& text);
 
 /// One robot of a team and its input: a sensor recording or a pose graph.
@@ -66,7 +66,7 @@ struct TeamPlan {
 
   void visit_fields(auto& visitor) {
     visitor.field("config", configs, Input{}, "one or several files, as for kimera_multi_robot");
-    visitor.field("rate", rate, "times real time, or max");
+    visitor.field("rate", rate, "times real time, max, or auto");
     visitor.field("domain", domain, {0, 230}, "of DDS; default: drawn at random");
     visitor.field("output", output,
                   "folder of the results, relative to the working directory; default: results/ "
@@ -81,7 +81,7 @@ struct TeamPlan {
     visitor.field("arguments", arguments, "more of the command line of every robot");
     visitor.sections("robots", robots);
     visitor.required({"robots"});
-    visitor.check(is_rate(rate), "rate", "is neither a positive number nor max");
+    visitor.check(is_rate(rate), "rate", "is neither a positive number nor max nor auto");
     for (std::size_t i = 0; i < robots.size(); ++i)
       for (std::size_t j = 0; j < i; ++j) {
         const RobotPlan &one = robots[i], &other = robots[j];

@@ -182,9 +182,15 @@ std::string mesh_table(const TeamMeshes& meshes) {
          "can have seen. Labels: share of\nthese that is right.\n";
 }
 
-// Empty unless the robot was too slow for the rate.
+// Empty unless processors were short for the rate.
 std::string skipped_remark(const RobotResult& robot) {
   const RunSummary summary = robot.summary.value_or(RunSummary{});
+  if (summary.rate.value_or(1.0) < 1.0)
+    return "note: the recording of " + robot.plan.name + " was played at " +
+           fixed(*summary.rate, 2) + " times its speed, all that this computer could do\n";
+  if (summary.paused_s > 0.0)
+    return "note: the recording of " + robot.plan.name + " was paused for " +
+           fixed(summary.paused_s, 1) + " s in all, as processors were short: use a lower --rate\n";
   const auto skipped = static_cast<double>(summary.frames_skipped);
   const double share = skipped / std::max(1.0, skipped + static_cast<double>(summary.frames));
   if (share <= kManySkipped) return "";

@@ -35,6 +35,7 @@ DenseSensingNode::DenseSensingNode(DenseSensor sensor, LabelsFrom labels, double
             step(*located);
           },
           "dense_sensing") {
+  topics_.load.subscribe([this](const auto& load) { gives_way_ = load->map; });
   topics_.located.subscribe([this](const auto& located) { worker_.post(located); });
 }
 
@@ -42,7 +43,8 @@ void DenseSensingNode::stop() noexcept {
   worker_.stop();
   if (std::exchange(stopped_, true)) return;
   const DenseSensingProgress& p = progress_;
-  log::info(name()) << p.frames << " frames with depth, " << p.without_labels << " without labels";
+  log::info(name()) << p.frames << " frames with depth, " << p.without_labels << " without labels, "
+                    << p.gave_way << " left out because processors were short";
   if (p.wrong_size + p.wrong_label_size + p.classes_outside > 0)
     log::warn(name()) << "images of the wrong size in " << p.wrong_size << " frames, labels in "
                       << p.wrong_label_size << "; " << p.classes_outside
@@ -52,6 +54,12 @@ void DenseSensingNode::stop() noexcept {
 void DenseSensingNode::step(const LocatedFrame& located) {
   const Stamp stamp = located.frame->stamp;
   if (last_ && seconds_between(*last_, stamp) < interval_s_ - kStampJitter_s) return;
+  if (gives_way_) {
+    ++progress_.gave_way;
+    last_ = stamp;
+    topics_.progress.publish(progress_);
+    return;
+  }
   DenseImages images;
   {
     const auto scope = sensing_.measure();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <exception>
 #include <optional>
 #include <string_view>
@@ -7,6 +8,7 @@
 
 #include "modules/core/dense_frame.hpp"
 #include "modules/core/odometry.hpp"
+#include "modules/core/processing_load.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
@@ -17,6 +19,7 @@ namespace km {
 /// Channels of the dense sensing node; they must outlive it.
 struct DenseSensingTopics {
   In<LocatedFrame> located;  ///< In order of time.
+  In<ShedLoad> load;         ///< Whether the map gives way to odometry.
   Out<DenseFrame> frames;
   Out<DenseSensingProgress> progress;  ///< With every frame that was due.
 };
@@ -47,6 +50,7 @@ class DenseSensingNode final : public Node {
   const bool wants_labels_;
   const double interval_s_;
   const DenseSensingTopics topics_;
+  std::atomic<bool> gives_way_ = false;
   std::optional<Stamp> last_;
   DenseSensingProgress progress_;
   Timing sensing_;  // of the frames that were due

@@ -73,6 +73,7 @@ class DenseSensor {
 /// What became of the frames that were due for the map, so far.
 struct DenseSensingProgress {
   std::uint64_t frames = 0;            ///< Handed on, with depth.
+  std::uint64_t gave_way = 0;          ///< Left out because processors were short.
   std::uint64_t without_depth = 0;     ///< Without a depth image: the next frame was taken.
   std::uint64_t wrong_size = 0;        ///< Images missing, or not of their camera's size.
   std::uint64_t without_labels = 0;    ///< Handed on without labels that were wanted.

@@ -59,7 +59,7 @@ BagDataset::BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig
       joiner_(!rig_.topics.right.empty(), !rig_.topics.depth.empty(), stereo_tolerance_s) {
   find_topics();
   if (is_live()) return;
-  first_ = read_packet();
+  first_ = read_packet([](Stamp, Stamp) { return FrameUse::kAll; });
   if (first_) return;
   std::ostringstream message;
   message << name_ << ": no frame with "
@@ -240,7 +240,7 @@ bool BagDataset::has_motion(const JoinedFrame& frame) {
   return false;
 }
 
-std::optional<StereoFrame> BagDataset::decode(const JoinedFrame& joined) {
+std::optional<StereoFrame> BagDataset::decode(const JoinedFrame& joined, FrameUse use) {
   StereoFrame frame;
   frame.stamp = joined.stamp;
   const auto gray = [&](const BagMessage& message, std::size_t camera, GrayImage& image) {
@@ -252,7 +252,8 @@ std::optional<StereoFrame> BagDataset::decode(const JoinedFrame& joined) {
   };
   if (!gray(joined.left, 0, frame.left)) return std::nullopt;
   if (joined.right && !gray(*joined.right, 1, frame.right)) return std::nullopt;
-  if (!joined.depth || !rig_.sensors.depth) return frame;
+  const bool is_rgbd = rig_.topics.right.empty();
+  if (!joined.depth || !rig_.sensors.depth || (use != FrameUse::kAll && !is_rgbd)) return frame;
   DepthResult depth = depth_of_message(bag_->channels()[joined.depth->channel], *joined.depth,
                                        place_of(*joined.depth), size_of(rig_.sensors.stereo, 0),
                                        rig_.depth_scale_m, *rig_.sensors.depth);
@@ -263,7 +264,7 @@ std::optional<StereoFrame> BagDataset::decode(const JoinedFrame& joined) {
   return frame;
 }
 
-std::optional<SensorPacket> BagDataset::read_packet() {
+std::optional<SensorPacket> BagDataset::read_packet(const ChooseUse& choose) {
   while (const auto joined = next_frame()) {
     if (!start_) start_ = joined->stamp;
     const double t_s = seconds_between(*start_, joined->stamp);
@@ -278,11 +279,13 @@ std::optional<SensorPacket> BagDataset::read_packet() {
       report_.add(ReaderFault::kFrameWithoutPose, place_of(joined->left) + ": a gap of the poses");
       continue;
     }
-    auto frame = decode(*joined);
+    // A live frame may have waited for others: its arrival is that of the newest message.
+    const FrameUse use = choose(joined->stamp, is_live() ? newest_log_time_ : 0);
+    if (use == FrameUse::kNone) continue;
+    auto frame = decode(*joined, use);
     if (!frame) continue;
     auto samples = has_imu() ? imu_.until(joined->stamp) : std::vector<ImuSample>{};
     count_gaps(samples);
-    arrival_ = newest_log_time_;  // it may have waited for others: that is no consumer's fault
     return SensorPacket{std::make_shared<const StereoFrame>(std::move(*frame)), std::move(samples),
                         pose};
   }
@@ -294,9 +297,12 @@ void BagDataset::count_gaps(const std::vector<ImuSample>& samples) {
     report_.add(ReaderFault::kImuGap, name_ + ": " + to_string(gap));
 }
 
-std::optional<SensorPacket> BagDataset::next() {
+std::optional<SensorPacket> BagDataset::next(const ChooseUse& choose) {
   if (is_over_) return std::nullopt;
-  std::optional<SensorPacket> packet = first_ ? std::exchange(first_, std::nullopt) : read_packet();
+  // The first packet is decoded already: it is used in any case.
+  if (first_) (void)choose(first_->frame->stamp, 0);
+  std::optional<SensorPacket> packet =
+      first_ ? std::exchange(first_, std::nullopt) : read_packet(choose);
   is_over_ = !packet;
   return packet;
 }

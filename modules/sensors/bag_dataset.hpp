@@ -56,13 +56,13 @@ class BagDataset final : public DatasetReader {
              std::optional<double> stereo_tolerance_s, const BagWindow& window = {});
 
   [[nodiscard]] const SensorRig& rig() const override { return rig_.sensors; }
-  [[nodiscard]] std::optional<SensorPacket> next() override;
+  using DatasetReader::next;
+  [[nodiscard]] std::optional<SensorPacket> next(const ChooseUse& choose) override;
   [[nodiscard]] ReaderReport report() const override;
   [[nodiscard]] std::size_t pair_count() const override { return pair_count_; }
   [[nodiscard]] std::vector<std::string> remarks() const override;
   [[nodiscard]] bool gives_poses() const override { return !rig_.topics.odometry.empty(); }
   [[nodiscard]] bool is_live() const override { return bag_->is_live(); }
-  [[nodiscard]] Stamp arrival() const override { return is_live() ? arrival_ : 0; }
   void stop() noexcept override { bag_->stop(); }
 
  private:
@@ -80,8 +80,8 @@ class BagDataset final : public DatasetReader {
   [[nodiscard]] std::optional<JoinedFrame> next_frame();
   [[nodiscard]] bool has_imu() const;
   [[nodiscard]] bool has_motion(const JoinedFrame& frame);
-  [[nodiscard]] std::optional<StereoFrame> decode(const JoinedFrame& joined);
-  [[nodiscard]] std::optional<SensorPacket> read_packet();
+  [[nodiscard]] std::optional<StereoFrame> decode(const JoinedFrame& joined, FrameUse use);
+  [[nodiscard]] std::optional<SensorPacket> read_packet(const ChooseUse& choose);
   void count_gaps(const std::vector<ImuSample>& samples);
   [[nodiscard]] std::string place_of(const BagMessage& message) const;
 
@@ -101,7 +101,6 @@ class BagDataset final : public DatasetReader {
   std::size_t pair_count_ = 0;
   std::optional<Stamp> start_;  // of the recording: its first frame
   Stamp newest_log_time_ = 0;
-  Stamp arrival_ = 0;                  // of the last packet
   bool ended_ = false;                 // the bag
   bool is_over_ = false;               // the window
   std::optional<SensorPacket> first_;  // read ahead

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -9,6 +10,7 @@
 #include "modules/core/camera.hpp"
 #include "modules/core/fault_report.hpp"
 #include "modules/core/frame.hpp"
+#include "modules/sensors/load_shedding.hpp"
 
 namespace km {
 
@@ -61,9 +63,20 @@ class DatasetReader {
 
   [[nodiscard]] virtual const SensorRig& rig() const = 0;
 
-  /// The next packet, or nullopt at the end. Faults on the way are skipped and counted. The samples
-  /// of a skipped pair are part of the packet after it, so that the intervals stay without a hole.
-  [[nodiscard]] virtual std::optional<SensorPacket> next() = 0;
+  /// Decides about a frame before its images are decoded. `arrival`: when a live frame was complete
+  /// [ns since 1970], 0 for a recording. The stamps of a live frame do not tell its arrival: they
+  /// may be of any clock, also of a simulator's slower one.
+  using ChooseUse = std::function<FrameUse(Stamp stamp, Stamp arrival)>;
+
+  /// The next packet of a frame that `choose` uses, or nullopt at the end. Faults on the way are
+  /// skipped and counted. The samples of a frame that is skipped or left out are part of the next
+  /// packet, so that the intervals stay without a hole.
+  [[nodiscard]] virtual std::optional<SensorPacket> next(const ChooseUse& choose) = 0;
+
+  /// The next packet; every frame is used.
+  [[nodiscard]] std::optional<SensorPacket> next() {
+    return next([](Stamp, Stamp) { return FrameUse::kAll; });
+  }
 
   /// Faults met so far.
   [[nodiscard]] virtual ReaderReport report() const = 0;
@@ -77,10 +90,6 @@ class DatasetReader {
 
   /// True for sensors that measure now: next() waits for them, and there is no end.
   [[nodiscard]] virtual bool is_live() const { return false; }
-
-  /// When the last packet was complete [ns since 1970]; 0 for a recording. Its stamps do not tell:
-  /// they may be of any clock, also of one that is slower, a simulator's.
-  [[nodiscard]] virtual Stamp arrival() const { return 0; }
 
   /// Ends next(), now and later, where it waits. Thread-safe.
   virtual void stop() noexcept {}

@@ -131,17 +131,19 @@ std::vector<std::string> EurocReader::remarks() const {
   return {to_string(files_.synchrony, "right")};
 }
 
-std::optional<SensorPacket> EurocReader::next() {
+std::optional<SensorPacket> EurocReader::next(const ChooseUse& choose) {
   while (next_pair_ < files_.pairs.size()) {
     const StereoPairFile& pair = files_.pairs[next_pair_++];
     if (!has_imu(pair)) continue;
+    const FrameUse use = choose(pair.stamp, 0);
+    if (use == FrameUse::kNone) continue;
     StereoPairResult loaded = load_stereo_pair(pair, rig_.stereo);
     if (loaded.status != ImageStatus::kOk) {
       report_.add(fault_of(loaded.status),
                   at_line(mav0_ / "cam0" / "data.csv", pair.line) + ": " + loaded.problem);
       continue;
     }
-    side_images_.load(pair, loaded.frame, report_);
+    if (use == FrameUse::kAll || is_rgbd(rig_)) side_images_.load(pair, loaded.frame, report_);
     return SensorPacket{std::make_shared<const StereoFrame>(std::move(loaded.frame)),
                         imu_until(pair.stamp)};
   }

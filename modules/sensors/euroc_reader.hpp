@@ -54,7 +54,8 @@ class EurocReader final : public DatasetReader {
               const EurocOptions& options = {});
 
   [[nodiscard]] const SensorRig& rig() const override { return rig_; }
-  [[nodiscard]] std::optional<SensorPacket> next() override;
+  using DatasetReader::next;
+  [[nodiscard]] std::optional<SensorPacket> next(const ChooseUse& choose) override;
   [[nodiscard]] ReaderReport report() const override { return report_; }
   [[nodiscard]] std::size_t pair_count() const override { return files_.pairs.size(); }
 

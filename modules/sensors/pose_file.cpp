@@ -64,8 +64,8 @@ PoseFileReader::PoseFileReader(std::unique_ptr<DatasetReader> reader,
                                const std::filesystem::path& file)
     : reader_(std::move(reader)), name_(file.string()), poses_(read_pose_file(file, report_)) {}
 
-std::optional<SensorPacket> PoseFileReader::next() {
-  while (auto packet = reader_->next()) {
+std::optional<SensorPacket> PoseFileReader::next(const ChooseUse& choose) {
+  while (auto packet = reader_->next(choose)) {
     packet->pose = poses_.at(packet->frame->stamp);
     if (packet->pose) return packet;
     report_.add(ReaderFault::kFrameWithoutPose,

@@ -21,7 +21,8 @@ class PoseFileReader final : public DatasetReader {
   PoseFileReader(std::unique_ptr<DatasetReader> reader, const std::filesystem::path& file);
 
   [[nodiscard]] const SensorRig& rig() const override { return reader_->rig(); }
-  [[nodiscard]] std::optional<SensorPacket> next() override;
+  using DatasetReader::next;
+  [[nodiscard]] std::optional<SensorPacket> next(const ChooseUse& choose) override;
   [[nodiscard]] ReaderReport report() const override;
   [[nodiscard]] std::size_t pair_count() const override { return reader_->pair_count(); }
   [[nodiscard]] std::vector<std::string> remarks() const override { return reader_->remarks(); }

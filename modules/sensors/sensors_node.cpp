@@ -1,20 +1,16 @@
 #include "modules/sensors/sensors_node.hpp"
 
+#include <cmath>
+#include <optional>
 #include <sstream>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
+#include "modules/core/text_table.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
 namespace {
-
-// The first sample of a packet repeats the last of the one before.
-void append(std::vector<ImuSample>& samples, const std::vector<ImuSample>& next) {
-  const bool repeats = !samples.empty() && !next.empty() && next[0].stamp == samples.back().stamp;
-  samples.insert(samples.end(), next.begin() + (repeats ? 1 : 0), next.end());
-}
 
 void log_lines(const std::string& text, std::string_view name) {
   std::istringstream lines(text);
@@ -23,30 +19,13 @@ void log_lines(const std::string& text, std::string_view name) {
 
 }  // namespace
 
-LagFilter::LagFilter(double max_lag_s) : max_lag_s_(max_lag_s) {
-  if (!(max_lag_s >= 0.0))
-    throw std::invalid_argument("LagFilter: max_lag_s " + std::to_string(max_lag_s) +
-                                " is negative");
-}
-
-std::shared_ptr<const SensorPacket> LagFilter::take(
-    const std::shared_ptr<const SensorPacket>& packet, double lag_s) {
-  if (lag_s > max_lag_s_) {
-    append(held_back_, packet->imu);
-    return nullptr;
-  }
-  if (held_back_.empty()) return packet;
-  auto joined =
-      std::make_shared<SensorPacket>(SensorPacket{packet->frame, std::exchange(held_back_, {})});
-  append(joined->imu, packet->imu);
-  return joined;
-}
-
 SensorsNode::SensorsNode(const SensorsConfig& config, double rate,
                          std::unique_ptr<DatasetReader> reader, const SensorsTopics& topics)
     : reader_(std::move(reader)),
       listed_(reader_->pair_count()),
-      filter_(checked(config).max_lag_s),
+      is_live_(reader_->is_live()),
+      in_real_time_(is_live_ || std::isfinite(rate)),
+      shedding_(checked(config).max_lag_s),
       clock_(rate),
       topics_(topics),
       worker_(
@@ -54,7 +33,12 @@ SensorsNode::SensorsNode(const SensorsConfig& config, double rate,
           [this](const Input& input) {
             std::visit([this](const auto& message) { step(message); }, input);
           },
-          "sensors") {}
+          "sensors") {
+  topics_.processed.subscribe([this](const auto& frame) {
+    const std::lock_guard lock(shedding_mutex_);
+    shedding_.finish(*frame);
+  });
+}
 
 void SensorsNode::start() {
   worker_.start();
@@ -78,7 +62,8 @@ void SensorsNode::decode() {
       auto packet = [this] {
         const Heartbeat::Step step(decoding_);
         const auto scope = reading_.measure();
-        return reader_->next();
+        return reader_->next(
+            [this](Stamp stamp, Stamp arrival) { return choose_use(stamp, arrival); });
       }();
       if (!std::exchange(has_remarked, true))
         for (const std::string& remark : reader_->remarks()) log::info(name()) << remark;
@@ -87,8 +72,7 @@ void SensorsNode::decode() {
         worker_.post(EndOfData{reader_->report()});
         return;
       }
-      auto data = std::make_shared<const SensorPacket>(std::move(*packet));
-      if (!worker_.post(Packet{std::move(data), reader_->arrival()})) return;
+      if (!worker_.post(std::make_shared<const SensorPacket>(std::move(*packet)))) return;
     }
   } catch (...) {
     worker_.post(std::current_exception());  // the worker ends with it, as any node does
@@ -116,34 +100,63 @@ void SensorsNode::take_faults() {
   told_faults_ = faults;
 }
 
-// Nullopt: stopped meanwhile.
-std::optional<double> SensorsNode::lag_when_due_s(const Packet& packet) {
-  if (packet.arrival != 0)
-    return stopped_ ? std::nullopt
-                    : std::optional(wall_now_s() - 1e-9 * static_cast<double>(packet.arrival));
-  const Heartbeat::Waiting waiting;
-  return clock_.wait_until(packet.data->frame->stamp) ? std::optional(clock_.lag_s())
-                                                      : std::nullopt;
+FrameUse SensorsNode::choose_use(Stamp stamp, Stamp arrival) {
+  if (!in_real_time_) return FrameUse::kAll;
+  const double due_s =
+      is_live_ ? 1e-9 * static_cast<double>(arrival) : clock_.due_s(stamp).value_or(0.0);
+  return choose_use(stamp, due_s, is_live_ ? wall_now_s() : steady_now_s());
+}
+
+FrameUse SensorsNode::choose_use(Stamp stamp, double due_s, double now_s) {
+  std::unique_lock lock(shedding_mutex_);
+  if (const double pause_s = is_live_ ? 0.0 : shedding_.pause_s(due_s, now_s); pause_s > 0.0) {
+    clock_.pause(pause_s);
+    shedding_.pause(pause_s);
+    due_s += pause_s;
+    paused_s_ += pause_s;
+    log::limited(log::Level::kWarn, name(), "pause")
+        << "processors are short: the recording has been paused for " << fixed(paused_s_, 1)
+        << " s in all";
+  }
+  const ShedLoad before = shedding_.load();
+  const FrameUse use = shedding_.use_next(stamp, due_s, now_s);
+  const ShedLoad now = shedding_.load();
+  lock.unlock();
+  if (now != before) tell(before, now);
+  if (use == FrameUse::kNone) ++skipped_;
+  return use;
+}
+
+void SensorsNode::tell(const ShedLoad& before, const ShedLoad& now) {
+  topics_.load.publish(now);
+  const bool is_more = now.stride > before.stride || (now.map && !before.map);
+  auto line = log::limited(is_more ? log::Level::kWarn : log::Level::kInfo, name(),
+                           is_more ? "shed" : "restored");
+  line << (is_more ? "processors are short: " : "processors are free again: ");
+  if (now.stride > 1)
+    line << "odometry gets one of " << now.stride << " images";
+  else if (before.stride > 1)
+    line << "odometry gets every image";
+  else
+    line << (now.map ? "the map gets no new frames" : "the map gets new frames");
 }
 
 void SensorsNode::step(const Packet& packet) {
-  const auto lag_s = lag_when_due_s(packet);
-  if (!lag_s) return;
-  if (const auto due = filter_.take(packet.data, *lag_s)) {
-    topics_.packets.publish(due);
-    ++published_;
-  } else {
-    ++skipped_;
-    log::limited(log::Level::kWarn, name(), "lag")
-        << "frame skipped, consumers lag behind: " << skipped_ << " of " << listed();
-  }
+  const bool is_due = [&] {
+    if (is_live_) return !stopped_;
+    const Heartbeat::Waiting waiting;
+    return clock_.wait_until(packet->frame->stamp);
+  }();
+  if (!is_due) return;
+  topics_.packets.publish(packet);
+  ++published_;
 }
 
 void SensorsNode::step(const EndOfData& data) {
   if (stopped_) return;
   log_lines(to_string(data.faults), name());
   log::info(name()) << "end of data: " << published_ << " frames, " << skipped_ << " skipped";
-  topics_.end.publish(SensorsEnd{published_, skipped_, data.faults});
+  topics_.end.publish(SensorsEnd{published_, skipped_, paused_s(), data.faults});
 }
 
 }  // namespace km

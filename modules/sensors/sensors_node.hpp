@@ -23,40 +23,26 @@
 
 namespace km {
 
-/// Gives up the images of packets that come too late, as a camera would overwrite them, and keeps
-/// their inertial samples.
-class LagFilter {
- public:
-  /// Throws std::invalid_argument unless max_lag_s >= 0.
-  explicit LagFilter(double max_lag_s);
-
-  /// What to publish of a packet that is `lag_s` late: the packet, with the samples of those given
-  /// up before it in front of its own; or null if it is given up itself.
-  [[nodiscard]] std::shared_ptr<const SensorPacket> take(
-      const std::shared_ptr<const SensorPacket>& packet, double lag_s);
-
- private:
-  double max_lag_s_;
-  std::vector<ImuSample> held_back_;  // of the packets given up since the last one taken
-};
-
 /// The recording is over; published once, after its last packet. Not published by a stop before.
 struct SensorsEnd {
   std::size_t published = 0;  ///< Packets.
-  std::size_t skipped = 0;    ///< Pairs given up because consumers lagged behind the rate.
+  std::size_t skipped = 0;    ///< Frames left out because processors were short.
+  double paused_s = 0.0;      ///< Time that the recording's clock paused for the same reason.
   ReaderReport faults;        ///< Of the recording.
 };
 
 /// Channels of the sensors node; they must outlive it.
 struct SensorsTopics {
+  In<ProcessedFrame> processed;  ///< By odometry, for each packet. Its callback only takes a note.
   Out<SensorPacket> packets;
+  Out<ShedLoad> load;  ///< When it changes, before the packets that it concerns.
   Out<SensorsEnd> end;
 };
 
 /// Plays a recording, or hands on what sensors measure now. One thread decodes ahead, another
-/// publishes each packet when it is due, which is at once if it is live; a consumer whose queue is
-/// full (kBlock) holds publication up, and at a finite rate pairs that became later than max_lag_s
-/// are skipped, their inertial samples kept.
+/// publishes each packet when it is due, which is at once if it is live. A consumer whose queue is
+/// full (kBlock) holds publication up. At a finite rate, and live, LoadShedding chooses which
+/// frames are decoded; the inertial samples of all frames are kept.
 class SensorsNode final : public Node {
  public:
   /// `rate`: dataset seconds per second; infinity: as fast as consumers take it. Throws ConfigError
@@ -74,9 +60,14 @@ class SensorsNode final : public Node {
   /// Reading and decoding a packet.
   DurationHistogram timing() const override { return reading_.histogram(); }
 
-  /// Packets published and pairs skipped so far. Thread-safe.
+  /// Packets published and frames left out so far. Thread-safe.
   std::size_t published() const { return published_; }
   std::size_t skipped() const { return skipped_; }
+  /// Time that the recording's clock has paused because processors are short [s]. Thread-safe.
+  double paused_s() const {
+    const std::lock_guard lock(shedding_mutex_);
+    return paused_s_;
+  }
   /// Faults of the source, as counted up to 5 s ago, and all of them after stop(). Thread-safe.
   ReaderReport faults() const {
     const std::lock_guard lock(faults_mutex_);
@@ -89,23 +80,26 @@ class SensorsNode final : public Node {
   struct EndOfData {
     ReaderReport faults;
   };
-  struct Packet {
-    std::shared_ptr<const SensorPacket> data;
-    Stamp arrival = 0;  // see DatasetReader
-  };
+  using Packet = std::shared_ptr<const SensorPacket>;
   using Input = std::variant<Packet, EndOfData, std::exception_ptr>;
 
   void decode();
   void count_faults();
   void take_faults();
-  [[nodiscard]] std::optional<double> lag_when_due_s(const Packet& packet);
+  [[nodiscard]] FrameUse choose_use(Stamp stamp, Stamp arrival);
+  [[nodiscard]] FrameUse choose_use(Stamp stamp, double due_s, double now_s);
+  void tell(const ShedLoad& before, const ShedLoad& now);
   void step(const Packet& packet);
   void step(const EndOfData& end);
   void step(const std::exception_ptr& failure) { std::rethrow_exception(failure); }
 
   std::unique_ptr<DatasetReader> reader_;
   const std::size_t listed_;
-  LagFilter filter_;
+  const bool is_live_;
+  const bool in_real_time_;  // live, or a recording at a finite rate
+  mutable std::mutex shedding_mutex_;
+  LoadShedding shedding_;
+  double paused_s_ = 0.0;
   ReplayClock clock_;
   const SensorsTopics topics_;
   std::atomic<std::size_t> published_ = 0;

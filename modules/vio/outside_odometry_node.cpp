@@ -38,7 +38,9 @@ void OutsideOdometryNode::step(const SensorPacket& packet) {
   if (result.state) topics_.odometry.publish(*result.state);
   if (result.keyframe) topics_.keyframes.publish(*result.keyframe);
   if (result.frame) topics_.frames.publish(*result.frame);
-  if (packet.frame != nullptr) topics_.images.publish(TrackedImage{packet.frame, {}});
+  if (packet.frame == nullptr) return;
+  topics_.images.publish(TrackedImage{packet.frame, {}});
+  topics_.processed.publish(ProcessedFrame{packet.frame->stamp, std::nullopt});
 }
 
 }  // namespace km

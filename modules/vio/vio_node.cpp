@@ -1,5 +1,6 @@
 #include "modules/vio/vio_node.hpp"
 
+#include <optional>
 #include <utility>
 
 #include "modules/core/text_table.hpp"
@@ -48,6 +49,13 @@ const char* text(StartStatus status) {
   return "unknown start";
 }
 
+// Of the features of the image before; crowded ones ran into others that are still tracked.
+std::optional<double> tracked_share(const TrackerStatistics& s) {
+  const int before = s.tracked + s.lost + s.backward + s.motion;
+  if (before == 0) return std::nullopt;
+  return static_cast<double>(s.tracked) / before;
+}
+
 }  // namespace
 
 VioNode::VioNode(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker,
@@ -85,6 +93,8 @@ void VioNode::step(const SensorPacket& packet) {
   blind_s_ = vio_.statistics().blind_s;
   if (result.problem != VioProblem::kNoImage && result.problem != VioProblem::kUnorderedImage)
     topics_.images.publish(TrackedImage{packet.frame, std::move(result.tracked)});
+  if (packet.frame)
+    topics_.processed.publish(ProcessedFrame{packet.frame->stamp, tracked_share(result.tracking)});
 }
 
 void VioNode::tell(const VisionEvent& event) const {

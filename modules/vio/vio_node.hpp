@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "modules/core/processing_load.hpp"
 #include "modules/core/tracked_image.hpp"
 #include "modules/vio/vio.hpp"
 #include "runtime/node.hpp"
@@ -20,6 +21,7 @@ struct VioTopics {
   Out<LocatedFrame> frames;               ///< One per image, after its keyframe.
   Out<VioStatistics> statistics;          ///< When something has happened, and while blind.
   Out<TrackedImage> images;               ///< All that are accepted.
+  Out<ProcessedFrame> processed;          ///< For each packet, when its step is over.
 };
 
 /// Stereo-inertial odometry as a thread: one Vio. A full queue holds the sensors up.

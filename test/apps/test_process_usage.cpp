@@ -20,6 +20,7 @@ TEST_CASE("Memory that is taken shows, and processor time does", "[robot]") {
   const ProcessUsage after = process_usage();
   CHECK(after.resident_bytes > before.resident_bytes + kTaken * 9 / 10);
   CHECK(after.cpu_s >= before.cpu_s);
+  CHECK(after.system_s <= after.cpu_s);
   CHECK(taken.back() == 1);
 }
 
@@ -43,9 +44,11 @@ TEST_CASE("The growth of memory is that of the second half of the time", "[robot
 TEST_CASE("process.csv has a row for each sample", "[robot]") {
   std::ostringstream text;
   ProcessCsv csv(text);
-  csv.append(0.5, {.cpu_s = 0.25, .resident_bytes = 12345});
+  csv.append(0.5, {.cpu_s = 0.25, .system_s = 0.125, .page_faults = 10, .resident_bytes = 12345});
   csv.append(1.5, {.cpu_s = 1.0, .resident_bytes = 23456, .peak_bytes = 34567});
-  CHECK(text.str() == "time_s,cpu_s,resident_bytes\n0.500,0.250,12345\n1.500,1.000,23456\n");
+  CHECK(text.str() ==
+        "time_s,cpu_s,resident_bytes,system_s,page_faults\n"
+        "0.500,0.250,12345,0.125,10\n1.500,1.000,23456,0.000,0\n");
   CHECK(csv.summary().cpu_s == 1.0);
   CHECK(csv.summary().peak_memory_bytes == 34567);
   for (int s = 2; s < 100; ++s) csv.append(1.0 * s, {.cpu_s = 1.0, .resident_bytes = 23456});
@@ -55,10 +58,12 @@ TEST_CASE("process.csv has a row for each sample", "[robot]") {
 TEST_CASE("process.csv goes on with the time of the run, and sums up that of processors",
           "[robot]") {
   std::ostringstream text;
-  ProcessCsv csv(text, "time_s,cpu_s,resident_bytes\n1.000,0.500,12345\n2.500,1.250,23456\n");
+  ProcessCsv csv(text,
+                 "time_s,cpu_s,resident_bytes,system_s,page_faults\n"
+                 "1.000,0.500,12345,0.250,100\n2.500,1.250,23456,0.500,200\n");
   CHECK(csv.former_s() == 2.5);
-  csv.append(3.5, {.cpu_s = 0.25, .resident_bytes = 34567});
-  CHECK(text.str() == "3.500,1.500,34567\n");
+  csv.append(3.5, {.cpu_s = 0.25, .system_s = 0.125, .page_faults = 50, .resident_bytes = 34567});
+  CHECK(text.str() == "3.500,1.500,34567,0.625,250\n");
   CHECK(csv.summary().cpu_s == 0.25);
 }
 

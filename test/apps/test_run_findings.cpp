@@ -145,6 +145,22 @@ TEST_CASE("What stands out of a run is told with its number", "[robot][findings]
     summary.frames_skipped = 1;
     told("frames.skipped", Severity::kNote, "1 frames skipped, 0.2 %");
   }
+  SECTION("a recording that was played more slowly") {
+    summary.rate = 1.0;
+    CHECK(findings_of_one(run).empty());
+    summary.rate = 0.625;
+    told("frames.slowed", Severity::kNote, "played at 0.6");
+  }
+  SECTION("a recording that was paused") {
+    summary.paused_s = 3.25;
+    told("frames.paused", Severity::kNote, "paused for 3.2 s in all");
+  }
+  SECTION("a map that gave way") {
+    summary.mapping = MappingSummary{.frames = 75, .gave_way = 25};
+    told("map.gave_way", Severity::kWarning, "25 frames were left out of the map, 25 %");
+    summary.mapping->gave_way = 1;
+    told("map.gave_way", Severity::kNote, "1 frames");
+  }
   SECTION("images that are missing") {
     summary.sensor_faults = {{"images missing between others", 116}, {"pauses of a camera", 1}};
     told("sensors.faults", Severity::kWarning,

@@ -60,7 +60,8 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
   std::string keys;
   for (const auto& [key, value] : json.items()) keys += key + ' ';
   CHECK(keys ==
-        "/robot /name /keyframes /keypoints /frames /frames_skipped /sensor_faults/x "
+        "/robot /name /keyframes /keypoints /frames /frames_skipped /rate /paused_s "
+        "/sensor_faults/x "
         "/closures/candidates /closures/verified /closures/inliers "
         "/pgo/rounds /pgo/seconds /pgo/cost /pgo/gradient_norm /pgo/anchor /pgo/settled "
         "/pgo/members/0 /pgo/members/1 "
@@ -71,7 +72,7 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/cameras/offset_s /cameras/offset_sigma_s /cameras/rotation_x_rad /cameras/rotation_y_rad "
         "/cameras/rotation_z_rad /cameras/rotation_sigma_rad /cameras/translation_x_m "
         "/cameras/translation_y_m /cameras/translation_z_m /cameras/translation_sigma_m "
-        "/mapping/frames /mapping/skipped_wrong_size /mapping/skipped_bad_pose "
+        "/mapping/frames /mapping/gave_way /mapping/skipped_wrong_size /mapping/skipped_bad_pose "
         "/mapping/skipped_too_late /mapping/without_labels /mapping/label_pixels_outside_palette "
         "/mapping/blocks_refused /mapping/blocks /mapping/vertices /mapping/faces "
         "/mapping/superseded_faces_dropped /mapping/corrections /mapping/moves_as_a_whole "
@@ -79,7 +80,8 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/traffic/x /held_back/delayed/messages/x /held_back/delayed/bytes/x "
         "/held_back/superseded/messages/x /held_back/superseded/bytes/x "
         "/held_back/dropped/messages/x /held_back/dropped/bytes/x /process/cpu_s "
-        "/process/peak_memory_bytes /process/memory_at_start_bytes "
+        "/process/system_s /process/page_faults /process/peak_memory_bytes "
+        "/process/memory_at_start_bytes "
         "/process/memory_at_end_bytes /process/memory_growth_bytes_per_minute "
         "/seconds /lost_peers/x /apart_peers/x /other_vocabulary/x /exit_reason "
         "/findings/0/id /findings/0/severity /findings/0/what /findings/0/means /findings/0/to_do "

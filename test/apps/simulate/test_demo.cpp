@@ -12,14 +12,14 @@
 namespace km {
 
 TEST_CASE("The demo joins three robots of a simulated world into one frame", "[demo][slow]") {
-  constexpr std::size_t kFrames = 160;  // 8 s at 20 Hz
+  constexpr std::size_t kFrames = 80;   // 8 s at 10 Hz
   constexpr double kMaxError_m = 0.3;   // robots in frames of their own are a metre off and more
   const TemporaryFolder folder;
   const auto demo = run_command("apps/demo --short --rate max --programs " KM_BIN_DIR " --output " +
                                 folder.path().string());
   CAPTURE(demo.output);
   REQUIRE(demo.exit_code == 0);
-  CHECK_THAT(demo.output, Catch::Contains("480 of 480 frames, 100 %") &&
+  CHECK_THAT(demo.output, Catch::Contains("240 of 240 frames, 100 %") &&
                               Catch::Contains("8 s of recording each, as fast as this") &&
                               Catch::Contains("team, one frame") &&
                               Catch::Contains("To look at, in " + folder.path().string()));

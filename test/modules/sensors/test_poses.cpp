@@ -105,7 +105,8 @@ TEST_CASE("A file of poses is read row by row", "[sensors][poses]") {
 class Frames final : public DatasetReader {
  public:
   const SensorRig& rig() const override { return rig_; }
-  std::optional<SensorPacket> next() override {
+  using DatasetReader::next;
+  std::optional<SensorPacket> next(const ChooseUse&) override {
     if (next_ == 5) return std::nullopt;
     StereoFrame frame;
     frame.stamp = nanoseconds(10.0 + next_++);

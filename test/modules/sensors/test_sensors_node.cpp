@@ -1,8 +1,10 @@
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <cmath>
 #include <future>
 #include <limits>
 #include <stdexcept>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -22,7 +24,10 @@ class FakeReader final : public DatasetReader {
   const SensorRig& rig() const override { return rig_; }
   ReaderReport report() const override { return report_; }
   std::size_t pair_count() const override { return static_cast<std::size_t>(count_); }
-  std::optional<SensorPacket> next() override {
+  using DatasetReader::next;
+  std::optional<SensorPacket> next(const ChooseUse& choose) override {
+    while (read_ < count_ && choose(1 + nanoseconds(period_s_ * read_), 0) == FrameUse::kNone)
+      ++read_;
     if (read_ == count_ && fails_) throw DatasetError("disk gone");
     if (read_ == count_) {
       report_.add(ReaderFault::kMissingImage, "x.csv line 3");
@@ -45,31 +50,25 @@ class FakeReader final : public DatasetReader {
 };
 
 struct Run {
-  SensorsTopics topics() { return {.packets = packets, .end = end}; }
+  SensorsTopics topics() {
+    return {.processed = processed, .packets = packets, .load = load, .end = end};
+  }
 
+  Topic<ProcessedFrame> processed;
   Topic<SensorPacket> packets;
+  Topic<ShedLoad> load;
   Topic<SensorsEnd> end;
   std::vector<Stamp> stamps;
   std::promise<SensorsEnd> ended;
 
   Run() {
-    packets.subscribe([this](const auto& packet) { stamps.push_back(packet->frame->stamp); });
+    packets.subscribe([this](const auto& packet) {
+      stamps.push_back(packet->frame->stamp);
+      processed.publish(ProcessedFrame{packet->frame->stamp, 1.0});
+    });
     end.subscribe([this](const auto& message) { ended.set_value(*message); });
   }
 };
-
-constexpr Stamp kSecond = 1'000'000'000;
-constexpr Stamp kImuPeriod = kSecond / 100;
-
-// A packet at `t` with samples every 10 ms over the 50 ms up to it.
-std::shared_ptr<const SensorPacket> packet_at(Stamp t) {
-  auto frame = std::make_shared<StereoFrame>();
-  frame->stamp = t;
-  auto packet = std::make_shared<SensorPacket>();
-  for (Stamp s = t - 5 * kImuPeriod; s <= t; s += kImuPeriod) packet->imu.emplace_back().stamp = s;
-  packet->frame = std::move(frame);
-  return packet;
-}
 
 }  // namespace
 
@@ -92,16 +91,45 @@ TEST_CASE("Every packet is published in order, then the end", "[sensors]") {
   CHECK(node.error() == nullptr);
 }
 
-TEST_CASE("Pairs that are late at a finite rate are skipped and counted", "[sensors]") {
+// Odometry that takes three times as long for an image as there is time.
+TEST_CASE("Images that come too fast are left out evenly, after the map", "[sensors]") {
+  constexpr double kRate = 10.0;  // an image every 5 ms
+  constexpr auto kCost = std::chrono::milliseconds(15);
   Run run;
+  std::vector<ShedLoad> loads;
+  run.load.subscribe([&](const auto& load) { loads.push_back(*load); });
+  run.packets.subscribe([&](const auto&) { std::this_thread::sleep_for(kCost); });
   SensorsConfig config;
-  config.max_lag_s = 0.0;
-  // At this rate all packets are due with the first one: the others are late.
-  SensorsNode node(config, 1e12, std::make_unique<FakeReader>(10), run.topics());
+  config.max_lag_s = 0.1;
+  SensorsNode node(config, kRate, std::make_unique<FakeReader>(1000), run.topics());
   node.start();
   const SensorsEnd end = run.ended.get_future().get();
-  CHECK(end.published == 1);
-  CHECK(end.skipped == 9);
+  node.stop();
+  CHECK(end.published + end.skipped == 1000);
+  CHECK(end.skipped > 500);
+  REQUIRE(loads.size() >= 2);
+  CHECK(loads[0] == ShedLoad{.map = true, .stride = 1});
+  CHECK(loads[1] == ShedLoad{.map = true, .stride = 2});
+  for (std::size_t k = 1; k < run.stamps.size(); ++k) {
+    CAPTURE(k);
+    CHECK(seconds_between(run.stamps[k - 1], run.stamps[k]) <=
+          0.05 * LoadShedding::kMaxStride + 1e-6);
+  }
+}
+
+TEST_CASE("Where nothing else helps, the clock of a recording pauses", "[sensors]") {
+  Run run;
+  run.packets.subscribe(
+      [](const auto&) { std::this_thread::sleep_for(std::chrono::milliseconds(5)); });
+  SensorsConfig config;
+  config.max_lag_s = 0.02;
+  // An image every 0.5 ms: even one of four takes 2.5 times as long as there is time.
+  SensorsNode node(config, 100.0, std::make_unique<FakeReader>(1000), run.topics());
+  node.start();
+  const SensorsEnd end = run.ended.get_future().get();
+  CHECK(end.paused_s > 0.1);
+  CHECK(end.paused_s == node.paused_s());
+  CHECK(end.published >= 250);
 }
 
 TEST_CASE("A node that waits for the next packet stops at once", "[sensors]") {
@@ -136,31 +164,6 @@ TEST_CASE("Unusable parameters of the node are refused", "[sensors]") {
                   ConfigError);
   CHECK_THROWS_AS(SensorsNode({}, 0.0, std::make_unique<FakeReader>(1), run.topics()),
                   std::invalid_argument);
-}
-
-TEST_CASE("A packet in time passes as it is", "[sensors]") {
-  LagFilter filter(0.2);
-  const auto packet = packet_at(kSecond);
-  CHECK(filter.take(packet, 0.2) == packet);
-}
-
-TEST_CASE("A late packet is given up, its samples come with the next", "[sensors]") {
-  LagFilter filter(0.2);
-  CHECK(filter.take(packet_at(kSecond), 0.3) == nullptr);
-  CHECK(filter.take(packet_at(kSecond + 5 * kImuPeriod), 0.25) == nullptr);
-  const auto joined = filter.take(packet_at(kSecond + 10 * kImuPeriod), 0.1);
-  REQUIRE(joined);
-  CHECK(joined->frame->stamp == kSecond + 10 * kImuPeriod);
-  REQUIRE(joined->imu.size() == 16);  // 150 ms, no sample twice
-  for (std::size_t i = 0; i < joined->imu.size(); ++i)
-    CHECK(joined->imu[i].stamp == kSecond + (static_cast<Stamp>(i) - 5) * kImuPeriod);
-  const auto next = packet_at(kSecond + 15 * kImuPeriod);
-  CHECK(filter.take(next, 0.0) == next);
-}
-
-TEST_CASE("A lag without sense is refused", "[sensors]") {
-  CHECK_THROWS_AS(LagFilter(-0.1), std::invalid_argument);
-  CHECK_THROWS_AS(LagFilter(std::nan("")), std::invalid_argument);
 }
 
 }  // namespace km

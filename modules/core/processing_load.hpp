@@ -1,0 +1,25 @@
+#pragma once
+
+#include <optional>
+
+#include "modules/core/stamp.hpp"
+
+namespace km {
+
+/// Odometry has finished with a frame.
+struct ProcessedFrame {
+  Stamp stamp = 0;
+  /// Share of the features of the image before that it still tracks, in [0, 1]; nullopt: no image
+  /// was tracked.
+  std::optional<double> tracked_share = {};
+};
+
+/// What a robot leaves out because its processors are short; see LoadShedding.
+struct ShedLoad {
+  bool map = false;  ///< No new frames for the map.
+  int stride = 1;    ///< Odometry gets every stride-th image.
+
+  friend bool operator==(const ShedLoad&, const ShedLoad&) = default;
+};
+
+}  // namespace km

@@ -1,0 +1,157 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "modules/sensors/load_shedding.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kPeriod_s = 0.05;
+constexpr double kMaxLag_s = 0.5;
+
+// One odometry that takes `cost_s` for each image, played in virtual time. Images are due every
+// 50 ms; the reader decides about an image when the queue has room for it.
+struct Playback {
+  double cost_s = 0.0;
+  double share_per_s = 0.9;  // of the features that survive a second
+  bool waits = true;         // a recording: its clock waits where nothing else helps
+
+  LoadShedding shedding{kMaxLag_s};
+  std::vector<FrameUse> uses{};
+  std::vector<int> gaps{};  // images from one that is used to the next
+  std::vector<ShedLoad> loads{};
+  double waited_s = 0.0, worst_lag_s = 0.0;
+
+  void play(int images) {
+    constexpr std::size_t kRoom = 4;
+    struct Running {
+      ProcessedFrame frame;
+      double end_s = 0.0;
+    };
+    std::vector<Running> queue;
+    double now_s = start_s;
+    int last_used = -1;
+    const auto finish_until = [&](double until_s) {
+      while (!queue.empty() && queue.front().end_s <= until_s) {
+        shedding.finish(queue.front().frame);
+        queue.erase(queue.begin());
+      }
+    };
+    for (int k = 0; k < images; ++k) {
+      const double due_s = start_s + k * kPeriod_s + waited_s;
+      now_s = std::max(now_s, due_s);
+      if (queue.size() == kRoom) now_s = std::max(now_s, queue.front().end_s);
+      finish_until(now_s);
+      if (const double pause_s = shedding.pause_s(due_s, now_s); waits && pause_s > 0.0) {
+        shedding.pause(pause_s);
+        waited_s += pause_s;
+      }
+      worst_lag_s = std::max(worst_lag_s, shedding.lag_s(now_s));
+      const Stamp stamp = first_stamp + nanoseconds(k * kPeriod_s);
+      uses.push_back(shedding.use_next(stamp, start_s + k * kPeriod_s + waited_s, now_s));
+      loads.push_back(shedding.load());
+      if (uses.back() == FrameUse::kNone) continue;
+      if (last_used >= 0) gaps.push_back(k - last_used);
+      const int gap = last_used >= 0 ? k - last_used : 1;
+      last_used = k;
+      const double begin_s = queue.empty() ? now_s : std::max(now_s, queue.back().end_s);
+      queue.push_back({{stamp, std::pow(share_per_s, gap * kPeriod_s)}, begin_s + cost_s});
+    }
+    start_s += images * kPeriod_s + waited_s;
+    first_stamp += nanoseconds(images * kPeriod_s);
+    waited_s = 0.0;
+  }
+
+  double start_s = 100.0;
+  Stamp first_stamp = 1'000'000'000;
+};
+
+int first_with(const Playback& run, auto&& is) {
+  for (std::size_t k = 0; k < run.loads.size(); ++k)
+    if (is(run.loads[k])) return static_cast<int>(k);
+  return -1;
+}
+
+}  // namespace
+
+TEST_CASE("A robot that keeps up leaves nothing out", "[sensors]") {
+  Playback run{.cost_s = 0.045};
+  run.play(2000);
+  for (const FrameUse use : run.uses) REQUIRE(use == FrameUse::kAll);
+  CHECK(run.waited_s == 0.0);
+}
+
+TEST_CASE("The map gives way first, then every second image, and both come back", "[sensors]") {
+  Playback run{.cost_s = 0.07};
+  run.play(400);
+  const int map = first_with(run, [](const ShedLoad& load) { return load.map; });
+  const int half = first_with(run, [](const ShedLoad& load) { return load.stride > 1; });
+  REQUIRE(map > 0);
+  REQUIRE(half > map);
+  for (int k = 0; k < map; ++k) CHECK(run.uses[static_cast<std::size_t>(k)] == FrameUse::kAll);
+  for (const ShedLoad& load : run.loads) CHECK((load.stride == 1 || load.map));
+  for (const int gap : run.gaps) CHECK(gap <= 2);  // a stride of 2 is enough, and used evenly
+  CHECK(run.worst_lag_s < 2.0 * kMaxLag_s);
+
+  run.cost_s = 0.01;
+  run.uses.clear();
+  run.play(1000);
+  CHECK(run.uses.back() == FrameUse::kAll);
+  CHECK(run.shedding.load() == ShedLoad{});
+}
+
+TEST_CASE("Images that come three times as fast as odometry is are left out evenly", "[sensors]") {
+  Playback run{.cost_s = 3.0 * kPeriod_s};
+  run.play(2000);
+  CHECK(run.worst_lag_s <= 2.0 * kMaxLag_s + 4 * run.cost_s);
+  const std::size_t settled = run.gaps.size() / 4;
+  for (std::size_t k = settled; k < run.gaps.size(); ++k) {
+    CHECK(run.gaps[k] >= 2);
+    CHECK(run.gaps[k] <= LoadShedding::kMaxStride);
+  }
+}
+
+TEST_CASE("Odometry keeps the images that it needs to hold on; the recording waits", "[sensors]") {
+  // A fifth of the features is lost from image to image: of every second image's, 0.64 stay, of
+  // every fourth one's 0.41.
+  Playback run{.cost_s = 0.25, .share_per_s = std::pow(0.8, 1.0 / kPeriod_s)};
+  run.play(1000);
+  CHECK(run.shedding.max_stride() == 3);
+  for (const int gap : run.gaps) CHECK(gap <= 3);
+  CHECK(run.worst_lag_s <= 2.0 * kMaxLag_s + run.cost_s);
+}
+
+TEST_CASE("A scene that turns too fast for every second image gets all of them", "[sensors]") {
+  Playback run{.cost_s = 0.1, .share_per_s = std::pow(0.6, 1.0 / kPeriod_s)};
+  run.play(500);
+  CHECK(run.shedding.max_stride() == 1);
+  for (const int gap : run.gaps) CHECK(gap == 1);
+}
+
+TEST_CASE("Live images that come too late are dropped", "[sensors]") {
+  Playback run{.cost_s = 0.5, .waits = false};
+  run.play(1000);
+  CHECK(run.worst_lag_s < 2.0 * kMaxLag_s + 5 * run.cost_s);
+  CHECK(run.shedding.load().map);
+  CHECK(run.shedding.load().stride == LoadShedding::kMaxStride);
+}
+
+TEST_CASE("A step that has to be repeated is undone less and less often", "[sensors]") {
+  Playback run{.cost_s = 0.06};
+  run.play(4000);
+  int changes = 0;
+  for (std::size_t k = 1; k < run.loads.size(); ++k)
+    changes += run.loads[k].stride != run.loads[k - 1].stride ? 1 : 0;
+  CHECK(changes >= 2);
+  CHECK(changes < 40);  // 200 s; without growing patience about one a second
+}
+
+TEST_CASE("A lag without sense is refused", "[sensors]") {
+  CHECK_THROWS_AS(LoadShedding(-0.1), std::invalid_argument);
+  CHECK_THROWS_AS(LoadShedding(std::nan("")), std::invalid_argument);
+}
+
+}  // namespace km

@@ -1,0 +1,82 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "apps/robot/run_summary.hpp"
+#include "modules/core/stamp.hpp"
+#include "modules/evaluation/trajectory_file.hpp"
+#include "test/support/command.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/temporary_folder.hpp"
+
+// What a robot takes of its computer, and what it leaves out where that is too little.
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+CommandResult run_robot(const fs::path& dataset, const fs::path& output,
+                        const std::string& options) {
+  return run_command(KM_BIN_DIR
+                     "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0"
+                     " --serve-limit 0 --interface lo --domain 98 --set dds.team=" +
+                     output.parent_path().filename().string() + " --dataset " + dataset.string() +
+                     " --to 15 --output " + output.string() + ' ' + options);
+}
+
+}  // namespace
+
+TEST_CASE("A robot keeps the memory of a frame for the next one", "[load]") {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  std::cout << "SKIPPED: sanitizers have an allocator of their own\n";
+#else
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const fs::path output = folder.path() / "a";
+  const CommandResult run = run_robot(*dataset, output, "--rate max");
+  CAPTURE(run.output);
+  REQUIRE(run.exit_code == 0);
+  const RunSummary summary = read_summary(output / "summary.json");
+  REQUIRE(summary.frames == 299);
+  // The start of the program, its vocabulary and what it records take 84 a frame; returning the
+  // memory of each frame to the kernel 3000.
+  CHECK(static_cast<double>(summary.process.page_faults) <
+        300.0 * static_cast<double>(summary.frames));
+#endif
+}
+
+TEST_CASE("On an overloaded computer the map gives way first, then images, evenly", "[load]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const fs::path output = folder.path() / "a";
+  // An image every 2.5 ms: odometry alone takes two to three times as long.
+  const CommandResult run =
+      run_robot(*dataset, output, "--rate 20 --set mapping.mode=metric sensors.max_lag_s=0.05");
+  CAPTURE(run.output);
+  REQUIRE(run.exit_code == 0);
+  const RunSummary summary = read_summary(output / "summary.json");
+  CHECK(summary.frames_skipped > 0);
+  REQUIRE(summary.mapping);
+  CHECK(summary.mapping->gave_way > 0);
+  REQUIRE(summary.odometry);
+  CHECK(summary.odometry->divergences == 0);
+
+  const auto map = run.output.find("processors are short: the map gets no new frames");
+  const auto images = run.output.find("processors are short: odometry gets one of");
+  CHECK(map != std::string::npos);
+  CHECK(map < images);
+
+  // Images are 0.05 s apart, and one pair of the recording is missing.
+  const std::vector<StampedPose> poses = read_trajectory(output / "odometry.tum");
+  REQUIRE(poses.size() > 60);
+  constexpr double kLongest_s = 4 * 0.05 + 0.05 + 1e-3;
+  for (std::size_t k = 1; k < poses.size(); ++k)
+    CHECK(seconds_between(poses[k - 1].stamp, poses[k].stamp) <= kLongest_s);
+}
+
+}  // namespace km
