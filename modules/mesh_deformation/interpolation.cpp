@@ -70,6 +70,8 @@ class NearestInTime {
     return true;
   }
 
+  void sort() {}  // nanoflann 1.5 calls it at the end: they are in order already
+
  private:
   const Nodes& nodes_;
   const SeenBy& seen_by_;
@@ -94,7 +96,7 @@ class NodeTree {
                       double limit2 = std::numeric_limits<double>::infinity()) const {
     if (found.empty()) return 0;
     NearestInTime nearest(nodes_, seen_by, window_, found, limit2);
-    index_.findNeighbors(nearest, point.data(), nanoflann::SearchParams());
+    index_.findNeighbors(nearest, point.data(), {});
     return nearest.size();
   }
 

@@ -28,8 +28,9 @@ FrameJoiner::FrameJoiner(bool has_right, bool has_depth, std::optional<double> t
   right_.exists = has_right;
   depth_.exists = has_depth;
   if (!tolerance_s) return;
-  for (Stream* stream : {&right_, &depth_})
-    if (stream->exists) stream->synchrony = Synchrony{.tolerance_s = *tolerance_s};
+  const Synchrony given{.tolerance_s = *tolerance_s};
+  if (has_right) right_.synchrony = given;
+  if (has_depth) depth_.synchrony = given;
 }
 
 FrameJoiner::Stream& FrameJoiner::stream_of(ImageRole role) {

@@ -7,7 +7,7 @@
 #include "runtime/config_layers.hpp"
 #include "test/support/spoilt_input.hpp"
 
-using Catch::Matchers::Contains;
+using Catch::Contains;
 
 namespace km {
 namespace {
@@ -58,8 +58,8 @@ TEST_CASE("A key without a value is none of a value that may be absent", "[confi
   layers.add_text("toy:\n  limit_m:\n", "a.yaml");
   CHECK(!loaded(layers).limit_m);
   CHECK_THAT(complaint("toy:\n  limit_m: far\n"),
-             Catch::Matchers::Contains("a.yaml:2: toy.limit_m = far is not a number"));
-  CHECK_THAT(complaint("toy:\n  count:\n"), Catch::Matchers::Contains("not a whole number"));
+             Catch::Contains("a.yaml:2: toy.limit_m = far is not a number"));
+  CHECK_THAT(complaint("toy:\n  count:\n"), Catch::Contains("not a whole number"));
 }
 
 TEST_CASE("A key that is absent keeps its default", "[config]") {

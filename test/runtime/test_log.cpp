@@ -29,7 +29,7 @@ TEST_CASE("A limited log line appears once per key", "[log]") {
   for (int i = 0; i < 100; ++i)
     log::limited(log::Level::kWarn, "test", "this test") << "line " << i;
   REQUIRE(captured.lines().size() == 1);
-  CHECK_THAT(captured.lines()[0], Catch::Matchers::EndsWith("warn test: line 0"));
+  CHECK_THAT(captured.lines()[0], Catch::EndsWith("warn test: line 0"));
 }
 
 TEST_CASE("Levels below the limit are not written", "[log]") {
@@ -40,7 +40,7 @@ TEST_CASE("Levels below the limit are not written", "[log]") {
   log::error("test") << "but this";
   log::set_level(log::Level::kInfo);
   REQUIRE(captured.lines().size() == 1);
-  CHECK_THAT(captured.lines()[0], Catch::Matchers::Contains("but this"));
+  CHECK_THAT(captured.lines()[0], Catch::Contains("but this"));
 }
 
 TEST_CASE("Who listens to the log hears the lines that are written, until another does", "[log]") {

@@ -75,7 +75,7 @@ TEST_CASE("A failed node ends the run with its name and its message", "[supervis
   REQUIRE(result.failure.has_value());
   CHECK(result.failure->node == "odometry");
   CHECK(result.failure->message == "the reason");
-  CHECK_THAT(log.text(), Catch::Matchers::Contains("odometry failed: the reason"));
+  CHECK_THAT(log.text(), Catch::Contains("odometry failed: the reason"));
 }
 
 TEST_CASE("A node that fails while it finishes its work is still reported", "[supervisor]") {

@@ -221,6 +221,16 @@ struct Cloud {
 using Index = nanoflann::KDTreeSingleIndexAdaptor<
     nanoflann::L2_Simple_Adaptor<float, Cloud, float, std::uint32_t>, Cloud, 3, std::uint32_t>;
 
+// The nearest samples that are closer than the root of `limit2`.
+class NearestWithin : public nanoflann::KNNResultSet<float, std::uint32_t> {
+ public:
+  explicit NearestWithin(float limit2) : KNNResultSet(kNeighbours), limit2_(limit2) {}
+  [[nodiscard]] float worstDist() const { return std::min(KNNResultSet::worstDist(), limit2_); }
+
+ private:
+  float limit2_;
+};
+
 // On the edge from corner `edge`, at a, to the next, at b.
 TrianglePoint nearest_on_edge(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
                               const Eigen::Vector3d& b, int edge) {
@@ -282,10 +292,9 @@ std::optional<NearestSample> NearestSurface::find(const Eigen::Vector3f& point,
   if (tree_->samples.points.empty()) return std::nullopt;
   std::array<std::uint32_t, kNeighbours> found{};
   std::array<float, kNeighbours> distances2{};
-  nanoflann::KNNResultSet<float, std::uint32_t> nearest(kNeighbours);
+  NearestWithin nearest(static_cast<float>(reach_m * reach_m));
   nearest.init(found.data(), distances2.data());
-  distances2.back() = static_cast<float>(reach_m * reach_m);  // the worst that it takes
-  tree_->index.findNeighbors(nearest, point.data(), nanoflann::SearchParams());
+  tree_->index.findNeighbors(nearest, point.data(), {});
   if (nearest.size() == 0) return std::nullopt;
   NearestSample result;
   result.sample = found[0];

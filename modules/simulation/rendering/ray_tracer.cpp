@@ -17,12 +17,39 @@ struct alignas(64) ValidLanes {
   }
 };
 
+// Rays of a packet run side by side.
+#if RTC_VERSION_MAJOR >= 4
+void find_hits(const ValidLanes& valid, RTCScene scene, RTCRayHit16& rays) {
+  RTCIntersectArguments options;
+  rtcInitIntersectArguments(&options);
+  options.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  rtcIntersect16(valid.lanes.data(), scene, &rays, &options);
+}
+
+void find_occluded(const ValidLanes& valid, RTCScene scene, RTCRay16& rays) {
+  RTCOccludedArguments options;
+  rtcInitOccludedArguments(&options);
+  options.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  rtcOccluded16(valid.lanes.data(), scene, &rays, &options);
+}
+#else
 RTCIntersectContext coherent() {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   return context;
 }
+
+void find_hits(const ValidLanes& valid, RTCScene scene, RTCRayHit16& rays) {
+  RTCIntersectContext context = coherent();
+  rtcIntersect16(valid.lanes.data(), scene, &context, &rays);
+}
+
+void find_occluded(const ValidLanes& valid, RTCScene scene, RTCRay16& rays) {
+  RTCIntersectContext context = coherent();
+  rtcOccluded16(valid.lanes.data(), scene, &context, &rays);
+}
+#endif
 
 // Embree's checks look at lanes that are not active, too: they get a ray of no length.
 void prepare(LaneMask active, RTCRay16& rays) {
@@ -86,17 +113,13 @@ void RayTracer::intersect(LaneMask active, RayPacket& rays) const {
   std::memset(rays.hit.primID, 0xFF, sizeof(rays.hit.primID));
   std::memset(rays.hit.geomID, 0xFF, sizeof(rays.hit.geomID));
   if (active == 0) return;
-  const ValidLanes valid(active);
-  RTCIntersectContext context = coherent();
-  rtcIntersect16(valid.lanes.data(), scene_.get(), &context, &rays);
+  find_hits(ValidLanes(active), scene_.get(), rays);
 }
 
 LaneMask RayTracer::occluded(LaneMask active, RayPacket& rays) const {
   if (active == 0) return 0;
   prepare(active, rays.ray);
-  const ValidLanes valid(active);
-  RTCIntersectContext context = coherent();
-  rtcOccluded16(valid.lanes.data(), scene_.get(), &context, &rays.ray);
+  find_occluded(ValidLanes(active), scene_.get(), rays.ray);
   LaneMask hit = 0;  // Embree marks them with tfar = -infinity
   for (int i = 0; i < kLanes; ++i) hit |= static_cast<LaneMask>(rays.ray.tfar[i] < 0.0F) << i;
   return hit & active;

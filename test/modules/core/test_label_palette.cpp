@@ -11,7 +11,7 @@
 namespace km {
 namespace {
 
-using Catch::Matchers::Contains;
+using Catch::Contains;
 
 const std::string kHeader = "name,red,green,blue,alpha,id\n";
 

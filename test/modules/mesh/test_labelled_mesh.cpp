@@ -56,7 +56,7 @@ TEST_CASE("Vertices take the colour of their class, black outside the palette") 
   CHECK(mesh.colors[1] == LabelledMesh::Color{10, 20, 30});
 }
 
-using Catch::Matchers::Contains;
+using Catch::Contains;
 
 std::filesystem::path write_text(const TemporaryFolder& folder, const std::string& text) {
   return folder.write("mesh.ply", text);

@@ -16,7 +16,7 @@
 namespace km {
 namespace {
 
-using Catch::Matchers::Contains;
+using Catch::Contains;
 
 constexpr ChunkGrid kGrid{.cell_m = 2.0, .step_m = 0.001};
 // Half a step, and the rounding of a float below 16 m.

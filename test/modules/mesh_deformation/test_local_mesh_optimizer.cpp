@@ -14,7 +14,7 @@
 namespace km {
 namespace {
 
-using Catch::Matchers::Contains;
+using Catch::Contains;
 
 constexpr double kSame = 1e-6;  // [m]: a few roundings of floats below 10 m
 

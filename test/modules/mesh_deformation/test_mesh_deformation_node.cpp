@@ -177,7 +177,7 @@ TEST_CASE("A last map that cannot be corrected is told", "[node]") {
   node.step(robot.map, 0.0);
   const CapturedLog log;
   node.step(kEnd, 0.0);
-  CHECK_THAT(log.text(), Catch::Matchers::Contains("the last map is not corrected"));
+  CHECK_THAT(log.text(), Catch::Contains("the last map is not corrected"));
   CHECK(robot.results().empty());
 }
 

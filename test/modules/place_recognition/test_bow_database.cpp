@@ -15,7 +15,7 @@
 namespace km {
 namespace {
 
-using Catch::Matchers::Contains;
+using Catch::Contains;
 
 constexpr double kScoreTolerance = 1e-5;  // sums of up to 40 floats below 1
 

@@ -22,7 +22,7 @@
 namespace km {
 namespace {
 
-using Catch::Matchers::Contains;
+using Catch::Contains;
 
 using Images = std::vector<std::vector<OrbDescriptor>>;
 

@@ -129,7 +129,7 @@ TEST_CASE("Poses of an odometry stand in for inertial samples", "[sensors][bag]"
   other->add("/left", image(kFirst, 1));
   other->add("/right", image(kFirst, 1));
   CHECK_THROWS_WITH(BagDataset("test.bag", std::move(other), rig, {}),
-                    Catch::Matchers::Contains("not of nav_msgs/Odometry"));
+                    Catch::Contains("not of nav_msgs/Odometry"));
 }
 
 TEST_CASE("A camera that is stamped late by a constant is paired, and it is said",
@@ -142,7 +142,7 @@ TEST_CASE("A camera that is stamped late by a constant is paired, and it is said
         "the right image is stamped 2.00 ms after the left one, within 1.00 ms");
   // As was asked for, it is not.
   CHECK_THROWS_WITH(BagDataset("test.bag", recording({.right_late = 2'000'000}), small_rig(), 1e-3),
-                    Catch::Matchers::Contains("left images without a right one"));
+                    Catch::Contains("left images without a right one"));
 }
 
 TEST_CASE("A frame whose right image is lost is counted, the others stay", "[sensors][bag]") {
@@ -172,9 +172,8 @@ TEST_CASE("A window of a bag begins with the second before it", "[sensors][bag]"
   BagDataset resumed("test.bag", recording({}), small_rig(), {},
                      {.not_before = kFirst + 30 * kFramePeriod});
   CHECK(packets_of(resumed).size() == 10);
-  CHECK_THROWS_WITH(
-      BagDataset("test.bag", recording({}), small_rig(), {}, {.from_s = 50.0}),
-      Catch::Matchers::StartsWith("test.bag: no frame") && Catch::Matchers::Contains("from 50 s"));
+  CHECK_THROWS_WITH(BagDataset("test.bag", recording({}), small_rig(), {}, {.from_s = 50.0}),
+                    Catch::StartsWith("test.bag: no frame") && Catch::Contains("from 50 s"));
 }
 
 TEST_CASE("Topics that are not there are refused with those that are", "[sensors][bag]") {
@@ -184,7 +183,7 @@ TEST_CASE("Topics that are not there are refused with those that are", "[sensors
                     "test.bag: no topic /rihgt; topics with images: /left, /right");
   rig.topics.right = "/imu";
   CHECK_THROWS_WITH(BagDataset("test.bag", recording({}), rig, {}),
-                    Catch::Matchers::Contains("/imu has messages of sensor_msgs/Imu"));
+                    Catch::Contains("/imu has messages of sensor_msgs/Imu"));
   CHECK_THROWS_WITH(BagDataset("test.bag", recording({.has_imu = false}), small_rig(), {}),
                     "test.bag: no topic /imu; topics with inertial samples: none");
 }
@@ -215,9 +214,9 @@ TEST_CASE("What of a bag cannot be read is counted with its place", "[sensors][b
   CHECK(packets_of(dataset).size() == 40);
   CHECK(dataset.report().count(ReaderFault::kDamagedBag) == 4);
   CHECK_THAT(dataset.report().entries().at(ReaderFault::kDamagedBag).first,
-             Catch::Matchers::Contains("test.bag byte"));
+             Catch::Contains("test.bag byte"));
   // Where nothing is left it may be why.
-  using Catch::Matchers::Contains;
+  using Catch::Contains;
   CHECK_THROWS_WITH(BagDataset("test.bag", damaged(std::make_unique<ListedBag>()), small_rig(), {}),
                     Contains("no topic /left; topics with images: none") &&
                         Contains("4 damaged pieces of the recording, first: ") &&

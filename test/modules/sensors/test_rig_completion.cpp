@@ -9,7 +9,7 @@
 namespace km {
 namespace {
 
-using Catch::Matchers::Contains;
+using Catch::Contains;
 
 RosCameraInfo info(const std::string& frame, double Tx) {
   RosCameraInfo info;

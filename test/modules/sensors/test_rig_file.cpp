@@ -9,7 +9,7 @@
 namespace km {
 namespace {
 
-using Catch::Matchers::Contains;
+using Catch::Contains;
 
 const std::string kStereo =
     "left: {topic: /cam0}\nright: {topic: /cam1}\nimu: {topic: /imu0}\n"

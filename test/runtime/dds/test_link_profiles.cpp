@@ -6,7 +6,7 @@
 #include "runtime/dds/participant.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 
-using Catch::Matchers::Contains;
+using Catch::Contains;
 
 namespace km {
 namespace {

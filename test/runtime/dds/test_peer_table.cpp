@@ -225,7 +225,7 @@ TEST_CASE("Nobody takes over the id of a robot that is there", "[peers]") {
   const auto events = table.take_events();
   REQUIRE(events.size() == 1);
   CHECK(events[0].kind == PeerEventKind::kRefused);
-  CHECK_THAT(events[0].text, Catch::Matchers::Contains("udp/10.0.0.66"));
+  CHECK_THAT(events[0].text, Catch::Contains("udp/10.0.0.66"));
   CHECK(table.standing(guid(3)) == Standing::kRival);
   CHECK(table.standing(guid(2)) == Standing::kAdmitted);
   CHECK(table.peers()[0].identity.boot == kBoot);
@@ -275,7 +275,7 @@ TEST_CASE("Of two processes with this robot's id the newer one yields", "[peers]
   const auto events = table.take_events();
   REQUIRE(events.size() == 1);
   CHECK(events[0].kind == expected);
-  CHECK_THAT(events[0].text, Catch::Matchers::Contains("give every robot its own --robot"));
+  CHECK_THAT(events[0].text, Catch::Contains("give every robot its own --robot"));
   CHECK(table.peers().empty());
 }
 
