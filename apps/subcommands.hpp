@@ -6,6 +6,8 @@
 #include <iostream>
 #include <string>
 
+#include "apps/program_version.hpp"
+
 namespace km {
 
 /// The main() of a program whose first word is a subcommand: each of `adders` adds one to the
@@ -16,6 +18,7 @@ inline int run_subcommands(const std::string& program, const char* about,
                            std::initializer_list<void (*)(CLI::App&)> adders, int argc,
                            char** argv) try {
   CLI::App app(about);
+  app.set_version_flag("--version", version_text(program));
   app.require_subcommand(1);
   for (const auto add : adders) add(app);
   try {

@@ -13,6 +13,7 @@
 #include "apps/doctor/network_probe.hpp"
 #include "apps/evaluate/stage_progress.hpp"
 #include "apps/output_file.hpp"
+#include "apps/program_version.hpp"
 #include "modules/sensors/rig_file_codec.hpp"
 #include "runtime/log.hpp"
 
@@ -71,6 +72,7 @@ Options parse_options(int argc, char** argv) {
   Options options;
   RobotOptions& robot = options.robot;
   CLI::App app{kAbout};
+  app.set_version_flag("--version", version_text("kimera_multi_doctor"));
   app.footer(kFooter);
   app.add_option("PATH", options.path, "Recording, or results")->check(CLI::ExistingPath);
   app.add_option("--live", options.live, "Rig file: look at the live topics that it names (ROS 2)")

@@ -9,6 +9,7 @@
 #include "apps/experiments/run_steps.hpp"
 #include "apps/experiments/step_record.hpp"
 #include "apps/program_folder.hpp"
+#include "apps/program_version.hpp"
 #include "modules/core/text_table.hpp"
 
 namespace {
@@ -207,6 +208,7 @@ void report(const km::ExperimentConfig& config, const km::ExperimentPaths& paths
 
 int main(int argc, char** argv) try {
   CLI::App app(kAbout);
+  app.set_version_flag("--version", km::version_text("kimera_multi_experiments"));
   Options options;
   define(app, options);
   app.require_subcommand(1);

@@ -16,6 +16,7 @@
 
 #include "apps/experiments/step_record.hpp"
 #include "apps/output_file.hpp"
+#include "apps/program_version.hpp"
 #include "apps/team/robot_process.hpp"
 #include "modules/core/text_table.hpp"
 #include "runtime/clock.hpp"

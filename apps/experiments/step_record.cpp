@@ -13,8 +13,6 @@
 #include "modules/core/bytes.hpp"
 #include "modules/core/json.hpp"
 
-#include "commit.hpp"  // written by the build
-
 namespace km {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Machine, processor, cores, memory_gb, load)
@@ -155,10 +153,6 @@ StepState state_of(const Step& step, const fs::path& results) {
   if (made && !record && step.adoptable) return StepState::kFound;
   if (!step.missing.empty()) return StepState::kMissing;
   return made && record ? StepState::kOutdated : StepState::kToDo;
-}
-
-std::string built_commit() {
-  return kCommit;
 }
 
 }  // namespace km

@@ -76,7 +76,4 @@ enum class StepState {
 /// Looks at the files only. An outdated step that needs none of the missing things is kOutdated.
 [[nodiscard]] StepState state_of(const Step& step, const std::filesystem::path& results);
 
-/// Commit that this program was built from, "unknown" outside a repository.
-[[nodiscard]] std::string built_commit();
-
 }  // namespace km

@@ -5,6 +5,7 @@
 #include <iostream>
 #include <thread>
 
+#include "apps/program_version.hpp"
 #include "apps/publish/answers.hpp"
 #include "apps/publish/euroc_messages.hpp"
 #include "apps/publish/message_player.hpp"
@@ -50,6 +51,7 @@ struct Options {
 Options parse_options(int argc, char** argv) {
   Options options;
   CLI::App app{kAbout};
+  app.set_version_flag("--version", version_text("kimera_multi_publish"));
   app.footer(kFooter);
   app.add_option("RECORDING", options.recording)->required()->check(CLI::ExistingPath);
   app.add_option("--rate", options.play.rate, "Speed: 1 real time, 2 twice as fast")

@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <sstream>
 
+#include "apps/program_version.hpp"
 #include "apps/robot/inspect.hpp"
 #include "apps/robot/robot_config.hpp"
 #include "apps/robot/run.hpp"
@@ -177,6 +178,7 @@ void add_output(CLI::App& app, RobotOptions& options) {
 RobotOptions parse_options(int argc, char** argv) {
   RobotOptions options;
   CLI::App app{"One robot of the team: odometry, place recognition, and the team's pose graph."};
+  app.set_version_flag("--version", version_text("kimera_multi_robot"));
   app.footer(kFooter);
   app.add_option("--config", options.configs, "Configuration files; later ones override earlier")
       ->check(CLI::ExistingFile);

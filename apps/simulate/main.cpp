@@ -2,6 +2,7 @@
 #include <exception>
 #include <iostream>
 
+#include "apps/program_version.hpp"
 #include "apps/simulate/simulate.hpp"
 
 namespace {
@@ -33,6 +34,7 @@ constexpr const char* kAbout =
 
 int main(int argc, char** argv) try {
   CLI::App app(kAbout);
+  app.set_version_flag("--version", km::version_text("kimera_multi_simulate"));
   km::SimulationOptions options;
   km::define(app, options);
   try {

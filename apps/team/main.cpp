@@ -6,6 +6,7 @@
 
 #include "apps/output_file.hpp"
 #include "apps/program_folder.hpp"
+#include "apps/program_version.hpp"
 #include "apps/result_files.hpp"
 #include "apps/result_writer.hpp"
 #include "apps/team/links_file.hpp"
@@ -232,6 +233,7 @@ int run(const TeamOptions& options) {
 
 int main(int argc, char** argv) try {
   CLI::App app(kAbout);
+  app.set_version_flag("--version", km::version_text("kimera_multi_team"));
   TeamOptions options;
   define(app, options);
   try {

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "apps/output_file.hpp"
+#include "apps/program_version.hpp"
 #include "apps/viewer/page_message.hpp"
 #include "apps/viewer/page_server.hpp"
 #include "apps/viewer/run_playback.hpp"
@@ -226,6 +227,7 @@ void show_team(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
 
 int main(int argc, char** argv) try {
   CLI::App app(km::kAbout);
+  app.set_version_flag("--version", km::version_text("kimera_multi_viewer"));
   km::ViewerOptions options;
   km::define(app, options);
   try {

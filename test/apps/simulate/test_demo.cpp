@@ -49,6 +49,17 @@ TEST_CASE("The demo says how long its world is", "[demo]") {
   CHECK_THAT(help.output, Catch::Contains("The simulated world is 25 s long, with --short 8 s"));
 }
 
+TEST_CASE("The demo says how a bag is played", "[demo]") {
+  const TemporaryFolder folder;
+  const std::string bag = GENERATE("walk.bag", "walk.mcap", "ros2/metadata.yaml", "ros2/walk.db3");
+  std::filesystem::path path = folder.write(bag, "x");
+  if (bag.starts_with("ros2/m")) path = path.parent_path();
+  const auto demo = run_command("apps/demo " + path.string());
+  CHECK(demo.exit_code == 1);
+  CHECK_THAT(demo.output, Catch::Contains("--inspect " + path.string() + " rig.yaml") &&
+                              Catch::Contains("--dataset " + path.string() + " --rig rig.yaml"));
+}
+
 TEST_CASE("The demo refuses what it cannot use", "[demo]") {
   const auto refusal = [](const std::string& arguments) {
     const auto result = run_command("apps/demo " + arguments);

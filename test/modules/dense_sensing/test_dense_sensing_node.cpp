@@ -17,6 +17,7 @@ struct Bench {
   StereoRig rig;
   StereoFrame seen;
   Topic<LocatedFrame> located;
+  Topic<ShedLoad> load;
   Topic<DenseFrame> frames;
   Topic<DenseSensingProgress> progress;
   std::vector<DenseFrame> published;
@@ -35,7 +36,7 @@ struct Bench {
   }
 
   DenseSensingTopics topics() {
-    return {.located = located, .frames = frames, .progress = progress};
+    return {.located = located, .load = load, .frames = frames, .progress = progress};
   }
 
   LocatedFrame frame(int i, bool with_depth) const {
@@ -84,6 +85,19 @@ TEST_CASE("A due frame without depth is made up for by the next one", "[dense_se
   CHECK(bench.published.front().stamp == kPeriod);
   CHECK(bench.last.without_depth > 0);
   CHECK(bench.last.frames == bench.published.size());
+}
+
+TEST_CASE("Frames that are due while the map gives way are left out and counted",
+          "[dense_sensing_node]") {
+  Bench bench;
+  for (int i = 0; i < 41; ++i) {
+    if (i == 8) bench.load.publish(ShedLoad{.map = true, .stride = 1});
+    if (i == 24) bench.load.publish(ShedLoad{});
+    bench.node->step(bench.frame(i, true));
+  }
+  CHECK(bench.last.gave_way == 4);  // at 8, 12, 16 and 20
+  CHECK(bench.last.frames == 7);
+  CHECK(bench.published.size() == 7);
 }
 
 TEST_CASE("The thread handles what was queued before it stops", "[dense_sensing_node]") {

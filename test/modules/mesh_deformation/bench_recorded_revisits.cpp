@@ -70,7 +70,9 @@ class Mapping {
  public:
   Mapping(const Task& task, const Run& run, const Camera& camera, const LabelPalette& palette)
       : run_(run), camera_(camera), mapper_(config(task), camera, palette), corrector_(lmo(task)) {
-    std::printf("time_s,resident_mb,blocks,vertices,faces,dropped_faces,nodes,correction_cpu_s\n");
+    std::printf(
+        "time_s,resident_mb,blocks,vertices,faces,dropped_faces,nodes,correction_cpu_s,system_s,"
+        "page_faults\n");
   }
 
   void add(Stamp stamp, const DenseImages& images) {
@@ -113,10 +115,11 @@ class Mapping {
     const double end_s = cpu_s();
     (void)mapper_.drop(result.superseded);
     const MapSize size = mapper_.size();
-    std::printf("%.1f,%.1f,%zu,%zu,%zu,%zu,%zu,%.2f\n", seconds_between(*first_, meshed_),
-                1e-6 * static_cast<double>(process_usage().resident_bytes), size.blocks,
-                size.vertices, size.faces, size.dropped_faces, result.report.nodes,
-                end_s - start_s);
+    const ProcessUsage usage = process_usage();
+    std::printf("%.1f,%.1f,%zu,%zu,%zu,%zu,%zu,%.2f,%.2f,%llu\n", seconds_between(*first_, meshed_),
+                1e-6 * static_cast<double>(usage.resident_bytes), size.blocks, size.vertices,
+                size.faces, size.dropped_faces, result.report.nodes, end_s - start_s,
+                usage.system_s, static_cast<unsigned long long>(usage.page_faults));
     std::fflush(stdout);
     return result;
   }

@@ -16,6 +16,7 @@
 #include "modules/mesh/ply_file.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/sensors/euroc_rig_codec.hpp"
+#include "test/support/processor_use.hpp"
 
 namespace km {
 namespace {
@@ -47,6 +48,7 @@ void map_with_true_poses(const Task& task) {
   std::optional<Stamp> last;
   KeyframeIndex frames = 0;
   double sensing_s = 0.0, mapping_s = 0.0;
+  const ProcessorUse before = processor_use();
   while (const auto packet = reader.next()) {
     const Stamp stamp = packet->frame->stamp;
     if (last && seconds_between(*last, stamp) < 1.0 / task.rate_hz - kJitter_s) continue;
@@ -64,11 +66,15 @@ void map_with_true_poses(const Task& task) {
     mapping_s += cpu_s() - sensed_s;
   }
   if (frames == 0) throw DatasetError(task.dataset + ": no frame with depth and a true pose");
+  const std::string share = kernel_share(before, frames);
   LabelledMesh mesh = mapper.mesh().mesh;
   mesh.colour_by(reader.label_palette());
   write_ply(task.output, mesh);
-  std::printf("%u frames, %zu vertices; CPU a frame: depth and labels %.2f ms, map %.2f ms\n",
-              frames, mesh.vertices.size(), 1e3 * sensing_s / frames, 1e3 * mapping_s / frames);
+  std::printf(
+      "%u frames, %zu vertices; CPU a frame: depth and labels %.2f ms, map %.2f ms, "
+      "with reading %s\n",
+      frames, mesh.vertices.size(), 1e3 * sensing_s / frames, 1e3 * mapping_s / frames,
+      share.c_str());
 }
 
 }  // namespace

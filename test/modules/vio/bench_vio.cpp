@@ -108,12 +108,14 @@ void print_piece(const char* name, const OdometryRun& run, std::size_t images) {
   }
   std::printf(
       "%s %4zu/%zu  ATE %6.2f mm max %6.2f  RPE %5.2f mm %5.3f deg  tilt %4.2f  scale %.3f  "
-      "| +2.4s ATE %5.2f RPE %5.2f %5.3f tilt %4.2f | cpu %.2f/%.2f/%.2f ms | it %.0f lm %.0f kf "
+      "| +2.4s ATE %5.2f RPE %5.2f %5.3f tilt %4.2f | cpu %.2f/%.2f/%.2f ms %s | it %.0f lm %.0f "
+      "kf "
       "%d restarts %d\n",
       name, run.states.size(), images, 1e3 * all.ate_m, 1e3 * all.max_m, 1e3 * all.rpe_m,
       all.rpe_deg, all.tilt_deg, all.scale, 1e3 * late.ate_m, 1e3 * late.rpe_m, late.rpe_deg,
       late.tilt_deg, quantile(cpu, 0.5), quantile(cpu, 0.95), quantile(run.cpu_ms, 1.0),
-      quantile(iterations, 0.5), quantile(landmarks, 0.5), keyframes, run.statistics.starts - 1);
+      run.kernel_share.c_str(), quantile(iterations, 0.5), quantile(landmarks, 0.5), keyframes,
+      run.statistics.starts - 1);
 }
 
 Recording with_black_images(Recording recording, double from_s, double to_s) {

@@ -17,6 +17,7 @@
 #include "modules/dense_sensing/stereo_depth.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/sensors/euroc_rig_codec.hpp"
+#include "test/support/processor_use.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -98,6 +99,7 @@ OdometryRun run_odometry(const Recording& recording, std::size_t first, std::siz
   if (checkpoint) vio.continue_from(*checkpoint);
   OdometryRun run;
   std::map<Stamp, const SE3*> truth;
+  const ProcessorUse before = processor_use();
   for (std::size_t k = first; k < last; ++k) {
     truth[recording.packets[k].frame->stamp] = &recording.T_world_body[k];
     const double begin = thread_cpu_ms();
@@ -110,6 +112,7 @@ OdometryRun run_odometry(const Recording& recording, std::size_t first, std::siz
     run.keyframes.insert(run.keyframes.end(), result.keyframes.begin(), result.keyframes.end());
     run.results.push_back(std::move(result));
   }
+  run.kernel_share = kernel_share(before, static_cast<double>(last - first));
   run.statistics = vio.statistics();
   return run;
 }

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "modules/core/geometry.hpp"
@@ -19,6 +20,7 @@ struct OdometryRun {
   std::vector<SE3> truth;  ///< At the states.
   std::vector<KeyframeOdometry> keyframes;
   std::vector<double> cpu_ms;  ///< Of each process(), this thread.
+  std::string kernel_share;    ///< Of a whole call, see test/support/processor_use.hpp.
   std::vector<VioResult> results;
   VioStatistics statistics;
 };

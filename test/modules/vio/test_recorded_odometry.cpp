@@ -325,18 +325,29 @@ TEST_CASE("The odometry node publishes what odometry gives, in order of time", "
   Topic<TrackedImage> images;
   std::vector<TrackedImage> tracked;
   images.subscribe([&](const auto& image) { tracked.push_back(*image); });
+  Topic<ProcessedFrame> processed;
+  std::vector<ProcessedFrame> finished;
+  processed.subscribe([&](const auto& frame) { finished.push_back(*frame); });
   VioNode node(5, data->rig, TrackerConfig{}, VioConfig{},
                {.packets = packets,
                 .odometry = odometry,
                 .keyframes = keyframes,
                 .frames = frames,
                 .statistics = statistics,
-                .images = images});
+                .images = images,
+                .processed = processed});
   node.start();
   for (std::size_t k = 0; k < 40; ++k) packets.publish(data->packets[k]);
   node.stop();  // drains the queue
   CHECK(node.error() == nullptr);
   CHECK(stamps.size() == 40);
+  REQUIRE(finished.size() == 40);
+  CHECK_FALSE(finished[0].tracked_share);  // no image before it
+  for (std::size_t k = 0; k < finished.size(); ++k) {
+    CHECK(finished[k].stamp == data->packets[k].frame->stamp);
+    if (k > 0) CHECK(finished[k].tracked_share.value_or(0.0) > 0.6);
+    CHECK(finished[k].tracked_share.value_or(1.0) <= 1.0);
+  }
   CHECK(std::is_sorted(stamps.begin(), stamps.end()));
   REQUIRE(indices.size() >= 2);
   for (std::size_t k = 0; k < indices.size(); ++k) CHECK(indices[k] == k);

@@ -9,6 +9,7 @@ using Catch::Approx;
 
 namespace Catch {
 
+using TestEventListenerBase = EventListenerBase;
 using Matchers::EndsWith;
 using Matchers::Equals;
 using Matchers::Matches;

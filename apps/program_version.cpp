@@ -1,0 +1,15 @@
+#include "apps/program_version.hpp"
+
+#include "commit.hpp"  // written by the build
+
+namespace km {
+
+std::string built_commit() {
+  return kCommit;
+}
+
+std::string version_text(const std::string& program) {
+  return program + " " KM_VERSION "\ncommit " + built_commit() + "\nbuilt with " KM_BUILT_WITH;
+}
+
+}  // namespace km
