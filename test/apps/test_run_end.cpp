@@ -131,7 +131,8 @@ TEST_CASE("A run without a single pose is none, and tells where the images went"
   const Verdict verdict = verdict_of(end);
   CHECK(verdict.exit_code == 1);
   CHECK(verdict.reason ==
-        "no pose estimated: of 100 images, 4 could not be used, 6 were skipped to keep the rate, "
+        "no pose estimated: of 100 images, 4 could not be used, 6 were skipped because processors "
+        "were short, "
         "90 were read but odometry did not start on them");
 }
 

@@ -114,7 +114,8 @@ TEST_CASE("Images that come three times as fast as odometry is are left out even
   }
 }
 
-TEST_CASE("Odometry keeps the images that it needs to hold on; the recording waits", "[sensors]") {
+TEST_CASE("Odometry keeps the images that it needs to hold on, and the recording waits",
+          "[sensors]") {
   // A fifth of the features is lost from image to image: of every second image's, 0.64 stay, of
   // every fourth one's 0.41.
   Playback run{.cost_s = 0.25, .share_per_s = std::pow(0.8, 1.0 / kPeriod_s)};
