@@ -211,7 +211,9 @@ RunSummary summary_of(const RunRecord& record) {
                  .gradient_norm = progress.gradient_norm,
                  .anchor = progress.anchor,
                  .settled = progress.settled,
-                 .members = progress.members};
+                 .members = progress.members,
+                 .odometry_rotation_noise = progress.odometry_rotation_noise,
+                 .odometry_translation_noise = progress.odometry_translation_noise};
   if (record.odometry_statistics()) summary.odometry = odometry_of(*record.odometry_statistics());
   summary.holes = holes_of(record.odometry());
   if (record.calibration()) summary.cameras = cameras_of(*record.calibration());

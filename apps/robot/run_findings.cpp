@@ -178,6 +178,23 @@ void add_map_gave_way(const RunSummary& run, std::vector<Finding>& findings) {
                                "faster computer"});
 }
 
+void add_noisy_odometry(const RunSummary& run, std::vector<Finding>& findings) {
+  const OptimizerSummary& pgo = run.pgo;
+  constexpr double kNoisy = 2.0;
+  if (std::max(pgo.odometry_rotation_noise, pgo.odometry_translation_noise) < kNoisy) return;
+  findings.push_back(
+      {.id = "odometry.noisy",
+       .severity = Severity::kWarning,
+       .what = run.name + ": its odometry is " + fixed(pgo.odometry_rotation_noise, 1) +
+               " times noisier in rotation and " + fixed(pgo.odometry_translation_noise, 1) +
+               " times in translation than it claims",
+       .means = "loop closures inside the robot contradict its odometry by that "
+                "much: the pose graph weighs it accordingly",
+       .to_do = "kimera_multi_doctor on the recording looks at calibration and "
+                "stamps; vio.drift_rotation and vio.drift_translation are what "
+                "odometry claims"});
+}
+
 // Samples and messages are more than frames: a share of the frames makes their faults look no
 // rarer.
 void add_sensor_faults(const RunSummary& run, std::vector<Finding>& findings) {
@@ -373,6 +390,7 @@ std::vector<Finding> findings_of(std::span<const RunFacts> runs) {
     add_slowed(run.summary, findings);
     add_paused(run.summary, findings);
     add_map_gave_way(run.summary, findings);
+    add_noisy_odometry(run.summary, findings);
     add_sensor_faults(run.summary, findings);
     add_holes(run.summary, findings);
     add_rejected(run, findings);

@@ -36,6 +36,8 @@ struct OptimizerSummary {
   std::optional<RobotId> anchor;  ///< Robot whose frame the poses are in.
   bool settled = false;
   std::vector<RobotId> members;
+  /// Noise of odometry in multiples of what it claims.
+  double odometry_rotation_noise = 1.0, odometry_translation_noise = 1.0;
 
   void visit_fields(auto& visitor) {
     visitor.field("rounds", rounds);
@@ -45,6 +47,8 @@ struct OptimizerSummary {
     visitor.field("anchor", anchor);
     visitor.field("settled", settled);
     visitor.field("members", members);
+    visitor.field("odometry_rotation_noise", odometry_rotation_noise);
+    visitor.field("odometry_translation_noise", odometry_translation_noise);
   }
   bool operator==(const OptimizerSummary&) const = default;
 };

@@ -98,6 +98,9 @@ struct OptimizerProgress {
   double gradient_norm = 0.0;    ///< Of the team: Riemannian, or (newton) its Newton decrement.
   double seconds = 0.0;          ///< Time spent optimising.
   bool settled = false;          ///< Nothing left to improve with what is known.
+  /// Noise of this robot's odometry in multiples of what it claims, see OdometryNoise.
+  double odometry_rotation_noise = 1.0;
+  double odometry_translation_noise = 1.0;
 };
 
 }  // namespace km

@@ -170,8 +170,15 @@ const std::vector<PoseEdge>* OwnGraph::newest_edges(RobotId peer) const {
                                                               : &sets->second.complete[0].edges;
 }
 
+void OwnGraph::judge_odometry() {
+  const std::vector<PoseEdge>* inside = newest_edges(self_);
+  odometry_noise_ =
+      inside == nullptr ? OdometryNoise{} : estimate_odometry_noise(odometry_, *inside);
+}
+
 std::vector<PoseEdge> OwnGraph::own_edges() const {
   std::vector<PoseEdge> edges = odometry_;
+  for (PoseEdge& step : edges) step.precision = odometry_noise_.corrected(step.precision);
   if (const std::vector<PoseEdge>* inside = newest_edges(self_))
     edges.insert(edges.end(), inside->begin(), inside->end());
   return edges;
@@ -185,7 +192,7 @@ Precision OwnGraph::mean_step_precision() const {
     sum.tau += step.precision.tau;
   }
   const auto steps = static_cast<double>(odometry_.size());
-  return {sum.kappa / steps, sum.tau / steps};
+  return odometry_noise_.corrected({sum.kappa / steps, sum.tau / steps});
 }
 
 }  // namespace km

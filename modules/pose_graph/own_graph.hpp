@@ -6,6 +6,7 @@
 
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
+#include "modules/pose_graph/odometry_noise.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
 #include "modules/pose_graph/team_messages.hpp"
 #include "modules/pose_graph/vertical_prior.hpp"
@@ -54,6 +55,12 @@ class OwnGraph {
   /// Edges of the newest complete set with a peer; nullptr if there is none.
   [[nodiscard]] const std::vector<PoseEdge>* newest_edges(RobotId peer) const;
 
+  /// Estimates the noise of odometry anew, from the closures inside this robot. From now on steps
+  /// have the weights that follow.
+  void judge_odometry();
+  /// As last estimated; of no more noise than odometry claims before.
+  [[nodiscard]] const OdometryNoise& odometry_noise() const { return odometry_noise_; }
+
   /// Odometry from each keyframe to the next, then closures inside this robot, ascending by id.
   [[nodiscard]] std::vector<PoseEdge> own_edges() const;
   /// Pose of keyframe 0 in the frame of odometry; the identity before there is one.
@@ -87,7 +94,8 @@ class OwnGraph {
   SE3 T_odom_first_ = SE3::Identity();
   std::uint32_t keyframes_ = 0;
   std::uint32_t revision_ = 0;
-  std::vector<PoseEdge> odometry_;
+  std::vector<PoseEdge> odometry_;  // with the precision that it claims
+  OdometryNoise odometry_noise_;
   std::vector<VerticalPrior> verticals_;
   std::map<ClosureId, PoseEdge> closures_;
   std::map<RobotId, std::size_t> closures_to_;  // by peer; of `closures_`

@@ -315,6 +315,8 @@ void TeamAgent::publish(TeamOutput& output) {
 OptimizerProgress TeamAgent::make_progress() const {
   OptimizerProgress progress{.anchor = world_ ? world_->anchor : self_.robot,
                              .members = {self_.robot}};
+  progress.odometry_rotation_noise = graph_.odometry_noise().rotation;
+  progress.odometry_translation_noise = graph_.odometry_noise().translation;
   progress.round = rounds_before_;
   progress.seconds = optimising_s_;
   if (!part_) return progress;

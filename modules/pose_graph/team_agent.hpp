@@ -138,6 +138,7 @@ class TeamAgent {
   void consider(const Session& session);
 
   // The session that this robot is in.
+  void judge_odometry();
   bool join(const Session& session);
   [[nodiscard]] std::optional<FrozenPart> freeze(const Session& session) const;
   void extend_poses();
@@ -196,6 +197,7 @@ class TeamAgent {
   double started_s_ = 0.0;
   std::uint64_t sent_bytes_ = 0;        // for it, to every reader, and passed on
   std::map<ClosureId, bool> verdicts_;  // of that session
+  double odometry_noticed_ = 0.0;       // largest noise scale of odometry in a notice
   std::optional<World> world_;          // in frame_
   std::size_t chordal_tried_ = 0;       // with so many closures inside this robot
 

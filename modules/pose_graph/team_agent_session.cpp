@@ -2,6 +2,7 @@
 #include <exception>
 #include <utility>
 
+#include "modules/core/text_table.hpp"
 #include "modules/pose_graph/frame_entry.hpp"
 #include "modules/pose_graph/team_agent.hpp"
 #include "modules/pose_graph/team_plan.hpp"
@@ -14,6 +15,11 @@ namespace {
 
 // A session in which nothing has happened for so many status periods is replaced.
 constexpr double kHopelessPeriods = 15.0;
+
+// Odometry this many times noisier than it claims is worth a notice, and another one when it is
+// this much worse.
+constexpr double kNoisyOdometry = 2.0;
+constexpr double kNoticedAgain = 1.5;
 
 // After so long without anything new [s] the team has come to rest.
 constexpr double kAtRest_s = 2.0;
@@ -238,8 +244,21 @@ void TeamAgent::try_chordal(const Session& session) {
   poses_ = better_of_chordal(std::move(poses_), own);
 }
 
+void TeamAgent::judge_odometry() {
+  graph_.judge_odometry();
+  const OdometryNoise& noise = graph_.odometry_noise();
+  const double worst = std::max(noise.rotation, noise.translation);
+  if (worst < kNoisyOdometry || worst < kNoticedAgain * odometry_noticed_) return;
+  odometry_noticed_ = worst;
+  notices_.push_back("odometry is " + fixed(noise.rotation, 1) + " times noisier in rotation and " +
+                     fixed(noise.translation, 1) + " times in translation than it claims, by " +
+                     std::to_string(noise.places) +
+                     " places of loop closures inside this robot; it is weighed accordingly");
+}
+
 bool TeamAgent::join(const Session& session) {
   if (graph_.keyframes() == 0) return false;
+  if (config_.robust) judge_odometry();
   auto part = freeze(session);
   if (!part) return false;
   if (in_session()) leave(part_->all_solved(told_));

@@ -151,6 +151,12 @@ TEST_CASE("What stands out of a run is told with its number", "[robot][findings]
     summary.rate = 0.625;
     told("frames.slowed", Severity::kNote, "played at 0.6");
   }
+  SECTION("odometry that is noisier than it claims") {
+    summary.pgo.odometry_translation_noise = 6.75;
+    told("odometry.noisy", Severity::kWarning, "1.0 times noisier in rotation and 6.8 times");
+    summary.pgo.odometry_translation_noise = 1.5;
+    CHECK(findings_of_one(run).empty());
+  }
   SECTION("a recording that was paused") {
     summary.paused_s = 3.25;
     told("frames.paused", Severity::kNote, "paused for 3.2 s in all");

@@ -65,6 +65,7 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/closures/candidates /closures/verified /closures/inliers "
         "/pgo/rounds /pgo/seconds /pgo/cost /pgo/gradient_norm /pgo/anchor /pgo/settled "
         "/pgo/members/0 /pgo/members/1 "
+        "/pgo/odometry_rotation_noise /pgo/odometry_translation_noise "
         "/odometry/starts /odometry/divergences /odometry/inertial_gaps /odometry/refused_images "
         "/odometry/refused_samples /odometry/images_without_pose /odometry/vision_losses "
         "/odometry/blind_seconds "

@@ -1,0 +1,223 @@
+#include "modules/pose_graph/odometry_noise.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "modules/core/lie.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::uint32_t kPlace = 10;  // keyframes that a place extends to, at both ends
+constexpr std::size_t kMostCycles = 200;
+constexpr double kPriorSigma = 1.0986;  // log 3, of log sqrt(v)
+constexpr double kLeastSide_m = 1.0;    // of the volume of false closures
+constexpr double kRatioSigma = 0.6931;  // log 2, of log sqrt(v_R / v_t)
+// Log of the odds from which on odometry is taken to be noisier than it claims: one in 1000 wrong.
+constexpr double kEvidence = 6.9;
+constexpr int kSweeps = 4;
+constexpr int kShareSteps = 5;
+
+// Variance factors: of steps' rotations and translations, and of closures.
+enum Component : std::size_t { kRotation, kTranslation, kClosure, kComponents };
+using Factors = std::array<double, kComponents>;
+
+struct Cycle {
+  Vector6 error;
+  std::array<Matrix6, kComponents> covariance;
+  double weight = 1.0;
+};
+
+// What the steps claim up to each keyframe, as perturbations of the first pose: differences are the
+// chains between.
+struct Chain {
+  std::vector<SE3> T_first_kf{SE3::Identity()};
+  std::array<std::vector<Matrix6>, 2> covariance{std::vector{Matrix6(Matrix6::Zero())},
+                                                 std::vector{Matrix6(Matrix6::Zero())}};
+
+  explicit Chain(std::span<const PoseEdge> steps) {
+    for (const PoseEdge& step : steps) {
+      T_first_kf.push_back(T_first_kf.back() * step.T_from_to);
+      const Matrix6 Ad = adjoint(T_first_kf.back());
+      const Matrix6 claimed = covariance_of(step.precision);
+      for (const Component part : {kRotation, kTranslation}) {
+        Matrix6 Sigma = Matrix6::Zero();
+        const Eigen::Index begin = part == kRotation ? 0 : 3;
+        Sigma.block<3, 3>(begin, begin) = claimed.block<3, 3>(begin, begin);
+        covariance[part].push_back(covariance[part].back() + Ad * Sigma * Ad.transpose());
+      }
+    }
+  }
+
+  // The cycle from the lower end along the steps to the upper one, and back by the closure.
+  [[nodiscard]] Cycle close(const PoseEdge& closure) const {
+    const bool is_up = closure.from < closure.to;
+    const std::size_t i = (is_up ? closure.from : closure.to).index;
+    const std::size_t j = (is_up ? closure.to : closure.from).index;
+    const SE3 measured = is_up ? closure.T_from_to : closure.T_from_to.inverse();
+    const SE3 T_j_first = T_first_kf[j].inverse();
+    const Matrix6 Ad = adjoint(T_j_first);
+    Cycle cycle;
+    // From the closure's upper pose to the chain's: small, so that both covariances are at j.
+    cycle.error = se3_log(measured.inverse() * T_first_kf[i].inverse() * T_first_kf[j]);
+    for (const Component part : {kRotation, kTranslation})
+      cycle.covariance[part] = Ad * (covariance[part][j] - covariance[part][i]) * Ad.transpose();
+    cycle.covariance[kClosure] = covariance_of(closure.precision);
+    if (!is_up) {
+      const Matrix6 Ad_closure = adjoint(closure.T_from_to);
+      cycle.covariance[kClosure] = Ad_closure * cycle.covariance[kClosure] * Ad_closure.transpose();
+    }
+    return cycle;
+  }
+};
+
+std::vector<PoseEdge> in_order(std::span<const PoseEdge> closures, std::size_t keyframes) {
+  std::vector<PoseEdge> sorted;
+  for (const PoseEdge& closure : closures)
+    if (closure.from.index < keyframes && closure.to.index < keyframes) sorted.push_back(closure);
+  std::ranges::sort(sorted, {}, &PoseEdge::id);
+  return sorted;
+}
+
+// Cycles with the weights by which a place counts once.
+std::vector<Cycle> cycles_of(const Chain& chain, std::span<const PoseEdge> closures,
+                             std::size_t& places) {
+  const std::vector<PoseEdge> sorted = in_order(closures, chain.T_first_kf.size());
+  std::vector<ClosureId> first_of;  // of each place
+  std::vector<std::size_t> sizes, place_of;
+  const auto near = [](const KeyframeId& a, const KeyframeId& b) {
+    return std::max(a.index, b.index) - std::min(a.index, b.index) <= kPlace;
+  };
+  for (const PoseEdge& closure : sorted) {
+    const ClosureId id = closure.id();
+    // Only the places that begin a little before it can hold it.
+    std::size_t place = first_of.size();
+    for (std::size_t k = first_of.size(); k-- > 0 && near(first_of[k].from, id.from);)
+      if (near(first_of[k].to, id.to)) place = k;
+    if (place == first_of.size()) {
+      first_of.push_back(id);
+      sizes.push_back(0);
+    }
+    ++sizes[place];
+    place_of.push_back(place);
+  }
+  places = first_of.size();
+  std::vector<Cycle> cycles;
+  const std::size_t stride = (sorted.size() + kMostCycles - 1) / kMostCycles;
+  for (std::size_t k = 0; k < sorted.size(); k += stride) {
+    cycles.push_back(chain.close(sorted[k]));
+    cycles.back().weight = static_cast<double>(stride) / static_cast<double>(sizes[place_of[k]]);
+  }
+  return cycles;
+}
+
+double log_density_if_true(const Cycle& cycle, const Factors& v) {
+  const Matrix6 Sigma = v[kRotation] * cycle.covariance[kRotation] +
+                        v[kTranslation] * cycle.covariance[kTranslation] +
+                        v[kClosure] * cycle.covariance[kClosure];
+  const Eigen::LLT<Matrix6> factor(Sigma);
+  const Vector6 white = factor.matrixL().solve(cycle.error);
+  const double log_root = factor.matrixLLT().diagonal().array().log().sum();
+  const double squared = white.squaredNorm();
+  return -0.5 * squared - log_root - 3.0 * std::log(2.0 * std::numbers::pi);
+}
+
+// The volume [m^3] in which a false closure may put its end: twice the box of the trajectory, and
+// as far beyond as closures reach.
+double volume_m3(const Chain& chain, std::span<const PoseEdge> closures) {
+  Eigen::AlignedBox3d box;
+  for (const SE3& T : chain.T_first_kf) box.extend(T.translation());
+  double reach_m = 0.0;
+  for (const PoseEdge& closure : closures)
+    reach_m = std::max(reach_m, closure.T_from_to.translation().norm());
+  return (2.0 * box.sizes().array() + 2.0 * reach_m + kLeastSide_m).prod();
+}
+
+// A false closure has any rotation and its end anywhere in the volume. In the tangent space at the
+// error the density of both has the factor det J = 2 (1 - cos |w|) / |w|^2.
+double log_density_if_false(const Cycle& cycle, double volume_m3) {
+  const double angle = cycle.error.head<3>().norm();
+  const double det_J = angle < 1e-3 ? 1.0 : 2.0 * (1.0 - std::cos(angle)) / (angle * angle);
+  constexpr double kRotations = 8.0 * std::numbers::pi * std::numbers::pi;
+  return 2.0 * std::log(det_J) - std::log(kRotations) - std::log(volume_m3);
+}
+
+// Log of the posterior density of the factors, at the likeliest share of true closures.
+double log_posterior(const std::vector<Cycle>& cycles, const std::vector<double>& if_false,
+                     const Factors& v) {
+  std::vector<double> ratio;  // density if true over density if false
+  for (std::size_t k = 0; k < cycles.size(); ++k)
+    ratio.push_back(
+        std::exp(std::clamp(log_density_if_true(cycles[k], v) - if_false[k], -600.0, 600.0)));
+  double share = 0.8, total = 0.0;
+  for (const Cycle& cycle : cycles) total += cycle.weight;
+  for (int i = 0; i < kShareSteps; ++i) {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < cycles.size(); ++k)
+      sum += cycles[k].weight * share * ratio[k] / (share * ratio[k] + 1.0 - share);
+    share = std::clamp(sum / total, 0.02, 0.98);
+  }
+  double log_sum = 0.0;
+  for (std::size_t k = 0; k < cycles.size(); ++k)
+    log_sum += cycles[k].weight * std::log(share * ratio[k] + 1.0 - share);
+  const auto prior = [](double log_root, double sigma) {
+    return -0.5 * log_root * log_root / (sigma * sigma);
+  };
+  for (const double factor : v) log_sum += prior(0.5 * std::log(factor), kPriorSigma);
+  return log_sum + prior(0.5 * std::log(v[kRotation] / v[kTranslation]), kRatioSigma);
+}
+
+}  // namespace
+
+OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
+                                      std::span<const PoseEdge> closures) {
+  OdometryNoise noise;
+  const Chain chain(steps);
+  const std::vector<Cycle> cycles = cycles_of(chain, closures, noise.places);
+  if (cycles.empty()) return noise;
+  std::vector<double> if_false;
+  const double volume = volume_m3(chain, closures);
+  for (const Cycle& cycle : cycles) if_false.push_back(log_density_if_false(cycle, volume));
+
+  // A pattern search, coarse to fine: along each factor, and along both of odometry's.
+  constexpr std::array<Factors, 5> kDirections{
+      {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, {1.0, 1.0, 0.0}, {1.0, -1.0, 0.0}}};
+  Factors best{1.0, 1.0, 1.0};
+  double most = log_posterior(cycles, if_false, best);
+  const auto try_factors = [&](const Factors& v) {
+    const double found = log_posterior(cycles, if_false, v);
+    if (found <= most) return false;
+    most = found;
+    best = v;
+    return true;
+  };
+  // Odometry that is worse altogether is farther away than one factor at a time can go.
+  for (double root = 2.0; root <= 32.0; root *= 2.0)
+    (void)try_factors({root * root, root * root, 1.0});
+  for (double ratio = 2.0; ratio > 1.05; ratio = std::sqrt(ratio))
+    for (int sweep = 0; sweep < kSweeps; ++sweep) {
+      bool is_better = false;
+      for (const Factors& direction : kDirections)
+        for (const double step : {ratio * ratio, 1.0 / (ratio * ratio)}) {
+          Factors next = best;
+          for (std::size_t f = 0; f < kComponents; ++f) next[f] *= std::pow(step, direction[f]);
+          for (const Component f : {kRotation, kTranslation}) next[f] = std::max(1.0, next[f]);
+          if (next != best) is_better |= try_factors(next);
+        }
+      if (!is_better) break;
+    }
+  // What closures alone explain is no evidence against odometry.
+  double without = log_posterior(cycles, if_false, {1.0, 1.0, 1.0});
+  for (double v = 1.0 / 64.0; v <= 4096.0; v *= 2.0)
+    without = std::max(without, log_posterior(cycles, if_false, {1.0, 1.0, v}));
+  if (most - without < kEvidence) return noise;
+  noise.rotation = std::sqrt(best[kRotation]);
+  noise.translation = std::sqrt(best[kTranslation]);
+  return noise;
+}
+
+}  // namespace km

@@ -1,0 +1,163 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "modules/core/lie.hpp"
+#include "modules/pose_graph/odometry_noise.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+// One robot on a helix that passes over itself every 50 keyframes, with claimed noise of 0.01 rad
+// and 5 cm a step and a closure.
+struct Walk {
+  static constexpr std::uint32_t kKeyframes = 300, kTurn = 50;
+  static constexpr double kRotation = 0.01, kTranslation = 0.05;
+
+  std::mt19937 rng;
+  std::vector<SE3> truth;
+  std::vector<PoseEdge> steps, closures;
+
+  explicit Walk(unsigned seed) : rng(seed) {
+    for (std::uint32_t k = 0; k < kKeyframes; ++k) {
+      const double angle = 2.0 * 3.14159265358979 * k / kTurn;
+      truth.push_back(make_pose(
+          Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix(),
+          Eigen::Vector3d(8.0 * std::cos(angle), 8.0 * std::sin(angle), 0.02 * k)));
+    }
+  }
+
+  PoseEdge edge(std::uint32_t i, std::uint32_t j, double rotation, double translation) {
+    Vector6 xi = random_vector<6>(rng);
+    xi.head<3>() *= rotation * kRotation;
+    xi.tail<3>() *= translation * kTranslation;
+    const Precision claimed{0.5 / (kRotation * kRotation), 1.0 / (kTranslation * kTranslation)};
+    return {{0, i}, {0, j}, truth[i].inverse() * truth[j] * se3_exp(xi), claimed};
+  }
+  void walk(double rotation, double translation) {
+    for (std::uint32_t k = 1; k < kKeyframes; ++k)
+      steps.push_back(edge(k - 1, k, rotation, translation));
+  }
+  void close(std::uint32_t every, double noise = 1.0) {
+    for (std::uint32_t k = 0; k + kTurn < kKeyframes; k += every) {
+      closures.push_back(edge(k, k + kTurn, noise, noise));
+      if (closures.size() % 2 == 0) {  // measured from the other end
+        PoseEdge& e = closures.back();
+        std::swap(e.from, e.to);
+        e.T_from_to = e.T_from_to.inverse();
+      }
+    }
+  }
+  void add_false(std::size_t count) {
+    std::uniform_int_distribution<std::uint32_t> any(0, kKeyframes - 1);
+    for (std::size_t k = 0; k < count; ++k) {
+      PoseEdge e = closures.front();
+      e.from.index = any(rng);
+      e.to.index = (e.from.index + 20 + any(rng) % 200) % kKeyframes;
+      e.T_from_to = random_pose(rng, 20.0);
+      closures.push_back(e);
+    }
+  }
+  [[nodiscard]] OdometryNoise noise() const { return estimate_odometry_noise(steps, closures); }
+};
+
+// The larger over the smaller.
+double factor(double a, double b) {
+  return std::max(a / b, b / a);
+}
+
+}  // namespace
+
+TEST_CASE("The noise of odometry is that of its cycles", "[odometry_noise]") {
+  const unsigned seed = GENERATE(range(1U, 11U));
+  const double scale = GENERATE(1.0, 2.0, 7.0, 20.0);
+  CAPTURE(seed, scale);
+  Walk walk(seed);
+  walk.walk(scale, scale);
+  walk.close(2);
+  const OdometryNoise noise = walk.noise();
+  // Five chains of the walk share no step, of three components each: the standard deviation of the
+  // log of a scale is 1 / sqrt(2 * 15) = 0.18, and three of them a factor of 1.7. Rotation noise
+  // times lever arms is as large as translation noise, so that the latter is known less well.
+  CHECK(noise.places >= 20);
+  CHECK(factor(noise.rotation, scale) < 1.7);
+  CHECK(factor(noise.translation, scale) < 2.2);
+}
+
+TEST_CASE("Rotation and translation are told apart", "[odometry_noise]") {
+  const unsigned seed = GENERATE(range(1U, 6U));
+  Walk walk(seed);
+  walk.walk(1.0, 10.0);
+  walk.close(2);
+  const OdometryNoise noise = walk.noise();
+  CHECK(noise.rotation < 1.5);
+  CHECK(factor(noise.translation, 10.0) < 1.7);
+}
+
+TEST_CASE("False closures do not make odometry noisy, nor hide that it is", "[odometry_noise]") {
+  const unsigned seed = GENERATE(range(1U, 6U));
+  const double scale = GENERATE(1.0, 7.0);
+  CAPTURE(seed, scale);
+  Walk walk(seed);
+  walk.walk(scale, scale);
+  walk.close(2);
+  walk.add_false(walk.closures.size() / 2);
+  const OdometryNoise noise = walk.noise();
+  // At 7 times the noise the ends of long chains are as far off as false closures are.
+  CHECK(factor(noise.rotation, scale) < (scale > 1.0 ? 2.0 : 1.7));
+  CHECK(factor(noise.translation, scale) < (scale > 1.0 ? 3.0 : 2.2));
+}
+
+TEST_CASE("A wrong place counts once, however many closures it has", "[odometry_noise]") {
+  Walk walk(1);
+  walk.walk(1.0, 1.0);
+  walk.close(10);
+  SE3 lie = random_pose(walk.rng, 5.0);
+  for (std::uint32_t k = 0; k < 10; ++k) {
+    PoseEdge e = walk.edge(20 + k, 240 + k, 1.0, 1.0);
+    e.T_from_to = walk.truth[20 + k].inverse() * lie * walk.truth[240 + k];
+    walk.closures.push_back(e);
+  }
+  const OdometryNoise noise = walk.noise();
+  CHECK(noise.rotation < 2.0);
+  CHECK(noise.translation < 2.0);
+}
+
+TEST_CASE("Closures that are noisier than they claim are not taken for odometry",
+          "[odometry_noise]") {
+  const unsigned seed = GENERATE(range(1U, 6U));
+  Walk walk(seed);
+  walk.walk(1.0, 1.0);
+  walk.close(2, 5.0);
+  for (std::uint32_t k = 0; k + 3 < Walk::kKeyframes; k += 10)  // short cycles: closures alone
+    walk.closures.push_back(walk.edge(k, k + 3, 5.0, 5.0));
+  const OdometryNoise noise = walk.noise();
+  CHECK(noise.rotation < 2.0);
+  CHECK(noise.translation < 2.0);
+}
+
+TEST_CASE("Without closures, or with a single one, odometry is taken at its word",
+          "[odometry_noise]") {
+  Walk walk(1);
+  walk.walk(1.0, 1.0);
+  CHECK(walk.noise().rotation == 1.0);
+  CHECK(walk.noise().places == 0);
+  walk.closures.push_back(walk.edge(3, 200, 1.0, 1.0));
+  CHECK(walk.noise().rotation < 1.5);
+  CHECK(walk.noise().translation < 1.5);
+  CHECK(walk.noise().places == 1);
+  walk.closures.front().to.index = 5000;  // no such keyframe
+  CHECK(walk.noise().places == 0);
+}
+
+TEST_CASE("A corrected precision has the variance that was found", "[odometry_noise]") {
+  const OdometryNoise noise{.rotation = 2.0, .translation = 5.0, .places = 1};
+  const Precision corrected = noise.corrected({8.0, 50.0});
+  CHECK(corrected.kappa == 2.0);
+  CHECK(corrected.tau == 2.0);
+}
+
+}  // namespace km
