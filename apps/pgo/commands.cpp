@@ -35,6 +35,14 @@ TeamGraph GraphInput::read(const CLI::App& app) const {
   if (app.count("--robots") > 0 && graph.robots() != robots)
     throw std::runtime_error("--robots " + std::to_string(robots) + ": there are " +
                              std::to_string(graph.robots()) + " robots in the folder or partition");
+  if (keep_steps) return graph;
+  graph = without_cut_steps(std::move(graph));
+  const std::vector<Eigen::Index> part = connected_parts(graph);
+  const auto apart = std::ranges::find_if(part, [](Eigen::Index lowest) { return lowest != 0; });
+  if (apart != part.end())
+    throw std::runtime_error(file.string() + ": no closures join robot " +
+                             std::to_string(graph.robot_of(apart - part.begin())) +
+                             " to robot 0. --keep-steps keeps the odometry between them");
   return graph;
 }
 

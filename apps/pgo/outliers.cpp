@@ -340,6 +340,10 @@ void define_scenario(CLI::App& app, OutliersCommand& command) {
       app, command, "--closure-share", [](Scenario& s, double share) { s.closure_share = share; },
       "Each closure of the graph is there with this probability")
       ->check(CLI::Range(0.0, 1.0));
+  change<double>(
+      app, command, "--inside-share", [](Scenario& s, double share) { s.inside_share = share; },
+      "Each of these inside a robot is, again, there with this probability")
+      ->check(CLI::Range(0.0, 1.0));
   change<std::size_t>(
       app, command, "--closures-per-pair",
       [](Scenario& s, std::size_t n) { s.closures_per_pair = n; },

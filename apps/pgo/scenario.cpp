@@ -36,6 +36,7 @@ const std::vector<Preset>& presets() {
                         .step_length_m = 0.22,
                         .step_sigma = kFineStep,
                         .closure_sigma = kFineClosure,
+                        .inside_share = 0.0,
                         .closures_per_pair = 6};
   const auto with = [](Scenario scenario, const std::string& name, auto change) {
     scenario.name = name;
@@ -94,6 +95,7 @@ const std::vector<Preset>& presets() {
       {with(garage, "place-bias",
             [](Scenario& s) {
               s.closures_per_pair.reset();
+              s.inside_share = 1.0;
               s.closure_share = 0.2;
               s.place_bias = 3.0;
             }),
@@ -181,12 +183,14 @@ void thin_out(TeamGraph& graph, const Scenario& scenario, std::mt19937& rng) {
   const std::vector<bool> odometry = odometry_edges(graph);
   std::vector<bool> stays(graph.edges.size(), true);
   std::bernoulli_distribution kept(scenario.closure_share);
+  std::bernoulli_distribution kept_inside(scenario.inside_share);
   std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> between;
   for (std::size_t k = 0; k < odometry.size(); ++k) {
     if (odometry[k]) continue;
-    stays[k] = kept(rng);
     const auto [a, b] =
         std::minmax({graph.robot_of(graph.edges[k].i), graph.robot_of(graph.edges[k].j)});
+    stays[k] = kept(rng);
+    if (a == b && !kept_inside(rng)) stays[k] = false;
     if (stays[k] && a != b) between[{a, b}].push_back(k);
   }
   if (scenario.closures_per_pair)

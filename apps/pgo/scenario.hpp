@@ -36,6 +36,7 @@ struct Scenario {
   std::optional<NoiseSigma> step_sigma = {};     ///< Claimed; nullopt: what the graph claims.
   std::optional<NoiseSigma> closure_sigma = {};  ///< The same of closures.
   double closure_share = 1.0;  ///< Probability with which a closure of the graph is kept.
+  double inside_share = 1.0;   ///< The same of closures inside a robot, on top of that.
   std::optional<std::size_t> closures_per_pair = {};  ///< At most so many between two robots.
 
   std::vector<RobotFactor> odometry_sigma = {};  ///< Claims and noise of its odometry, times this.

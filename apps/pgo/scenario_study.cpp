@@ -34,8 +34,8 @@ struct Minimum {
 };
 
 // Of edges that connect all poses.
-Minimum minimum_near(std::vector<SE3> start, const std::vector<BlockEdge>& edges, int dimension) {
-  constexpr std::uint32_t kMaxRounds = 300;
+Minimum minimum_near(std::vector<SE3> start, const std::vector<BlockEdge>& edges, int dimension,
+                     std::uint32_t most_steps) {
   constexpr double kPatience = 8.0;  // rounds: second derivatives need not be told
   SessionGraph graph{.start = std::move(start)};
   for (const BlockEdge& e : edges) graph.own.push_back(own_edge(e));
@@ -43,10 +43,10 @@ Minimum minimum_near(std::vector<SE3> start, const std::vector<BlockEdge>& edges
                     TreeNewtonOptions{.dimension = dimension,
                                       .absolute_tolerance = 1e-12,
                                       .patience_rounds = kPatience,
-                                      .max_rounds = kMaxRounds,
+                                      .max_rounds = most_steps,
                                       .robust = false});
   while (!newton.done()) (void)newton.advance();
-  return {newton.poses(), !newton.state().failed && newton.state().round < kMaxRounds};
+  return {newton.poses(), !newton.state().failed && newton.state().round + 1 < most_steps};
 }
 
 // Poses and edges of one connected part, numbered anew.
@@ -138,7 +138,8 @@ PlacedTeam solve_by(const std::string& method, const ScenarioGraph& drawn,
 
 }  // namespace
 
-PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::vector<SE3> start) {
+PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::vector<SE3> start,
+                           std::uint32_t most_steps) {
   const TeamGraph used = with_edges(graph, kept);
   PlacedTeam placed{
       .T_frame_kf = std::move(start), .frame_of = connected_parts(used), .kept = std::move(kept)};
@@ -146,7 +147,7 @@ PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::
     std::vector<SE3> poses;
     for (const Index i : part.poses)
       poses.push_back(placed.T_frame_kf[static_cast<std::size_t>(i)]);
-    const Minimum minimum = minimum_near(std::move(poses), part.edges, graph.dimension);
+    const Minimum minimum = minimum_near(std::move(poses), part.edges, graph.dimension, most_steps);
     placed.decided = placed.decided && minimum.decided;
     for (std::size_t k = 0; k < part.poses.size(); ++k)
       placed.T_frame_kf[static_cast<std::size_t>(part.poses[k])] = minimum.poses[k];
@@ -159,6 +160,7 @@ PlacedTeam solve_by_gnc(const TeamGraph& graph) {
   constexpr double kSteeper = 1.4;   // as recommended there
   constexpr double kFloor = 1e-10;   // keeps the equations regular
   constexpr int kMostUpdates = 100;  // as there
+  constexpr std::uint32_t kStepsOfUpdate = 20;
   const double c2 = chi_squared_6_quantile(kConfidence);
   const std::vector<bool> odometry = odometry_edges(graph);
   const std::vector<bool> all(graph.edges.size(), true);
@@ -180,7 +182,8 @@ PlacedTeam solve_by_gnc(const TeamGraph& graph) {
       decided = decided && (weight == 1.0 || weight == kFloor);
       weights[k] = weight;
     }
-    PlacedTeam next = solve_centrally(with_weights(graph, weights), all, placed.T_frame_kf);
+    PlacedTeam next =
+        solve_centrally(with_weights(graph, weights), all, placed.T_frame_kf, kStepsOfUpdate);
     placed.T_frame_kf = std::move(next.T_frame_kf);
   }
   for (std::size_t k = 0; k < odometry.size(); ++k) placed.kept[k] = weights[k] > 0.5;

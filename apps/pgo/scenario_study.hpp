@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -68,19 +69,20 @@ struct PlacedTeam {
   bool decided = true;
 };
 
-/// The minimum near `start` of the edges that are `kept`, by Newton's method on one computer. Parts
-/// that these leave unconnected are solved one by one, each in a frame of its own.
+/// The minimum near `start` of the edges that are `kept`, by at most so many steps of Newton's
+/// method on one computer. Parts that these edges leave unconnected are solved one by one, each in
+/// a frame of its own.
 [[nodiscard]] PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept,
-                                         std::vector<SE3> start);
+                                         std::vector<SE3> start, std::uint32_t most_steps = 300);
 
 /// Graduated non-convexity with truncated least squares at a fixed scale (Yang et al., "Graduated
 /// Non-Convexity for Robust Spatial Perception", RA-L 2020, Algorithm 1): closures whose residual
 /// exceeds the 99 % quantile of chi-squared (6 degrees) at what they claim are rejected. Odometry
-/// is trusted. From odometry_start(). Each change of the weights is followed by a solve to
-/// convergence.
+/// is trusted. The start is odometry_start(), or chordal where closures do not join all robots.
+/// Each change of the weights is followed by at most 20 Newton steps.
 [[nodiscard]] PlacedTeam solve_by_gnc(const TeamGraph& graph);
 
-/// Writes what `placed` comes to, but for method and seed.
+/// Closures lost and kept, and errors of `placed`. Method, seed and time are left open.
 [[nodiscard]] ScenarioResult judge(const ScenarioGraph& drawn, const PlacedTeam& placed);
 
 }  // namespace km

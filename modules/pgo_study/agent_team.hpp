@@ -33,8 +33,9 @@ struct AgentTeamRun {
 /// TeamAgent per robot with the robots' solvers (solver_choice()), which exchange encoded messages
 /// over perfect links in virtual time. Closures inside a robot count at once. Those between two
 /// robots count once WitnessedPair has its witnesses, or `pcm.witness_wait_s` after the first one.
-/// Deterministic. Throws std::invalid_argument if the graph is planar or a robot's odometry is
-/// interrupted.
+/// Robots use one of several closures between the same two poses (see OwnGraph). `kept` is the same
+/// for all of these. Deterministic. Throws std::invalid_argument if the graph is planar or a
+/// robot's odometry is interrupted.
 [[nodiscard]] AgentTeamRun run_agent_team(const TeamGraph& graph, const AgentTeamOptions& options);
 
 }  // namespace km

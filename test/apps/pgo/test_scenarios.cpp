@@ -33,6 +33,9 @@ struct Whole {
   explicit Whole(Index poses, unsigned seed = 1) {
     std::mt19937 rng(seed);
     graph = noisy_chain(poses, 1, 0.0, rng);
+    std::set<std::pair<Index, Index>> known;  // a pair of poses counts once with robots
+    std::erase_if(graph.edges,
+                  [&](const BlockEdge& e) { return !known.insert(std::minmax(e.i, e.j)).second; });
     truth.push_back(SE3::Identity());
     for (const BlockEdge& e : graph.edges)
       if (e.j == e.i + 1) truth.push_back(truth.back() * e.T_i_j);

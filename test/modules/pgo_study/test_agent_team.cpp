@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <random>
+#include <set>
+#include <utility>
 
 #include "modules/pgo_study/agent_team.hpp"
 #include "modules/pgo_study/central_solver.hpp"
@@ -17,6 +19,9 @@ constexpr double kNoise = 0.01;
 TeamGraph team_of_three(unsigned seed) {
   std::mt19937 rng(seed);
   TeamGraph graph = noisy_chain(90, 3, kNoise, rng);
+  std::set<std::pair<Eigen::Index, Eigen::Index>> known;  // a pair of poses counts once
+  std::erase_if(graph.edges,
+                [&](const BlockEdge& e) { return !known.insert(std::minmax(e.i, e.j)).second; });
   for (BlockEdge& e : graph.edges) {
     e.kappa = 0.5 / (kNoise * kNoise);
     e.tau = 1.0 / (kNoise * kNoise);
