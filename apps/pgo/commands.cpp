@@ -1,6 +1,8 @@
 #include "apps/pgo/commands.hpp"
 
+#include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include "modules/core/input_file.hpp"
 #include "modules/pgo_study/team_graph_file.hpp"
@@ -16,6 +18,9 @@ void GraphInput::define(CLI::App& app) {
       ->check(CLI::Range(1, 65535));
   app.add_option("--partition", partition,
                  "contiguous: runs of equal length; or a file with rows \"vertex robot\"");
+  app.add_flag("--keep-steps", keep_steps,
+               "Keep the odometry between two robots that a cut leaves. The default is without:\n"
+               "closures alone join robots in the field");
 }
 
 TeamGraph GraphInput::read(const CLI::App& app) const {
@@ -24,12 +29,20 @@ TeamGraph GraphInput::read(const CLI::App& app) const {
   if (folder && !contiguous)
     throw std::runtime_error("--partition is for a single file, " + file.string() +
                              " is a folder with one file per robot");
-  const TeamGraph graph = folder       ? read_team_folder(file)
-                          : contiguous ? deal_contiguously(read_g2o(file), robots, file.string())
-                                       : deal(read_g2o(file), read_partition(partition), partition);
+  TeamGraph graph = folder       ? read_team_folder(file)
+                    : contiguous ? deal_contiguously(read_g2o(file), robots, file.string())
+                                 : deal(read_g2o(file), read_partition(partition), partition);
   if (app.count("--robots") > 0 && graph.robots() != robots)
     throw std::runtime_error("--robots " + std::to_string(robots) + ": there are " +
                              std::to_string(graph.robots()) + " robots in the folder or partition");
+  if (keep_steps) return graph;
+  graph = without_cut_steps(std::move(graph));
+  const std::vector<Eigen::Index> part = connected_parts(graph);
+  const auto apart = std::ranges::find_if(part, [](Eigen::Index lowest) { return lowest != 0; });
+  if (apart != part.end())
+    throw std::runtime_error(file.string() + ": no closures join robot " +
+                             std::to_string(graph.robot_of(apart - part.begin())) +
+                             " to robot 0. --keep-steps keeps the odometry between them");
   return graph;
 }
 

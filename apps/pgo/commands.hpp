@@ -21,12 +21,14 @@ struct GraphInput {
   std::filesystem::path file = {};
   std::size_t robots = 1;
   std::string partition = "contiguous";
+  bool keep_steps = false;
 
-  /// Defines FILE, --robots and --partition, which fill this: it outlives `app`.
+  /// Defines FILE, --robots, --partition and --keep-steps, which fill this: it outlives `app`.
   void define(CLI::App& app);
 
-  /// Throws std::runtime_error if there is no such graph, and if --robots was given to `app` and is
-  /// not their number.
+  /// Without odometry between robots unless keep_steps. Throws std::runtime_error if there is no
+  /// such graph, if --robots was given to `app` and is not their number, and if the robots are not
+  /// connected.
   [[nodiscard]] TeamGraph read(const CLI::App& app) const;
 };
 

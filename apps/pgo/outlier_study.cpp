@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <map>
 #include <random>
 #include <set>
@@ -13,66 +12,22 @@
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/outlier_rejection/random_outliers.hpp"
 #include "modules/pgo_study/central_solver.hpp"
+#include "modules/pgo_study/team_closures.hpp"
 #include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/corroboration.hpp"
-#include "modules/pose_graph/recorded_graph.hpp"
 #include "modules/pose_graph/rounding.hpp"
 
 namespace km {
-namespace {
-
-// An edge in the robots' own numbering of their poses.
-RelativePose relative_pose(const TeamGraph& graph, const BlockEdge& e, double noise_scale) {
-  const auto id = [&](Eigen::Index pose) {
-    const std::size_t robot = graph.robot_of(pose);
-    return KeyframeId{static_cast<RobotId>(robot),
-                      static_cast<KeyframeIndex>(pose - graph.first[robot])};
-  };
-  return {id(e.i), id(e.j), e.T_i_j,
-          noise_scale * noise_scale * covariance_in({e.kappa, e.tau}, graph.dimension)};
-}
-
-// Poses of all robots along their odometry, in the numbering of the graph.
-std::vector<OdometryPose> odometry_chains(const TeamGraph& graph, const std::vector<bool>& odometry,
-                                          double noise_scale) {
-  std::vector<std::vector<RelativePose>> steps(graph.robots());
-  for (std::size_t k = 0; k < odometry.size(); ++k) {
-    const RelativePose step = relative_pose(graph, graph.edges[k], noise_scale);
-    if (odometry[k] && step.from.robot == step.to.robot) steps[step.from.robot].push_back(step);
-  }
-  std::vector<OdometryPose> poses;
-  for (std::size_t robot = 0; robot < graph.robots(); ++robot) {
-    RecordedGraph chain;
-    chain.robot = static_cast<RobotId>(robot);
-    std::ranges::sort(steps[robot], {}, [](const RelativePose& step) { return step.from; });
-    for (const RelativePose& step : steps[robot])
-      if (step.from.index == chain.odometry.size()) chain.odometry.push_back(step);
-    if (static_cast<Eigen::Index>(chain.poses()) != graph.poses_of(robot))
-      throw std::invalid_argument(
-          "no odometry leads to pose " +
-          to_string(graph.ids[static_cast<std::size_t>(graph.first[robot]) + chain.poses()]));
-    std::ranges::move(odometry_poses(chain), std::back_inserter(poses));
-  }
-  return poses;
-}
-
-}  // namespace
-
 std::vector<bool> pairwise_consistent(const TeamGraph& graph, const PcmConfig& config,
                                       double noise_scale) {
   std::vector<bool> kept = odometry_edges(graph);
-  const std::vector<OdometryPose> poses = odometry_chains(graph, kept, noise_scale);
   std::map<std::pair<RobotId, RobotId>, Pcm> pairs;
   std::map<ClosureId, std::size_t> edge_of;
-  for (std::size_t k = 0; k < kept.size(); ++k) {
-    if (kept[k]) continue;
-    const BlockEdge& e = graph.edges[k];
-    const RelativePose measured = relative_pose(graph, e, noise_scale);
-    if (!edge_of.emplace(closure_id(measured.from, measured.to), k).second) continue;
-    const auto [a, b] = std::minmax({measured.from.robot, measured.to.robot});
+  for (const TeamClosure& measured : team_closures(graph, noise_scale)) {
+    const Closure& closure = measured.closure;
+    if (kept[measured.edge] || !edge_of.emplace(closure.id(), measured.edge).second) continue;
+    const auto [a, b] = std::minmax({closure.from.id.robot, closure.to.id.robot});
     Pcm& pcm = pairs.try_emplace({a, b}, a, b, config).first->second;
-    (void)pcm.add({poses[static_cast<std::size_t>(e.i)], poses[static_cast<std::size_t>(e.j)],
-                   measured.T_from_to, measured.covariance, 0, 0.0});
+    (void)pcm.add(closure);
   }
   for (const auto& [pair, pcm] : pairs)
     for (const ClosureId& id : pcm.inliers()) kept[edge_of.at(id)] = true;
@@ -80,14 +35,6 @@ std::vector<bool> pairwise_consistent(const TeamGraph& graph, const PcmConfig& c
 }
 
 namespace {
-
-TeamGraph part_with(const TeamGraph& graph, const std::vector<bool>& kept) {
-  TeamGraph part = graph;
-  part.edges.clear();
-  for (std::size_t k = 0; k < kept.size(); ++k)
-    if (kept[k]) part.edges.push_back(graph.edges[k]);
-  return part;
-}
 
 double rmse_m(const std::vector<SE3>& truth, const std::vector<SE3>& estimate) {
   std::vector<PosePair> pairs;
@@ -100,13 +47,6 @@ double rmse_m(const std::vector<SE3>& truth, const std::vector<SE3>& estimate) {
         (pair.T_truth_body.translation() - alignment.apply(pair.T_estimate_body).translation())
             .norm());
   return statistics_of(std::move(errors)).rmse;
-}
-
-// Half the longest side of the box around all positions.
-double half_extent_m(const std::vector<SE3>& poses) {
-  Eigen::AlignedBox3d box;
-  for (const SE3& T : poses) box.extend(T.translation());
-  return 0.5 * box.sizes().maxCoeff();
 }
 
 // One method on a graph whose edges from `own_edges` on are false.
@@ -122,7 +62,7 @@ OutlierResult attempt(const std::string& method, const TeamGraph& graph, std::si
   if (by_pcm) kept = pairwise_consistent(graph, options.pcm, options.pcm_sigmas);
   const double pcm_s = meter.cpu_s() - begin_s;
 
-  const TeamGraph part = part_with(graph, kept);
+  const TeamGraph part = with_edges(graph, kept);
   const SolverRun run = run_solver(part, {},
                                    {.method = "newton",
                                     .run = {.max_rounds = options.max_rounds},
@@ -146,6 +86,12 @@ OutlierResult attempt(const std::string& method, const TeamGraph& graph, std::si
 }
 
 }  // namespace
+
+double half_extent_m(const std::vector<SE3>& poses) {
+  Eigen::AlignedBox3d box;
+  for (const SE3& T : poses) box.extend(T.translation());
+  return 0.5 * box.sizes().maxCoeff();
+}
 
 TeamGraph spoil(const TeamGraph& graph, std::size_t count, double half_side_m, unsigned seed) {
   const std::vector<bool> odometry = odometry_edges(graph);

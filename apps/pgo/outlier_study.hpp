@@ -77,6 +77,9 @@ using OutlierProgress = std::function<void(std::size_t, std::size_t)>;
                                              const TeamMeter& meter,
                                              const OutlierProgress& progress = {});
 
+/// Half the longest side of the box around all positions.
+[[nodiscard]] double half_extent_m(const std::vector<SE3>& poses);
+
 /// Adds `count` false closures after the graph's own edges: between uniform pairs of poses that do
 /// not follow each other, with uniform rotations and translations uniform within +-half_side_m
 /// along every axis (in the plane: both). Each claims the weights of a true closure drawn at

@@ -1,14 +1,20 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <ostream>
 #include <sstream>
+#include <utility>
 
 #include "apps/evaluate/stage_progress.hpp"
 #include "apps/pgo/commands.hpp"
 #include "apps/pgo/outlier_study.hpp"
+#include "apps/pgo/scenario_report.hpp"
+#include "apps/pgo/scenario_study.hpp"
+#include "modules/core/input_file.hpp"
 #include "modules/core/json.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/evaluation/statistics.hpp"
@@ -141,47 +147,101 @@ std::vector<Plot> outlier_plots(const OutlierStudy& study) {
                 [](const Cell& cell) { return cell.median(&OutlierResult::cpu_s); })};
 }
 
-constexpr const char* kOutliersDetails =
-    "How far do the poses of a team of robots lie from those without any false closure?\n\n"
-    "FILE is as in kimera_multi_pgo solve; what it says of which way is up is left out. A share "
-    "of\n"
-    "30 adds 30 false closures for every 100 true ones: between uniform pairs of poses, with\n"
-    "uniform rotation and translation, and the weights of a true closure.\n\n"
-    "Methods:\n"
-    "  pcm      pairwise consistency: between two robots, and inside one, the largest set of\n"
-    "           closures that agree pairwise along the odometry, by exact clique search; then\n"
-    "           Newton steps of the team, from odometry, on odometry and these\n"
-    "  newton   what the robots run, see solve: the team finds out which closures are false\n"
-    "  pcm+newton  the second on what the first leaves\n"
-    "  none     Newton steps on everything\n\n"
-    "With --clusters there are, beside these, false closures that agree with one another, as\n"
-    "between aisles that look alike: between the first robot and the last, at so many places.\n\n"
-    "The error is the RMSE of positions to the certified optimum of the graph without false\n"
-    "closures, after rigid alignment. Sent is what the robots' solver sends; CPU time is\n"
-    "that of all robots together. Of several seeds the\n"
-    "worst is shown: fewest true and most false closures kept, largest error, most rounds; of\n"
-    "what is sent and of CPU time the median.\n\n"
-    "Examples:\n"
-    "  kimera_multi_pgo outliers sphere2500.g2o --json out.json --plot out.html\n"
-    "  kimera_multi_pgo outliers parking-garage.g2o --shares 30,100,400 --methods newton \\\n"
-    "      --seeds 1,2,3\n"
-    "  kimera_multi_pgo outliers sphere2500.g2o --shares 0 --clusters 5 --cluster-size 10";
+std::string details() {
+  return "How far do the poses of a team of robots lie from those without any false closure?\n\n"
+         "FILE is as in kimera_multi_pgo solve; what it says of which way is up is left out. A\n"
+         "share of 30 adds 30 false closures for every 100 true ones: between uniform pairs of\n"
+         "poses, with uniform rotation and translation, and the weights of a true closure.\n\n"
+         "Methods:\n"
+         "  pcm      pairwise consistency: between two robots, and inside one, the largest set of\n"
+         "           closures that agree pairwise along the odometry, by exact clique search; "
+         "then\n"
+         "           Newton steps of the team, from odometry, on odometry and these\n"
+         "  newton   the members of one session, see solve: they find out which closures are "
+         "false\n"
+         "  pcm+newton  the second on what the first leaves\n"
+         "  none     Newton steps on everything\n\n"
+         "With --clusters there are, beside these, false closures that agree with one another, as\n"
+         "between aisles that look alike: between the first robot and the last, at so many "
+         "places.\n\n"
+         "The error is the RMSE of positions to the certified optimum of the graph without false\n"
+         "closures, after rigid alignment. Sent is what the robots' solver sends; CPU time is\n"
+         "that of all robots together. Of several seeds the worst is shown: fewest true and most\n"
+         "false closures kept, largest error, most rounds; of what is sent and of CPU time the\n"
+         "median.\n\n"
+         "Scenarios: with --scenario, or any option of that group, the optimum of FILE is the\n"
+         "truth, and odometry and closures are drawn anew around it, seed by seed. The others of\n"
+         "these options change the named scenario. Scenarios, and the graph each is meant for:\n" +
+         scenario_list() +
+         "Their methods:\n"
+         "  robots     the robots' own code, from measurements to published poses (TeamAgent)\n"
+         "  trust-all  all closures, on one computer\n"
+         "  pcm        the same on what pairwise consistency keeps\n"
+         "  gnc        graduated non-convexity at the scale claimed, on one computer\n"
+         "  reference  only the true closures, weighed by the noise that was drawn\n"
+         "A table has each seed of the first method, another the median and the worst of all\n"
+         "seeds of each method. Errors are of positions to the truth; robots that a method leaves\n"
+         "in several frames are aligned frame by frame. The ratio is of the RMS error to that of\n"
+         "the reference.\n\n"
+         "Examples:\n"
+         "  kimera_multi_pgo outliers sphere2500.g2o --json out.json --plot out.html\n"
+         "  kimera_multi_pgo outliers parking-garage.g2o --shares 30,100,400 --methods newton \\\n"
+         "      --seeds 1,2,3\n"
+         "  kimera_multi_pgo outliers sphere2500.g2o --shares 0 --clusters 5:10\n"
+         "  kimera_multi_pgo outliers sphere2500.g2o --scenario noisy-odometry --csv runs.csv\n"
+         "  kimera_multi_pgo outliers torus3D.g2o --robots 4 --odometry-noise 1:10 --seeds 1,2";
+}
 
 struct OutliersCommand {
   GraphInput input{.robots = 5};
   OutlierStudyOptions study{.shares_percent = {10, 20, 30, 40, 50, 60, 70, 80},
                             .methods = {"pcm", "newton", "pcm+newton"}};
-  ReportFiles files;
+  std::string scenario = {};
+  std::vector<std::function<void(Scenario&)>> changes = {};  // to it, as the options say
+  double keyframes_per_s = 0.0;
+  std::filesystem::path csv = {};
+  ReportFiles files = {};
 };
 
-void define(CLI::App& app, OutlierStudyOptions& study) {
-  app.add_option("--shares", study.shares_percent, "False closures for every 100 true ones [%]")
+// "A:B".
+std::pair<double, double> two_numbers(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  double first = 0.0, second = 0.0;
+  if (colon == std::string::npos || !CLI::detail::lexical_cast(text.substr(0, colon), first) ||
+      !CLI::detail::lexical_cast(text.substr(colon + 1), second) || !(first >= 0.0) ||
+      !(second >= 0.0))
+    throw CLI::ValidationError(text + " is not two numbers with a colon between");
+  return {first, second};
+}
+
+std::size_t whole_number(double number) {
+  if (number != std::floor(number)) throw CLI::ValidationError("not a whole number");
+  return static_cast<std::size_t>(number);
+}
+
+Clusters clusters_of(const std::string& text) {
+  if (text.find(':') == std::string::npos) return clusters_of(text + ":5");
+  const auto [places, size] = two_numbers(text);
+  if (places > 10000.0 || size < 1.0 || size > 1000.0)
+    throw CLI::ValidationError(text + ": at most 10000 clusters of 1 to 1000 closures");
+  return {whole_number(places), whole_number(size)};
+}
+
+void define(CLI::App& app, OutliersCommand& command) {
+  OutlierStudyOptions& study = command.study;
+  std::vector<std::string> methods = kRejections;
+  methods.insert(methods.end(), kScenarioMethods.begin(), kScenarioMethods.end());
+  app.add_option("--shares", study.shares_percent,
+                 "False closures for every 100 true ones [%]; of a scenario one share")
       ->check(CLI::Range(0.0, 10000.0))
       ->delimiter(',');
-  app.add_option("--methods", study.methods, "See below")
-      ->check(CLI::IsMember(kRejections).description(""))
+  app.add_option("--methods", study.methods,
+                 "See below; of scenarios: robots,trust-all,pcm,gnc,reference")
+      ->check(CLI::IsMember(methods).description(""))
       ->delimiter(',');
-  app.add_option("--seeds", study.seeds, "Of the false closures; a run for each")->delimiter(',');
+  app.add_option("--seeds", study.seeds,
+                 "Of the false closures; a run for each. Of scenarios: 1 to 10")
+      ->delimiter(',');
   app.add_option("--outlier-range", study.half_side_m,
                  "Translations of false closures are at most this along every axis [m]; 0: half\n"
                  "the longest side of the map")
@@ -195,16 +255,179 @@ void define(CLI::App& app, OutlierStudyOptions& study) {
   app.add_option("--pcm-sigmas", study.pcm_sigmas,
                  "pcm: sigmas of all edges, in multiples of the file's")
       ->check(CLI::Range(0.01, 1000.0));
-  app.add_option("--clusters", study.clusters.places,
-                 "Of false closures that agree with each other")
-      ->check(CLI::Range(0, 10000));
-  app.add_option("--cluster-size", study.clusters.size, "Closures in each")
-      ->check(CLI::Range(1, 1000));
+  app.add_option_function<std::string>(
+         "--clusters",
+         [&command](const std::string& text) {
+           const Clusters clusters = clusters_of(text);
+           command.study.clusters = clusters;
+           command.changes.push_back([clusters](Scenario& s) { s.clusters = clusters; });
+         },
+         "N:SIZE: N false places of SIZE successive keyframes (5 without :SIZE) between two\n"
+         "robots, whose closures agree with each other")
+      ->type_name("N:SIZE");
   app.add_option("--rounds", study.max_rounds, "At most so many")->check(CLI::Range(1, 1000000));
+}
+
+// An option that changes the scenario.
+template <typename T>
+CLI::Option* change(CLI::App& app, OutliersCommand& command, const std::string& name,
+                    std::function<void(Scenario&, const T&)> set, const std::string& says) {
+  return app.add_option_function<T>(
+      name,
+      [&command, set](const T& value) {
+        command.changes.push_back([set, value](Scenario& s) { set(s, value); });
+      },
+      says);
+}
+
+void change_factors(CLI::App& app, OutliersCommand& command, const std::string& name,
+                    std::vector<RobotFactor> Scenario::*factors, const std::string& says) {
+  change<std::vector<std::string>>(
+      app, command, name,
+      [factors](Scenario& s, const std::vector<std::string>& texts) {
+        (s.*factors).clear();
+        for (const std::string& text : texts) {
+          const auto [robot, factor] = two_numbers(text);
+          (s.*factors).push_back({whole_number(robot), factor});
+        }
+      },
+      says)
+      ->type_name("ROBOT:K")
+      ->delimiter(',');
+}
+
+void change_sigma(CLI::App& app, OutliersCommand& command, const std::string& name,
+                  std::optional<NoiseSigma> Scenario::*sigma, const std::string& says) {
+  change<std::string>(
+      app, command, name,
+      [sigma](Scenario& s, const std::string& text) {
+        const auto [rotation_rad, translation_m] = two_numbers(text);
+        s.*sigma = NoiseSigma{rotation_rad, translation_m};
+      },
+      says)
+      ->type_name("RAD:M");
+}
+
+void define_scenario(CLI::App& app, OutliersCommand& command) {
+  std::vector<std::string> names;
+  for (const Scenario& scenario : scenarios()) names.push_back(scenario.name);
+  app.option_defaults()->group("Scenarios");
+  app.add_option("--scenario", command.scenario, "See below")
+      ->check(CLI::IsMember(names).description(""));
+  change<std::size_t>(
+      app, command, "--first", [](Scenario& s, std::size_t n) { s.first_poses = n; },
+      "Only so many poses of the graph, from its first; 0: all");
+  change<double>(
+      app, command, "--step-length", [](Scenario& s, double m) { s.step_length_m = m; },
+      "The truth is scaled so that steps of odometry have this mean length [m]; 0: as it is")
+      ->check(CLI::NonNegativeNumber);
+  change_sigma(app, command, "--step-noise", &Scenario::step_sigma,
+               "Sigma of a step of odometry on each axis, in place of the file's");
+  change_sigma(app, command, "--closure-sigma", &Scenario::closure_sigma, "The same of closures");
+  change_factors(app, command, "--odometry-noise", &Scenario::odometry_noise,
+                 "Odometry of this robot is K times as noisy as it claims; several: 1:7,2:3");
+  change_factors(app, command, "--odometry-sigma", &Scenario::odometry_sigma,
+                 "Odometry of this robot is K times as noisy as the others', and claims so");
+  change_factors(app, command, "--closure-noise", &Scenario::closure_noise,
+                 "Closures with an end on this robot are K times as noisy as they claim. Below 1\n"
+                 "they claim too much. Between two robots the larger K counts");
+  change<double>(
+      app, command, "--place-bias", [](Scenario& s, double sigma) { s.place_bias = sigma; },
+      "Closures of one place (both ends within the same ten keyframes) share an error of so\n"
+      "many of their sigmas")
+      ->check(CLI::NonNegativeNumber);
+  change<double>(
+      app, command, "--closure-share", [](Scenario& s, double share) { s.closure_share = share; },
+      "Each closure of the graph is there with this probability")
+      ->check(CLI::Range(0.0, 1.0));
+  change<double>(
+      app, command, "--inside-share", [](Scenario& s, double share) { s.inside_share = share; },
+      "Each of these inside a robot is, again, there with this probability")
+      ->check(CLI::Range(0.0, 1.0));
+  change<std::size_t>(
+      app, command, "--closures-per-pair",
+      [](Scenario& s, std::size_t n) { s.closures_per_pair = n; },
+      "At most so many true closures between two robots, drawn at random");
+  change<std::string>(
+      app, command, "--cluster-robots",
+      [](Scenario& s, const std::string& text) {
+        const auto [a, b] = two_numbers(text);
+        s.cluster_robots = {whole_number(a), whole_number(b)};
+      },
+      "Clusters are between these two; without it each cluster draws its two robots")
+      ->type_name("A:B");
+  app.add_option("--keyframes-per-s", command.keyframes_per_s,
+                 "robots: keyframes that each robot plays in a second of virtual time; 0: all at\n"
+                 "once")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--csv", command.csv, "Also write every run to this file");
+}
+
+// --clusters is an option of both studies.
+bool is_scenario(const CLI::App& app, const OutliersCommand& command) {
+  return command.changes.size() > app.count("--clusters") || app.count("--scenario") > 0;
+}
+
+void check_methods(const std::vector<std::string>& methods, const std::vector<std::string>& known,
+                   const char* which) {
+  for (const std::string& method : methods)
+    if (std::ranges::find(known, method) == known.end())
+      throw std::runtime_error("--methods " + method + " is not for " + which);
+}
+
+Scenario scenario_asked(const CLI::App& app, const OutliersCommand& command) {
+  Scenario scenario = command.scenario.empty() ? Scenario{} : scenario_of(command.scenario);
+  for (const auto& change : command.changes) change(scenario);
+  const bool cut = !is_folder(command.input.file) && command.input.partition == "contiguous";
+  if (!cut)
+    scenario.robots = 0;
+  else if (app.count("--robots") > 0 || scenario.robots == 0)
+    scenario.robots = command.input.robots;
+  scenario.keep_steps = command.input.keep_steps;
+  if (app.count("--shares") == 0) return scenario;
+  if (command.study.shares_percent.size() != 1)
+    throw std::runtime_error("--shares: a scenario has one share");
+  scenario.random_percent = command.study.shares_percent.front();
+  return scenario;
+}
+
+void run_scenario(const CLI::App& app, const OutliersCommand& command) {
+  for (const char* option : {"--outlier-range", "--barc", "--pcm-sigmas", "--rounds"})
+    if (app.count(option) > 0)
+      throw std::runtime_error(std::string(option) + " is not for scenarios");
+  ScenarioStudyOptions options{.scenario = scenario_asked(app, command),
+                               .pcm = command.study.pcm,
+                               .keyframes_per_s = command.keyframes_per_s};
+  if (app.count("--methods") > 0) options.methods = command.study.methods;
+  if (app.count("--seeds") > 0) options.seeds = command.study.seeds;
+  check_methods(options.methods, kScenarioMethods, "scenarios");
+  check_output_folder(command.csv);
+  GraphInput whole = command.input;
+  whole.keep_steps = true;
+  if (options.scenario.robots > 0) whole.robots = 1;
+  TeamGraph graph = whole.read(app);
+  graph.verticals.clear();
+  std::cout << indefinite_text(graph.indefinite_edges);
+  StageProgress progress;
+  const ScenarioStudy study =
+      run_scenario_study(graph, options, cpu_meter(), [&](std::size_t done, std::size_t all) {
+        progress(std::to_string(all) + " runs",
+                 static_cast<double>(done) / static_cast<double>(all));
+      });
+  std::cout << scenario_text(study);
+  write_output(command.csv, [&](std::ostream& out) { write_scenario_csv(out, study); });
+  command.files.write([&](std::ostream& out) { write_scenario_json(out, study); },
+                      "Scenario " + study.scenario + ": " + command.input.file.string(),
+                      [&] { return scenario_plots(study); });
 }
 
 void run(const CLI::App& app, const OutliersCommand& command) {
   command.files.check();
+  if (is_scenario(app, command)) return run_scenario(app, command);
+  for (const char* option : {"--keyframes-per-s", "--csv"})
+    if (app.count(option) > 0)
+      throw std::runtime_error(std::string(option) + " is for scenarios only");
+  check_methods(command.study.methods, kRejections, "shares: it is for scenarios");
   TeamGraph graph = command.input.read(app);
   graph.verticals.clear();
   std::cout << indefinite_text(graph.indefinite_edges);
@@ -224,12 +447,15 @@ void run(const CLI::App& app, const OutliersCommand& command) {
 
 void add_outliers(CLI::App& parent) {
   CLI::App& app = *parent.add_subcommand(
-      "outliers", "Adds more and more random false closures and compares what keeps them out");
-  app.footer(kOutliersDetails);
+      "outliers",
+      "Adds false closures, or noise that is not as claimed, and compares what keeps them out");
+  app.footer(details());
   app.option_defaults()->always_capture_default();
   const auto command = std::make_shared<OutliersCommand>();
   command->input.define(app);
-  define(app, command->study);
+  define(app, *command);
+  define_scenario(app, *command);
+  app.option_defaults()->group("Options");
   command->files.define(app, "every run", "error, closures and time");
   app.callback([&app, command] { run(app, *command); });
 }

@@ -64,7 +64,7 @@ SolverRun run_newton(const TeamGraph& graph, std::vector<SE3> start, const Solve
       [&](SessionGraph part, TreePlace place) {
         return std::make_unique<TreeNewton>(std::move(part), std::move(place), newton);
       },
-      options.shape);
+      options.shape, !options.trust_all);
   SolverRun run;
   run.rounds = run_team(graph, team,
                         {.max_rounds = options.run.max_rounds, .gradient_tolerance = -1.0}, meter);

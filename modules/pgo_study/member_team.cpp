@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/precision_limits.hpp"
 #include "modules/pose_graph/team_plan.hpp"
 #include "modules/pose_graph/tree_front.hpp"
 
@@ -14,7 +15,7 @@ namespace km {
 using Eigen::Index;
 
 MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> start, Factory make,
-                       TeamShape shape)
+                       TeamShape shape, bool limited)
     : graph_(graph),
       rank_(rank),
       make_(std::move(make)),
@@ -24,7 +25,10 @@ MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> star
   if (static_cast<Index>(start.size()) != graph.poses())
     throw std::invalid_argument("MemberTeam: " + std::to_string(start.size()) +
                                 " start poses for " + std::to_string(graph.poses()));
-  for (std::size_t k = 0; k < parts_.size(); ++k) parts_[k] = part_of(graph, k);
+  for (std::size_t k = 0; k < parts_.size(); ++k) {
+    parts_[k] = part_of(graph, k);
+    if (limited) limit_precisions(parts_[k]);
+  }
   places_ = places(shape);
   tell_starts(std::move(start), nullptr);
   open_session();

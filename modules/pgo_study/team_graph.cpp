@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 #include <set>
+#include <utility>
 
 namespace km {
 
@@ -22,6 +24,41 @@ std::vector<bool> odometry_edges(const TeamGraph& graph) {
     odometry.push_back(step && has_step.insert(from).second);
   }
   return odometry;
+}
+
+TeamGraph with_edges(TeamGraph graph, const std::vector<bool>& kept) {
+  std::vector<BlockEdge> edges;
+  for (std::size_t k = 0; k < kept.size(); ++k)
+    if (kept[k]) edges.push_back(graph.edges[k]);
+  graph.edges = std::move(edges);
+  return graph;
+}
+
+TeamGraph without_cut_steps(TeamGraph graph) {
+  std::vector<bool> kept = odometry_edges(graph);
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    const BlockEdge& e = graph.edges[k];
+    kept[k] = !kept[k] || graph.robot_of(e.i) == graph.robot_of(e.j);
+  }
+  return with_edges(std::move(graph), kept);
+}
+
+std::vector<Eigen::Index> connected_parts(const TeamGraph& graph) {
+  std::vector<Eigen::Index> parent(static_cast<std::size_t>(graph.poses()));
+  std::iota(parent.begin(), parent.end(), Eigen::Index{0});
+  const auto up = [&](Eigen::Index i) -> Eigen::Index& {
+    return parent[static_cast<std::size_t>(i)];
+  };
+  const auto root = [&](Eigen::Index i) {
+    while (up(i) != i) i = up(i) = up(up(i));
+    return i;
+  };
+  for (const BlockEdge& e : graph.edges) {
+    const auto [low, high] = std::minmax({root(e.i), root(e.j)});
+    up(high) = low;
+  }
+  for (Eigen::Index i = 0; i < graph.poses(); ++i) up(i) = root(i);
+  return parent;
 }
 
 SessionGraph part_of(const TeamGraph& graph, std::size_t robot) {

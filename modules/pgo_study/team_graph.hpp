@@ -33,6 +33,16 @@ struct TeamGraph {
 /// Which edges are odometry: the first one from a pose to the next of the same robot of the file.
 [[nodiscard]] std::vector<bool> odometry_edges(const TeamGraph& graph);
 
+/// The graph with those of its edges that are `kept`.
+[[nodiscard]] TeamGraph with_edges(TeamGraph graph, const std::vector<bool>& kept);
+
+/// The graph without the odometry that a cut has left between two robots: each robot is on its own
+/// but for closures, as robots in the field are. Parts need not be connected any more.
+[[nodiscard]] TeamGraph without_cut_steps(TeamGraph graph);
+
+/// The connected part that each pose is in, by the lowest pose of that part.
+[[nodiscard]] std::vector<Eigen::Index> connected_parts(const TeamGraph& graph);
+
 /// What one robot of the team knows of the graph, without any poses: `start` and `told` are empty.
 /// Robot k has id k, and its keyframes are its poses, from 0. Odometry that was cut between two
 /// robots is trusted. `step_precision` is that of all robots.

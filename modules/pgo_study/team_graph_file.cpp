@@ -2,7 +2,6 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <numeric>
 #include <set>
 #include <stdexcept>
 
@@ -44,20 +43,12 @@ Precision weight_of(const RelativePose& e, EdgeWeights weights, int dimension,
 }
 
 void check_connected(const TeamGraph& graph, const std::string& file) {
-  std::vector<Eigen::Index> parent(static_cast<std::size_t>(graph.poses()));
-  std::iota(parent.begin(), parent.end(), Eigen::Index{0});
-  const auto root = [&](Eigen::Index i) {
-    while (parent[static_cast<std::size_t>(i)] != i)
-      i = parent[static_cast<std::size_t>(i)] =
-          parent[static_cast<std::size_t>(parent[static_cast<std::size_t>(i)])];
-    return i;
-  };
-  for (const BlockEdge& e : graph.edges) parent[static_cast<std::size_t>(root(e.i))] = root(e.j);
-  for (Eigen::Index i = 1; i < graph.poses(); ++i)
-    if (root(i) != root(0))
-      throw std::runtime_error(file + ": the graph is not connected: no path of edges from pose " +
-                               to_string(graph.ids[0]) + " to pose " +
-                               to_string(graph.ids[static_cast<std::size_t>(i)]));
+  const std::vector<Eigen::Index> part = connected_parts(graph);
+  const auto apart = std::ranges::find_if(part, [](Eigen::Index lowest) { return lowest != 0; });
+  if (apart == part.end()) return;
+  const auto pose = static_cast<std::size_t>(apart - part.begin());
+  throw std::runtime_error(file + ": the graph is not connected: no path of edges from pose " +
+                           to_string(graph.ids[0]) + " to pose " + to_string(graph.ids[pose]));
 }
 
 void add_vertical(TeamGraph& team, const std::map<KeyframeId, Eigen::Index>& number_of,

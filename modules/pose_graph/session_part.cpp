@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "modules/pose_graph/frame_entry.hpp"
-#include "modules/pose_graph/pair_consensus.hpp"
+#include "modules/pose_graph/precision_limits.hpp"
 
 namespace km {
 namespace {
@@ -16,13 +16,6 @@ constexpr std::size_t kRememberedRounds = 16;
 // Of letters before there is a solver. What there is no room for comes again.
 constexpr std::size_t kMaxEarlyLetters = 1000;
 constexpr std::size_t kMaxEarlyBytes = 1U << 26U;
-
-// What weights may be at most, in those of a step of the lower median robot: of closures half the
-// sigma; odometry adds up, and a robot's own mean is held closer.
-constexpr double kMostPrecise = 4.0;
-constexpr double kBestOdometry = 1.25;
-// Of two nobody can say which one is usual.
-constexpr std::size_t kMajority = 3;
 
 void add_told(const MemberPoses& poses, std::map<KeyframeId, SE3>& told) {
   for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
@@ -136,30 +129,8 @@ bool SessionPart::gather(const ToldPoses& told) {
     graph_.step_precision[robot] = poses.step_precision;
     combine_decisions(poses);
   }
-  if (suspicious_) limit_precisions();
+  if (suspicious_) limit_precisions(graph_);
   return true;
-}
-
-// Nobody measures much better than the team moves: whoever says so would overrule all others. All
-// members know the same steps, and limit alike.
-void SessionPart::limit_precisions() {
-  if (graph_.step_precision.size() < kMajority) return;
-  const Precision own = graph_.step_precision[self_.robot];
-  std::vector<Precision> steps;
-  for (const auto& [robot, step] : graph_.step_precision) steps.push_back(step);
-  const Precision usual = lower_median(steps);
-  const auto limited = [&](const Precision& p) {
-    return Precision{std::min(p.kappa, kMostPrecise * usual.kappa),
-                     std::min(p.tau, kMostPrecise * usual.tau)};
-  };
-  // Inside a robot what is better than the rest stays so.
-  for (PoseEdge& e : graph_.own) {
-    e.precision.kappa *= std::min(1.0, kBestOdometry * usual.kappa / own.kappa);
-    e.precision.tau *= std::min(1.0, kBestOdometry * usual.tau / own.tau);
-  }
-  for (auto* edges : {&graph_.between, &graph_.to_absent})
-    for (PoseEdge& e : *edges) e.precision = limited(e.precision);
-  for (auto& [robot, step] : graph_.step_precision) step = limited(step);
 }
 
 // Both ends of a closure come to the same: rejected if either says so, kept if both do.

@@ -109,7 +109,6 @@ class SessionPart {
   [[nodiscard]] bool align(const ToldPoses& told);
   [[nodiscard]] bool gather(const ToldPoses& told);
   void combine_decisions(const MemberPoses& told);
-  void limit_precisions();
   void start_solver(double now_s);
   [[nodiscard]] bool hand_over(const SessionLetter& letter, double now_s);
   void keep(const SessionLetter& letter);

@@ -62,8 +62,7 @@ TEST_CASE("Clusters of false closures are added on request", "[outliers]") {
   const TemporaryFolder folder;
   const std::string graph = folder.write("laps.g2o", laps_g2o()).string();
   const CommandResult result =
-      run_command(kOutliersTool + graph +
-                  " --robots 2 --shares 0 --methods newton --clusters 2 --cluster-size 3");
+      run_command(kOutliersTool + graph + " --robots 2 --shares 0 --methods newton --clusters 2:3");
   CAPTURE(result.output);
   CHECK(result.exit_code == 0);
   CHECK_THAT(result.output, Contains("newton    0 %      6"));

@@ -1,0 +1,262 @@
+#include "apps/pgo/scenario_study.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <stdexcept>
+#include <utility>
+
+#include "modules/evaluation/trajectory_error.hpp"
+#include "modules/outlier_rejection/chi_squared.hpp"
+#include "modules/pgo_study/agent_team.hpp"
+#include "modules/pgo_study/central_solver.hpp"
+#include "modules/pgo_study/odometry_start.hpp"
+#include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/robust_schedule.hpp"
+#include "modules/pose_graph/rounding.hpp"
+#include "modules/pose_graph/tree_newton.hpp"
+
+namespace km {
+namespace {
+
+using Eigen::Index;
+
+PoseEdge own_edge(const BlockEdge& e) {
+  return {{0, static_cast<KeyframeIndex>(e.i)},
+          {0, static_cast<KeyframeIndex>(e.j)},
+          e.T_i_j,
+          {e.kappa, e.tau}};
+}
+
+struct Minimum {
+  std::vector<SE3> poses;
+  bool decided = true;
+};
+
+// Of edges that connect all poses.
+Minimum minimum_near(std::vector<SE3> start, const std::vector<BlockEdge>& edges, int dimension,
+                     std::uint32_t most_steps) {
+  constexpr double kPatience = 8.0;  // rounds: second derivatives need not be told
+  SessionGraph graph{.start = std::move(start)};
+  for (const BlockEdge& e : edges) graph.own.push_back(own_edge(e));
+  TreeNewton newton(std::move(graph), TreePlace{.members = {0}},
+                    TreeNewtonOptions{.dimension = dimension,
+                                      .absolute_tolerance = 1e-12,
+                                      .patience_rounds = kPatience,
+                                      .max_rounds = most_steps,
+                                      .robust = false});
+  while (!newton.done()) (void)newton.advance();
+  return {newton.poses(), !newton.state().failed && newton.state().round + 1 < most_steps};
+}
+
+// Poses and edges of one connected part, numbered anew.
+struct Part {
+  std::vector<Index> poses;  // in the whole
+  std::vector<BlockEdge> edges;
+};
+
+std::map<Index, Part> parts_of(const TeamGraph& graph) {
+  const std::vector<Index> part_of = connected_parts(graph);
+  std::map<Index, Part> parts;
+  std::vector<Index> number;
+  for (Index i = 0; i < graph.poses(); ++i) {
+    std::vector<Index>& poses = parts[part_of[static_cast<std::size_t>(i)]].poses;
+    number.push_back(static_cast<Index>(poses.size()));
+    poses.push_back(i);
+  }
+  for (const BlockEdge& e : graph.edges) {
+    BlockEdge own = e;
+    own.i = number[static_cast<std::size_t>(e.i)];
+    own.j = number[static_cast<std::size_t>(e.j)];
+    parts.at(part_of[static_cast<std::size_t>(e.i)]).edges.push_back(own);
+  }
+  return parts;
+}
+
+// By chordal initialisation, part by part.
+std::vector<SE3> chordal_start(const TeamGraph& graph) {
+  std::vector<SE3> start(static_cast<std::size_t>(graph.poses()));
+  for (const auto& [lowest, part] : parts_of(graph)) {
+    const auto poses = chordal_initialisation(static_cast<Index>(part.poses.size()), part.edges);
+    for (std::size_t k = 0; k < poses.size(); ++k)
+      start[static_cast<std::size_t>(part.poses[k])] = poses[k];
+  }
+  return start;
+}
+
+double residual(const BlockEdge& e, const std::vector<SE3>& poses) {
+  return residual_of(own_edge(e), poses[static_cast<std::size_t>(e.i)],
+                     poses[static_cast<std::size_t>(e.j)]);
+}
+
+TeamGraph with_weights(const TeamGraph& graph, const std::vector<double>& weights) {
+  TeamGraph weighed = graph;
+  for (std::size_t k = 0; k < weights.size(); ++k) {
+    weighed.edges[k].kappa *= weights[k];
+    weighed.edges[k].tau *= weights[k];
+  }
+  return weighed;
+}
+
+PlacedTeam solve_by_robots(const TeamGraph& graph, double keyframes_per_s) {
+  AgentTeamRun run = run_agent_team(graph, {.keyframes_per_s = keyframes_per_s});
+  PlacedTeam placed{.T_frame_kf = std::move(run.T_world_kf),
+                    .frame_of = {},
+                    .kept = std::move(run.kept),
+                    .decided = run.settled};
+  for (std::size_t robot = 0; robot < graph.robots(); ++robot)
+    placed.frame_of.insert(placed.frame_of.end(), static_cast<std::size_t>(graph.poses_of(robot)),
+                           run.world_of[robot]);
+  return placed;
+}
+
+PlacedTeam solve_reference(const ScenarioGraph& drawn) {
+  TeamGraph honest = drawn.graph;
+  std::vector<bool> kept;
+  for (std::size_t k = 0; k < honest.edges.size(); ++k) {
+    honest.edges[k].kappa = drawn.honest[k].kappa;
+    honest.edges[k].tau = drawn.honest[k].tau;
+    kept.push_back(!drawn.is_false[k]);
+  }
+  return solve_centrally(honest, std::move(kept), drawn.truth);
+}
+
+PlacedTeam solve_by(const std::string& method, const ScenarioGraph& drawn,
+                    const ScenarioStudyOptions& options) {
+  const TeamGraph& graph = drawn.graph;
+  if (method == "robots") return solve_by_robots(graph, options.keyframes_per_s);
+  if (method == "reference") return solve_reference(drawn);
+  if (method == "gnc") return solve_by_gnc(graph);
+  std::vector<bool> kept(graph.edges.size(), true);
+  if (method == "pcm")
+    kept = pairwise_consistent(graph, options.pcm);
+  else if (method != "trust-all")
+    throw std::invalid_argument("scenario study: unknown method " + method);
+  std::vector<SE3> start = chordal_start(with_edges(graph, kept));
+  return solve_centrally(graph, std::move(kept), std::move(start));
+}
+
+}  // namespace
+
+PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::vector<SE3> start,
+                           std::uint32_t most_steps) {
+  const TeamGraph used = with_edges(graph, kept);
+  PlacedTeam placed{
+      .T_frame_kf = std::move(start), .frame_of = connected_parts(used), .kept = std::move(kept)};
+  for (const auto& [lowest, part] : parts_of(used)) {
+    std::vector<SE3> poses;
+    for (const Index i : part.poses)
+      poses.push_back(placed.T_frame_kf[static_cast<std::size_t>(i)]);
+    const Minimum minimum = minimum_near(std::move(poses), part.edges, graph.dimension, most_steps);
+    placed.decided = placed.decided && minimum.decided;
+    for (std::size_t k = 0; k < part.poses.size(); ++k)
+      placed.T_frame_kf[static_cast<std::size_t>(part.poses[k])] = minimum.poses[k];
+  }
+  return placed;
+}
+
+PlacedTeam solve_by_gnc(const TeamGraph& graph) {
+  constexpr double kConfidence = 0.99;
+  constexpr double kSteeper = 1.4;   // as recommended there
+  constexpr double kFloor = 1e-10;   // keeps the equations regular
+  constexpr int kMostUpdates = 100;  // as there
+  constexpr std::uint32_t kStepsOfUpdate = 20;
+  const double c2 = chi_squared_6_quantile(kConfidence);
+  const std::vector<bool> odometry = odometry_edges(graph);
+  const std::vector<bool> all(graph.edges.size(), true);
+  const bool joined = std::ranges::count(connected_parts(graph), 0) == graph.poses();
+  PlacedTeam placed =
+      solve_centrally(graph, all, joined ? odometry_start(graph) : chordal_start(graph));
+  double largest = 0.0;
+  for (std::size_t k = 0; k < odometry.size(); ++k)
+    if (!odometry[k]) largest = std::max(largest, residual(graph.edges[k], placed.T_frame_kf));
+  double mu = first_mu(largest * largest, c2);
+  std::vector<double> weights(graph.edges.size(), 1.0);
+  bool decided = false;
+  for (int update = 0; update < kMostUpdates && !decided; ++update, mu *= kSteeper) {
+    decided = true;
+    for (std::size_t k = 0; k < odometry.size(); ++k) {
+      if (odometry[k]) continue;
+      const double r = residual(graph.edges[k], placed.T_frame_kf);
+      const double weight = std::max(kFloor, robust_weight(r * r, c2, mu));
+      decided = decided && (weight == 1.0 || weight == kFloor);
+      weights[k] = weight;
+    }
+    PlacedTeam next =
+        solve_centrally(with_weights(graph, weights), all, placed.T_frame_kf, kStepsOfUpdate);
+    placed.T_frame_kf = std::move(next.T_frame_kf);
+  }
+  for (std::size_t k = 0; k < odometry.size(); ++k) placed.kept[k] = weights[k] > 0.5;
+  PlacedTeam end = solve_centrally(graph, placed.kept, placed.T_frame_kf);
+  end.decided = end.decided && decided;
+  return end;
+}
+
+ScenarioResult judge(const ScenarioGraph& drawn, const PlacedTeam& placed) {
+  ScenarioResult result{.decided = placed.decided};
+  const TeamGraph& graph = drawn.graph;
+  const std::vector<bool> odometry = odometry_edges(graph);
+  for (std::size_t k = 0; k < odometry.size(); ++k) {
+    if (odometry[k]) continue;
+    if (drawn.is_false[k]) {
+      ++result.false_closures;
+      if (placed.kept[k]) ++result.false_kept;
+      continue;
+    }
+    const bool between = graph.robot_of(graph.edges[k].i) != graph.robot_of(graph.edges[k].j);
+    ++result.true_closures;
+    if (between) ++result.between;
+    if (placed.kept[k]) continue;
+    ++result.true_lost;
+    if (between) ++result.between_lost;
+  }
+  std::map<Index, std::vector<PosePair>> frames;
+  for (std::size_t i = 0; i < drawn.truth.size(); ++i)
+    frames[placed.frame_of[i]].push_back(
+        {static_cast<Stamp>(i), drawn.truth[i], placed.T_frame_kf[i]});
+  std::vector<double> errors;
+  for (const auto& [frame, pairs] : frames) {
+    const Alignment alignment = align(pairs, false);
+    for (const PosePair& pair : pairs)
+      errors.push_back(
+          (pair.T_truth_body.translation() - alignment.apply(pair.T_estimate_body).translation())
+              .norm());
+  }
+  const Statistics statistics = statistics_of(std::move(errors));
+  result.frames = frames.size();
+  result.rms_m = statistics.rmse;
+  result.max_m = statistics.max;
+  return result;
+}
+
+ScenarioStudy run_scenario_study(const TeamGraph& whole, const ScenarioStudyOptions& options,
+                                 const TeamMeter& meter, const OutlierProgress& progress) {
+  CentralSolver central(whole.edges, lift(chordal_initialisation(whole.poses(), whole.edges), 3),
+                        whole.dimension);
+  while (central.step()) {
+  }
+  const std::vector<SE3> optimum = round_to_poses(central.X(), central.X().leftCols<4>());
+  ScenarioStudy study{.scenario = options.scenario.name,
+                      .certified = central.certificate() && central.certificate()->certified,
+                      .results = {}};
+  const std::size_t all = options.seeds.size() * options.methods.size();
+  for (const unsigned seed : options.seeds) {
+    const ScenarioGraph drawn = draw_scenario(whole, optimum, options.scenario, seed);
+    study.robots = drawn.graph.robots();
+    study.poses = drawn.truth.size();
+    for (const std::string& method : options.methods) {
+      if (progress) progress(study.results.size(), all);
+      const double begin_s = meter.cpu_s();
+      const PlacedTeam placed = solve_by(method, drawn, options);
+      const double cpu_s = meter.cpu_s() - begin_s;
+      study.results.push_back(judge(drawn, placed));
+      study.results.back().method = method;
+      study.results.back().seed = seed;
+      study.results.back().cpu_s = cpu_s;
+    }
+  }
+  if (progress) progress(all, all);
+  return study;
+}
+
+}  // namespace km

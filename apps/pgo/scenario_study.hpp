@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "apps/pgo/outlier_study.hpp"
+#include "apps/pgo/scenario.hpp"
+#include "modules/pgo_study/round_meter.hpp"
+
+namespace km {
+
+/// How a scenario is solved:
+///   robots     by the robots' own code at its defaults, see run_agent_team();
+///   trust-all  all closures, at what they claim, by Newton's method on one computer;
+///   pcm        the same on what pairwise consistency keeps;
+///   gnc        graduated non-convexity on one computer, see solve_by_gnc();
+///   reference  only the true closures, all edges weighed by the noise that was drawn, on one
+///              computer, begun at the truth: the best that can be had.
+inline const std::vector<std::string> kScenarioMethods = {"robots", "trust-all", "pcm", "gnc",
+                                                          "reference"};
+
+struct ScenarioStudyOptions {
+  Scenario scenario = {};
+  std::vector<std::string> methods = kScenarioMethods;
+  std::vector<unsigned> seeds = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
+  PcmConfig pcm = {};
+  double keyframes_per_s = 0.0;  ///< robots: see AgentTeamOptions.
+};
+
+/// What one method made of one drawn scenario.
+struct ScenarioResult {
+  std::string method = {};
+  unsigned seed = 0;
+  std::size_t true_closures = 0;
+  std::size_t true_lost = 0;
+  std::size_t between = 0;  ///< True closures between two robots.
+  std::size_t between_lost = 0;
+  std::size_t false_closures = 0;
+  std::size_t false_kept = 0;
+  std::size_t frames = 1;  ///< In which the method leaves the robots.
+  /// Of positions to the truth, each frame of the method aligned by one rigid transform.
+  double rms_m = 0.0;
+  double max_m = 0.0;
+  bool decided = true;  ///< False: the method came to no end.
+  double cpu_s = 0.0;
+};
+
+struct ScenarioStudy {
+  std::string scenario;
+  std::size_t robots = 0;
+  std::size_t poses = 0;
+  bool certified = false;               ///< The optimum that is the truth is.
+  std::vector<ScenarioResult> results;  ///< By seed, then method.
+};
+
+/// Throws std::invalid_argument if graph or options are not usable.
+[[nodiscard]] ScenarioStudy run_scenario_study(const TeamGraph& whole,
+                                               const ScenarioStudyOptions& options,
+                                               const TeamMeter& meter,
+                                               const OutlierProgress& progress = {});
+
+/// Where a method has placed the robots, and which edges it uses.
+struct PlacedTeam {
+  std::vector<SE3> T_frame_kf;
+  std::vector<Eigen::Index> frame_of;  ///< Of each pose; poses of one frame have the same number.
+  std::vector<bool> kept;              ///< Of the edges.
+  bool decided = true;
+};
+
+/// The minimum near `start` of the edges that are `kept`, by at most so many steps of Newton's
+/// method on one computer. Parts that these edges leave unconnected are solved one by one, each in
+/// a frame of its own.
+[[nodiscard]] PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept,
+                                         std::vector<SE3> start, std::uint32_t most_steps = 300);
+
+/// Graduated non-convexity with truncated least squares at a fixed scale (Yang et al., "Graduated
+/// Non-Convexity for Robust Spatial Perception", RA-L 2020, Algorithm 1): closures whose residual
+/// exceeds the 99 % quantile of chi-squared (6 degrees) at what they claim are rejected. Odometry
+/// is trusted. The start is odometry_start(), or chordal where closures do not join all robots.
+/// Each change of the weights is followed by at most 20 Newton steps.
+[[nodiscard]] PlacedTeam solve_by_gnc(const TeamGraph& graph);
+
+/// Closures lost and kept, and errors of `placed`. Method, seed and time are left open.
+[[nodiscard]] ScenarioResult judge(const ScenarioGraph& drawn, const PlacedTeam& placed);
+
+}  // namespace km
