@@ -27,6 +27,7 @@ enum Component : std::size_t { kRotation, kTranslation, kClosure, kComponents };
 using Factors = std::array<double, kComponents>;
 
 struct Cycle {
+  PoseEdge closure;
   Vector6 error;
   std::array<Matrix6, kComponents> covariance;
   double weight = 1.0;
@@ -62,6 +63,7 @@ struct Chain {
     const SE3 T_j_first = T_first_kf[j].inverse();
     const Matrix6 Ad = adjoint(T_j_first);
     Cycle cycle;
+    cycle.closure = closure;
     // From the closure's upper pose to the chain's: small, so that both covariances are at j.
     cycle.error = se3_log(measured.inverse() * T_first_kf[i].inverse() * T_first_kf[j]);
     for (const Component part : {kRotation, kTranslation})
@@ -146,24 +148,39 @@ double log_density_if_false(const Cycle& cycle, double volume_m3) {
   return 2.0 * std::log(det_J) - std::log(kRotations) - std::log(volume_m3);
 }
 
-// Log of the posterior density of the factors, at the likeliest share of true closures.
-double log_posterior(const std::vector<Cycle>& cycles, const std::vector<double>& if_false,
-                     const Factors& v) {
-  std::vector<double> ratio;  // density if true over density if false
+struct Mixture {
+  std::vector<double> ratio;  // per cycle: density if true over density if false
+  double share = 0.8;         // of true closures, the likeliest one
+
+  [[nodiscard]] double true_probability(std::size_t k) const {
+    return share * ratio[k] / (share * ratio[k] + 1.0 - share);
+  }
+};
+
+Mixture fit_mixture(const std::vector<Cycle>& cycles, const std::vector<double>& if_false,
+                    const Factors& v) {
+  Mixture mixture;
   for (std::size_t k = 0; k < cycles.size(); ++k)
-    ratio.push_back(
+    mixture.ratio.push_back(
         std::exp(std::clamp(log_density_if_true(cycles[k], v) - if_false[k], -600.0, 600.0)));
-  double share = 0.8, total = 0.0;
+  double total = 0.0;
   for (const Cycle& cycle : cycles) total += cycle.weight;
   for (int i = 0; i < kShareSteps; ++i) {
     double sum = 0.0;
     for (std::size_t k = 0; k < cycles.size(); ++k)
-      sum += cycles[k].weight * share * ratio[k] / (share * ratio[k] + 1.0 - share);
-    share = std::clamp(sum / total, 0.02, 0.98);
+      sum += cycles[k].weight * mixture.true_probability(k);
+    mixture.share = std::clamp(sum / total, 0.02, 0.98);
   }
+  return mixture;
+}
+
+// Log of the posterior density of the factors, at the likeliest share of true closures.
+double log_posterior(const std::vector<Cycle>& cycles, const std::vector<double>& if_false,
+                     const Factors& v) {
+  const Mixture mixture = fit_mixture(cycles, if_false, v);
   double log_sum = 0.0;
   for (std::size_t k = 0; k < cycles.size(); ++k)
-    log_sum += cycles[k].weight * std::log(share * ratio[k] + 1.0 - share);
+    log_sum += cycles[k].weight * std::log(mixture.share * mixture.ratio[k] + 1.0 - mixture.share);
   const auto prior = [](double log_root, double sigma) {
     return -0.5 * log_root * log_root / (sigma * sigma);
   };
@@ -217,6 +234,9 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   if (most - without < kEvidence) return noise;
   noise.rotation = std::sqrt(best[kRotation]);
   noise.translation = std::sqrt(best[kTranslation]);
+  const Mixture mixture = fit_mixture(cycles, if_false, best);
+  for (std::size_t k = 0; k < cycles.size(); ++k)
+    if (mixture.true_probability(k) > 0.5) noise.likely.push_back(cycles[k].closure);
   return noise;
 }
 

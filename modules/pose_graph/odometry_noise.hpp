@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "modules/pose_graph/pose_edge.hpp"
 
@@ -12,6 +13,9 @@ struct OdometryNoise {
   double rotation = 1.0;     ///< At least 1.
   double translation = 1.0;  ///< At least 1.
   std::size_t places = 0;    ///< That bear witness; see estimate_odometry_noise().
+  /// Closures that are more likely true than false, a part of very many; empty where odometry is
+  /// taken at its word.
+  std::vector<PoseEdge> likely = {};
 
   /// The precision of a step that claims `claimed`.
   [[nodiscard]] Precision corrected(const Precision& claimed) const {
