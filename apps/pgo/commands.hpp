@@ -6,7 +6,7 @@
 #include <string>
 
 #include "apps/report_files.hpp"
-#include "modules/pgo_study/team_graph.hpp"
+#include "modules/pgo_study/team_graph_file.hpp"
 
 namespace km {
 
@@ -25,13 +25,17 @@ struct GraphInput {
   /// Defines FILE, --robots and --partition, which fill this: it outlives `app`.
   void define(CLI::App& app);
 
-  /// Throws std::runtime_error if there is no such graph, and if --robots was given to `app` and is
+  /// With what the file says of the truth. Throws std::runtime_error if there is no such graph, and
+  /// if --robots was given to `app` and is
   /// not their number.
-  [[nodiscard]] TeamGraph read(const CLI::App& app) const;
+  [[nodiscard]] LabelledTeamGraph read(const CLI::App& app) const;
 };
 
 /// What to say of edges that were weighed by the blocks of their information matrix alone, since it
 /// is not positive definite, as SE-Sync reads them; nothing if there are none.
 [[nodiscard]] std::string indefinite_text(std::size_t edges);
+
+/// Which measurements of the file are not in the graph; nothing if all are.
+[[nodiscard]] std::string left_out_text(const LabelledTeamGraph& team);
 
 }  // namespace km

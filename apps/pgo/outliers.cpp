@@ -9,6 +9,7 @@
 #include "apps/evaluate/stage_progress.hpp"
 #include "apps/pgo/commands.hpp"
 #include "apps/pgo/outlier_study.hpp"
+#include "apps/pgo/truth_score.hpp"
 #include "modules/core/json.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/evaluation/statistics.hpp"
@@ -203,9 +204,20 @@ void define(CLI::App& app, OutlierStudyOptions& study) {
   app.add_option("--rounds", study.max_rounds, "At most so many")->check(CLI::Range(1, 1000000));
 }
 
+// Without the closures that the file itself labels as false.
+TeamGraph true_graph(const LabelledTeamGraph& input, const std::string& file) {
+  if (input.truth.is_false.empty()) return input.graph;
+  std::vector<ConnectedPart> parts = true_parts(input);
+  if (parts.size() > 1)
+    throw std::runtime_error(file +
+                             ": without the closures labelled false the graph is not connected");
+  return std::move(parts.front().graph);
+}
+
 void run(const CLI::App& app, const OutliersCommand& command) {
   command.files.check();
-  TeamGraph graph = command.input.read(app);
+  const LabelledTeamGraph input = command.input.read(app);
+  TeamGraph graph = true_graph(input, command.input.file.string());
   graph.verticals.clear();
   std::cout << indefinite_text(graph.indefinite_edges);
   StageProgress progress;

@@ -20,8 +20,9 @@ constexpr const char* kSolveDetails =
     "Every robot has only its part of the graph, and what it hears from the others are the\n"
     "messages that would cross the network.\n\n"
     "FILE is a g2o file, 2D or 3D, dealt out to --robots robots, or a folder with one *.csv or\n"
-    "*.g2o per robot, or what a team's run has left behind. The cost is the chordal one without\n"
-    "1/2, weights as SE-Sync reads them (of a team's results: as the robots weighed them):\n"
+    "*.g2o per robot, or what a team's run has left behind, or a team's JRL file (COSMO-Bench).\n"
+    "The cost is the chordal one without 1/2, weights as SE-Sync reads them (of a team's results\n"
+    "and JRL files: as the robots weigh them):\n"
     "  F = sum kappa |R_j - R_i R_ij|^2 + tau |t_j - t_i - R_i t_ij|^2\n"
     "Where a g2o file says which way is up at a pose (EDGE_SE3_PRIOR with information on the tilt\n"
     "alone, as kimera_multi_robot writes it), |R_i up_i - z|^2 / sigma_i^2 is added; dgs and\n"
@@ -49,12 +50,18 @@ constexpr const char* kSolveDetails =
     "robot of each round, summed, and of all. A broadcast counts once; newton's letters have one\n"
     "reader each. The certificate proves how far any poses can lie below at most. Of newton\n"
     "without --trust-all it says what was kept.\n\n"
+    "If a JRL file labels false closures, a table shows how many of them, and of the true ones,\n"
+    "were kept. If it has true poses, another shows the ATE: the RMSE [m] of the positions of all\n"
+    "robots under one rigid alignment, then of each robot under that alignment and under its own.\n"
+    "With both, the optimum of all closures that are not labelled false is shown for comparison.\n"
+    "Priors are left out.\n\n"
     "Examples:\n"
     "  kimera_multi_pgo solve sphere2500.g2o --robots 5 --method newton --trust-all --json "
     "out.json\n"
     "  kimera_multi_pgo solve tunnels_8robots --method rbcd --rounds 300 --plot gap.html\n"
     "  kimera_multi_pgo solve tunnels_8robots\n"
     "  kimera_multi_pgo solve tunnels_8robots --barc 20 --links chain\n"
+    "  kimera_multi_pgo solve ntu_r3_02_d02_n04_n13_wifi.jrl\n"
     "  kimera_multi_pgo solve manhattan.g2o --method centralized --output manhattan.tum";
 
 struct SolveCommand {
@@ -199,17 +206,23 @@ void write_solved(std::ostream& out, const TeamGraph& graph, const std::vector<S
   write_g2o(out, result);
 }
 
+std::vector<bool> kept_by(const Solution& solution) {
+  return solution.run.decision ? solution.run.decision->kept : std::vector<bool>();
+}
+
 void run(const CLI::App& app, SolveCommand& command) {
   check(app, command);
-  TeamGraph graph = command.input.read(app);
+  LabelledTeamGraph team = command.input.read(app);
+  TeamGraph& graph = team.graph;
   if (command.no_vertical) graph.verticals.clear();
   const Solution solution = solve(graph, command.solver, command.optimum, cpu_meter());
   for (const SE3& T_world_kf : solution.T_world_kf)
     if (!T_world_kf.matrix().allFinite())
       throw std::runtime_error(command.input.file.string() + ": " + command.solver.name() +
                                " found no finite poses: do steps and weights make sense?");
-  std::cout << solution_text(graph, solution);
-  command.files.write([&](std::ostream& out) { write_solution_json(out, graph, solution); },
+  const TruthScore truth = score(team, solution.T_world_kf, kept_by(solution));
+  std::cout << left_out_text(team) << solution_text(graph, solution) << score_text(graph, truth);
+  command.files.write([&](std::ostream& out) { write_solution_json(out, graph, solution, truth); },
                       "Gap to the optimum: " + command.input.file.string(),
                       [&] { return gap_plots(solution); });
   write_output(command.output, [&](std::ostream& out) {

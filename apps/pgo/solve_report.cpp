@@ -129,6 +129,43 @@ std::string decision_text(const TeamGraph& graph, const Solution& solution) {
   return text.str();
 }
 
+std::vector<std::string> count_row(const std::string& name, const ClosureCounts& counts) {
+  return {name, std::to_string(counts.true_kept), std::to_string(counts.true_lost),
+          std::to_string(counts.false_kept), std::to_string(counts.false_rejected)};
+}
+
+Json counts_json(const ClosureCounts& counts) {
+  return {{"true_kept", counts.true_kept},
+          {"true_lost", counts.true_lost},
+          {"false_kept", counts.false_kept},
+          {"false_rejected", counts.false_rejected}};
+}
+
+RobotId robot_id(const TeamGraph& graph, std::size_t robot) {
+  return graph.ids[static_cast<std::size_t>(graph.first[robot])].robot;
+}
+
+std::vector<std::string> ate_row(const std::string& name, const TeamAte& ate) {
+  constexpr int kDecimals = 3;
+  std::vector<std::string> row{name, fixed(ate.team_m, kDecimals)};
+  for (std::size_t k = 0; k < ate.alone_m.size(); ++k)
+    row.insert(row.end(), {fixed(ate.in_team_m[k], kDecimals), fixed(ate.alone_m[k], kDecimals)});
+  return row;
+}
+
+Json ate_json(const TeamGraph& graph, const TeamAte& ate) {
+  Json robots = Json::array();
+  for (std::size_t k = 0; k < ate.alone_m.size(); ++k)
+    robots.push_back({{"robot", robot_id(graph, k)},
+                      {"in_team_m", ate.in_team_m[k]},
+                      {"alone_m", ate.alone_m[k]}});
+  return {{"team_m", ate.team_m}, {"parts", ate.parts}, {"robots", std::move(robots)}};
+}
+
+double ate_ratio(const TruthScore& truth) {
+  return truth.ate->team_m / truth.optimum_of_true->team_m;
+}
+
 }  // namespace
 
 std::string solution_text(const TeamGraph& graph, const Solution& solution) {
@@ -142,7 +179,33 @@ std::string solution_text(const TeamGraph& graph, const Solution& solution) {
   return text.str();
 }
 
-void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution) {
+std::string score_text(const TeamGraph& graph, const TruthScore& truth) {
+  std::string text;
+  if (truth.inside && truth.between)
+    text += align_columns({{"closures", "true kept", "true lost", "false kept", "false rejected"},
+                           count_row("inside a robot", *truth.inside),
+                           count_row("between robots", *truth.between)});
+  if (!truth.ate) return text;
+  std::vector<std::string> header{"ATE [m]", "team"};
+  for (std::size_t k = 0; k < graph.robots(); ++k) {
+    const std::string robot = std::to_string(robot_id(graph, k));
+    header.insert(header.end(), {"robot " + robot + " in team", "alone"});
+  }
+  std::vector<std::vector<std::string>> rows{std::move(header), ate_row("solution", *truth.ate)};
+  if (truth.optimum_of_true) {
+    rows.push_back(ate_row("optimum of the true closures", *truth.optimum_of_true));
+    rows.push_back({"ratio", fixed(ate_ratio(truth), 3)});
+    rows.back().resize(rows.front().size());
+  }
+  text += align_columns(rows);
+  if (truth.optimum_of_true && truth.optimum_of_true->parts > 1)
+    text += "the true closures leave " + std::to_string(truth.optimum_of_true->parts) +
+            " unconnected parts, each aligned by itself\n";
+  return text;
+}
+
+void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution,
+                         const TruthScore& truth) {
   Json rounds = Json::array();
   for (const TeamRound& round : solution.run.rounds)
     rounds.push_back({{"cost", round.cost},
@@ -177,6 +240,14 @@ void write_solution_json(std::ostream& out, const TeamGraph& graph, const Soluti
                  {"kept", Json::array()}});
     for (std::size_t k = 0; k < decision->kept.size(); ++k)
       if (decision->kept[k]) json["kept"].push_back(k);
+  }
+  if (truth.inside && truth.between)
+    json["closures"] = {{"inside", counts_json(*truth.inside)},
+                        {"between", counts_json(*truth.between)}};
+  if (truth.ate) json["ate"] = ate_json(graph, *truth.ate);
+  if (truth.optimum_of_true) {
+    json["optimum_of_true"] = ate_json(graph, *truth.optimum_of_true);
+    json["ate_ratio"] = ate_ratio(truth);
   }
   out << json_text(json);
 }

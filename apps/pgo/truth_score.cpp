@@ -1,0 +1,119 @@
+#include "apps/pgo/truth_score.hpp"
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <span>
+
+#include "apps/pgo/solvers.hpp"
+#include "modules/evaluation/trajectory_error.hpp"
+#include "modules/pose_graph/rounding.hpp"
+
+namespace km {
+namespace {
+
+// A sum of squared position errors.
+struct SquaredErrors {
+  double sum_m2 = 0.0;
+  std::size_t poses = 0;
+
+  void add(const Alignment& alignment, std::span<const PosePair> pairs) {
+    for (const PosePair& pair : pairs)
+      sum_m2 +=
+          (alignment.apply(pair.T_estimate_body).translation() - pair.T_truth_body.translation())
+              .squaredNorm();
+    poses += pairs.size();
+  }
+  [[nodiscard]] double rmse_m() const {
+    return poses == 0 ? std::numeric_limits<double>::quiet_NaN()
+                      : std::sqrt(sum_m2 / static_cast<double>(poses));
+  }
+};
+
+std::vector<SolvedPart> optimum_of(const std::vector<ConnectedPart>& parts) {
+  std::vector<SolvedPart> solved;
+  for (const ConnectedPart& part : parts) {
+    if (part.edges.empty()) {  // a single pose
+      solved.push_back({part.poses, {SE3::Identity()}});
+      continue;
+    }
+    const LiftedPoses X = central_optimum(part.graph).X;
+    solved.push_back({part.poses, round_to_poses(X, X.leftCols<4>())});
+  }
+  return solved;
+}
+
+}  // namespace
+
+std::vector<ConnectedPart> true_parts(const LabelledTeamGraph& team) {
+  std::vector<bool> keep = team.truth.is_false;
+  keep.flip();
+  return connected_parts(team.graph, std::vector<bool>(team.graph.ids.size(), true), keep);
+}
+
+LabelCounts count_closures(const LabelledTeamGraph& team, const std::vector<bool>& kept) {
+  const std::vector<bool> odometry = odometry_edges(team.graph);
+  LabelCounts counts;
+  for (std::size_t k = 0; k < odometry.size(); ++k) {
+    if (odometry[k]) continue;
+    const BlockEdge& e = team.graph.edges[k];
+    const bool inside = team.graph.robot_of(e.i) == team.graph.robot_of(e.j);
+    ClosureCounts& count = inside ? counts.inside : counts.between;
+    const bool is_kept = kept.empty() || kept[k];
+    if (team.truth.is_false[k])
+      ++(is_kept ? count.false_kept : count.false_rejected);
+    else
+      ++(is_kept ? count.true_kept : count.true_lost);
+  }
+  return counts;
+}
+
+TeamAte ate_of(const LabelledTeamGraph& team, const std::vector<SolvedPart>& parts) {
+  const std::size_t robots = team.graph.robots();
+  SquaredErrors all;
+  std::vector<SquaredErrors> in_team(robots), alone(robots);
+  for (const SolvedPart& part : parts) {
+    std::vector<std::vector<PosePair>> of_robot(robots);
+    std::vector<PosePair> pairs;
+    for (std::size_t i = 0; i < part.poses.size(); ++i) {
+      const auto& truth = team.truth.T_world_kf[part.poses[i]];
+      if (!truth) continue;
+      pairs.push_back({.T_truth_body = *truth, .T_estimate_body = part.T_world_kf[i]});
+      of_robot[team.graph.robot_of(static_cast<Eigen::Index>(part.poses[i]))].push_back(
+          pairs.back());
+    }
+    if (pairs.empty()) continue;
+    const Alignment alignment = align(pairs, false);
+    all.add(alignment, pairs);
+    for (std::size_t k = 0; k < robots; ++k) {
+      if (of_robot[k].empty()) continue;
+      in_team[k].add(alignment, of_robot[k]);
+      alone[k].add(align(of_robot[k], false), of_robot[k]);
+    }
+  }
+  TeamAte ate{.team_m = all.rmse_m(), .in_team_m = {}, .alone_m = {}, .parts = parts.size()};
+  for (std::size_t k = 0; k < robots; ++k) {
+    ate.in_team_m.push_back(in_team[k].rmse_m());
+    ate.alone_m.push_back(alone[k].rmse_m());
+  }
+  return ate;
+}
+
+TruthScore score(const LabelledTeamGraph& team, const std::vector<SE3>& T_world_kf,
+                 const std::vector<bool>& kept) {
+  TruthScore score;
+  const bool labels = !team.truth.is_false.empty();
+  if (labels) {
+    const LabelCounts counts = count_closures(team, kept);
+    score.inside = counts.inside;
+    score.between = counts.between;
+  }
+  if (team.truth.T_world_kf.empty()) return score;
+  SolvedPart whole{std::vector<std::size_t>(T_world_kf.size()), T_world_kf};
+  std::iota(whole.poses.begin(), whole.poses.end(), std::size_t{0});
+  score.ate = ate_of(team, {std::move(whole)});
+  if (labels) score.optimum_of_true = ate_of(team, optimum_of(true_parts(team)));
+  return score;
+}
+
+}  // namespace km
