@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <ostream>
 #include <sstream>
@@ -162,8 +163,33 @@ Json ate_json(const TeamGraph& graph, const TeamAte& ate) {
   return {{"team_m", ate.team_m}, {"parts", ate.parts}, {"robots", std::move(robots)}};
 }
 
-double ate_ratio(const TruthScore& truth) {
-  return truth.ate->team_m / truth.optimum_of_true->team_m;
+// NaN unless both are known.
+double ate_ratio(const std::optional<TeamAte>& ate, const std::optional<TeamAte>& optimum) {
+  return ate && optimum ? ate->team_m / optimum->team_m : std::numeric_limits<double>::quiet_NaN();
+}
+
+void add_truth(const TeamGraph& graph, const std::optional<LabelCounts>& closures,
+               const std::optional<TeamAte>& ate, const std::optional<TeamAte>& optimum,
+               Json& json) {
+  if (closures)
+    json["closures"] = {{"inside", counts_json(closures->inside)},
+                        {"between", counts_json(closures->between)}};
+  if (ate) json["ate"] = ate_json(graph, *ate);
+  if (!ate || !optimum) return;
+  json["optimum_of_true"] = ate_json(graph, *optimum);
+  json["ate_ratio"] = ate_ratio(ate, optimum);
+}
+
+Json instant_json(const TeamGraph& graph, const Instant& instant) {
+  Json json = {{"after_s", instant.after_s},         {"poses", instant.poses},
+               {"known_closures", instant.closures}, {"parts", instant.parts},
+               {"rounds", instant.rounds},           {"critical_path_s", instant.critical_path_s}};
+  add_truth(graph, instant.counts, instant.ate, instant.optimum_of_true, json);
+  return json;
+}
+
+std::string metres(const std::optional<TeamAte>& ate) {
+  return ate ? fixed(ate->team_m, 3) : "-";
 }
 
 }  // namespace
@@ -181,10 +207,10 @@ std::string solution_text(const TeamGraph& graph, const Solution& solution) {
 
 std::string score_text(const TeamGraph& graph, const TruthScore& truth) {
   std::string text;
-  if (truth.inside && truth.between)
+  if (truth.closures)
     text += align_columns({{"closures", "true kept", "true lost", "false kept", "false rejected"},
-                           count_row("inside a robot", *truth.inside),
-                           count_row("between robots", *truth.between)});
+                           count_row("inside a robot", truth.closures->inside),
+                           count_row("between robots", truth.closures->between)});
   if (!truth.ate) return text;
   std::vector<std::string> header{"ATE [m]", "team"};
   for (std::size_t k = 0; k < graph.robots(); ++k) {
@@ -194,18 +220,40 @@ std::string score_text(const TeamGraph& graph, const TruthScore& truth) {
   std::vector<std::vector<std::string>> rows{std::move(header), ate_row("solution", *truth.ate)};
   if (truth.optimum_of_true) {
     rows.push_back(ate_row("optimum of the true closures", *truth.optimum_of_true));
-    rows.push_back({"ratio", fixed(ate_ratio(truth), 3)});
+    rows.push_back({"ratio", fixed(ate_ratio(truth.ate, truth.optimum_of_true), 3)});
     rows.back().resize(rows.front().size());
   }
   text += align_columns(rows);
   if (truth.optimum_of_true && truth.optimum_of_true->parts > 1)
     text += "the true closures leave " + std::to_string(truth.optimum_of_true->parts) +
             " unconnected parts, each aligned by itself\n";
+  if (truth.optimum_of_true && !truth.certified)
+    text += "the optimum of the true closures is not certified\n";
   return text;
 }
 
+std::string timeline_text(const std::vector<Instant>& instants) {
+  if (instants.empty()) return {};
+  std::vector<std::vector<std::string>> rows{{"after [s]", "poses", "closures", "parts",
+                                              "true lost", "false kept", "rounds", "ATE [m]",
+                                              "optimum of true", "ratio"}};
+  for (const Instant& instant : instants) {
+    const auto& counts = instant.counts;
+    const auto sum = [&](auto ClosureCounts::*member) {
+      return counts ? std::to_string(counts->inside.*member + counts->between.*member) : "-";
+    };
+    rows.push_back({fixed(instant.after_s, 1), std::to_string(instant.poses),
+                    std::to_string(instant.closures), std::to_string(instant.parts),
+                    sum(&ClosureCounts::true_lost), sum(&ClosureCounts::false_kept),
+                    std::to_string(instant.rounds), metres(instant.ate),
+                    metres(instant.optimum_of_true),
+                    fixed(ate_ratio(instant.ate, instant.optimum_of_true), 3)});
+  }
+  return align_columns(rows);
+}
+
 void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution,
-                         const TruthScore& truth) {
+                         const TruthScore& truth, const std::vector<Instant>& instants) {
   Json rounds = Json::array();
   for (const TeamRound& round : solution.run.rounds)
     rounds.push_back({{"cost", round.cost},
@@ -241,14 +289,9 @@ void write_solution_json(std::ostream& out, const TeamGraph& graph, const Soluti
     for (std::size_t k = 0; k < decision->kept.size(); ++k)
       if (decision->kept[k]) json["kept"].push_back(k);
   }
-  if (truth.inside && truth.between)
-    json["closures"] = {{"inside", counts_json(*truth.inside)},
-                        {"between", counts_json(*truth.between)}};
-  if (truth.ate) json["ate"] = ate_json(graph, *truth.ate);
-  if (truth.optimum_of_true) {
-    json["optimum_of_true"] = ate_json(graph, *truth.optimum_of_true);
-    json["ate_ratio"] = ate_ratio(truth);
-  }
+  add_truth(graph, truth.closures, truth.ate, truth.optimum_of_true, json);
+  if (truth.optimum_of_true) json["optimum_of_true"]["certified"] = truth.certified;
+  for (const Instant& instant : instants) json["instants"].push_back(instant_json(graph, instant));
   out << json_text(json);
 }
 

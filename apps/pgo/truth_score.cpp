@@ -30,40 +30,52 @@ struct SquaredErrors {
   }
 };
 
-std::vector<SolvedPart> optimum_of(const std::vector<ConnectedPart>& parts) {
-  std::vector<SolvedPart> solved;
-  for (const ConnectedPart& part : parts) {
-    if (part.edges.empty()) {  // a single pose
-      solved.push_back({part.poses, {SE3::Identity()}});
-      continue;
-    }
-    const LiftedPoses X = central_optimum(part.graph).X;
-    solved.push_back({part.poses, round_to_poses(X, X.leftCols<4>())});
-  }
-  return solved;
+std::vector<ConnectedPart> true_parts(const LabelledTeamGraph& team,
+                                      const std::vector<bool>& keep_pose,
+                                      std::vector<bool> keep_edge) {
+  for (std::size_t k = 0; k < keep_edge.size(); ++k)
+    if (team.truth.is_false[k]) keep_edge[k] = false;
+  return connected_parts(team.graph, keep_pose, keep_edge);
+}
+
+std::vector<bool> all_of(std::size_t n) {
+  return std::vector<bool>(n, true);
 }
 
 }  // namespace
 
 std::vector<ConnectedPart> true_parts(const LabelledTeamGraph& team) {
-  std::vector<bool> keep = team.truth.is_false;
-  keep.flip();
-  return connected_parts(team.graph, std::vector<bool>(team.graph.ids.size(), true), keep);
+  return true_parts(team, all_of(team.graph.ids.size()), all_of(team.graph.edges.size()));
 }
 
-LabelCounts count_closures(const LabelledTeamGraph& team, const std::vector<bool>& kept) {
+TrueOptimum optimum_of_true(const LabelledTeamGraph& team, const std::vector<bool>& keep_pose,
+                            const std::vector<bool>& keep_edge) {
+  TrueOptimum optimum;
+  for (const ConnectedPart& part : true_parts(team, keep_pose, keep_edge)) {
+    if (part.edges.empty()) {  // a single pose
+      optimum.parts.push_back({part.poses, {SE3::Identity()}});
+      continue;
+    }
+    const CentralOptimum solved = central_optimum(part.graph);
+    optimum.parts.push_back({part.poses, round_to_poses(solved.X, solved.X.leftCols<4>())});
+    optimum.certified = optimum.certified && solved.certified;
+  }
+  return optimum;
+}
+
+LabelCounts count_closures(const LabelledTeamGraph& team, const std::vector<bool>& known,
+                           const std::vector<bool>& kept) {
   const std::vector<bool> odometry = odometry_edges(team.graph);
   LabelCounts counts;
   for (std::size_t k = 0; k < odometry.size(); ++k) {
-    if (odometry[k]) continue;
+    if (odometry[k] || !known[k]) continue;
     const BlockEdge& e = team.graph.edges[k];
     const bool inside = team.graph.robot_of(e.i) == team.graph.robot_of(e.j);
     ClosureCounts& count = inside ? counts.inside : counts.between;
-    const bool is_kept = kept.empty() || kept[k];
     if (team.truth.is_false[k])
-      ++(is_kept ? count.false_kept : count.false_rejected);
+      ++(kept[k] ? count.false_kept : count.false_rejected);
     else
-      ++(is_kept ? count.true_kept : count.true_lost);
+      ++(kept[k] ? count.true_kept : count.true_lost);
   }
   return counts;
 }
@@ -100,19 +112,20 @@ TeamAte ate_of(const LabelledTeamGraph& team, const std::vector<SolvedPart>& par
 }
 
 TruthScore score(const LabelledTeamGraph& team, const std::vector<SE3>& T_world_kf,
-                 const std::vector<bool>& kept) {
+                 std::vector<bool> kept) {
   TruthScore score;
+  const std::vector<bool> all_edges = all_of(team.graph.edges.size());
   const bool labels = !team.truth.is_false.empty();
-  if (labels) {
-    const LabelCounts counts = count_closures(team, kept);
-    score.inside = counts.inside;
-    score.between = counts.between;
-  }
+  if (kept.empty()) kept = all_edges;
+  if (labels) score.closures = count_closures(team, all_edges, kept);
   if (team.truth.T_world_kf.empty()) return score;
   SolvedPart whole{std::vector<std::size_t>(T_world_kf.size()), T_world_kf};
   std::iota(whole.poses.begin(), whole.poses.end(), std::size_t{0});
   score.ate = ate_of(team, {std::move(whole)});
-  if (labels) score.optimum_of_true = ate_of(team, optimum_of(true_parts(team)));
+  if (!labels) return score;
+  const TrueOptimum optimum = optimum_of_true(team, all_of(team.graph.ids.size()), all_edges);
+  score.optimum_of_true = ate_of(team, optimum.parts);
+  score.certified = optimum.certified;
   return score;
 }
 
