@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 namespace km {
 
@@ -59,8 +61,8 @@ class SmallJrl {
             {"prior", pose(0, 0)},
             {"covariance", covariance()}};
   }
-  static Json entry(std::int64_t after_ns, Json measurements) {
-    return {{"stamp", kStart + after_ns}, {"measurements", std::move(measurements)}};
+  static Json entry(std::int64_t after_ns, const std::vector<Json>& measurements) {
+    return {{"stamp", kStart + after_ns}, {"measurements", measurements}};
   }
   static Json measurements() {
     const Json shared = between(kB + 1, kA + 1, 0, -2);

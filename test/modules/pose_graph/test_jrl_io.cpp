@@ -249,7 +249,7 @@ TEST_CASE("What a JRL file must not have is refused with its place and value", "
        }},
       {"/key1: 5 is not a letter and an index below 2^32",
        [&](json& d) { factor(d, "a", 1, 0)["key1"] = 5; }},
-      {"/key1: 6989586625974303487",
+      {"/key1: 6989586625973977087",
        [&](json& d) {  // the largest index there is
          factor(d, "a", 2, 1)["key1"] = SmallJrl::kA + 0xffffffffU;
        }},
