@@ -13,7 +13,7 @@ namespace {
 
 using Catch::Contains;
 
-const std::string kTool = KM_BIN_DIR "/kimera_multi_pgo ";
+const std::string kPgoTool = KM_BIN_DIR "/kimera_multi_pgo ";
 
 LabelledTeamGraph small_team() {
   return labelled_team(parse_jrl(SmallJrl().text(), "small.jrl"), "small.jrl");
@@ -152,7 +152,7 @@ TEST_CASE("solve prints what a JRL file knows of the truth", "[pgo][truth]") {
   const TemporaryFolder folder;
   const auto file = folder.write("small.jrl", SmallJrl().text());
   const CommandResult result =
-      run_command(kTool + "solve " + file.string() + " --instants 2 --json " +
+      run_command(kPgoTool + "solve " + file.string() + " --instants 2 --json " +
                   (folder.path() / "out.json").string());
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
@@ -172,7 +172,7 @@ TEST_CASE("solve prints what a JRL file knows of the truth", "[pgo][truth]") {
   unlabelled.document.erase("outlier_factors");
   unlabelled.document.erase("groundtruth");
   (void)folder.write("small.jrl", unlabelled.text());
-  const CommandResult plain = run_command(kTool + "solve " + file.string());
+  const CommandResult plain = run_command(kPgoTool + "solve " + file.string());
   CHECK(plain.exit_code == 0);
   CHECK_THAT(plain.output, !Contains("ATE") && !Contains("true kept"));
 }
@@ -187,7 +187,7 @@ TEST_CASE("What does not go with a JRL file is refused", "[pgo][truth]") {
        {"step.g2o --instants 2", "step.g2o has no times"}}));
   CAPTURE(arguments);
   const CommandResult result =
-      run_command("cd " + folder.path().string() + " && " + kTool + "solve " + arguments);
+      run_command("cd " + folder.path().string() + " && " + kPgoTool + "solve " + arguments);
   CHECK(result.exit_code == 1);
   CHECK_THAT(result.output, Contains(message));
 }
@@ -196,7 +196,7 @@ TEST_CASE("outliers leaves out the closures that a JRL file labels as false", "[
   const TemporaryFolder folder;
   const auto file = folder.write("small.jrl", SmallJrl().text());
   const CommandResult result =
-      run_command(kTool + "outliers " + file.string() + " --shares 100 --methods none");
+      run_command(kPgoTool + "outliers " + file.string() + " --shares 100 --methods none");
   CAPTURE(result.output);
   CHECK(result.exit_code == 0);
   CHECK_THAT(result.output, Contains("5 poses, 2 true closures, 2 robots"));
