@@ -181,9 +181,13 @@ void add_truth(const TeamGraph& graph, const std::optional<LabelCounts>& closure
 }
 
 Json instant_json(const TeamGraph& graph, const Instant& instant) {
-  Json json = {{"after_s", instant.after_s},         {"poses", instant.poses},
-               {"known_closures", instant.closures}, {"parts", instant.parts},
-               {"rounds", instant.rounds},           {"critical_path_s", instant.critical_path_s}};
+  Json json = {{"after_s", instant.after_s},
+               {"poses", instant.poses},
+               {"known_closures", instant.closures},
+               {"parts", instant.parts},
+               {"decided", instant.decided},
+               {"rounds", instant.rounds},
+               {"critical_path_s", instant.critical_path_s}};
   add_truth(graph, instant.counts, instant.ate, instant.optimum_of_true, json);
   return json;
 }
@@ -245,8 +249,8 @@ std::string timeline_text(const std::vector<Instant>& instants) {
     rows.push_back({fixed(instant.after_s, 1), std::to_string(instant.poses),
                     std::to_string(instant.closures), std::to_string(instant.parts),
                     sum(&ClosureCounts::true_lost), sum(&ClosureCounts::false_kept),
-                    std::to_string(instant.rounds), metres(instant.ate),
-                    metres(instant.optimum_of_true),
+                    std::to_string(instant.rounds) + (instant.decided ? "" : ", not decided"),
+                    metres(instant.ate), metres(instant.optimum_of_true),
                     fixed(ate_ratio(instant.ate, instant.optimum_of_true), 3)});
   }
   return align_columns(rows);

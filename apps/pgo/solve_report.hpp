@@ -22,7 +22,7 @@ namespace km {
 /// With what the data set knows also "closures": {"inside", "between": {"true_kept", "true_lost",
 /// "false_kept", "false_rejected"}}, "ate": {"team_m", "parts", "robots": [{"robot", "in_team_m",
 /// "alone_m"}]}, "optimum_of_true": the same with "certified", "ate_ratio": that of the two
-/// "team_m"; "instants": [{"after_s", "poses", "known_closures", "parts", "rounds",
+/// "team_m"; "instants": [{"after_s", "poses", "known_closures", "parts", "decided", "rounds",
 /// "critical_path_s", "closures", "ate", "optimum_of_true", "ate_ratio"}] of what was played.
 void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution,
                          const TruthScore& truth, const std::vector<Instant>& instants);

@@ -27,6 +27,7 @@ Instant solve_at(const LabelledTeamGraph& team, const std::vector<bool>& odometr
     }
     const Solution solution = solve(part.graph, options, std::nullopt, meter);
     const auto& decision = solution.run.decision;
+    instant.decided = instant.decided && (!decision || decision->decided);
     for (std::size_t k = 0; k < part.edges.size(); ++k) {
       known[part.edges[k]] = true;
       kept[part.edges[k]] = !decision || decision->kept[k];

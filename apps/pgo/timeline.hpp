@@ -17,6 +17,7 @@ struct Instant {
   std::size_t parts = 0;                   ///< Connected parts, each solved by itself.
   std::size_t rounds = 0;                  ///< Of the part that took the most.
   double critical_path_s = 0.0;            ///< Of the part that took the longest.
+  bool decided = true;                     ///< False: the rounds did not suffice for some part.
   std::optional<LabelCounts> counts = {};  ///< Of the known closures; only with labels.
   std::optional<TeamAte> ate = {};         ///< Each part aligned by itself; only with true poses.
   std::optional<TeamAte> optimum_of_true = {};  ///< See TruthScore; of what is known by then.
