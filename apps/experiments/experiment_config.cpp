@@ -89,6 +89,10 @@ ExperimentConfig read_experiments(const fs::path& folder, bool quick) {
     add_with_repetitions(world, name, config.worlds);
   }
   read("pcm.yaml", [&](YamlFields& fields) { config.pcm.visit_fields(fields); });
+  read("cosmo.yaml", [&](YamlFields& fields) {
+    fields.sections("sets", config.cosmo.sets);
+    fields.required({"sets"});
+  });
   read("trajectory.yaml", [&](YamlFields& fields) {
     read_names(fields, config.worlds, config.trajectory_worlds);
     fields.sections("methods", config.methods);
@@ -111,6 +115,8 @@ ExperimentConfig read_experiments(const fs::path& folder, bool quick) {
   problems.finish();
   for (PgoMethodConfig& method : config.methods)
     if (method.title.empty()) method.title = method.name;
+  for (CosmoSet& set : config.cosmo.sets)
+    if (set.title.empty()) set.title = set.stem();
   return config;
 }
 

@@ -77,6 +77,26 @@ struct PcmExperiment {
   }
 };
 
+/// A graph of COSMO-Bench.
+struct CosmoSet {
+  std::string graph;
+  std::string title;
+
+  /// Name of the file without its extension.
+  [[nodiscard]] std::string stem() const { return std::filesystem::path(graph).stem().string(); }
+
+  void visit_fields(auto& visitor) {
+    visitor.field("graph", graph, "JRL file, looked for in --graphs");
+    visitor.field("title", title, "for people; default: the file's name");
+    visitor.required({"graph"});
+  }
+};
+
+/// Rejection of labelled false closures: cosmo.yaml.
+struct CosmoExperiment {
+  std::vector<CosmoSet> sets;
+};
+
 /// One robot without others and without a map.
 struct AloneExperiment {
   std::string world;
@@ -113,6 +133,7 @@ struct ExperimentConfig {
   /// WORLD-seed2 on those of another seed.
   std::vector<WorldConfig> worlds;
   PcmExperiment pcm;
+  CosmoExperiment cosmo;
   AloneExperiment alone;                       ///< Without a world: there is no such experiment.
   std::vector<std::string> trajectory_worlds;  ///< Names in `worlds`, as those below.
   std::vector<PgoMethodConfig> methods;
@@ -127,7 +148,8 @@ struct ExperimentConfig {
   [[nodiscard]] std::vector<std::string> repetitions(const std::string& world) const;
 };
 
-/// Reads worlds.yaml, pcm.yaml, trajectory.yaml, resources.yaml, mesh.yaml and semantics.yaml.
+/// Reads worlds.yaml, pcm.yaml, cosmo.yaml, trajectory.yaml, resources.yaml, mesh.yaml and
+/// semantics.yaml.
 /// With `quick` the keys below `quick:` replace those beside it. Throws ConfigError with every
 /// problem of all files, by file and line; names of worlds must be in worlds.yaml.
 [[nodiscard]] ExperimentConfig read_experiments(const std::filesystem::path& folder, bool quick);

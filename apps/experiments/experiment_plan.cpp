@@ -243,6 +243,24 @@ std::vector<Step> picture_steps(const WorldConfig& world, const ExperimentPaths&
   return steps;
 }
 
+std::vector<Step> cosmo_steps(const CosmoExperiment& cosmo, const ExperimentPaths& paths) {
+  std::vector<Step> steps;
+  for (const CosmoSet& set : cosmo.sets) {
+    const fs::path graph = paths.graphs / set.graph;
+    const fs::path json = cosmo_file(set, paths);
+    steps.push_back({.name = cosmo_step_name(set),
+                     .title = "COSMO-Bench, " + set.title,
+                     .command = {(paths.programs / "kimera_multi_pgo").string(), "solve",
+                                 graph.string(), "--json", json.string()},
+                     .inputs = {graph},
+                     .outputs = {json},
+                     .expected_s = 1.0});
+    if (!fs::exists(graph))
+      steps.back().missing = "no pose graph " + graph.string() + "; --graphs says where it is";
+  }
+  return steps;
+}
+
 std::vector<Step> pcm_steps(const PcmExperiment& pcm, const ExperimentPaths& paths) {
   const fs::path graph = paths.graphs / pcm.graph;
   std::vector<Step> steps;
@@ -377,6 +395,14 @@ PcmFiles pcm_files(unsigned seed, const ExperimentPaths& paths) {
   return {paths.results / (name + ".json"), paths.results / "figures" / (name + ".html")};
 }
 
+std::string cosmo_step_name(const CosmoSet& set) {
+  return "cosmo-" + set.stem();
+}
+
+fs::path cosmo_file(const CosmoSet& set, const ExperimentPaths& paths) {
+  return paths.results / (cosmo_step_name(set) + ".json");
+}
+
 fs::path picture_file(const WorldConfig& world, bool corrected, const ExperimentPaths& paths) {
   return paths.results / "figures" /
          ("mesh-" + world.name + (corrected ? "-after.png" : "-before.png"));
@@ -385,6 +411,7 @@ fs::path picture_file(const WorldConfig& world, bool corrected, const Experiment
 std::vector<Step> plan_experiment(const std::string& experiment, const ExperimentConfig& config,
                                   const ExperimentPaths& paths) {
   if (experiment == "pcm") return pcm_steps(config.pcm, paths);
+  if (experiment == "cosmo") return cosmo_steps(config.cosmo, paths);
   const std::vector<std::string>& worlds = experiment == "trajectory"  ? config.trajectory_worlds
                                            : experiment == "resources" ? config.resources_worlds
                                            : experiment == "mesh"      ? config.mesh_worlds

@@ -44,6 +44,7 @@ struct ExperimentName {
 
 inline constexpr std::array kExperiments = {
     ExperimentName{"pcm", "outlier rejection: time and clique against the size of the graph"},
+    ExperimentName{"cosmo", "closures kept and errors on COSMO-Bench, beside published ones"},
     ExperimentName{"trajectory", "errors and costs of local, distributed and central optimisation"},
     ExperimentName{"resources", "bytes, rounds and seconds; what the robots' processors do"},
     ExperimentName{"mesh", "error of the meshes before and after their correction"},
@@ -81,6 +82,10 @@ struct PcmFiles {
   std::filesystem::path json, plot;
 };
 [[nodiscard]] PcmFiles pcm_files(unsigned seed, const ExperimentPaths& paths);
+
+[[nodiscard]] std::string cosmo_step_name(const CosmoSet& set);
+/// What solving a set of COSMO-Bench has come to, as JSON.
+[[nodiscard]] std::filesystem::path cosmo_file(const CosmoSet& set, const ExperimentPaths& paths);
 
 /// PNG of the meshes of all robots.
 [[nodiscard]] std::filesystem::path picture_file(const WorldConfig& world, bool corrected,

@@ -34,6 +34,7 @@ constexpr const char* kAbout =
     "  kimera_multi_experiments list\n"
     "  kimera_multi_experiments run all --quick               # small, minutes on two cores\n"
     "  kimera_multi_experiments run pcm --graphs ~/graphs     # manhattan.g2o is there\n"
+    "  kimera_multi_experiments run cosmo --graphs ~/cosmo    # COSMO-Bench's *.jrl are there\n"
     "  kimera_multi_experiments run trajectory --euroc ~/euroc\n"
     "  kimera_multi_experiments report\n\n"
     "--euroc DIR is for the Vicon rooms: of V1_01 to V2_03 either the original folders, whose\n"
@@ -219,7 +220,8 @@ int main(int argc, char** argv) try {
   std::vector<std::string> names = all_names();
   names.emplace_back("all");
   run_command
-      ->add_option("NAME", options.names, "pcm, trajectory, resources, mesh, semantics, or all")
+      ->add_option("NAME", options.names,
+                   "pcm, cosmo, trajectory, resources, mesh, semantics, or all")
       ->required()
       ->check(CLI::IsMember(names));
   run_command->add_flag("--again", options.again, "Also what is done");

@@ -46,6 +46,17 @@ auto find_world(const Rows& rows, const std::string& world) -> decltype(rows.dat
 
 }  // namespace
 
+const PublishedTeamErrors* published_team_errors(const std::string& set) {
+  static const std::vector<PublishedTeamErrors> kSets = {
+      {"kth_r3_00_d06_d09_d10_wifi", {1.77}, {1.79}},
+      {"kth_r3_00_d06_d09_d10_proradio", {1.10, 1.11}, {}},
+      {"ntu_r3_02_d02_n04_n13_wifi", {2.70, 6.33, 147.0}, {2.31}},
+      {"ntu_r3_02_d02_n04_n13_proradio", {3.32, 3.44, 112.0}, {}}};
+  const auto found = std::find_if(kSets.begin(), kSets.end(),
+                                  [&](const PublishedTeamErrors& row) { return row.set == set; });
+  return found == kSets.end() ? nullptr : &*found;
+}
+
 const PaperWorld* paper_world(const std::string& world) {
   return find_world(kWorlds, world);
 }

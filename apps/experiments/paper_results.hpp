@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace km {
 
@@ -35,6 +36,18 @@ struct PaperLabels {
 /// nullptr for a world that the paper has not.
 [[nodiscard]] const PaperWorld* paper_world(const std::string& world);
 [[nodiscard]] const PaperLabels* paper_labels(const std::string& world);
+
+/// RMSE of the positions of all robots under one rigid alignment [m], on a graph of COSMO-Bench, in
+/// the tables of UMich-RobotExploration/variable-projection (examples/data/analysis/): centralised,
+/// without priors, from chained odometry.
+struct PublishedTeamErrors {
+  const char* set;                  ///< Name of the file without its extension.
+  std::vector<double> irls_gnc_m;   ///< Variants of iteratively reweighted GNC.
+  std::vector<double> gtsam_gnc_m;  ///< GTSAM's GNC, Geman-McClure; empty: not there.
+};
+
+/// nullptr for a set without published values.
+[[nodiscard]] const PublishedTeamErrors* published_team_errors(const std::string& set);
 
 /// Column of a method of config/experiments/trajectory.yaml in Table I, by its name.
 [[nodiscard]] std::optional<std::size_t> paper_column(const std::string& method);

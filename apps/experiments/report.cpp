@@ -106,8 +106,8 @@ ReportDocument make_document(ReportInput& input) {
   if (input.config().quick) document.lead += kQuick;
   std::string missing;
   std::vector<ReportSection> sections;
-  constexpr std::array kSections = {pcm_section, trajectory_section, resources_section,
-                                    mesh_section, semantics_section};
+  constexpr std::array kSections = {pcm_section,       cosmo_section, trajectory_section,
+                                    resources_section, mesh_section,  semantics_section};
   static_assert(kSections.size() == kExperiments.size());
   for (std::size_t k = 0; k < kSections.size(); ++k)
     if (auto section = kSections[k](input))

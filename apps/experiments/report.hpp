@@ -49,6 +49,7 @@ struct Spread {
 /// result at all; of what is there in part the rest is left out. All throw std::runtime_error for
 /// results that cannot be read.
 [[nodiscard]] std::optional<ReportSection> pcm_section(ReportInput& input);
+[[nodiscard]] std::optional<ReportSection> cosmo_section(ReportInput& input);
 [[nodiscard]] std::optional<ReportSection> trajectory_section(ReportInput& input);
 [[nodiscard]] std::optional<ReportSection> resources_section(ReportInput& input);
 [[nodiscard]] std::optional<ReportSection> mesh_section(ReportInput& input);

@@ -10,8 +10,10 @@
 namespace km {
 
 void GraphInput::define(CLI::App& app) {
-  app.add_option("FILE", file,
-                 "Pose graph (*.g2o), or a folder with one file per robot, or a team's results")
+  app.add_option(
+         "FILE", file,
+         "Pose graph (*.g2o), a team's (*.jrl), or a folder with one file per robot, or a team's\n"
+         "results")
       ->required()
       ->check(CLI::ExistingPath);
   app.add_option("--robots", robots, "Number of robots that a single file is dealt out to")
@@ -23,27 +25,32 @@ void GraphInput::define(CLI::App& app) {
                "closures alone join robots in the field");
 }
 
-TeamGraph GraphInput::read(const CLI::App& app) const {
+LabelledTeamGraph GraphInput::read(const CLI::App& app) const {
   const bool folder = is_folder(file);
+  const bool of_a_team = folder || file.extension() == ".jrl";
   const bool contiguous = partition == "contiguous";
-  if (folder && !contiguous)
-    throw std::runtime_error("--partition is for a single file, " + file.string() +
-                             " is a folder with one file per robot");
-  TeamGraph graph = folder       ? read_team_folder(file)
-                    : contiguous ? deal_contiguously(read_g2o(file), robots, file.string())
-                                 : deal(read_g2o(file), read_partition(partition), partition);
-  if (app.count("--robots") > 0 && graph.robots() != robots)
+  if (of_a_team && !contiguous)
+    throw std::runtime_error(
+        "--partition is for a single g2o file, " + file.string() +
+        (folder ? " is a folder with one file per robot" : " says which robot each pose is of"));
+  LabelledTeamGraph team =
+      folder       ? LabelledTeamGraph{read_team_folder(file)}
+      : of_a_team  ? labelled_team(read_jrl(file), file.string())
+      : contiguous ? LabelledTeamGraph{deal_contiguously(read_g2o(file), robots, file.string())}
+                   : LabelledTeamGraph{deal(read_g2o(file), read_partition(partition), partition)};
+  if (app.count("--robots") > 0 && team.graph.robots() != robots)
     throw std::runtime_error("--robots " + std::to_string(robots) + ": there are " +
-                             std::to_string(graph.robots()) + " robots in the folder or partition");
-  if (keep_steps) return graph;
-  graph = without_cut_steps(std::move(graph));
-  const std::vector<Eigen::Index> part = connected_parts(graph);
+                             std::to_string(team.graph.robots()) +
+                             " robots in the file, folder or partition");
+  if (keep_steps || of_a_team) return team;
+  team.graph = without_cut_steps(std::move(team.graph));
+  const std::vector<Eigen::Index> part = part_of_poses(team.graph);
   const auto apart = std::ranges::find_if(part, [](Eigen::Index lowest) { return lowest != 0; });
   if (apart != part.end())
     throw std::runtime_error(file.string() + ": no closures join robot " +
-                             std::to_string(graph.robot_of(apart - part.begin())) +
+                             std::to_string(team.graph.robot_of(apart - part.begin())) +
                              " to robot 0. --keep-steps keeps the odometry between them");
-  return graph;
+  return team;
 }
 
 std::string indefinite_text(std::size_t edges) {
@@ -51,6 +58,12 @@ std::string indefinite_text(std::size_t edges) {
   return std::to_string(edges) +
          " edges have an information matrix that is not positive definite: weighed by its blocks, "
          "as SE-Sync does\n";
+}
+
+std::string left_out_text(const LabelledTeamGraph& team) {
+  if (team.priors + team.repeated == 0) return {};
+  return "left out: " + std::to_string(team.priors) + " priors, " + std::to_string(team.repeated) +
+         " exact copies of other measurements\n";
 }
 
 }  // namespace km

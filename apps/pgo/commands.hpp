@@ -6,7 +6,7 @@
 #include <string>
 
 #include "apps/report_files.hpp"
-#include "modules/pgo_study/team_graph.hpp"
+#include "modules/pgo_study/team_graph_file.hpp"
 
 namespace km {
 
@@ -26,14 +26,17 @@ struct GraphInput {
   /// Defines FILE, --robots, --partition and --keep-steps, which fill this: it outlives `app`.
   void define(CLI::App& app);
 
-  /// Without odometry between robots unless keep_steps. Throws std::runtime_error if there is no
-  /// such graph, if --robots was given to `app` and is not their number, and if the robots are not
-  /// connected.
-  [[nodiscard]] TeamGraph read(const CLI::App& app) const;
+  /// With what the file says of the truth, and without odometry between robots unless keep_steps.
+  /// Throws std::runtime_error if there is no such graph, if --robots was given to `app` and is not
+  /// their number, and if a g2o graph that is dealt out falls apart.
+  [[nodiscard]] LabelledTeamGraph read(const CLI::App& app) const;
 };
 
 /// What to say of edges that were weighed by the blocks of their information matrix alone, since it
 /// is not positive definite, as SE-Sync reads them; nothing if there are none.
 [[nodiscard]] std::string indefinite_text(std::size_t edges);
+
+/// Which measurements of the file are not in the graph; nothing if all are.
+[[nodiscard]] std::string left_out_text(const LabelledTeamGraph& team);
 
 }  // namespace km

@@ -14,6 +14,8 @@
 #include "modules/pgo_study/central_solver.hpp"
 #include "modules/pgo_study/team_closures.hpp"
 #include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/corroboration.hpp"
+#include "modules/pose_graph/recorded_graph.hpp"
 #include "modules/pose_graph/rounding.hpp"
 
 namespace km {
@@ -164,18 +166,15 @@ OutlierStudy run_outlier_study(const TeamGraph& clean, const OutlierStudyOptions
   for (const double percent : options.shares_percent)
     if (!(percent >= 0.0 && std::isfinite(percent)))
       throw std::invalid_argument("outlier study: a share of " + std::to_string(percent) + " %");
-  CentralSolver central(clean.edges, lift(chordal_initialisation(clean.poses(), clean.edges), 3),
-                        clean.dimension);
-  while (central.step()) {
-  }
-  const std::vector<SE3> truth = round_to_poses(central.X(), central.X().leftCols<4>());
+  const CentralOptimum central = central_optimum(clean);
+  const std::vector<SE3> truth = round_to_poses(central.X, central.X.leftCols<4>());
   const std::vector<bool> odometry = odometry_edges(clean);
   OutlierStudy study{
       .robots = clean.robots(),
       .poses = static_cast<std::size_t>(clean.poses()),
       .true_closures =
           static_cast<std::size_t>(std::count(odometry.begin(), odometry.end(), false)),
-      .certified = central.certificate() && central.certificate()->certified,
+      .certified = central.certified,
       .half_side_m = options.half_side_m > 0.0 ? options.half_side_m : half_extent_m(truth),
       .results = {}};
   const std::size_t all =

@@ -14,6 +14,7 @@
 #include "apps/pgo/outlier_study.hpp"
 #include "apps/pgo/scenario_report.hpp"
 #include "apps/pgo/scenario_study.hpp"
+#include "apps/pgo/truth_score.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/json.hpp"
 #include "modules/core/text_table.hpp"
@@ -405,7 +406,7 @@ void run_scenario(const CLI::App& app, const OutliersCommand& command) {
   GraphInput whole = command.input;
   whole.keep_steps = true;
   if (options.scenario.robots > 0) whole.robots = 1;
-  TeamGraph graph = whole.read(app);
+  TeamGraph graph = whole.read(app).graph;
   graph.verticals.clear();
   std::cout << indefinite_text(graph.indefinite_edges);
   StageProgress progress;
@@ -421,6 +422,16 @@ void run_scenario(const CLI::App& app, const OutliersCommand& command) {
                       [&] { return scenario_plots(study); });
 }
 
+// Without the closures that the file itself labels as false.
+TeamGraph true_graph(const LabelledTeamGraph& input, const std::string& file) {
+  if (input.truth.is_false.empty()) return input.graph;
+  std::vector<ConnectedPart> parts = true_parts(input);
+  if (parts.size() > 1)
+    throw std::runtime_error(file +
+                             ": without the closures labelled false the graph is not connected");
+  return std::move(parts.front().graph);
+}
+
 void run(const CLI::App& app, const OutliersCommand& command) {
   command.files.check();
   if (is_scenario(app, command)) return run_scenario(app, command);
@@ -428,7 +439,8 @@ void run(const CLI::App& app, const OutliersCommand& command) {
     if (app.count(option) > 0)
       throw std::runtime_error(std::string(option) + " is for scenarios only");
   check_methods(command.study.methods, kRejections, "shares: it is for scenarios");
-  TeamGraph graph = command.input.read(app);
+  const LabelledTeamGraph input = command.input.read(app);
+  TeamGraph graph = true_graph(input, command.input.file.string());
   graph.verticals.clear();
   std::cout << indefinite_text(graph.indefinite_edges);
   StageProgress progress;

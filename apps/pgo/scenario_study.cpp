@@ -56,7 +56,7 @@ struct Part {
 };
 
 std::map<Index, Part> parts_of(const TeamGraph& graph) {
-  const std::vector<Index> part_of = connected_parts(graph);
+  const std::vector<Index> part_of = part_of_poses(graph);
   std::map<Index, Part> parts;
   std::vector<Index> number;
   for (Index i = 0; i < graph.poses(); ++i) {
@@ -142,7 +142,7 @@ PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::
                            std::uint32_t most_steps) {
   const TeamGraph used = with_edges(graph, kept);
   PlacedTeam placed{
-      .T_frame_kf = std::move(start), .frame_of = connected_parts(used), .kept = std::move(kept)};
+      .T_frame_kf = std::move(start), .frame_of = part_of_poses(used), .kept = std::move(kept)};
   for (const auto& [lowest, part] : parts_of(used)) {
     std::vector<SE3> poses;
     for (const Index i : part.poses)
@@ -164,7 +164,7 @@ PlacedTeam solve_by_gnc(const TeamGraph& graph) {
   const double c2 = chi_squared_6_quantile(kConfidence);
   const std::vector<bool> odometry = odometry_edges(graph);
   const std::vector<bool> all(graph.edges.size(), true);
-  const bool joined = std::ranges::count(connected_parts(graph), 0) == graph.poses();
+  const bool joined = std::ranges::count(part_of_poses(graph), 0) == graph.poses();
   PlacedTeam placed =
       solve_centrally(graph, all, joined ? odometry_start(graph) : chordal_start(graph));
   double largest = 0.0;

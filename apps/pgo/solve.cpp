@@ -20,8 +20,9 @@ constexpr const char* kSolveDetails =
     "Every robot has only its part of the graph, and what it hears from the others are the\n"
     "messages that would cross the network.\n\n"
     "FILE is a g2o file, 2D or 3D, dealt out to --robots robots, or a folder with one *.csv or\n"
-    "*.g2o per robot, or what a team's run has left behind. The cost is the chordal one without\n"
-    "1/2, weights as SE-Sync reads them (of a team's results: as the robots weighed them):\n"
+    "*.g2o per robot, or what a team's run has left behind, or a team's JRL file (COSMO-Bench).\n"
+    "The cost is the chordal one without 1/2, weights as SE-Sync reads them (of a team's results\n"
+    "and JRL files: as the robots weigh them):\n"
     "  F = sum kappa |R_j - R_i R_ij|^2 + tau |t_j - t_i - R_i t_ij|^2\n"
     "Where a g2o file says which way is up at a pose (EDGE_SE3_PRIOR with information on the tilt\n"
     "alone, as kimera_multi_robot writes it), |R_i up_i - z|^2 / sigma_i^2 is added; dgs and\n"
@@ -49,12 +50,20 @@ constexpr const char* kSolveDetails =
     "robot of each round, summed, and of all. A broadcast counts once; newton's letters have one\n"
     "reader each. The certificate proves how far any poses can lie below at most. Of newton\n"
     "without --trust-all it says what was kept.\n\n"
+    "If a JRL file labels false closures, a table shows how many of them, and of the true ones,\n"
+    "were kept. If it has true poses, another shows the ATE: the RMSE [m] of the positions of all\n"
+    "robots under one rigid alignment, then of each robot under that alignment and under its own.\n"
+    "With both, the optimum of all closures that are not labelled false is shown for comparison.\n"
+    "Priors are left out. --instants N solves what the stamps of the file say is known at N "
+    "times,\n"
+    "spread evenly; parts that no closure connects yet are solved and aligned by themselves.\n\n"
     "Examples:\n"
     "  kimera_multi_pgo solve sphere2500.g2o --robots 5 --method newton --trust-all --json "
     "out.json\n"
     "  kimera_multi_pgo solve tunnels_8robots --method rbcd --rounds 300 --plot gap.html\n"
     "  kimera_multi_pgo solve tunnels_8robots\n"
     "  kimera_multi_pgo solve tunnels_8robots --barc 20 --links chain\n"
+    "  kimera_multi_pgo solve ntu_r3_02_d02_n04_n13_wifi.jrl --instants 10\n"
     "  kimera_multi_pgo solve manhattan.g2o --method centralized --output manhattan.tum";
 
 struct SolveCommand {
@@ -63,6 +72,7 @@ struct SolveCommand {
   SolverOptions solver;
   std::string schedule = "coloured";
   std::optional<double> optimum;
+  std::size_t instants = 0;
   ReportFiles files;
   fs::path output;
 };
@@ -107,6 +117,9 @@ void define_method(CLI::App& app, SolveCommand& command) {
       ->check(CLI::NonNegativeNumber);
   app.add_option("--rank", solver.rank, "rbcd*, newton --trust-all: of the relaxation")
       ->check(CLI::Range(3, 10));
+  app.add_option("--instants", command.instants,
+                 "JRL: also solve what is known at so many times, each time anew, and show the ATE")
+      ->check(CLI::Range(1, 10000));
   app.add_option("--optimum", command.optimum, "The optimum, if known: it is not computed then")
       ->check(CLI::PositiveNumber);
 }
@@ -199,19 +212,32 @@ void write_solved(std::ostream& out, const TeamGraph& graph, const std::vector<S
   write_g2o(out, result);
 }
 
+std::vector<bool> kept_by(const Solution& solution) {
+  return solution.run.decision ? solution.run.decision->kept : std::vector<bool>();
+}
+
 void run(const CLI::App& app, SolveCommand& command) {
   check(app, command);
-  TeamGraph graph = command.input.read(app);
+  LabelledTeamGraph team = command.input.read(app);
+  TeamGraph& graph = team.graph;
+  if (command.instants > 0 && team.truth.edge_stamps.empty())
+    throw std::runtime_error("--instants: " + command.input.file.string() +
+                             " has no times, as JRL files have them");
   if (command.no_vertical) graph.verticals.clear();
   const Solution solution = solve(graph, command.solver, command.optimum, cpu_meter());
   for (const SE3& T_world_kf : solution.T_world_kf)
     if (!T_world_kf.matrix().allFinite())
       throw std::runtime_error(command.input.file.string() + ": " + command.solver.name() +
                                " found no finite poses: do steps and weights make sense?");
-  std::cout << solution_text(graph, solution);
-  command.files.write([&](std::ostream& out) { write_solution_json(out, graph, solution); },
-                      "Gap to the optimum: " + command.input.file.string(),
-                      [&] { return gap_plots(solution); });
+  const TruthScore truth = score(team, solution.T_world_kf, kept_by(solution));
+  std::cout << left_out_text(team) << solution_text(graph, solution) << score_text(graph, truth);
+  const std::vector<Instant> instants =
+      command.instants > 0 ? play(team, command.solver, command.instants, cpu_meter())
+                           : std::vector<Instant>();
+  std::cout << timeline_text(instants);
+  command.files.write(
+      [&](std::ostream& out) { write_solution_json(out, graph, solution, truth, instants); },
+      "Gap to the optimum: " + command.input.file.string(), [&] { return gap_plots(solution); });
   write_output(command.output, [&](std::ostream& out) {
     command.output.extension() == ".tum" ? write_tum(out, solution.T_world_kf)
                                          : write_solved(out, graph, solution.T_world_kf);

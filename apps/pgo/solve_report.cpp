@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <ostream>
 #include <sstream>
@@ -129,6 +130,72 @@ std::string decision_text(const TeamGraph& graph, const Solution& solution) {
   return text.str();
 }
 
+std::vector<std::string> count_row(const std::string& name, const ClosureCounts& counts) {
+  return {name, std::to_string(counts.true_kept), std::to_string(counts.true_lost),
+          std::to_string(counts.false_kept), std::to_string(counts.false_rejected)};
+}
+
+Json counts_json(const ClosureCounts& counts) {
+  return {{"true_kept", counts.true_kept},
+          {"true_lost", counts.true_lost},
+          {"false_kept", counts.false_kept},
+          {"false_rejected", counts.false_rejected}};
+}
+
+RobotId robot_id(const TeamGraph& graph, std::size_t robot) {
+  return graph.ids[static_cast<std::size_t>(graph.first[robot])].robot;
+}
+
+std::vector<std::string> ate_row(const std::string& name, const TeamAte& ate) {
+  constexpr int kDecimals = 3;
+  std::vector<std::string> row{name, fixed(ate.team_m, kDecimals)};
+  for (std::size_t k = 0; k < ate.alone_m.size(); ++k)
+    row.insert(row.end(), {fixed(ate.in_team_m[k], kDecimals), fixed(ate.alone_m[k], kDecimals)});
+  return row;
+}
+
+Json ate_json(const TeamGraph& graph, const TeamAte& ate) {
+  Json robots = Json::array();
+  for (std::size_t k = 0; k < ate.alone_m.size(); ++k)
+    robots.push_back({{"robot", robot_id(graph, k)},
+                      {"in_team_m", ate.in_team_m[k]},
+                      {"alone_m", ate.alone_m[k]}});
+  return {{"team_m", ate.team_m}, {"parts", ate.parts}, {"robots", std::move(robots)}};
+}
+
+// NaN unless both are known.
+double ate_ratio(const std::optional<TeamAte>& ate, const std::optional<TeamAte>& optimum) {
+  return ate && optimum ? ate->team_m / optimum->team_m : std::numeric_limits<double>::quiet_NaN();
+}
+
+void add_truth(const TeamGraph& graph, const std::optional<LabelCounts>& closures,
+               const std::optional<TeamAte>& ate, const std::optional<TeamAte>& optimum,
+               Json& json) {
+  if (closures)
+    json["closures"] = {{"inside", counts_json(closures->inside)},
+                        {"between", counts_json(closures->between)}};
+  if (ate) json["ate"] = ate_json(graph, *ate);
+  if (!ate || !optimum) return;
+  json["optimum_of_true"] = ate_json(graph, *optimum);
+  json["ate_ratio"] = ate_ratio(ate, optimum);
+}
+
+Json instant_json(const TeamGraph& graph, const Instant& instant) {
+  Json json = {{"after_s", instant.after_s},
+               {"poses", instant.poses},
+               {"known_closures", instant.closures},
+               {"parts", instant.parts},
+               {"decided", instant.decided},
+               {"rounds", instant.rounds},
+               {"critical_path_s", instant.critical_path_s}};
+  add_truth(graph, instant.counts, instant.ate, instant.optimum_of_true, json);
+  return json;
+}
+
+std::string metres(const std::optional<TeamAte>& ate) {
+  return ate ? fixed(ate->team_m, 3) : "-";
+}
+
 }  // namespace
 
 std::string solution_text(const TeamGraph& graph, const Solution& solution) {
@@ -142,7 +209,55 @@ std::string solution_text(const TeamGraph& graph, const Solution& solution) {
   return text.str();
 }
 
-void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution) {
+std::string score_text(const TeamGraph& graph, const TruthScore& truth) {
+  std::string text;
+  if (truth.closures)
+    text += align_columns({{"closures", "true kept", "true lost", "false kept", "false rejected"},
+                           count_row("inside a robot", truth.closures->inside),
+                           count_row("between robots", truth.closures->between)});
+  if (!truth.ate) return text;
+  std::vector<std::string> header{"ATE [m]", "team"};
+  for (std::size_t k = 0; k < graph.robots(); ++k) {
+    const std::string robot = std::to_string(robot_id(graph, k));
+    header.insert(header.end(), {"robot " + robot + " in team", "alone"});
+  }
+  std::vector<std::vector<std::string>> rows{std::move(header), ate_row("solution", *truth.ate)};
+  if (truth.optimum_of_true) {
+    rows.push_back(ate_row("optimum of the true closures", *truth.optimum_of_true));
+    rows.push_back({"ratio", fixed(ate_ratio(truth.ate, truth.optimum_of_true), 3)});
+    rows.back().resize(rows.front().size());
+  }
+  text += align_columns(rows);
+  if (truth.optimum_of_true && truth.optimum_of_true->parts > 1)
+    text += "the true closures leave " + std::to_string(truth.optimum_of_true->parts) +
+            " unconnected parts, each aligned by itself\n";
+  if (truth.optimum_of_true && !truth.certified)
+    text += "the optimum of the true closures is not certified\n";
+  return text;
+}
+
+std::string timeline_text(const std::vector<Instant>& instants) {
+  if (instants.empty()) return {};
+  std::vector<std::vector<std::string>> rows{{"after [s]", "poses", "closures", "parts",
+                                              "true lost", "false kept", "rounds", "ATE [m]",
+                                              "optimum of true", "ratio"}};
+  for (const Instant& instant : instants) {
+    const auto& counts = instant.counts;
+    const auto sum = [&](auto ClosureCounts::*member) {
+      return counts ? std::to_string(counts->inside.*member + counts->between.*member) : "-";
+    };
+    rows.push_back({fixed(instant.after_s, 1), std::to_string(instant.poses),
+                    std::to_string(instant.closures), std::to_string(instant.parts),
+                    sum(&ClosureCounts::true_lost), sum(&ClosureCounts::false_kept),
+                    std::to_string(instant.rounds) + (instant.decided ? "" : ", not decided"),
+                    metres(instant.ate), metres(instant.optimum_of_true),
+                    fixed(ate_ratio(instant.ate, instant.optimum_of_true), 3)});
+  }
+  return align_columns(rows);
+}
+
+void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution,
+                         const TruthScore& truth, const std::vector<Instant>& instants) {
   Json rounds = Json::array();
   for (const TeamRound& round : solution.run.rounds)
     rounds.push_back({{"cost", round.cost},
@@ -178,6 +293,9 @@ void write_solution_json(std::ostream& out, const TeamGraph& graph, const Soluti
     for (std::size_t k = 0; k < decision->kept.size(); ++k)
       if (decision->kept[k]) json["kept"].push_back(k);
   }
+  add_truth(graph, truth.closures, truth.ate, truth.optimum_of_true, json);
+  if (truth.optimum_of_true) json["optimum_of_true"]["certified"] = truth.certified;
+  for (const Instant& instant : instants) json["instants"].push_back(instant_json(graph, instant));
   out << json_text(json);
 }
 

@@ -111,6 +111,18 @@ SolverRun run_solver(const TeamGraph& graph, const std::vector<SE3>& start,
   return run;
 }
 
+CentralOptimum central_optimum(const TeamGraph& graph, const std::vector<SE3>& start) {
+  CentralSolver solver(graph.edges, lift(start, kRigidRank), graph.dimension, {}, graph.verticals);
+  while (solver.step()) {
+  }
+  return {solver.X(), solver.cost(), solver.certificate() && solver.certificate()->certified};
+}
+
+CentralOptimum central_optimum(const TeamGraph& graph) {
+  return central_optimum(
+      graph, levelled(chordal_initialisation(graph.poses(), graph.edges), graph.verticals));
+}
+
 TeamMeter cpu_meter() {
   return {.cpu_s = thread_cpu_s};
 }
@@ -125,18 +137,6 @@ Eigen::Index numerical_rank(const LiftedPoses& X, int dimension) {
   const Eigen::VectorXd values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(gram).eigenvalues();
   const double least = kRelative * kRelative * values.maxCoeff();
   return (values.array() > least).count() - (dimension == 2 ? 1 : 0);
-}
-
-struct Optimum {
-  double cost = 0.0;
-  bool certified = false;
-};
-
-Optimum optimum_of(const TeamGraph& graph, const std::vector<SE3>& start) {
-  CentralSolver solver(graph.edges, lift(start, 3), graph.dimension, {}, graph.verticals);
-  while (solver.step()) {
-  }
-  return {solver.cost(), solver.certificate() && solver.certificate()->certified};
 }
 
 // The frame of the first pose; with verticals, that turned the least so that z is up.
@@ -160,7 +160,8 @@ Solution solve(const TeamGraph& graph, const SolverOptions& options, std::option
   const LiftedPoses& X = solution.run.X;
   solution.T_world_kf = round_to_poses(X, world_of(graph, X));
   if (options.rejects()) return solution;
-  const Optimum least = optimum ? Optimum{*optimum, true} : optimum_of(graph, start);
+  const CentralOptimum least =
+      optimum ? CentralOptimum{{}, *optimum, true} : central_optimum(graph, start);
   solution.judgement =
       Judgement{.rounded_cost = problem_of(graph, 3).cost(lift(solution.T_world_kf, 3)),
                 .optimum = least.cost,

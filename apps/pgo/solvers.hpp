@@ -66,6 +66,17 @@ struct SolverRun {
 [[nodiscard]] SolverRun run_solver(const TeamGraph& graph, const std::vector<SE3>& start,
                                    const SolverOptions& options, const TeamMeter& meter);
 
+/// The least cost of a graph all of whose edges are trusted, as one computer finds it.
+struct CentralOptimum {
+  LiftedPoses X;
+  double cost = 0.0;
+  bool certified = false;
+};
+
+/// By CentralSolver from `start`, and from the chordal initialisation.
+[[nodiscard]] CentralOptimum central_optimum(const TeamGraph& graph, const std::vector<SE3>& start);
+[[nodiscard]] CentralOptimum central_optimum(const TeamGraph& graph);
+
 /// Measures CPU time of the calling thread.
 [[nodiscard]] TeamMeter cpu_meter();
 

@@ -94,7 +94,9 @@ void add_input(CLI::App& app, RobotOptions& options) {
           "Rig file: its topics are those of drivers that run now, on ROS 2 (see ros: in "
           "config/robot.yaml); until Ctrl-C")
       ->check(CLI::ExistingFile);
-  group->add_option("--graph", options.graph, "Recorded pose graph of one robot (.g2o or .csv)")
+  group
+      ->add_option("--graph", options.graph,
+                   "Recorded pose graph of one robot (.g2o or .csv), or of a team (.jrl)")
       ->check(CLI::ExistingFile);
   group
       ->add_option("--session", options.session,

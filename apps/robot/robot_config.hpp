@@ -41,7 +41,7 @@ struct RobotOptions {
   std::filesystem::path rig;       ///< Of a bag: which topics are the sensors (see RigFile).
   std::filesystem::path odometry;  ///< Poses of another odometry, in place of the own.
   bool is_live = false;            ///< The topics of `rig` are those of drivers that run now.
-  std::filesystem::path graph;     ///< Recorded pose graph, g2o or CSV.
+  std::filesystem::path graph;     ///< Recorded pose graph: g2o, CSV or JRL.
   std::filesystem::path session;   ///< Results of a run of the past; exclusive with both.
   std::optional<double> from_s;    ///< Part of the recording [s since its first image].
   std::optional<double> to_s;

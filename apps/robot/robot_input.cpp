@@ -237,11 +237,7 @@ void find_beyond(const CameraCalibration& correction, RestoredRun& run) {
 }
 
 RecordedGraph open_graph(const RobotOptions& options) {
-  RecordedGraph graph = read_recorded_graph(options.graph);
-  if (graph.robot != options.robot)
-    throw std::invalid_argument(options.graph.string() + " holds robot " +
-                                std::to_string(graph.robot) + ": start it with --robot " +
-                                std::to_string(graph.robot));
+  RecordedGraph graph = read_recorded_graph(options.graph, options.robot);
   if (graph.indefinite_edges > 0)
     log::warn("graph") << options.graph.string() << ": " << graph.indefinite_edges
                        << " edges have an information matrix that is not positive definite: "

@@ -35,7 +35,7 @@ struct RobotPlan {
     visitor.field("id", id, {0, 65535}, "unique in the team");
     visitor.field("name", name, "unique, and that of its folder of results; default: robot<id>");
     visitor.field("dataset", dataset, Input{}, "EuRoC/ASL folder; or");
-    visitor.field("graph", graph, Input{}, "recorded pose graph, g2o or CSV");
+    visitor.field("graph", graph, Input{}, "recorded pose graph: g2o, CSV or JRL");
     visitor.field("from", from_s, {0.0, 1e9}, "[s since the first image] part of the recording");
     visitor.field("to", to_s, {0.0, 1e9}, "[s since the first image]");
     visitor.field("truth", truth, Input{.must_exist = false},

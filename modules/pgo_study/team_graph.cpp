@@ -43,7 +43,7 @@ TeamGraph without_cut_steps(TeamGraph graph) {
   return with_edges(std::move(graph), kept);
 }
 
-std::vector<Eigen::Index> connected_parts(const TeamGraph& graph) {
+std::vector<Eigen::Index> part_of_poses(const TeamGraph& graph) {
   std::vector<Eigen::Index> parent(static_cast<std::size_t>(graph.poses()));
   std::iota(parent.begin(), parent.end(), Eigen::Index{0});
   const auto up = [&](Eigen::Index i) -> Eigen::Index& {

@@ -41,7 +41,7 @@ struct TeamGraph {
 [[nodiscard]] TeamGraph without_cut_steps(TeamGraph graph);
 
 /// The connected part that each pose is in, by the lowest pose of that part.
-[[nodiscard]] std::vector<Eigen::Index> connected_parts(const TeamGraph& graph);
+[[nodiscard]] std::vector<Eigen::Index> part_of_poses(const TeamGraph& graph);
 
 /// What one robot of the team knows of the graph, without any poses: `start` and `told` are empty.
 /// Robot k has id k, and its keyframes are its poses, from 0. Odometry that was cut between two

@@ -43,7 +43,7 @@ Precision weight_of(const RelativePose& e, EdgeWeights weights, int dimension,
 }
 
 void check_connected(const TeamGraph& graph, const std::string& file) {
-  const std::vector<Eigen::Index> part = connected_parts(graph);
+  const std::vector<Eigen::Index> part = part_of_poses(graph);
   const auto apart = std::ranges::find_if(part, [](Eigen::Index lowest) { return lowest != 0; });
   if (apart == part.end()) return;
   const auto pose = static_cast<std::size_t>(apart - part.begin());
@@ -237,6 +237,34 @@ TeamGraph read_team_folder(const std::filesystem::path& folder) {
     for (const RelativePose& e : part.inter_closures)
       if (e.to.robot == part.robot && !from_start.contains({e.from, e.to})) all.edges.push_back(e);
   return deal(all, robot_of, folder.string(), weights);
+}
+
+LabelledTeamGraph labelled_team(const JrlGraph& graph, const std::string& file) {
+  G2oGraph all{.dimension = 3, .vertices = {}, .edges = {}};
+  std::map<KeyframeId, std::size_t> robot_of;
+  TeamTruth truth;
+  for (std::size_t k = 0; k < graph.robots.size(); ++k) {
+    const RobotId robot = graph.robots[k];
+    const std::vector<Stamp>& stamps = graph.stamps.at(robot);
+    for (KeyframeIndex i = 0; i < stamps.size(); ++i) {
+      all.vertices.push_back({{robot, i}, SE3::Identity()});
+      robot_of.emplace(KeyframeId{robot, i}, k);
+    }
+    truth.pose_stamps.insert(truth.pose_stamps.end(), stamps.begin(), stamps.end());
+  }
+  for (const JrlMeasurement& measured : graph.measurements) {
+    all.edges.push_back(measured.edge);
+    if (graph.has_labels) truth.is_false.push_back(measured.is_false);
+    truth.edge_stamps.push_back(measured.stamp);
+  }
+  TeamGraph team = deal(all, robot_of, file, EdgeWeights::kAsTheTeam);
+  if (!graph.truth.empty())
+    for (const KeyframeId& id : team.ids) {
+      const auto pose = graph.truth.find(id);
+      truth.T_world_kf.push_back(pose == graph.truth.end() ? std::nullopt
+                                                           : std::optional(pose->second));
+    }
+  return {std::move(team), std::move(truth), graph.priors, graph.repeated};
 }
 
 }  // namespace km

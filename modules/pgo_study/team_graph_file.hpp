@@ -2,10 +2,13 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
+#include <vector>
 
 #include "modules/core/precision.hpp"
 #include "modules/pgo_study/team_graph.hpp"
 #include "modules/pose_graph/g2o_io.hpp"
+#include "modules/pose_graph/jrl_io.hpp"
 
 namespace km {
 
@@ -48,5 +51,25 @@ enum class EdgeWeights {
 /// robot it starts from has it; if that has none between the two poses, as often as the other
 /// robot's file has. Throws std::runtime_error as deal() does, and if a robot's file is not there.
 [[nodiscard]] TeamGraph read_team_folder(const std::filesystem::path& folder);
+
+/// What a data set says of a team's graph that no solver may know. Empty where it says nothing.
+struct TeamTruth {
+  std::vector<std::optional<SE3>> T_world_kf = {};  ///< Of the graph's poses, where known.
+  std::vector<bool> is_false = {};                  ///< Of the graph's edges: false closures.
+  std::vector<Stamp> pose_stamps = {};              ///< When each pose became known.
+  std::vector<Stamp> edge_stamps = {};              ///< When each edge became known.
+};
+
+struct LabelledTeamGraph {
+  TeamGraph graph;
+  TeamTruth truth = {};
+  std::size_t priors = 0;  ///< See JrlGraph, as `repeated`.
+  std::size_t repeated = 0;
+};
+
+/// The team of a JRL file: robot k is the k-th of its robots, edges are in the order of its
+/// measurements and weigh as on the robots (kAsTheTeam). `file` names the source in errors. Throws
+/// std::runtime_error as deal() does.
+[[nodiscard]] LabelledTeamGraph labelled_team(const JrlGraph& graph, const std::string& file);
 
 }  // namespace km

@@ -68,7 +68,7 @@ void GraphPlaybackNode::play(std::size_t index) {
 
 void GraphPlaybackNode::wait_until_due(std::size_t index) {
   if (std::isinf(rate_) || index < known_) return;
-  const double due_s = static_cast<double>(index - known_) / poses_per_second_ / rate_;
+  const double due_s = seconds_between(stamp_of(known_), stamp_of(index)) / rate_;
   const Heartbeat::Waiting waiting;
   std::mutex unshared;  // the stop token is all there is to wait for
   std::condition_variable_any never;
@@ -76,10 +76,15 @@ void GraphPlaybackNode::wait_until_due(std::size_t index) {
   never.wait_until(lock, stop_.get_token(), begin_ + steady_duration(due_s), [] { return false; });
 }
 
+Stamp GraphPlaybackNode::stamp_of(std::size_t index) const {
+  if (!graph_.stamps.empty()) return graph_.stamps[index];
+  return nanoseconds(static_cast<double>(index) / poses_per_second_);
+}
+
 void GraphPlaybackNode::step(std::size_t index) {
   KeyframeOdometry odometry;
   odometry.id = {graph_.robot, static_cast<std::uint32_t>(index)};
-  odometry.stamp = nanoseconds(static_cast<double>(index) / poses_per_second_);
+  odometry.stamp = stamp_of(index);
   if (const auto vertical = graph_.verticals.find(odometry.id.index);
       vertical != graph_.verticals.end())
     odometry.vertical = vertical->second;

@@ -40,7 +40,8 @@ struct GraphPlaybackTopics {
 /// with the later of its keyframes. One between two robots is in the records of both: the robot it
 /// starts `from` publishes it, with its own keyframe, be the other robot there yet or not.
 /// Verticals go with their keyframes; with them odometry starts upright, see
-/// RecordedGraph::T_odom_first().
+/// RecordedGraph::T_odom_first(). Keyframes have the stamps of the graph; if it has none, keyframe
+/// i is at i / poses_per_second.
 class GraphPlaybackNode final : public Node {
  public:
   /// `rate`: recorded seconds per second; infinity: as fast as consumers take it.
@@ -69,6 +70,7 @@ class GraphPlaybackNode final : public Node {
 
   void play(std::size_t index);
   void wait_until_due(std::size_t index);
+  [[nodiscard]] Stamp stamp_of(std::size_t index) const;
 
   const double poses_per_second_;
   const double rate_;

@@ -16,6 +16,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/core/precision.hpp"
 #include "modules/pose_graph/g2o_io.hpp"
+#include "modules/pose_graph/jrl_io.hpp"
 #include "modules/pose_graph/measurement_limits.hpp"
 #include "modules/pose_graph/text_fields.hpp"
 
@@ -182,12 +183,23 @@ std::vector<RelativePose> read_measurements_csv(std::istream& in, const std::str
   return parse_measurements(text, file);
 }
 
-RecordedGraph read_recorded_graph(const std::filesystem::path& file) {
-  if (file.extension() == ".g2o") return make_recorded_graph(read_g2o(file), file.string());
-  if (file.extension() != ".csv")
-    throw std::runtime_error(file.string() + ": neither .g2o nor .csv");
-  return make_recorded_graph(parse_measurements(read_input_file(file), file.string()),
-                             file.string());
+RecordedGraph read_recorded_graph(const std::filesystem::path& file, std::optional<RobotId> robot) {
+  const std::string name = file.string();
+  if (file.extension() == ".jrl") {
+    const JrlGraph team = read_jrl(file);
+    if (!robot) throw std::runtime_error(name + ": holds several robots, and none is named");
+    return part_of(team, *robot, name);
+  }
+  if (file.extension() != ".g2o" && file.extension() != ".csv")
+    throw std::runtime_error(name + ": neither .g2o nor .csv nor .jrl");
+  RecordedGraph graph =
+      file.extension() == ".g2o"
+          ? make_recorded_graph(read_g2o(file), name)
+          : make_recorded_graph(parse_measurements(read_input_file(file), name), name);
+  if (robot && graph.robot != *robot)
+    throw std::runtime_error(name + " holds robot " + std::to_string(graph.robot) + ", not robot " +
+                             std::to_string(*robot));
+  return graph;
 }
 
 }  // namespace km

@@ -4,11 +4,13 @@
 #include <filesystem>
 #include <iosfwd>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
+#include "modules/core/stamp.hpp"
 
 namespace km {
 
@@ -20,6 +22,8 @@ struct RecordedGraph {
   std::vector<RelativePose> inter_closures;  ///< `robot` at one end, either one; as in the file.
   std::map<KeyframeIndex, Vertical> verticals = {};  ///< Of its keyframes, where known.
   std::size_t indefinite_edges = 0;                  ///< See G2oGraph.
+  /// [i]: time of keyframe i, strictly ascending. Empty if the file has no times.
+  std::vector<Stamp> stamps = {};
 
   [[nodiscard]] std::size_t poses() const { return odometry.size() + 1; }
   /// Where odometry starts: the identity, turned the least that gives its frame z up if keyframe 0
@@ -48,10 +52,12 @@ struct RecordedGraph {
 [[nodiscard]] std::vector<RelativePose> read_measurements_csv(std::istream& in,
                                                               const std::string& file);
 
-/// Reads one robot's part from a 3D g2o file (*.g2o), with its verticals, or a table of
-/// measurements
-/// (*.csv). Throws std::runtime_error as the functions above, and "file: what" if a vertical is not
-/// of a keyframe on the robot's chain.
-[[nodiscard]] RecordedGraph read_recorded_graph(const std::filesystem::path& file);
+/// Reads one robot's part from a 3D g2o file (*.g2o), with its verticals, from a table of
+/// measurements (*.csv), or that of `robot` from a team's JRL file (*.jrl). Throws
+/// std::runtime_error as the functions above and read_jrl() do, and "file: what" if a vertical is
+/// not of a keyframe on the robot's chain, if the file holds another robot than `robot`, or if a
+/// JRL file is read without `robot`.
+[[nodiscard]] RecordedGraph read_recorded_graph(const std::filesystem::path& file,
+                                                std::optional<RobotId> robot = std::nullopt);
 
 }  // namespace km

@@ -21,10 +21,10 @@ constexpr double kHopelessPeriods = 15.0;
 constexpr double kNoisyOdometry = 2.0;
 constexpr double kNoticedAgain = 1.5;
 
-// Closures that make a start by noisy odometry better. A handful bends it at random: of tunnels,
-// with five to six likely ones a robot, the team then decides on 2.6 % of all closures otherwise
-// than in one session, and on less than 1 % without. Of sphere2500, with 7 times the noise and 160
-// likely ones, two of ten seeds end 8 and 94 times as far off without.
+// Closures that make a start by noisy odometry better; a handful bends it at random. In tunnels,
+// with five or six likely ones a robot, the team would decide on 2.6 % of the closures otherwise
+// than in one session, in place of less than 1 %. In sphere2500 with 7 times the noise, two of ten
+// seeds end 8 and 94 times as far off without.
 constexpr std::size_t kEnoughForChordal = 20;
 
 // After so long without anything new [s] the team has come to rest.

@@ -85,6 +85,18 @@ TEST_CASE("One robot is run alone on the recording of a world", "[experiments]")
                                               Contains("--rate max --set mapping.mode=off"));
 }
 
+TEST_CASE("Graphs of COSMO-Bench are solved where they are", "[experiments]") {
+  const Plan plan;
+  const auto steps = plan_experiment("cosmo", plan.config, plan.paths());
+  REQUIRE(steps.size() == plan.config.cosmo.sets.size());
+  for (const Step& step : steps) CHECK_THAT(step.missing, Contains("--graphs says where it is"));
+  plan.folder.write("data/kth_r3_00_d06_d09_d10_wifi.jrl", "{}");
+  const Step step = plan.step("cosmo", "cosmo-kth_r3_00_d06_d09_d10_wifi");
+  CHECK(step.missing.empty());
+  CHECK_THAT(command_text(step.command),
+             Contains("kimera_multi_pgo solve") && Contains("_wifi.jrl --json"));
+}
+
 TEST_CASE("A step is the same wherever its files lie", "[experiments]") {
   Step step{.name = "s", .title = "", .command = {"/a/tool", "data/city/", "--rate", "max"}};
   const std::string fingerprint = fingerprint_of(step);

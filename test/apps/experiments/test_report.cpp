@@ -71,6 +71,11 @@ TEST_CASE("The report has every table with our values and the paper's", "[experi
           Contains(
               "`kimera_multi_pgo solve RESULTS/graphs/city --method local --no-vertical --json ") &&
           Contains("12.5 s, load 0.5"));
+  // Closures lost and kept, errors, ratio, published errors, rounds and seconds of COSMO-Bench.
+  CHECK_THAT(text, Contains("| kth_r3_00, Wi-Fi | 1604 | 1 of 100 | 1 of 100 | 0 of 20 | 2 of 20 | "
+                            "1.50 | 2.00 | 0.75 | 1.77 | 1.79 | 1 | 0.250 |") &&
+                       Contains("| ATE on COSMO-Bench | kth_r3_00, Wi-Fi | at most 1.77 m, the "
+                                "best published | **1.50 m** |"));
   // Several runs and seeds by median and range.
   CHECK_THAT(text,
              Contains("| City | 3 | 0.9000 (0.8000 to 1.0000) | 0.5000 (0.5000 to 0.5000) |"));
@@ -98,10 +103,10 @@ TEST_CASE("A robot that never met the others is named", "[experiments]") {
 TEST_CASE("Small versions are judged only by what they can answer", "[experiments]") {
   const CannedCity city(true);
   const ReportSummary summary = city.report();
-  CHECK(summary.targets == 6);  // two costs, two searches with time and clique
-  CHECK(summary.met == 6);
+  CHECK(summary.targets == 7);  // two costs, COSMO-Bench, two searches with time and clique
+  CHECK(summary.met == 7);
   const std::string text = city.read("report.md");
-  CHECK_THAT(text, Contains("6 of 6 are met.") && Contains("Not judged: inputs of full size") &&
+  CHECK_THAT(text, Contains("7 of 7 are met.") && Contains("Not judged: inputs of full size") &&
                        Contains("| ATE of RBCD over that of local PGO | City | at most 0.39, the "
                                 "paper's | 0.56 (0.50 to 0.62 in 3 runs) |") &&
                        !Contains("**Missed**"));
@@ -118,7 +123,7 @@ TEST_CASE("The page stands alone and is well formed", "[experiments]") {
   for (const auto& [id, drawn] : plots.items()) CHECK(occurrences(page, " id=\"" + id + '"') == 1);
   CHECK(occurrences(page, "data:image/png;base64,") == 2);
   for (const char* id :
-       {"targets", "pcm", "trajectory", "resources", "mesh", "semantics", "origin"}) {
+       {"targets", "pcm", "cosmo", "trajectory", "resources", "mesh", "semantics", "origin"}) {
     CAPTURE(id);
     CHECK_THAT(page, Contains("<section id=\"" + std::string(id) + "\">") &&
                          Contains("<a href=\"#" + std::string(id) + "\">"));

@@ -208,7 +208,7 @@ TEST_CASE("A scenario leaves as many closures between two robots as it says", "[
   scenario.closures_per_pair = 0;
   scenario.closure_share = 0.0;
   const ScenarioGraph apart = draw_scenario(whole.graph, whole.truth, scenario, 1);
-  const std::vector<Index> parts = connected_parts(apart.graph);
+  const std::vector<Index> parts = part_of_poses(apart.graph);
   CHECK(std::set<Index>(parts.begin(), parts.end()) == std::set<Index>{0, 200, 400});
 }
 

@@ -85,8 +85,9 @@ TEST_CASE("A graph without noise has no gap to report, and is certified", "[pgo]
   const TemporaryFolder folder;
   const auto graph = folder.write("exact.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n");
   const auto json = folder.path() / "out.json";
-  const CommandResult result = run_command(kSolveTool + graph.string() +
-                                           " --robots 2 --method rbcd --json " + json.string());
+  const CommandResult result =
+      run_command(kSolveTool + graph.string() + " --robots 2 --keep-steps --method rbcd --json " +
+                  json.string());
   CAPTURE(result.output);
   CHECK(result.exit_code == 0);
   CHECK_THAT(result.output, !Contains("nan") && Contains("\ncertified"));
@@ -234,7 +235,7 @@ TEST_CASE("Verticals of the file are used, told of, and written again", "[pgo][v
   const std::string method =
       GENERATE("newton --trust-all", "rbcd", "rbcd-accelerated", "centralized", "local");
   CAPTURE(method);
-  const std::string options = graph.string() + " --robots 2 --rounds 100 --method " + method;
+  const std::string options = graph.string() + " --robots 2 --rounds 300 --method " + method;
   const CommandResult result = run_command(kSolveTool + options + " --json " + json.string() +
                                            " --output " + solved.string());
   CAPTURE(result.output);

@@ -36,9 +36,9 @@ bool is_between(const TeamGraph& graph, const BlockEdge& e) {
 TEST_CASE("Robots without steps between them hang together by closures alone", "[agent_team]") {
   TeamGraph graph = team_of_three(1);
   for (const BlockEdge& e : graph.edges) CHECK((e.j != e.i + 1 || !is_between(graph, e)));
-  CHECK(std::ranges::count(connected_parts(graph), 0) == 90);
+  CHECK(std::ranges::count(part_of_poses(graph), 0) == 90);
   std::erase_if(graph.edges, [&](const BlockEdge& e) { return is_between(graph, e); });
-  const std::vector<Eigen::Index> parts = connected_parts(graph);
+  const std::vector<Eigen::Index> parts = part_of_poses(graph);
   for (Eigen::Index i = 0; i < 90; ++i) CHECK(parts[static_cast<std::size_t>(i)] == i / 30 * 30);
 }
 

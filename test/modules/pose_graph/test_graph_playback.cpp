@@ -92,6 +92,20 @@ TEST_CASE("A played graph chains its odometry with the covariance of the chain",
   CHECK(played.odometry[0].covariance.isZero());
 }
 
+TEST_CASE("Keyframes of a graph with times have its times", "[playback]") {
+  std::mt19937 rng(1);
+  RecordedGraph graph = recording(rng);
+  graph.stamps = {100, 250, 251, 1'000'000, 2'000'000};
+  Played played;
+  GraphPlaybackNode node(GraphPlaybackConfig(), kMax, graph, played.topics());
+  play_all(node, graph);
+  REQUIRE(played.odometry.size() == 5);
+  for (std::size_t i = 0; i < 5; ++i) {
+    CHECK(played.odometry[i].stamp == graph.stamps[i]);
+    CHECK(played.keyframes[i].stamp == graph.stamps[i]);
+  }
+}
+
 TEST_CASE("Verticals are played with their keyframes, and odometry starts upright",
           "[playback][vertical]") {
   std::mt19937 rng(2);
