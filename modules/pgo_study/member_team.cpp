@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/odometry_noise.hpp"
 #include "modules/pose_graph/precision_limits.hpp"
 #include "modules/pose_graph/team_plan.hpp"
 #include "modules/pose_graph/tree_front.hpp"
@@ -14,8 +15,29 @@ namespace km {
 
 using Eigen::Index;
 
+namespace {
+
+// What robots do with what they know before a session: odometry that is noisier than it claims is
+// weighed accordingly, all know it, and no robot is much more precise than the others.
+void weigh_as_robots(std::vector<SessionGraph>& parts) {
+  std::map<RobotId, OdometryNoise> noise;
+  for (SessionGraph& part : parts) {
+    const std::span<PoseEdge> own(part.own);
+    noise[part.self] =
+        estimate_odometry_noise(own.first(part.odometry), own.subspan(part.odometry));
+    for (PoseEdge& step : own.first(part.odometry))
+      step.precision = noise[part.self].corrected(step.precision);
+  }
+  for (SessionGraph& part : parts) {
+    for (auto& [robot, step] : part.step_precision) step = noise.at(robot).corrected(step);
+    limit_precisions(part);
+  }
+}
+
+}  // namespace
+
 MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> start, Factory make,
-                       TeamShape shape, bool limited)
+                       TeamShape shape, bool as_robots)
     : graph_(graph),
       rank_(rank),
       make_(std::move(make)),
@@ -25,10 +47,8 @@ MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> star
   if (static_cast<Index>(start.size()) != graph.poses())
     throw std::invalid_argument("MemberTeam: " + std::to_string(start.size()) +
                                 " start poses for " + std::to_string(graph.poses()));
-  for (std::size_t k = 0; k < parts_.size(); ++k) {
-    parts_[k] = part_of(graph, k);
-    if (limited) limit_precisions(parts_[k]);
-  }
+  for (std::size_t k = 0; k < parts_.size(); ++k) parts_[k] = part_of(graph, k);
+  if (as_robots) weigh_as_robots(parts_);
   places_ = places(shape);
   tell_starts(std::move(start), nullptr);
   open_session();

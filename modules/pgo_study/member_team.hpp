@@ -25,11 +25,11 @@ class MemberTeam final : public TeamSolver {
  public:
   using Factory = std::function<std::unique_ptr<MemberSolver>(SessionGraph, TreePlace)>;
 
-  /// `start`: a pose for each of the graph's. `limited`: weights are limited as robots that expect
-  /// false closures limit them, see limit_precisions(). Throws std::invalid_argument if there is
-  /// another number of poses, and what `make` throws.
+  /// `start`: a pose for each of the graph's. `as_robots`: weights are what robots make of them
+  /// that expect false closures, see estimate_odometry_noise() and limit_precisions(). Throws
+  /// std::invalid_argument if there is another number of poses, and what `make` throws.
   MemberTeam(const TeamGraph& graph, Eigen::Index rank, std::vector<SE3> start, Factory make,
-             TeamShape shape = TeamShape::kAll, bool limited = false);
+             TeamShape shape = TeamShape::kAll, bool as_robots = false);
 
   bool step(RoundMeter& meter) override;
   [[nodiscard]] const LiftedPoses& block(std::size_t robot) const override {
