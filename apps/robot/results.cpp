@@ -69,6 +69,14 @@ void write_closures(std::ostream& out, const RunRecord& record) {
         << ",\"" << row.reason << "\"\n";
 }
 
+// The covariance of a step of odometry with the noise that the pose graph was optimised with.
+Matrix6 judged_covariance(const Matrix6& claimed, const OptimizerProgress& progress) {
+  Vector6 scale;
+  scale.head<3>().setConstant(progress.odometry_rotation_noise);
+  scale.tail<3>().setConstant(progress.odometry_translation_noise);
+  return scale.asDiagonal() * claimed * scale.asDiagonal();
+}
+
 // The robot's own poses with every edge that touches them: odometry, and the inlier closures of
 // either finder; and the verticals. Poses of other robots stay in their files.
 G2oGraph graph_of(const RunRecord& record) {
@@ -82,7 +90,7 @@ G2oGraph graph_of(const RunRecord& record) {
     if (keyframes[i].vertical) graph.verticals.push_back({keyframes[i].id, *keyframes[i].vertical});
     if (i > 0)
       graph.edges.push_back({keyframes[i - 1].id, keyframes[i].id, keyframes[i].T_previous_kf,
-                             keyframes[i].covariance});
+                             judged_covariance(keyframes[i].covariance, record.progress())});
   }
   for (RelativePose& closure : record.inlier_closures()) graph.edges.push_back(std::move(closure));
   return graph;

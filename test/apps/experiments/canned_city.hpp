@@ -73,6 +73,7 @@ class CannedCity {
   void forget(const std::string& step) const {
     std::filesystem::remove(folder_.path() / "results/steps" / (step + ".json"));
   }
+  void forget_cosmo() const { forget(cosmo_step_name(config_.cosmo.sets[0])); }
 
  private:
   static constexpr int kKeyframes = 4;

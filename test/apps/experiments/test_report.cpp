@@ -143,6 +143,7 @@ TEST_CASE("Without results the report says so", "[experiments]") {
                        Contains("Not done: pcm-1, pcm-2, pcm-3 (no pose graph ") &&
                        Contains("Not done: pgo-city-rbcd (not run, or not up to date)."));
   for (const char* step : {"team-city", "alone-city"}) city.forget(step);
+  city.forget_cosmo();
   (void)city.report();
   text = city.read("report.md");
   CHECK_THAT(text, !Contains("Table I:") && !Contains("Table III") && !Contains("## Meshes") &&
