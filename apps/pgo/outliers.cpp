@@ -167,9 +167,9 @@ std::string details() {
          "places.\n\n"
          "The error is the RMSE of positions to the certified optimum of the graph without false\n"
          "closures, after rigid alignment. Sent is what the robots' solver sends; CPU time is\n"
-         "that of all robots together. Of several seeds the worst is shown: fewest true and most\n"
-         "false closures kept, largest error, most rounds; of what is sent and of CPU time the\n"
-         "median.\n\n"
+         "that of all robots together. With several seeds the worst is shown: fewest true and "
+         "most\n"
+         "false closures kept, largest error, most rounds. Bytes and CPU time are medians.\n\n"
          "Scenarios: with --scenario, or any option of that group, the optimum of FILE is the\n"
          "truth, and odometry and closures are drawn anew around it, seed by seed. The others of\n"
          "these options change the named scenario. Scenarios, and the graph each is meant for:\n" +
@@ -241,7 +241,7 @@ void define(CLI::App& app, OutliersCommand& command) {
       ->check(CLI::IsMember(methods).description(""))
       ->delimiter(',');
   app.add_option("--seeds", study.seeds,
-                 "Of the false closures; a run for each. Of scenarios: 1 to 10")
+                 "Seeds of the false closures: a run for each. The default of scenarios is 1 to 10")
       ->delimiter(',');
   app.add_option("--outlier-range", study.half_side_m,
                  "Translations of false closures are at most this along every axis [m]; 0: half\n"
@@ -324,7 +324,8 @@ void define_scenario(CLI::App& app, OutliersCommand& command) {
       ->check(CLI::NonNegativeNumber);
   change_sigma(app, command, "--step-noise", &Scenario::step_sigma,
                "Sigma of a step of odometry on each axis, in place of the file's");
-  change_sigma(app, command, "--closure-sigma", &Scenario::closure_sigma, "The same of closures");
+  change_sigma(app, command, "--closure-sigma", &Scenario::closure_sigma,
+               "Sigma of a closure on each axis, in place of the file's");
   change_factors(app, command, "--odometry-noise", &Scenario::odometry_noise,
                  "Odometry of this robot is K times as noisy as it claims; several: 1:7,2:3");
   change_factors(app, command, "--odometry-sigma", &Scenario::odometry_sigma,

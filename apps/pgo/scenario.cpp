@@ -229,7 +229,7 @@ SE3 moved_by(const SE3& T, const Vector6& errors, const NoiseSigma& sigma) {
                    T.translation() + sigma.translation_m * errors.tail<3>());
 }
 
-// Where a closure is, as far as an error is shared: robots and runs of keyframes of both ends.
+// Closures with equal places share an error: robots and runs of keyframes of both ends.
 using Place = std::array<Index, 4>;
 
 Place place_of(const TeamGraph& graph, const BlockEdge& e) {
@@ -277,7 +277,7 @@ void measure(ScenarioGraph& drawn, const Scenario& scenario, std::mt19937& rng) 
   }
 }
 
-// What a closure claims: as given, or as a true one does.
+// Claim of a false closure: the scenario's, or else that of the first true closure.
 Precision closure_claims(const TeamGraph& graph, const Scenario& scenario) {
   if (scenario.closure_sigma) return precision_of(*scenario.closure_sigma, graph.dimension);
   const std::vector<bool> odometry = odometry_edges(graph);

@@ -23,8 +23,8 @@ struct RobotFactor {
   double factor = 1.0;
 };
 
-/// What a team measures, and what it says of that: a graph's optimum is the truth, and every
-/// measurement of the graph is drawn anew around it.
+/// A team's measurements and what the team claims of them. The optimum of a graph is the truth, and
+/// every measurement of the graph is drawn anew around it.
 struct Scenario {
   std::string name = {};
   std::size_t first_poses = 0;  ///< Only so many poses of the graph, from its first; 0: all.
@@ -34,9 +34,9 @@ struct Scenario {
   double step_length_m = 0.0;  ///< The truth is scaled so that steps are so long on average; 0: as
                                ///< it is.
   std::optional<NoiseSigma> step_sigma = {};     ///< Claimed; nullopt: what the graph claims.
-  std::optional<NoiseSigma> closure_sigma = {};  ///< The same of closures.
+  std::optional<NoiseSigma> closure_sigma = {};  ///< Claimed for closures; nullopt: by the graph.
   double closure_share = 1.0;  ///< Probability with which a closure of the graph is kept.
-  double inside_share = 1.0;   ///< The same of closures inside a robot, on top of that.
+  double inside_share = 1.0;   ///< Further probability for a closure inside a robot.
   std::optional<std::size_t> closures_per_pair = {};  ///< At most so many between two robots.
 
   std::vector<RobotFactor> odometry_sigma = {};  ///< Claims and noise of its odometry, times this.
@@ -61,13 +61,13 @@ inline constexpr Eigen::Index kPlaceKeyframes = 10;
 /// The name of each scenario and the graph that it is meant for, a row each.
 [[nodiscard]] std::string scenario_list();
 
-/// What the robots of a scenario are given, and what is true of it.
+/// The graph that the robots of a scenario are given, and the truth.
 struct ScenarioGraph {
   TeamGraph graph;             ///< Weights are those claimed. Need not be connected.
   std::vector<SE3> truth;      ///< In the numbering of the graph.
-  std::vector<bool> is_false;  ///< Of the edges.
+  std::vector<bool> is_false;  ///< By edge.
   std::vector<Precision>
-      honest;  ///< Of the edges: the noise that was drawn; of false ones as claimed.
+      honest;  ///< By edge: weights of the noise drawn; claims of false closures.
 };
 
 /// Draws what a team measures of `whole`, whose optimum is `optimum`. Verticals are left out.

@@ -33,10 +33,10 @@ struct Minimum {
   bool decided = true;
 };
 
-// Of edges that connect all poses.
+// Minimum of edges that connect all poses.
 Minimum minimum_near(std::vector<SE3> start, const std::vector<BlockEdge>& edges, int dimension,
                      std::uint32_t most_steps) {
-  constexpr double kPatience = 8.0;  // rounds: second derivatives need not be told
+  constexpr double kPatience = 8.0;  // rounds: second derivatives cost nothing to send
   SessionGraph graph{.start = std::move(start)};
   for (const BlockEdge& e : edges) graph.own.push_back(own_edge(e));
   TreeNewton newton(std::move(graph), TreePlace{.members = {0}},

@@ -29,7 +29,7 @@ struct ScenarioStudyOptions {
   double keyframes_per_s = 0.0;  ///< robots: see AgentTeamOptions.
 };
 
-/// What one method made of one drawn scenario.
+/// Result of one method for one drawn scenario.
 struct ScenarioResult {
   std::string method = {};
   unsigned seed = 0;
@@ -40,7 +40,7 @@ struct ScenarioResult {
   std::size_t false_closures = 0;
   std::size_t false_kept = 0;
   std::size_t frames = 1;  ///< In which the method leaves the robots.
-  /// Of positions to the truth, each frame of the method aligned by one rigid transform.
+  /// Errors of positions; each frame of the method is aligned to the truth by one rigid transform.
   double rms_m = 0.0;
   double max_m = 0.0;
   bool decided = true;  ///< False: the method came to no end.
@@ -61,11 +61,11 @@ struct ScenarioStudy {
                                                const TeamMeter& meter,
                                                const OutlierProgress& progress = {});
 
-/// Where a method has placed the robots, and which edges it uses.
+/// The poses that a method has found and the edges that it uses.
 struct PlacedTeam {
   std::vector<SE3> T_frame_kf;
-  std::vector<Eigen::Index> frame_of;  ///< Of each pose; poses of one frame have the same number.
-  std::vector<bool> kept;              ///< Of the edges.
+  std::vector<Eigen::Index> frame_of;  ///< By pose; poses of one frame have the same number.
+  std::vector<bool> kept;              ///< By edge.
   bool decided = true;
 };
 

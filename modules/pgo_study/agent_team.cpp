@@ -30,7 +30,7 @@ struct PlayedClosure {
   Closure closure;
 };
 
-// What one robot decides for a pair, as PcmNode does.
+// Decides whether a pair of robots is joined, as PcmNode does.
 class PlayedPair {
  public:
   PlayedPair(const RobotPair& pair, const PcmConfig& config)

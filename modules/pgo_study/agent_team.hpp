@@ -12,19 +12,19 @@ namespace km {
 
 struct AgentTeamOptions {
   PoseGraphConfig pose_graph = {};
-  PcmConfig pcm = {};            ///< Of `selection: witness`: when a pair of robots is joined.
+  PcmConfig pcm = {};            ///< Says when a pair of robots is joined; `selection` is witness.
   double keyframes_per_s = 0.0;  ///< At which robots play their graphs; 0: all of it at once.
-  double longest_s = 3600.0;     ///< Of virtual time; then the run ends where it is.
+  double longest_s = 3600.0;     ///< Virtual time after which the run ends where it is.
 };
 
-/// What robots have made of a graph.
+/// Result of a run.
 struct AgentTeamRun {
   std::vector<SE3> T_world_kf;    ///< As published, in the numbering of the graph.
   std::vector<RobotId> world_of;  ///< By robot: the robot whose odometry frame its poses are in.
-  std::vector<bool> kept;         ///< Of the graph's edges: used in the solution published.
+  std::vector<bool> kept;         ///< By edge of the graph: used in the solution published.
   bool settled = false;           ///< Else longest_s did not suffice.
-  double seconds = 0.0;           ///< Of virtual time, until nothing changed any more.
-  std::size_t rounds = 0;         ///< Of the team; the most of any robot.
+  double seconds = 0.0;           ///< Virtual time until nothing changed any more.
+  std::size_t rounds = 0;         ///< Most rounds of any robot.
   std::size_t bytes = 0;          ///< Sent by all, each reader counted.
   std::vector<std::string> notices;
 };

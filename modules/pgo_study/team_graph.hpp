@@ -36,8 +36,8 @@ struct TeamGraph {
 /// The graph with those of its edges that are `kept`.
 [[nodiscard]] TeamGraph with_edges(TeamGraph graph, const std::vector<bool>& kept);
 
-/// The graph without the odometry that a cut has left between two robots: each robot is on its own
-/// but for closures, as robots in the field are. Parts need not be connected any more.
+/// The graph without the odometry that a cut has left between two robots: closures alone join
+/// robots, as in the field. The graph need not be connected any more.
 [[nodiscard]] TeamGraph without_cut_steps(TeamGraph graph);
 
 /// The connected part that each pose is in, by the lowest pose of that part.

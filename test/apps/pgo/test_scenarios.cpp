@@ -65,7 +65,7 @@ struct Spread {
     count += 6.0;
   }
   [[nodiscard]] double scale() const { return std::sqrt(squares / count); }
-  // Of the scale, relative: the square of a standard normal has variance 2.
+  // Relative sigma of the scale: the square of a standard normal has variance 2.
   [[nodiscard]] double sigma() const { return std::sqrt(0.5 / count); }
 };
 
