@@ -1,13 +1,17 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <memory>
 #include <random>
 #include <set>
 #include <utility>
 
 #include "modules/pgo_study/agent_team.hpp"
 #include "modules/pgo_study/central_solver.hpp"
+#include "modules/pgo_study/member_team.hpp"
+#include "modules/pgo_study/odometry_start.hpp"
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/rounding.hpp"
+#include "modules/pose_graph/tree_newton.hpp"
 #include "test/support/team_graphs.hpp"
 
 namespace km {
@@ -31,6 +35,18 @@ TeamGraph team_of_three(unsigned seed) {
 
 bool is_between(const TeamGraph& graph, const BlockEdge& e) {
   return graph.robot_of(e.i) != graph.robot_of(e.j);
+}
+
+// Largest difference of positions, both in the frame of their first pose.
+double largest_difference_m(const std::vector<SE3>& a, const std::vector<SE3>& b) {
+  REQUIRE(a.size() == b.size());
+  double largest = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const Eigen::Vector3d t_a = a.front().inverse() * a[i].translation();
+    const Eigen::Vector3d t_b = b.front().inverse() * b[i].translation();
+    largest = std::max(largest, (t_a - t_b).norm());
+  }
+  return largest;
 }
 
 TEST_CASE("Robots without steps between them hang together by closures alone", "[agent_team]") {
@@ -57,10 +73,36 @@ TEST_CASE("Robots' own code publishes the optimum of a graph", "[agent_team]") {
   while (central.step()) {
   }
   const std::vector<SE3> optimum = round_to_poses(central.X(), central.X().leftCols<4>());
-  REQUIRE(run.T_world_kf.size() == optimum.size());
-  const SE3 T = run.T_world_kf.front();
-  for (std::size_t i = 0; i < optimum.size(); ++i)
-    CHECK((run.T_world_kf[i].translation() - T * optimum[i].translation()).norm() < 1e-3 * kNoise);
+  CHECK(largest_difference_m(run.T_world_kf, optimum) < 1e-3 * kNoise);
+}
+
+std::vector<SE3> solved_by_members(const TeamGraph& graph, bool limited) {
+  MemberTeam team(
+      graph, 3, odometry_start(graph),
+      [](SessionGraph part, TreePlace place) {
+        return std::make_unique<TreeNewton>(std::move(part), std::move(place), TreeNewtonOptions{});
+      },
+      TeamShape::kAll, limited);
+  RoundMeter meter(graph.robots(), {});
+  while (team.step(meter)) {
+  }
+  const LiftedPoses X = team_poses(graph, team);
+  return round_to_poses(X, X.leftCols<4>());
+}
+
+TEST_CASE("Members of a study limit the weights of a robot that claims too much as robots do",
+          "[agent_team]") {
+  TeamGraph graph = team_of_three(1);
+  for (BlockEdge& e : graph.edges)
+    if (graph.robot_of(e.i) == 1) {
+      e.kappa *= 100.0;
+      e.tau *= 100.0;
+    }
+  const AgentTeamRun run = run_agent_team(graph, {});
+  REQUIRE(std::ranges::count(run.kept, false) == 0);
+  constexpr double kRounding_m = 1e-5;
+  CHECK(largest_difference_m(solved_by_members(graph, true), run.T_world_kf) < kRounding_m);
+  CHECK(largest_difference_m(solved_by_members(graph, false), run.T_world_kf) > 0.1 * kNoise);
 }
 
 TEST_CASE("A pair of robots with one closure is joined after the wait for witnesses",
