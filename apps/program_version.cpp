@@ -4,12 +4,17 @@
 
 namespace km {
 
+std::string built_version() {
+  return KM_VERSION;
+}
+
 std::string built_commit() {
   return kCommit;
 }
 
 std::string version_text(const std::string& program) {
-  return program + " " KM_VERSION "\ncommit " + built_commit() + "\nbuilt with " KM_BUILT_WITH;
+  return program + ' ' + built_version() + "\ncommit " + built_commit() +
+         "\nbuilt with " KM_BUILT_WITH;
 }
 
 }  // namespace km

@@ -4,8 +4,11 @@
 
 namespace km {
 
-/// The commit of the sources that this program is built from: ten digits, with "-changed" if files
-/// differ from it; "unknown" if they are in no git repository.
+/// The project's version, as "0.1.0".
+[[nodiscard]] std::string built_version();
+
+/// The commit that this program is built from: ten digits or more, followed by "-dirty" if tracked
+/// files differ from it; "unknown" if the sources are not in a git repository.
 [[nodiscard]] std::string built_commit();
 
 /// What --version prints: the program's name and version, the commit, the compiler, the build type,

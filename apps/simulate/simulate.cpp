@@ -13,6 +13,7 @@
 #include <sstream>
 #include <vector>
 
+#include "apps/program_version.hpp"
 #include "apps/simulate/dataset_folder.hpp"
 #include "apps/simulate/dataset_texts.hpp"
 #include "apps/simulate/frame_workers.hpp"
@@ -443,7 +444,7 @@ class Simulation {
 SimulationOutcome simulate(const SimulationOptions& options, SignalWatch& signals,
                            Progress& progress) {
   DatasetRecord record;
-  record.generator = "kimera_multi_simulate " KM_VERSION;
+  record.generator = "kimera_multi_simulate " + built_version();
   record.parameters = parameters(options);
   std::vector<RecordedFlight> flights;
   for (std::size_t i = 0; i < options.truths.size(); ++i) {
