@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include "apps/output_file.hpp"
+#include "apps/program_version.hpp"
 #include "apps/result_files.hpp"
 #include "apps/result_writer.hpp"
 #include "apps/robot/growing_file.hpp"
@@ -449,6 +450,8 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
   end.missed = watch->missed();
   RunSummary summary = summary_of(record);
   summary.name = options.name;
+  summary.version = built_version();
+  summary.commit = built_commit();
   summary.frames = end.images.value_or(ImageCounts{}).read;
   summary.frames_skipped = end.images.value_or(ImageCounts{}).skipped;
   if (options.auto_rate) summary.rate = options.rate;
@@ -549,12 +552,13 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
     log::info("robot") << "interrupted before the calibration was complete: no results";
     return 0;
   }
+  ResultWriter results;
+  change_output(options, results, make_output);
+  log::info("robot") << "kimera_multi_robot " << built_version() << ", commit " << built_commit();
   const std::optional<double> rate = chosen_rate(options, config, mapping, rig, signals);
   options.rate = rate.value_or(options.rate);
   const bool goes_on = options.resume && input->restored;
   options.record = record_file(options, goes_on);
-  ResultWriter results;
-  change_output(options, results, make_output);
   Robot robot(options, config, *std::move(input), mapping, results, signals);
   if (listen) listen(robot.topics());
   log_network(config, robot.interface());

@@ -203,6 +203,7 @@ struct HolesSummary {
 struct RunSummary {
   RobotId robot = 0;
   std::string name;
+  std::string version, commit;  ///< Of the program: see built_version() and built_commit().
   std::uint64_t keyframes = 0;
   std::uint64_t keypoints = 0;       ///< Of all keyframes.
   std::uint64_t frames = 0;          ///< Stereo pairs played.
@@ -233,6 +234,8 @@ struct RunSummary {
   void visit_fields(auto& visitor) {
     visitor.field("robot", robot);
     visitor.field("name", name);
+    visitor.field("version", version);
+    visitor.field("commit", commit);
     visitor.field("keyframes", keyframes);
     visitor.field("keypoints", keypoints);
     visitor.field("frames", frames);

@@ -60,7 +60,8 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
   std::string keys;
   for (const auto& [key, value] : json.items()) keys += key + ' ';
   CHECK(keys ==
-        "/robot /name /keyframes /keypoints /frames /frames_skipped /rate /paused_s "
+        "/robot /name /version /commit "
+        "/keyframes /keypoints /frames /frames_skipped /rate /paused_s "
         "/sensor_faults/x "
         "/closures/candidates /closures/verified /closures/inliers "
         "/pgo/rounds /pgo/seconds /pgo/cost /pgo/gradient_norm /pgo/anchor /pgo/settled "
