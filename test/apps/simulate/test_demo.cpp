@@ -51,13 +51,95 @@ TEST_CASE("The demo says how long its world is", "[demo]") {
 
 TEST_CASE("The demo says how a bag is played", "[demo]") {
   const TemporaryFolder folder;
-  const std::string bag = GENERATE("walk.bag", "walk.mcap", "ros2/metadata.yaml", "ros2/walk.db3");
-  std::filesystem::path path = folder.write(bag, "x");
-  if (bag.starts_with("ros2/m")) path = path.parent_path();
-  const auto demo = run_command("apps/demo " + path.string());
+  const auto [file, dataset] = GENERATE(table<std::string, std::string>({
+      {"walk.bag", "walk.bag"},
+      {"walk.mcap", "walk.mcap"},
+      {"walk.db3", "walk.db3"},
+      {"ros2/metadata.yaml", "ros2"},
+      {"ros2/walk_0.db3", "ros2"},
+      {"ros2/walk_0.mcap", "ros2"},
+  }));
+  CAPTURE(file, dataset);
+  folder.write(file, "x");
+  const std::string path = (folder.path() / dataset).string();
+  const auto demo = run_command("apps/demo --programs " KM_BIN_DIR " " + path);
   CHECK(demo.exit_code == 1);
-  CHECK_THAT(demo.output, Catch::Contains("--inspect " + path.string() + " rig.yaml") &&
-                              Catch::Contains("--dataset " + path.string() + " --rig rig.yaml"));
+  const std::string robot = KM_BIN_DIR "/kimera_multi_robot ";
+  CHECK_THAT(demo.output, Catch::StartsWith("demo: " + path + " is a bag of ROS.") &&
+                              Catch::Contains(robot + "--inspect " + path + " rig.yaml\n") &&
+                              Catch::Contains(robot + "--robot 0 --dataset " + path +
+                                              " --rig rig.yaml --output results/robot0\n"));
+}
+
+TEST_CASE("The demo's commands for a bag can be pasted, also with spaces in its name", "[demo]") {
+  const TemporaryFolder folder;
+  const auto bag = folder.write("a walk.bag", "x");
+  const auto demo = run_command("apps/demo '" + bag.string() + "'");
+  CHECK(demo.exit_code == 1);
+  CHECK_THAT(demo.output, Catch::Contains((folder.path() / "a\\ walk.bag").string() + " rig.yaml"));
+}
+
+// A recording of 10 s, and programs that print their command lines.
+struct StubbedDemo {
+  TemporaryFolder folder;
+
+  StubbedDemo() {
+    std::string frames = "#timestamp [ns],filename\n";
+    for (int i = 0; i <= 100; ++i)
+      frames += std::to_string(1'000'000'000'000 + i * 100'000'000LL) + ",x.png\n";
+    folder.write("recording/mav0/cam0/data.csv", frames);
+    folder.write("recording/walk.mcap", "x");  // a bag in an ASL folder
+    for (const char* program : {"robot", "team", "evaluate"}) add(program, "echo \"$0 $*\"");
+  }
+  void add(const std::string& program, const std::string& script) const {
+    const auto file = folder.write("bin/kimera_multi_" + program, "#!/bin/sh\n" + script + '\n');
+    std::filesystem::permissions(file, std::filesystem::perms::owner_all);
+  }
+  CommandResult run(const std::string& arguments) const {
+    const std::string root = folder.path().string() + '/';
+    return run_command("apps/demo " + root + "recording --programs " + root + "bin --output " +
+                       root + "out " + arguments);
+  }
+};
+
+TEST_CASE("The demo builds and draws a map of a recording with --map only", "[demo]") {
+  const StubbedDemo demo;
+  const std::string settings = "--set mapping.mode=metric";
+  const CommandResult without = demo.run("");
+  CAPTURE(without.output);
+  CHECK(without.exit_code == 0);
+  CHECK_THAT(without.output, !Catch::Contains(settings) && !Catch::Contains("team_mesh.png"));
+
+  demo.add("team",
+           "echo \"$*\"; : >\"" + (demo.folder.path() / "out/team_mesh.ply").string() + '"');
+  const CommandResult with = demo.run("--map");
+  CAPTURE(with.output);
+  CHECK(with.exit_code == 0);
+  CHECK_THAT(with.output, Catch::Contains("/out/team.json -- " + settings + '\n') &&
+                              Catch::Contains("team_mesh.png ") &&
+                              Catch::Contains("team_mesh.ply "));
+  const std::string render = demo.folder.read("out/render.log");
+  CHECK_THAT(render,
+             Catch::Contains("/out/team_mesh.ply --output ") && !Catch::Contains("--palette"));
+}
+
+TEST_CASE("The demo says which map is missing, and lists the other results", "[demo]") {
+  const StubbedDemo demo;
+  const CommandResult result = demo.run("--map");
+  CAPTURE(result.output);
+  CHECK(result.exit_code == 1);
+  CHECK_THAT(result.output,
+             Catch::Contains("report.html") && !Catch::Contains("team_mesh.png ") &&
+                 Catch::EndsWith("demo: the team built no mesh: see robot0/robot.log\n"));
+}
+
+TEST_CASE("The demo needs the evaluation program for a map", "[demo]") {
+  const StubbedDemo demo;
+  std::filesystem::remove(demo.folder.path() / "bin/kimera_multi_evaluate");
+  CHECK(demo.run("").exit_code == 0);
+  const CommandResult with = demo.run("--map");
+  CHECK(with.exit_code == 1);
+  CHECK_THAT(with.output, Catch::StartsWith("demo: --programs: no kimera_multi_evaluate in "));
 }
 
 TEST_CASE("The demo refuses what it cannot use", "[demo]") {
