@@ -19,9 +19,11 @@ constexpr int kTrueClosures = 30;  // of each pair
 constexpr double kNoise_m = 0.1;   // of closures; of a step of odometry half of it
 constexpr double kNoise_rad = 0.01;
 
-// What a liar may cost the others.
-constexpr double kWorse = 1.05;
-constexpr double kWorse_m = 0.2;
+// What a liar may cost the others. Measured with eight seeds: up to 0.014 m if robots contradict
+// it, 0.098 m if no closure to it is true, 0.19 m if its odometry is too long.
+constexpr double kContradicted_m = 0.2 * kNoise_m;
+constexpr double kOnlyLies_m = kNoise_m;
+constexpr double kWrongOdometry_m = 2.0 * kNoise_m;
 
 struct Lie {
   RobotId liar = 1;
@@ -162,6 +164,16 @@ double error_m(const TeamNetwork& network, const Walk& walk, RobotId liar) {
   return std::sqrt((aligned - truth).colwise().squaredNorm().mean());
 }
 
+// True if the honest robots are members of one settled session, the liar may be another.
+bool settled_without(const TeamNetwork& network, RobotId liar) {
+  return std::all_of(network.robots.begin(), network.robots.end(), [&](const auto& entry) {
+    const auto& [id, robot] = entry;
+    return id == liar ||
+           (robot.progress.settled && robot.progress.members.size() + 1 >= kTeam.size());
+  });
+}
+
+// error_m(); infinite, too, if the honest robots have no settled session.
 double error_of_team(const Walk& walk, const TeamProblem& problem, RobotId liar, bool with_liar) {
   TeamNetwork network;
   for (const RobotId robot : kTeam) {
@@ -173,8 +185,9 @@ double error_of_team(const Walk& walk, const TeamProblem& problem, RobotId liar,
                     [&](const PoseEdge& e) { return e.from.robot == liar || e.to.robot == liar; });
     feed(agent, robot, known);
   }
-  (void)network.run(200.0, [&] { return network.all_settled(); });
-  return error_m(network, walk, liar);
+  (void)network.run(200.0, [&] { return network.all_settled(); });  // not with a refused liar
+  return settled_without(network, liar) ? error_m(network, walk, liar)
+                                        : std::numeric_limits<double>::infinity();
 }
 
 std::ostream& operator<<(std::ostream& out, const Lie& lie) {
@@ -188,21 +201,27 @@ std::ostream& operator<<(std::ostream& out, const Lie& lie) {
 
 class Team {
  public:
+  explicit Team(unsigned seed = 1) : seed_(seed), walk_(seed) {}
   /// Errors of the others [m]: without the liar, with it.
   [[nodiscard]] double alone(RobotId liar) const {
     return error_of_team(walk_, walk_.problem, liar, false);
   }
   [[nodiscard]] double with(const Lie& lie) const {
-    return error_of_team(walk_, with_lie(walk_, lie, kSeed), lie.liar, true);
+    return error_of_team(walk_, with_lie(walk_, lie, seed_), lie.liar, true);
   }
 
  private:
-  static constexpr unsigned kSeed = 1;
-  Walk walk_{kSeed};
+  unsigned seed_;
+  Walk walk_;
 };
 
-double limit_m(double alone_m) {
-  return std::max(kWorse * alone_m, alone_m + kWorse_m);
+void check_cost(const Lie& lie, double most_m) {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(lie, seed);
+  const Team team(seed);
+  const double alone_m = team.alone(lie.liar);
+  REQUIRE(alone_m < 2.0 * kNoise_m);  // measured: 0.12 to 0.16 m
+  CHECK(team.with(lie) - alone_m <= most_m);
 }
 
 // Says what each lie costs.
@@ -216,10 +235,10 @@ void check_table(const std::vector<Lie>& lies) {
   }
   for (const Lie& lie : lies) {
     const double error_m = team.with(lie);
+    const bool little = error_m - alone[lie.liar] <= kWrongOdometry_m;
     CAPTURE(lie);
-    CHECK(error_m <= limit_m(alone[lie.liar]));
-    std::cout << lie << ": " << error_m << " m" << (error_m <= limit_m(alone[lie.liar]) ? "" : " !")
-              << std::endl;
+    CHECK(little);
+    std::cout << lie << ": " << error_m << " m" << (little ? "" : " !") << std::endl;
   }
 }
 
@@ -230,25 +249,33 @@ constexpr double kTooHuge = 1e14;  // refused
 
 }  // namespace
 
-TEST_CASE("one liar of four costs the others little", "[pose_graph][liars]") {
+TEST_CASE("one liar of four whom others contradict costs them next to nothing",
+          "[pose_graph][liars]") {
   const auto lie = GENERATE(
       Lie{.liar = 1, .offset_m = 0.5, .closures = 100},
       Lie{.liar = 4, .offset_m = 5.0, .closures = 100, .consistent = false},
       Lie{.liar = 1, .offset_m = 50.0, .closures = 100},
       Lie{.liar = 4, .offset_m = 1000.0, .closures = 1000},
       Lie{.liar = 1, .offset_m = 5.0, .closures = 1000},
-      Lie{.liar = 4, .offset_m = 5.0, .closures = 1000, .only_lies = true},
-      Lie{.liar = 1, .offset_m = 0.5, .closures = 1000, .only_lies = true},
-      Lie{.liar = 4, .offset_m = 0.5, .closures = 1000, .only_lies = true},
       Lie{.liar = 1, .offset_m = 50.0, .closures = 1000, .consistent = false},
       Lie{.liar = 4, .offset_m = 1000.0, .closures = 1000, .consistent = false, .variance = kHuge},
       Lie{.liar = 1, .offset_m = 5.0, .closures = 100, .variance = kTiny},
       Lie{.liar = 4, .offset_m = 50.0, .closures = 100, .variance = kTiny},
-      Lie{.liar = 4, .offset_m = 1000.0, .closures = 100, .variance = kTooHuge},
-      Lie{.liar = 1, .stretched = 1.1, .odometry_variance = kTiny});
-  CAPTURE(lie);
-  const Team team;
-  CHECK(team.with(lie) <= limit_m(team.alone(lie.liar)));
+      Lie{.liar = 4, .offset_m = 1000.0, .closures = 100, .variance = kTooHuge});
+  check_cost(lie, kContradicted_m);
+}
+
+TEST_CASE("one liar of four without a true closure costs the others less than a closure's noise",
+          "[pose_graph][liars]") {
+  const auto lie = GENERATE(Lie{.liar = 4, .offset_m = 5.0, .closures = 1000, .only_lies = true},
+                            Lie{.liar = 1, .offset_m = 0.5, .closures = 1000, .only_lies = true},
+                            Lie{.liar = 4, .offset_m = 0.5, .closures = 1000, .only_lies = true});
+  check_cost(lie, kOnlyLies_m);
+}
+
+TEST_CASE("odometry of one liar of four costs the others less than twice a closure's noise",
+          "[pose_graph][liars]") {
+  check_cost({.liar = 1, .stretched = 1.1, .odometry_variance = kTiny}, kWrongOdometry_m);
 }
 
 TEST_CASE("table: closures of a liar", "[.][liars_long]") {
