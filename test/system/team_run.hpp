@@ -101,6 +101,7 @@ inline std::filesystem::path write_team(const SplitGraph& graph, const Temporary
 struct TeamResult {
   WholeGraph graph;
   std::vector<SE3> poses;
+  std::vector<int> robot_of;  ///< Of each pose.
 };
 
 /// Of robots 0 to `robots` - 1, whose results are in robot0, robot1, ...
@@ -113,6 +114,7 @@ inline TeamResult read_team(const std::filesystem::path& folder, int robots) {
     for (const G2oVertex& vertex : parts.back().vertices) {
       index_of[vertex.id] = team.graph.poses++;
       team.poses.push_back(vertex.T_world_kf);
+      team.robot_of.push_back(i);
     }
   }
   for (int robot = 0; robot < robots; ++robot)

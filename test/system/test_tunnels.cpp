@@ -6,6 +6,8 @@
 #include <fstream>
 #include <iostream>
 #include <limits>
+#include <map>
+#include <utility>
 
 #include "test/support/shared_data.hpp"
 #include "test/system/team_run.hpp"
@@ -46,6 +48,28 @@ int rounds_to(double cost, const std::filesystem::path& optimizer_csv) {
   return reached <= last ? reached : std::numeric_limits<int>::max();
 }
 
+/// What the robots have kept of the closures.
+struct KeptClosures {
+  std::size_t count = 0;
+  std::map<std::pair<int, int>, std::size_t> between = {};  ///< Two robots, the lower one first.
+  double largest = 0.0;  ///< Residual in the team's frame [sigma].
+};
+
+KeptClosures kept_closures(const TeamResult& team) {
+  KeptClosures kept;
+  for (const BlockEdge& e : team.graph.edges) {
+    const auto i = static_cast<std::size_t>(e.i), j = static_cast<std::size_t>(e.j);
+    if (team.robot_of[i] == team.robot_of[j] && e.j == e.i + 1) continue;  // odometry
+    ++kept.count;
+    if (team.robot_of[i] != team.robot_of[j])
+      ++kept.between[std::minmax(team.robot_of[i], team.robot_of[j])];
+    const Eigen::MatrixXd T_i = team.poses[i].matrix().topRows<3>();
+    const Eigen::MatrixXd T_j = team.poses[j].matrix().topRows<3>();
+    kept.largest = std::max(kept.largest, std::sqrt(edge_cost(T_i, T_j, e.T_i_j, e.kappa, e.tau)));
+  }
+  return kept;
+}
+
 TEST_CASE("Eight processes bring the tunnels graph into one frame", "[system][slow]") {
   const auto dataset = shared_data("multi_robot/tunnels_8robots");
   if (!dataset) return;
@@ -62,19 +86,28 @@ TEST_CASE("Eight processes bring the tunnels graph into one frame", "[system][sl
   }
   const TeamResult team = read_team(folder.path(), kRobots);
   CHECK(team.poses.size() == 1255);
-  CHECK(team.graph.edges.size() > 1247 + 2000);  // odometry, and most of the good closures
+  const KeptClosures kept = kept_closures(team);
+  // Measured: 2655 to 2843. Robust solvers agree on 2669 to 2987.
+  CHECK(kept.count >= 2500);
+  CHECK(kept.count <= 3000);
+  // One frame: closures between every two robots hold in it. The threshold is 6.2 sigma of the
+  // noise that the robots find, 3.3 to 5.1 times what the graph says, as they meet sooner or later.
+  // The worst false closure is off by 440 sigma if it is kept.
+  CHECK(kept.between.size() == kRobots * (kRobots - 1) / 2);
+  CHECK(kept.largest <= 6.0 * 6.2);
+  for (const auto& [pair, count] : kept.between) CHECK(count >= 20);  // measured: 46 or more
 
   const TruncatedNewtonResult central = solve_centrally(team.graph);
   const double reached = cost_of(team.graph, team.poses);
   const int rounds = rounds_to(1.01 * central.cost, folder.path() / "robot0" / "optimizer.csv");
   const double gap = reached / central.cost - 1.0;
   const double rmse_m = position_rmse(team.poses, central.X);
-  std::cout << "tunnels: closures kept " << team.graph.edges.size() - 1247 << ", rounds to 1e-2 "
-            << rounds << ", cost " << reached << ", gap " << gap << ", RMSE to the optimum "
-            << rmse_m << " m\n";
+  std::cout << "tunnels: closures kept " << kept.count << ", largest residual " << kept.largest
+            << " sigma, rounds to 1e-2 " << rounds << ", cost " << reached << ", gap " << gap
+            << ", RMSE to the optimum " << rmse_m << " m\n";
   CHECK(rounds <= 254);  // what the authors' own program needs, its start included
   CHECK(gap < 1e-8);     // solved to convergence, as far as the reference is
-  CHECK(rmse_m < 1e-2);  // paths are 475 to 886 m long
+  CHECK(rmse_m < 1e-2);  // measured: 1.1e-3; paths are 475 to 886 m long
 }
 
 }  // namespace
