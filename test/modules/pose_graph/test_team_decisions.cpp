@@ -368,10 +368,25 @@ TeamProblem with_judged_odometry(TeamProblem problem) {
   return problem;
 }
 
+// Closures fit the trajectories up to `barc` [sigma], except for those that are `out`.
+void check_fit(const TeamProblem& problem, const TeamPoses& poses, const std::set<ClosureId>& out,
+               double barc) {
+  std::size_t misfits_kept = 0, fits_rejected = 0;
+  for (const PoseEdge& e : problem.edges) {
+    if (is_step(e)) continue;
+    const bool fits = residual_of(e, poses.at(e.from.robot)[e.from.index],
+                                  poses.at(e.to.robot)[e.to.index]) <= barc;
+    if (fits && out.contains(e.id())) ++fits_rejected;
+    if (!fits && !out.contains(e.id())) ++misfits_kept;
+  }
+  CHECK(misfits_kept == 0);
+  CHECK(fits_rejected == 0);
+}
+
 }  // namespace
 
 // Every robot has had a session of its own before, and knows the noise badly from that.
-TEST_CASE("eight robots in tunnels decide as one session would that knows nothing before",
+TEST_CASE("eight robots in tunnels decide nearly as one session that knows nothing before",
           "[pose_graph][decisions]") {
   const auto folder = shared_data("multi_robot/tunnels_8robots");
   if (!folder) return;
@@ -389,9 +404,13 @@ TEST_CASE("eight robots in tunnels decide as one session would that knows nothin
                                 std::back_inserter(differ));
   const SolverState state = network.agent(0).part()->state();
   CAPTURE(out.size(), at_once.size(), state.noise_scale, state.round);
-  const auto kept = static_cast<double>(closures_of(problem) - at_once.size());
-  CHECK(static_cast<double>(differ.size()) < 0.01 * kept);  // Jaccard's index
-  TeamProblem rest = without(with_judged_odometry(problem), out);
+  const std::size_t kept = closures_of(problem) - at_once.size();
+  CHECK(kept >= 2600);  // measured: 2775; robust solvers agree on 2669 to 2987
+  CHECK(kept <= 3000);
+  CHECK(differ.size() * 150 < kept);  // Jaccard's index; measured: 11
+  const TeamProblem judged = with_judged_odometry(problem);
+  check_fit(judged, network.trajectories(), out, state.barc);
+  TeamProblem rest = without(judged, out);
   rest.start = network.trajectories();
   check_cost(network, rest);
 }
