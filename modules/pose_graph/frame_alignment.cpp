@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "modules/pose_graph/stiefel.hpp"
@@ -61,16 +62,22 @@ Eigen::MatrixXd average(std::span<const Eigen::MatrixXd> candidates,
 }  // namespace
 
 std::optional<FrameAlignment> align_frames(std::span<const Eigen::MatrixXd> candidates,
-                                           const AlignmentTolerance& tolerance) {
+                                           const AlignmentTolerance& tolerance,
+                                           const std::vector<double>& given_weights) {
   check(candidates, tolerance);
   if (candidates.empty()) return std::nullopt;
+  std::vector<double> weights = given_weights;
+  if (weights.empty()) weights.resize(candidates.size(), 1.0);
+  if (weights.size() != candidates.size() ||
+      !std::ranges::all_of(weights, [](double w) { return w > 0.0; }))
+    throw std::invalid_argument("align_frames: not a positive weight for each candidate");
   const Distance distance(tolerance);
   std::size_t best = 0;
-  double best_cost = static_cast<double>(candidates.size()) + 1.0;
+  double best_cost = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < candidates.size(); ++k) {
     double cost = 0.0;
-    for (const Eigen::MatrixXd& other : candidates)
-      cost += std::min(1.0, distance(candidates[k], other));
+    for (std::size_t other = 0; other < candidates.size(); ++other)
+      cost += weights[other] * std::min(1.0, distance(candidates[k], candidates[other]));
     if (cost < best_cost) {
       best_cost = cost;
       best = k;

@@ -20,15 +20,18 @@ struct [[nodiscard]] FrameAlignment {
 };
 
 /// Robust average of candidates [Y p] (r x 4) for one transform, of which many may be wrong:
-/// minimises the truncated sum of squares sum_k min(1, d_k^2), d_k^2 being the larger of the
+/// minimises the truncated sum of squares sum_k w_k min(1, d_k^2), d_k^2 being the larger of the
 /// squared chordal distance of the rotations and the squared distance of the translations, each
 /// over its tolerance. Every candidate is tried as the start, the best one is refined by averaging
-/// its inliers until they no longer change. With rank 3 these are ordinary rigid transforms.
+/// its inliers, each alike, until they no longer change. With rank 3 these are ordinary rigid
+/// transforms.
 ///
 /// Translations compare where the frames' origin lies: choose it near the measurements, or errors
 /// of rotation are counted again through the lever. nullopt if there is no candidate. O(n^2 r).
-/// Throws std::invalid_argument if shapes differ or a tolerance is not positive.
+/// `weights` w: one per candidate; empty: all are 1.
+/// Throws std::invalid_argument if shapes differ or a tolerance or a weight is not positive.
 [[nodiscard]] std::optional<FrameAlignment> align_frames(
-    std::span<const Eigen::MatrixXd> candidates, const AlignmentTolerance& tolerance);
+    std::span<const Eigen::MatrixXd> candidates, const AlignmentTolerance& tolerance,
+    const std::vector<double>& weights = {});
 
 }  // namespace km

@@ -1,6 +1,7 @@
 #include "modules/pose_graph/frame_entry.hpp"
 
 #include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/closure_places.hpp"
 #include "modules/pose_graph/rounding.hpp"
 #include "modules/pose_graph/truncated_newton.hpp"
 
@@ -28,24 +29,24 @@ std::optional<std::vector<SE3>> moved_into_frame(const std::vector<SE3>& poses, 
                                                  std::span<const PoseEdge> closures,
                                                  const std::map<KeyframeId, SE3>& told,
                                                  const AlignmentTolerance& tolerance) {
-  std::vector<const PoseEdge*> heard;
+  std::vector<PoseEdge> heard;
   SE3 T_own_centre = SE3::Identity();
   for (const PoseEdge& e : closures) {
     if (!told.contains(e.other(self))) continue;
-    heard.push_back(&e);
+    heard.push_back(e);
     T_own_centre.translation() += poses[e.end_on(self).index].translation();
   }
   if (heard.empty()) return std::nullopt;
   T_own_centre.translation() /= static_cast<double>(heard.size());
   std::vector<Eigen::MatrixXd> candidates;
-  for (const PoseEdge* e : heard) {
-    const SE3& T_frame_other = told.at(e->other(self));
-    const SE3 T_other_kf = e->from.robot == self ? e->T_from_to.inverse() : e->T_from_to;
-    const SE3& T_own_kf = poses[e->end_on(self).index];
+  for (const PoseEdge& e : heard) {
+    const SE3& T_frame_other = told.at(e.other(self));
+    const SE3 T_other_kf = e.from.robot == self ? e.T_from_to.inverse() : e.T_from_to;
+    const SE3& T_own_kf = poses[e.end_on(self).index];
     const SE3 T_frame_centre = T_frame_other * T_other_kf * T_own_kf.inverse() * T_own_centre;
     candidates.emplace_back(T_frame_centre.matrix().topRows<3>());
   }
-  const auto alignment = align_frames(candidates, tolerance);
+  const auto alignment = align_frames(candidates, tolerance, find_places(heard).weights());
   const SE3 T_frame_own =
       make_pose(alignment->L.leftCols<3>(), alignment->L.col(3)) * T_own_centre.inverse();
   std::vector<SE3> moved;

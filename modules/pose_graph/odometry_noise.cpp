@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "modules/core/lie.hpp"
+#include "modules/pose_graph/closure_places.hpp"
 
 namespace km {
 namespace {
 
-constexpr std::uint32_t kPlace = 10;  // keyframes that a place extends to, at both ends
 constexpr std::size_t kMostCycles = 200;
 constexpr double kPriorSigma = 1.0986;  // log 3, of log sqrt(v)
 constexpr double kLeastSide_m = 1.0;    // of the volume of false closures
@@ -89,30 +89,14 @@ std::vector<PoseEdge> in_order(std::span<const PoseEdge> closures, std::size_t k
 std::vector<Cycle> cycles_of(const Chain& chain, std::span<const PoseEdge> closures,
                              std::size_t& places) {
   const std::vector<PoseEdge> sorted = in_order(closures, chain.T_first_kf.size());
-  std::vector<ClosureId> first_of;  // of each place
-  std::vector<std::size_t> sizes, place_of;
-  const auto near = [](const KeyframeId& a, const KeyframeId& b) {
-    return std::max(a.index, b.index) - std::min(a.index, b.index) <= kPlace;
-  };
-  for (const PoseEdge& closure : sorted) {
-    const ClosureId id = closure.id();
-    // Only the places that begin a little before it can hold it.
-    std::size_t place = first_of.size();
-    for (std::size_t k = first_of.size(); k-- > 0 && near(first_of[k].from, id.from);)
-      if (near(first_of[k].to, id.to)) place = k;
-    if (place == first_of.size()) {
-      first_of.push_back(id);
-      sizes.push_back(0);
-    }
-    ++sizes[place];
-    place_of.push_back(place);
-  }
-  places = first_of.size();
+  const ClosurePlaces found = find_places(sorted);
+  const std::vector<double> weights = found.weights();
+  places = found.sizes.size();
   std::vector<Cycle> cycles;
   const std::size_t stride = (sorted.size() + kMostCycles - 1) / kMostCycles;
   for (std::size_t k = 0; k < sorted.size(); k += stride) {
     cycles.push_back(chain.close(sorted[k]));
-    cycles.back().weight = static_cast<double>(stride) / static_cast<double>(sizes[place_of[k]]);
+    cycles.back().weight = static_cast<double>(stride) * weights[k];
   }
   return cycles;
 }

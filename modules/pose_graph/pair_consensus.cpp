@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "modules/core/lie.hpp"
+#include "modules/pose_graph/closure_places.hpp"
 #include "modules/pose_graph/frame_alignment.hpp"
 
 namespace km {
@@ -126,11 +127,14 @@ void hold_most(const PairMotions& pairs, std::map<RobotId, SE3>& placed) {
 std::optional<PairMotion> motion_of_pair(std::span<const PoseEdge> closures, RobotId a,
                                          const std::function<SE3(const KeyframeId&)>& pose) {
   if (closures.empty()) return std::nullopt;
+  const std::vector<double> weight_of = find_places(closures).weights();
   const std::size_t stride = (closures.size() + kEnoughCandidates - 1) / kEnoughCandidates;
   PairMotion result;
   std::vector<std::pair<SE3, SE3>> ends;  // of b: where it is placed, where a's has it
+  std::vector<double> weights;
   for (std::size_t k = 0; k < closures.size(); k += stride) {
     const PoseEdge& e = closures[k];
+    weights.push_back(weight_of[k]);
     const SE3 T_a_b = e.from.robot == a ? e.T_from_to : e.T_from_to.inverse();
     ends.emplace_back(pose(e.other(a)), pose(e.end_on(a)) * T_a_b);
     result.centre += ends.back().first.translation();
@@ -143,7 +147,7 @@ std::optional<PairMotion> motion_of_pair(std::span<const PoseEdge> closures, Rob
     result.radius_m += (placed.translation() - result.centre).squaredNorm();
   }
   result.radius_m = std::sqrt(result.radius_m / static_cast<double>(ends.size()));
-  const auto alignment = align_frames(candidates, {});
+  const auto alignment = align_frames(candidates, {}, weights);
   const SE3 T = make_pose(alignment->L.leftCols<3>(), alignment->L.col(3)) * to_centre.inverse();
   result.T = SinglePose::of(T);
   for (const PoseEdge& e : closures) {

@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <map>
 #include <memory>
 #include <random>
 #include <set>
 #include <utility>
 
+#include "modules/core/lie.hpp"
 #include "modules/pgo_study/agent_team.hpp"
 #include "modules/pgo_study/central_solver.hpp"
 #include "modules/pgo_study/member_team.hpp"
@@ -90,8 +92,7 @@ std::vector<SE3> solved_by_members(const TeamGraph& graph, bool limited) {
   return round_to_poses(X, X.leftCols<4>());
 }
 
-TEST_CASE("Members of a study weigh odometry that claims too much as robots do",
-          "[agent_team]") {
+TEST_CASE("Members of a study weigh odometry that claims too much as robots do", "[agent_team]") {
   TeamGraph graph = team_of_three(1);
   for (BlockEdge& e : graph.edges)
     if (e.j == e.i + 1 && graph.robot_of(e.i) == 1) {
@@ -130,6 +131,39 @@ TEST_CASE("Robots' own code refuses planar and interrupted graphs", "[agent_team
   graph = team_of_three(1);
   std::erase_if(graph.edges, [](const BlockEdge& e) { return e.i == 4 && e.j == 5; });
   CHECK_THROWS_WITH(run_agent_team(graph, {}), Catch::Contains("0:5"));
+}
+
+// Successive poses of robot 0 taken for successive ones of robot 1: all false, and all agree.
+void mistake_a_place(TeamGraph& graph, Eigen::Index closures) {
+  const SE3 off =
+      make_pose(so3_exp(Eigen::Vector3d(0.0, 0.0, 2.0)), Eigen::Vector3d(3.0, 4.0, 0.0));
+  const std::vector<SE3> T = odometry_start(graph);
+  const Eigen::Index a = graph.first[0] + 15, b = graph.first[1] + 5;
+  const auto at = [&](Eigen::Index k) { return T[static_cast<std::size_t>(k)]; };
+  for (Eigen::Index k = 0; k < closures; ++k)
+    graph.edges.push_back({a + k, b + k,
+                           at(a + k).inverse() * at(a) * off * at(b).inverse() * at(b + k),
+                           graph.edges.front().kappa, graph.edges.front().tau});
+}
+
+TEST_CASE("A place that is taken for another has one say, however many closures it has",
+          "[agent_team]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  TeamGraph graph = team_of_three(seed);
+  std::map<std::pair<std::size_t, std::size_t>, int> closures;
+  std::erase_if(graph.edges, [&](const BlockEdge& e) {
+    const auto pair = std::minmax({graph.robot_of(e.i), graph.robot_of(e.j)});
+    return is_between(graph, e) && ++closures[pair] > 5;
+  });
+  const std::size_t true_edges = graph.edges.size();
+  mistake_a_place(graph, 10);
+  const AgentTeamRun run = run_agent_team(graph, {});
+  CHECK(run.settled);
+  CHECK(std::count(run.kept.begin(), run.kept.begin() + static_cast<std::ptrdiff_t>(true_edges),
+                   false) == 0);
+  CHECK(std::count(run.kept.begin() + static_cast<std::ptrdiff_t>(true_edges), run.kept.end(),
+                   true) == 0);
 }
 
 }  // namespace

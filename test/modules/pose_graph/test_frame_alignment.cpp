@@ -34,6 +34,22 @@ TEST_CASE("ten equal candidates win over forty random ones", "[pose_graph]") {
   CHECK(alignment->inliers == std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9});
 }
 
+TEST_CASE("candidates have the say of their weights", "[pose_graph]") {
+  std::mt19937 rng(1);
+  const SE3 few = random_pose(rng);
+  const SE3 many = few * make_pose(Eigen::Matrix3d::Identity(), Eigen::Vector3d(100.0, 0.0, 0.0));
+  std::vector<Eigen::MatrixXd> candidates(3, as_candidate(few));
+  candidates.resize(10, as_candidate(many));
+  CHECK(align_frames(candidates, {})->inliers.size() == 7);
+  std::vector<double> weights(3, 1.0);
+  weights.resize(10, 1.0 / 7.0);
+  CHECK(align_frames(candidates, {}, weights)->inliers == std::vector<std::size_t>{0, 1, 2});
+  weights.back() = 0.0;
+  CHECK_THROWS_AS(align_frames(candidates, {}, weights), std::invalid_argument);
+  weights.pop_back();
+  CHECK_THROWS_AS(align_frames(candidates, {}, weights), std::invalid_argument);
+}
+
 TEST_CASE("noise of the agreeing candidates averages out", "[pose_graph]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
