@@ -143,6 +143,8 @@ void add_network(CLI::App& app, RobotOptions& options) {
   app.add_option("--peers", options.peers, "Addresses of the other hosts, where multicast is off")
       ->delimiter(',');
   app.add_option("--interface", options.interface_name, "Network interface, e.g. wlan0");
+  app.add_flag("--view", options.view,
+               "Let anybody in the domain watch (kimera_multi_viewer): trajectory, mesh, images");
   app.add_option("--security", options.security,
                  "Folder of this robot's keys (kimera_multi_keys): only the team reads and speaks")
       ->check(CLI::ExistingDirectory);

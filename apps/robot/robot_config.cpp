@@ -31,6 +31,7 @@ void apply_options(const RobotOptions& options, ConfigLayers& layers) {
   if (options.domain) layers.add_override("dds.domain=" + std::to_string(*options.domain));
   if (!options.interface_name.empty())
     layers.add_override("dds.interface=" + options.interface_name);
+  if (options.view) layers.add_override("view.on=true");
   if (options.peers.empty()) return;
   std::string list;
   for (const std::string& peer : options.peers) list += (list.empty() ? "" : ", ") + peer;

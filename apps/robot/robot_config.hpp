@@ -58,6 +58,7 @@ struct RobotOptions {
   bool resume = false;  ///< Go on with the run whose results are in `output`.
   std::optional<std::filesystem::path> record;  ///< MCAP file for viewers; empty: in `output`.
   bool record_images = false;                   ///< The left ones, too.
+  bool view = false;             ///< Viewers in the domain are sent what the robot knows.
   double serve_limit_s = 120.0;  ///< Longest time to serve peers after the input has ended.
   std::string log_level = "info";
 };

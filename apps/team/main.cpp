@@ -53,6 +53,7 @@ struct TeamOptions {
   std::optional<double> time_limit_s;
   std::vector<std::string> arguments;
   std::optional<fs::path> record;  // empty: in the folder of the results
+  bool view = false;
   bool report = false;
 };
 
@@ -93,6 +94,8 @@ void define(CLI::App& app, TeamOptions& options) {
          "end they become one file (default: team.mcap in the folder of the results)")
       ->expected(0, 1)
       ->type_name("[FILE.mcap]");
+  app.add_flag("--view", options.view,
+               "Robots let anybody in the domain watch them: kimera_multi_viewer --domain N");
   app.add_flag("--report", options.report,
                "Start nothing: the tables of a run that has ended, from its folders in --output")
       ->excludes("--links");
@@ -113,6 +116,7 @@ km::TeamPlan make_plan(const TeamOptions& options) {
                                                                km::kLastQuietDomain)(device);
   }
   plan.record = options.record.has_value();
+  plan.view = options.view;
   if (!options.security.empty()) plan.security = options.security;
   if (!options.truth.empty()) plan.notes.clear();  // they are about the truths of the file
   for (km::RobotPlan& robot : plan.robots) {

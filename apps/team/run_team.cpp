@@ -164,6 +164,7 @@ std::vector<std::string> robot_command(const fs::path& binary, const TeamPlan& p
   option("--domain", std::to_string(plan.domain.value_or(0)));
   option("--output", (plan.output / robot.name).string());
   if (plan.record) command.emplace_back("--record");
+  if (plan.view) command.emplace_back("--view");
   command.insert(command.end(), robot.arguments.begin(), robot.arguments.end());
   return command;
 }

@@ -63,6 +63,7 @@ struct TeamPlan {
   std::vector<RobotPlan> robots;   ///< As read: with what the team gives them.
   std::vector<std::string> notes;  ///< What cannot be had, for the table.
   bool record = false;             ///< Each robot leaves one for viewers; not in the file.
+  bool view = false;               ///< Robots run with --view; not in the file.
 
   void visit_fields(auto& visitor) {
     visitor.field("config", configs, Input{}, "one or several files, as for kimera_multi_robot");

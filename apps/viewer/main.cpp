@@ -34,8 +34,8 @@ constexpr const char* kAbout =
 
 constexpr const char* kFooter = R"(
 With --domain it joins the team's DDS domain and listens; it says nothing there, and robots neither wait
-for it nor count it. They send what a page needs: about 2 kB/s, the map's pieces as they change, and small
-camera images of a robot while a page shows them.
+for it nor count it. Robots that run with --view send what a page needs: about 2 kB/s, the map's pieces as
+they change, and small camera images of a robot while a page shows them.
 
 RESULTS is the folder of kimera_multi_team, or of one robot. Results do not say when all was known:
 a piece of the mesh is shown from when the robot came nearest to it, and robots join with the first
@@ -84,7 +84,8 @@ void define(CLI::App& app, ViewerOptions& options) {
   auto* const rate =
       app.add_option("--rate", options.rate, "Play as if live: 1 as it was, 2 twice as fast");
   rate->check(CLI::Range(1e-3, 1e3))->needs(results);
-  auto* const domain = app.add_option("--domain", options.dds.domain, "DDS domain of the team");
+  auto* const domain = app.add_option("--domain", options.dds.domain,
+                                      "DDS domain of the team, whose robots run with --view");
   domain->check(CLI::Range(0, 230))->excludes(results);
   app.add_option("--team", options.dds.team, "Its dds.team")->needs(domain)->capture_default_str();
   app.add_option("--interface", options.dds.interface, "Network interface, e.g. lo")->needs(domain);
@@ -213,7 +214,8 @@ void show_team(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
     }
   });
   log::info("viewer") << title << " on " << listener.interface().name << " ("
-                      << listener.interface().address << ")";
+                      << listener.interface().address
+                      << "): shows robots that run with --view (or view.on: true)";
   tell_address(server);
   wait_for_end(signals);
   teller.request_stop();

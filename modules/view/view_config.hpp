@@ -8,7 +8,7 @@ namespace km {
 struct ViewConfig {
   static constexpr const char* kSection = "view";
 
-  bool on = true;
+  bool on = false;
   bool in_clear = false;
   double bytes_per_s = 2000.0;
   double past_bytes_per_s = 20000.0;
@@ -17,8 +17,8 @@ struct ViewConfig {
 
   void visit_fields(auto& visitor) {
     visitor.field("on", on,
-                  "tell who watches (kimera_multi_viewer) how this robot does; costs nothing while "
-                  "nobody does");
+                  "send this robot's trajectory, mesh and images to anybody in the domain who asks "
+                  "(kimera_multi_viewer), as with --view; costs nothing while nobody asks");
     visitor.field("in_clear", in_clear,
                   "where the team has keys: tell it nevertheless; anybody on the network can read "
                   "it then");

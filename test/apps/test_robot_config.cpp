@@ -90,6 +90,13 @@ TEST_CASE("What comes later wins: profile, files, settings, options", "[robot]")
   CHECK(load_robot_config(options).dds.discovery == Discovery::kPeers);
 }
 
+TEST_CASE("A robot can be watched only if its owner asks for it", "[robot]") {
+  RobotOptions options;
+  CHECK_FALSE(load_robot_config(options).view.on);
+  options.view = true;
+  CHECK(load_robot_config(options).view.on);
+}
+
 TEST_CASE("Every shipped configuration loads", "[robot]") {
   for (const char* file :
        {"config/robot.yaml", "config/datasets/euroc.yaml", "config/datasets/tunnels.yaml"})

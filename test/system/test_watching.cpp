@@ -77,7 +77,8 @@ std::vector<std::string> robot_on(const Walk& walk, const Walk& other, const fs:
           "--output",
           (folder / name).string(),
           "--domain",
-          std::to_string(domain)};
+          std::to_string(domain),
+          "--view"};
 }
 
 // What it was told is what the robot has written.
@@ -124,6 +125,17 @@ TEST_CASE("Who watches a team knows how it ends, and changes nothing", "[system]
     CHECK(summary.exit_reason == "all present robots have settled");
   }
   CHECK(audience.refused() == 0);
+}
+
+TEST_CASE("A robot that is not to be watched sends viewers nothing", "[system][view]") {
+  const TemporaryFolder folder;
+  const int domain = random_domain();
+  Audience audience(domain);
+  std::vector<std::string> command = robot_on({0, 0}, {1, 40}, folder.path(), domain);
+  std::erase(command, "--view");
+  Process robot(command);
+  CHECK(robot.wait() == 0);
+  CHECK(audience.finish().empty());
 }
 
 TEST_CASE("Where the team has keys nothing is told, unless it is asked for", "[system][view]") {

@@ -61,6 +61,7 @@ function greet({source: shown, title, labels}) {
   source = shown;
   $('title').textContent = title;
   $('live').textContent = {live: 'Live', replay: 'Newest', run: 'End'}[source];
+  if (source === 'live') $('empty').textContent = 'Waiting for robots that run with --view (or view.on: true)';
   document.title = `${title} – kimera_multi`;
   scene.meshes.setPalette(labels);
 }

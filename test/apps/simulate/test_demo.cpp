@@ -12,8 +12,8 @@
 namespace km {
 
 TEST_CASE("The demo joins three robots of a simulated world into one frame", "[demo][slow]") {
-  constexpr std::size_t kFrames = 80;   // 8 s at 10 Hz
-  constexpr double kMaxError_m = 0.3;   // robots in frames of their own are a metre off and more
+  constexpr std::size_t kFrames = 80;  // 8 s at 10 Hz
+  constexpr double kMaxError_m = 0.3;  // robots in frames of their own are a metre off and more
   const TemporaryFolder folder;
   const auto demo = run_command("apps/demo --short --rate max --programs " KM_BIN_DIR " --output " +
                                 folder.path().string());
@@ -121,6 +121,20 @@ TEST_CASE("The demo builds and draws a map of a recording with --map only", "[de
   const std::string render = demo.folder.read("out/render.log");
   CHECK_THAT(render,
              Catch::Contains("/out/team_mesh.ply --output ") && !Catch::Contains("--palette"));
+}
+
+TEST_CASE("The demo lets robots be watched with --view only", "[demo]") {
+  const StubbedDemo demo;
+  demo.add("viewer", "echo Open http://here");
+  const CommandResult without = demo.run("");
+  CHECK(without.exit_code == 0);
+  CHECK_THAT(without.output, !Catch::Contains("--view"));
+  const CommandResult with = demo.run("--view");
+  CAPTURE(with.output);
+  CHECK(with.exit_code == 0);
+  CHECK_THAT(with.output, Catch::Contains("To watch the team, open http://here") &&
+                              Catch::Contains("/kimera_multi_team --config") &&
+                              Catch::Contains(" --view\n"));
 }
 
 TEST_CASE("The demo says which map is missing, and lists the other results", "[demo]") {

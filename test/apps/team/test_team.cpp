@@ -78,6 +78,16 @@ TEST_CASE("A team runs its robots, shows their lines and prints the table", "[te
   CHECK_THAT(team.folder.read("out/bob/robot.log"), Catch::Contains("status of bob"));
 }
 
+TEST_CASE("Robots of a team can be watched only with --view", "[team]") {
+  const Team team("exit 0");
+  CHECK_THAT(run_command(team.command).output, !Catch::Contains("--view"));
+  const auto watched = run_command(team.command + " --view");
+  CAPTURE(watched.output);
+  for (const char* name : {"alice", "bob"})
+    CHECK_THAT(team.folder.read(std::string("out/") + name + "/robot.log"),
+               Catch::Contains("--view"));
+}
+
 TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
   const Team team(
       "[ $name = bob ] && { echo 'out of luck'; echo '  or of fuel'; } >&2 && exit 9; exit 0");

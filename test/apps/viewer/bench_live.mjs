@@ -45,7 +45,7 @@ try {
   const run = spawn(
       join(programs, 'kimera_multi_team'),
       [
-        '--config', team, '--domain', domain, '--output', folder, ...rest, '--', '--log', 'debug'
+        '--config', team, '--domain', domain, '--view', '--output', folder, ...rest, '--', '--log', 'debug'
       ],
       {stdio: ['ignore', 'ignore', 'inherit']});
   const code = await new Promise((done) => run.on('exit', done));
