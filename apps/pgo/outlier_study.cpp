@@ -72,7 +72,7 @@ OutlierResult attempt(const std::string& method, const TeamGraph& graph, std::si
                                     .barc = options.barc},
                                    meter);
   result.rmse_m = rmse_m(truth, round_to_poses(run.X, run.X.leftCols<4>()));
-  result.rounds = run.rounds.size() - 1;
+  result.rounds = run.rounds.back().round;
   result.decided = run.decision->decided;
   result.noise_scale = run.decision->noise_scale;
   result.bytes = run.rounds.back().work.bytes;

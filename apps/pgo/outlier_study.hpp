@@ -53,7 +53,7 @@ struct OutlierResult {
   std::size_t false_kept = 0;
   double noise_scale = 1.0;  ///< Of closures, as newton has found it.
   double rmse_m = 0.0;       ///< Of positions to the optimum of the clean graph, rigidly aligned.
-  std::size_t rounds = 0;
+  int rounds = 0;
   bool decided = true;    ///< False: max_rounds did not suffice.
   std::size_t bytes = 0;  ///< Sent by the solver; closures are known to their two robots anyway.
   double cpu_s = 0.0;     ///< Of all robots, pairwise consistency included.

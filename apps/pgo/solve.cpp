@@ -30,9 +30,10 @@ constexpr const char* kSolveDetails =
     "Methods:\n"
     "  local             every robot alone; their frames joined by one closure each\n"
     "  dgs               two-stage distributed Gauss-Seidel (Choudhary et al., IJRR 2017)\n"
-    "  rbcd              Riemannian block-coordinate descent (Tian et al., TRO 2021),\n"
-    "                    over-relaxed; as published with --over-relaxation 1 or --schedule greedy\n"
-    "  rbcd-accelerated  the same with Nesterov's acceleration and restarts\n"
+    "  rbcd              Riemannian block-coordinate descent (Tian et al., TRO 2021) as robots "
+    "run\n"
+    "                    it: in a round all update, in turn; over-relaxed, without by\n"
+    "                    --over-relaxation 1; ends when the cost hardly falls any more\n"
     "  rbcd-asynchronous all robots at once, on poses up to --max-delay rounds old; descends all\n"
     "                    the same\n"
     "  centralized       the whole graph on one computer: Newton, certified; else the staircase\n"
@@ -44,11 +45,14 @@ constexpr const char* kSolveDetails =
     "                    of those that it keeps; with --trust-all it keeps all\n"
     "newton starts from odometry; the others, and newton --trust-all, from the chordal\n"
     "initialisation of the whole graph, timed apart (local: from each robot's own).\n\n"
-    "A round is one exchange of messages, of newton one way up the tree and down again. The table\n"
-    "says after how many rounds each gap to the certified optimum was reached (computed centrally\n"
-    "unless given), what had been sent by then by all robots, and the CPU time: of the slowest\n"
-    "robot of each round, summed, and of all. A broadcast counts once; newton's letters have one\n"
-    "reader each. The certificate proves how far any poses can lie below at most. Of newton\n"
+    "A round is one exchange of messages, of newton one way up the tree and down again, of rbcd "
+    "an\n"
+    "update by every robot; rbcd has poses to show after every fifth. The table says after how\n"
+    "many rounds each gap to the certified optimum was reached (computed centrally unless given),\n"
+    "what had been sent by then by all robots, and the CPU time: of the slowest robot of each\n"
+    "exchange, summed, and of all. newton and rbcd write the robots' own letters, which have one\n"
+    "reader each; of the others nothing is encoded, and a broadcast counts once. The certificate "
+    "proves how far any poses can lie below at most. Of newton\n"
     "without --trust-all it says what was kept.\n\n"
     "If a JRL file labels false closures, a table shows how many of them, and of the true ones,\n"
     "were kept. If it has true poses, another shows the ATE: the RMSE [m] of the positions of all\n"
@@ -70,7 +74,6 @@ struct SolveCommand {
   GraphInput input;
   bool no_vertical = false;
   SolverOptions solver;
-  std::string schedule = "coloured";
   std::optional<double> optimum;
   std::size_t instants = 0;
   ReportFiles files;
@@ -84,7 +87,7 @@ struct Takers {
 };
 
 std::vector<Takers> takers() {
-  const std::vector<std::string> lifted{"rbcd", "rbcd-accelerated", "rbcd-asynchronous"};
+  const std::vector<std::string> lifted{"rbcd", "rbcd-asynchronous"};
   const std::vector<std::string> newton{"newton", "newton --trust-all"};
   std::vector<std::string> judged = lifted;
   judged.insert(judged.end(), {"local", "dgs", "centralized", "newton --trust-all"});
@@ -92,16 +95,15 @@ std::vector<Takers> takers() {
           {"--gradient", judged},
           {"--optimum", judged},
           {"--plot", judged},
-          {"--schedule", {"rbcd"}},
-          {"--over-relaxation", {"rbcd", "rbcd-asynchronous"}},
-          {"--verify", {"rbcd", "rbcd-accelerated"}},
+          {"--over-relaxation", lifted},
+          {"--verify", {"rbcd"}},
           {"--max-delay", {"rbcd-asynchronous"}},
           {"--loss", {"rbcd-asynchronous"}},
           {"--seed", {"rbcd-asynchronous"}},
           {"--barc", {"newton"}},
           {"--reject-odometry", {"newton"}},
           {"--tell-private", newton},
-          {"--links", newton}};
+          {"--links", {"newton", "newton --trust-all", "rbcd"}}};
 }
 
 void define_method(CLI::App& app, SolveCommand& command) {
@@ -115,8 +117,16 @@ void define_method(CLI::App& app, SolveCommand& command) {
   app.add_option("--gradient", solver.run.gradient_tolerance,
                  "Stop once the norm of the Riemannian gradient is at most this")
       ->check(CLI::NonNegativeNumber);
-  app.add_option("--rank", solver.rank, "rbcd*, newton --trust-all: of the relaxation")
+  app.add_option("--rank", solver.rank, "rbcd, rbcd-asynchronous: of the relaxation")
       ->check(CLI::Range(3, 10));
+  app.add_option_function<std::string>(
+         "--links",
+         [&solver](const std::string& shape) {
+           solver.shape = shape == "chain" ? TeamShape::kChain : TeamShape::kAll;
+         },
+         "newton, rbcd: who hears whom: all, or chain (robot k only k - 1 and k + 1)")
+      ->check(CLI::IsMember({"all", "chain"}))
+      ->default_str("all");
   app.add_option("--instants", command.instants,
                  "JRL: also solve what is known at so many times, each time anew, and show the ATE")
       ->check(CLI::Range(1, 10000));
@@ -127,18 +137,12 @@ void define_method(CLI::App& app, SolveCommand& command) {
 void define_descent(CLI::App& app, SolveCommand& command) {
   SolverOptions& solver = command.solver;
   app.option_defaults()->group("Block descent");
-  app.add_option("--schedule", command.schedule,
-                 "rbcd: coloured (robots without common edges together) or greedy (the one with\n"
-                 "the largest gradient)")
-      ->check(CLI::IsMember({"coloured", "greedy"}));
-  app.add_option(
-         "--over-relaxation", solver.over_relaxation,
-         "rbcd, coloured, and rbcd-asynchronous: how far beyond the minimum of its block a\n"
-         "robot may go")
+  app.add_option("--over-relaxation", solver.over_relaxation,
+                 "How far beyond the minimum of its block a robot may go")
       ->check(CLI::Range(1.0, 1.99));
-  app.add_flag("--verify", solver.verify,
-               "rbcd, rbcd-accelerated: the team verifies its result itself, and goes on one rank\n"
-               "higher if a direction leads down");
+  app.add_flag(
+      "--verify", solver.verify,
+      "rbcd: the team verifies its result itself: it looks for a direction that leads down");
   app.add_option("--max-delay", solver.max_delay,
                  "rbcd-asynchronous: messages come up to so many rounds late, at random; a robot\n"
                  "that knows less of a neighbour waits")
@@ -160,14 +164,6 @@ void define_newton(CLI::App& app, SolveCommand& command) {
   app.add_flag(
       "--tell-private", solver.tell_private,
       "Poses that no closure to another robot ends on are told, too, where that saves bytes");
-  app.add_option_function<std::string>(
-         "--links",
-         [&solver](const std::string& shape) {
-           solver.shape = shape == "chain" ? TeamShape::kChain : TeamShape::kAll;
-         },
-         "Who hears whom: all, or chain (robot k only k - 1 and k + 1)")
-      ->check(CLI::IsMember({"all", "chain"}))
-      ->default_str("all");
   app.add_flag("--reject-odometry", solver.reject_odometry,
                "Steps of odometry inside a robot can be false, too");
 }
@@ -180,9 +176,6 @@ void check(const CLI::App& app, SolveCommand& command) {
     if (app.count(option) > 0 && std::find(methods.begin(), methods.end(), method) == methods.end())
       throw std::runtime_error(std::string(option) + " is for --method " +
                                CLI::detail::join(methods, ", ") + " only, not for " + method);
-  command.solver.greedy = command.schedule == "greedy";
-  if (command.solver.greedy && app.count("--over-relaxation") > 0)
-    throw std::runtime_error("--over-relaxation is for --schedule coloured only");
   command.files.check();
   check_output_folder(command.output);
 }

@@ -41,7 +41,7 @@ std::string table(const Solution& solution) {
   std::vector<std::vector<std::string>> rows{
       {"", "rounds", "cost", "gap", "gradient", "sent", "critical s", "CPU s"}};
   const auto add = [&](const std::string& name, const TeamRound& round) {
-    rows.push_back({name, std::to_string(&round - rounds.data()), rounded(round.cost, 9),
+    rows.push_back({name, std::to_string(round.round), rounded(round.cost, 9),
                     rounded(gap(solution, round), 2), rounded(round.gradient_norm, 2),
                     work_bytes(round.work), fixed(round.work.critical_path_s, 3),
                     fixed(round.work.total_cpu_s, 3)});
@@ -121,7 +121,7 @@ std::string decision_text(const TeamGraph& graph, const Solution& solution) {
        << "closures are " << rounded(decision.noise_scale, 3)
        << " times as noisy as the graph says; kept up to " << rounded(decision.threshold, 3)
        << " sigma of the graph\n"
-       << solution.run.rounds.size() - 1 << " rounds, " << work_bytes(work)
+       << solution.run.rounds.back().round << " rounds, " << work_bytes(work)
        << " sent, by one robot at most " << bytes_text(static_cast<double>(decision.most_sent))
        << " and to one " << bytes_text(static_cast<double>(decision.most_received))
        << ", critical path " << fixed(work.critical_path_s, 3) << " s, CPU "
@@ -260,7 +260,8 @@ void write_solution_json(std::ostream& out, const TeamGraph& graph, const Soluti
                          const TruthScore& truth, const std::vector<Instant>& instants) {
   Json rounds = Json::array();
   for (const TeamRound& round : solution.run.rounds)
-    rounds.push_back({{"cost", round.cost},
+    rounds.push_back({{"round", round.round},
+                      {"cost", round.cost},
                       {"gradient_norm", round.gradient_norm},
                       {"bytes", round.work.bytes},
                       {"critical_path_s", round.work.critical_path_s},
@@ -317,7 +318,7 @@ std::vector<Plot> gap_plots(const Solution& solution) {
                 .log_y = true,
                 .series = {std::move(curve)}};
   };
-  return {panel("rounds", [](std::size_t k) { return static_cast<double>(k); }),
+  return {panel("rounds", [&](std::size_t k) { return static_cast<double>(rounds[k].round); }),
           panel("sent by all robots [MB]",
                 [&](std::size_t k) { return 1e-6 * static_cast<double>(rounds[k].work.bytes); }),
           panel("critical path [s of CPU time]",

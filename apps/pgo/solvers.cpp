@@ -11,8 +11,8 @@
 #include "modules/pgo_study/gauss_seidel_team.hpp"
 #include "modules/pgo_study/local_team.hpp"
 #include "modules/pgo_study/odometry_start.hpp"
-#include "modules/pgo_study/team_staircase.hpp"
 #include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/member_rbcd.hpp"
 #include "modules/pose_graph/rounding.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
 
@@ -20,25 +20,30 @@ namespace km {
 namespace {
 
 constexpr Eigen::Index kRigidRank = 3;
-constexpr Eigen::Index kLastRank = 10;  // of the staircase
 
-BlockDescentOptions descent_options(const SolverOptions& options) {
-  return {.schedule = options.greedy ? BlockSchedule::kGreedy : BlockSchedule::kColoured,
-          .max_over_relaxation = options.over_relaxation,
-          .accelerated = options.method == "rbcd-accelerated"};
+// The robots' own block descent, with the end that robots come to.
+std::unique_ptr<TeamSolver> rbcd_team(const TeamGraph& graph, const std::vector<SE3>& start,
+                                      const SolverOptions& options) {
+  const RbcdOptions rbcd{.rank = options.rank,
+                         .max_rounds = static_cast<std::uint32_t>(options.run.max_rounds),
+                         .max_over_relaxation = options.over_relaxation};
+  return std::make_unique<MemberTeam>(
+      graph, kRigidRank, start,
+      [rbcd](SessionGraph part, const TreePlace& place) {
+        return std::make_unique<MemberRbcd>(std::move(part), place, rbcd);
+      },
+      options.shape);
 }
 
 std::unique_ptr<TeamSolver> make_team(const TeamGraph& graph, const std::vector<SE3>& start,
                                       const SolverOptions& options) {
   const std::string& method = options.method;
-  const auto lifted = [&] { return lift(start, options.rank); };
   if (method == "local") return std::make_unique<LocalTeam>(graph);
   if (method == "dgs") return std::make_unique<GaussSeidelTeam>(graph, start);
-  if (method == "rbcd" || method == "rbcd-accelerated")
-    return std::make_unique<BlockDescentTeam>(graph, lifted(), descent_options(options));
+  if (method == "rbcd") return rbcd_team(graph, start, options);
   if (method == "rbcd-asynchronous")
     return std::make_unique<AsynchronousTeam>(
-        graph, lifted(),
+        graph, lift(start, options.rank),
         AsynchronousOptions{.max_delay = options.max_delay,
                             .loss = options.loss,
                             .seed = options.seed,
@@ -98,16 +103,11 @@ SolverRun run_solver(const TeamGraph& graph, const std::vector<SE3>& start,
                      const SolverOptions& options, const TeamMeter& meter) {
   check_verticals(graph, options);
   if (options.method == "newton") return run_newton(graph, start, options, meter);
-  if (options.verify) {
-    TeamStaircase staircase = run_team_staircase(
-        graph, lift(start, options.rank), descent_options(options), options.run, kLastRank, meter);
-    return {std::move(staircase.rounds), std::move(staircase.X), std::move(staircase.verification),
-            std::nullopt};
-  }
   const auto team = make_team(graph, start, options);
   SolverRun run;
   run.rounds = run_team(graph, *team, options.run, meter);
   run.X = team_poses(graph, *team);
+  if (options.verify) run.verification = verify_team(graph, run.X, {}, meter);
   return run;
 }
 

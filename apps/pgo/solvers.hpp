@@ -22,10 +22,9 @@ namespace km {
 /// A method by its name, and what it takes. kMethods has the names.
 struct SolverOptions {
   std::string method = "newton";
-  Eigen::Index rank = 5;
+  Eigen::Index rank = 5;  ///< rbcd, rbcd-asynchronous: of the relaxation.
   TeamRunOptions run = {.max_rounds = 100};
-  bool greedy = false;            ///< rbcd.
-  bool verify = false;            ///< rbcd, rbcd-accelerated: the staircase over the rank.
+  bool verify = false;            ///< rbcd: the team looks for a way down from its poses.
   double over_relaxation = 1.95;  ///< rbcd, rbcd-asynchronous: at most; 1: as published.
   int max_delay = 0;              ///< rbcd-asynchronous, as loss and seed: see AsynchronousOptions.
   double loss = 0.0;
@@ -34,7 +33,7 @@ struct SolverOptions {
   double barc = 0.0;             ///< newton: residual of an inlier [sigma]; 0: the team finds it.
   bool reject_odometry = false;  ///< newton: odometry can be false, too.
   bool tell_private = false;     ///< newton: see TreeNewtonOptions.
-  TeamShape shape = TeamShape::kAll;  ///< newton: who hears whom.
+  TeamShape shape = TeamShape::kAll;  ///< newton, rbcd: who hears whom.
 
   [[nodiscard]] bool rejects() const { return method == "newton" && !trust_all; }
   /// The method in the words of the command line.
@@ -42,7 +41,7 @@ struct SolverOptions {
 };
 
 inline const std::vector<std::string> kMethods = {
-    "local", "dgs", "rbcd", "rbcd-accelerated", "rbcd-asynchronous", "centralized", "newton"};
+    "local", "dgs", "rbcd", "rbcd-asynchronous", "centralized", "newton"};
 
 /// Which edges a method has kept, and how it came to that.
 struct Decision {

@@ -33,7 +33,7 @@ Instant solve_at(const LabelledTeamGraph& team, const std::vector<bool>& odometr
       kept[part.edges[k]] = !decision || decision->kept[k];
       if (!odometry[part.edges[k]]) ++instant.closures;
     }
-    instant.rounds = std::max(instant.rounds, solution.run.rounds.size() - 1);
+    instant.rounds = std::max(instant.rounds, solution.run.rounds.back().round);
     instant.critical_path_s =
         std::max(instant.critical_path_s, solution.run.rounds.back().work.critical_path_s);
     solved.push_back({part.poses, solution.T_world_kf});

@@ -15,7 +15,7 @@ struct Instant {
   std::size_t poses = 0;                   ///< Known by then.
   std::size_t closures = 0;                ///< Known by then.
   std::size_t parts = 0;                   ///< Connected parts, each solved by itself.
-  std::size_t rounds = 0;                  ///< Of the part that took the most.
+  int rounds = 0;                          ///< Of the part that took the most.
   double critical_path_s = 0.0;            ///< Of the part that took the longest.
   bool decided = true;                     ///< False: the rounds did not suffice for some part.
   std::optional<LabelCounts> counts = {};  ///< Of the known closures; only with labels.

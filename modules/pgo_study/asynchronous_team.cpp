@@ -39,7 +39,7 @@ AsynchronousTeam::AsynchronousTeam(const TeamGraph& graph, const LiftedPoses& st
   }
 }
 
-bool AsynchronousTeam::step(RoundMeter& meter) {
+int AsynchronousTeam::step(RoundMeter& meter) {
   ++round_;
   deliver(meter);
   const double relaxation =
@@ -50,7 +50,7 @@ bool AsynchronousTeam::step(RoundMeter& meter) {
     ++updates_;
   }
   for (std::size_t k = 0; k < robots_.size(); ++k) send(k, meter);
-  return true;
+  return 1;
 }
 
 // Poses that were overtaken by newer ones are dropped.
@@ -62,7 +62,7 @@ void AsynchronousTeam::deliver(RoundMeter& meter) {
     if (letter.round <= heard) continue;
     heard = letter.round;
     meter.run(letter.receiver,
-              [&] { (void)receiver.block.block().set_neighbour(letter.sender, letter.poses); });
+              [&] { (void)receiver.block.set_neighbour(letter.sender, letter.poses); });
   }
   std::erase_if(letters_, [&](const Letter& letter) { return letter.due <= round_; });
 }
@@ -77,7 +77,7 @@ bool AsynchronousTeam::may_move(const Robot& robot) const {
 // Also by a robot that has not moved: what it told before may be lost.
 void AsynchronousTeam::send(std::size_t k, RoundMeter& meter) {
   Robot& robot = robots_[k];
-  const ToldBlock poses = meter.run(k, [&] { return robot.block.block().round_public_poses(); });
+  const ToldBlock poses = meter.run(k, [&] { return robot.block.round_public_poses(); });
   meter.sent(kMessageHeader + bytes_of_poses(poses.keyframes.size(), poses.X.rows()));
   for (const auto& [peer, heard] : robot.heard) {
     const bool lost = std::bernoulli_distribution(options_.loss)(rng_);

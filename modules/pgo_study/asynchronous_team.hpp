@@ -46,9 +46,9 @@ class AsynchronousTeam : public TeamSolver {
   AsynchronousTeam(const TeamGraph& graph, const LiftedPoses& start,
                    const AsynchronousOptions& options);
 
-  bool step(RoundMeter& meter) override;
+  int step(RoundMeter& meter) override;
   [[nodiscard]] const LiftedPoses& block(std::size_t robot) const override {
-    return robots_[robot].block.block().X();
+    return robots_[robot].block.X();
   }
   /// Of the robots that could move, summed over the rounds so far.
   [[nodiscard]] std::size_t updates() const { return updates_; }

@@ -10,10 +10,10 @@ CentralTeam::CentralTeam(const TeamGraph& graph, const LiftedPoses& start,
   copy_blocks();
 }
 
-bool CentralTeam::step(RoundMeter& meter) {
+int CentralTeam::step(RoundMeter& meter) {
   const bool stepped = meter.run(0, [&] { return solver_.step(); });
   copy_blocks();
-  return stepped;
+  return stepped ? 1 : 0;
 }
 
 void CentralTeam::copy_blocks() {

@@ -16,7 +16,7 @@ class CentralTeam : public TeamSolver {
   CentralTeam(const TeamGraph& graph, const LiftedPoses& start,
               const StaircaseOptions& options = {});
 
-  bool step(RoundMeter& meter) override;
+  int step(RoundMeter& meter) override;
   [[nodiscard]] const LiftedPoses& block(std::size_t robot) const override {
     return blocks_[robot];
   }

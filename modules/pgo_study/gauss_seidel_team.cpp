@@ -81,22 +81,22 @@ GaussSeidelTeam::GaussSeidelTeam(const TeamGraph& graph, const std::vector<SE3>&
   }
 }
 
-bool GaussSeidelTeam::step(RoundMeter& meter) {
-  if (done_) return false;
+int GaussSeidelTeam::step(RoundMeter& meter) {
+  if (done_) return 0;
   const bool flagged = sweep_ == 0;
   const std::vector<std::size_t> turn =
       flagged ? std::vector<std::size_t>{tree_.order[turn_]} : colours_[turn_];
   for (const std::size_t k : turn) solve(k, meter);
   for (const std::size_t k : turn) tell(k, meter);
   turn_ = (turn_ + 1) % (flagged ? tree_.order.size() : colours_.size());
-  if (turn_ != 0) return true;
+  if (turn_ != 0) return 1;
   ++sweep_;
-  if (!sweep_ended()) return true;
+  if (!sweep_ended()) return 1;
   if (poses_stage_)
     done_ = true;
   else
     start_second_stage(meter);
-  return true;
+  return 1;
 }
 
 bool GaussSeidelTeam::sweep_ended() {

@@ -3,10 +3,10 @@
 #include <map>
 #include <vector>
 
-#include "modules/pgo_study/descent_block.hpp"
 #include "modules/pgo_study/least_squares_block.hpp"
 #include "modules/pgo_study/team_schedule.hpp"
 #include "modules/pgo_study/team_solver.hpp"
+#include "modules/pgo_study/told_block.hpp"
 
 namespace km {
 
@@ -32,7 +32,7 @@ class GaussSeidelTeam : public TeamSolver {
 
   /// Throws std::invalid_argument, naming the robot, if its own edges and those to the robots
   /// before it do not fix its poses.
-  bool step(RoundMeter& meter) override;
+  int step(RoundMeter& meter) override;
   [[nodiscard]] const LiftedPoses& block(std::size_t robot) const override {
     return robots_[robot].X;
   }

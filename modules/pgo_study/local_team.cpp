@@ -50,14 +50,14 @@ LocalTeam::LocalTeam(const TeamGraph& graph)
     if (k != 0) depth_[k] = depth_[tree_.parent[k]] + 1;
 }
 
-bool LocalTeam::step(RoundMeter& meter) {
+int LocalTeam::step(RoundMeter& meter) {
   const std::size_t level = round_++;
-  if (level > *std::max_element(depth_.begin(), depth_.end())) return false;
+  if (level > *std::max_element(depth_.begin(), depth_.end())) return 0;
   for (std::size_t k = 0; k < blocks_.size(); ++k) {
     if (level == 0) meter.run(k, [&] { solve(k); });
     if (level > 0 && depth_[k] == level) join(k, meter);
   }
-  return true;
+  return 1;
 }
 
 void LocalTeam::solve(std::size_t k) {

@@ -17,7 +17,7 @@ class LocalTeam : public TeamSolver {
   /// poses.
   explicit LocalTeam(const TeamGraph& graph);
 
-  bool step(RoundMeter& meter) override;
+  int step(RoundMeter& meter) override;
   [[nodiscard]] const LiftedPoses& block(std::size_t robot) const override {
     return blocks_[robot];
   }

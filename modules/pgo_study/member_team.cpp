@@ -129,9 +129,10 @@ void MemberTeam::take_poses() {
     if (!places_.at(k).parent) state_ = members_[k]->state();
 }
 
-bool MemberTeam::step(RoundMeter& meter) {
+int MemberTeam::step(RoundMeter& meter) {
   if (to_announce_ > 0) meter.sent(std::exchange(to_announce_, 0));
-  if (done() && !reconsider(meter)) return false;
+  if (done() && !reconsider(meter)) return 0;
+  const std::uint32_t before = rounds_;
   const std::uint32_t round = rounds_ - rounds_before_ + 1;
   const auto arrived = [&] {
     return std::all_of(members_.begin(), members_.end(),
@@ -140,9 +141,10 @@ bool MemberTeam::step(RoundMeter& meter) {
   while (!arrived())
     if (!pass_on(round, meter))
       throw std::runtime_error("MemberTeam: the members wait for each other");
-  ++rounds_;
   take_poses();
-  return true;
+  // A solver may let its members know of every few rounds only.
+  rounds_ = rounds_before_ + std::max(round, state_.round);
+  return static_cast<int>(rounds_ - before);
 }
 
 bool MemberTeam::done() const {
@@ -170,6 +172,7 @@ bool MemberTeam::pass_on(std::uint32_t round, RoundMeter& meter) {
       post_.push_back({static_cast<RobotId>(k), std::move(letter)});
     }
   }
+  meter.finish_exchange();
   return worked;
 }
 

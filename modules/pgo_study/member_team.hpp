@@ -20,7 +20,8 @@ enum class TeamShape {
 
 /// A recorded graph solved by the members of a session as they are in the robots, with the letters
 /// between them: one session after the other, until no closure that was rejected fits any more. The
-/// tree is the robots' own. A round is over when every member has come one round further.
+/// tree is the robots' own. A step is over when every member has come a round further, or several
+/// if the solver lets its members know of every few rounds only.
 class MemberTeam final : public TeamSolver {
  public:
   using Factory = std::function<std::unique_ptr<MemberSolver>(SessionGraph, TreePlace)>;
@@ -31,7 +32,7 @@ class MemberTeam final : public TeamSolver {
   MemberTeam(const TeamGraph& graph, Eigen::Index rank, std::vector<SE3> start, Factory make,
              TeamShape shape = TeamShape::kAll, bool as_robots = false);
 
-  bool step(RoundMeter& meter) override;
+  int step(RoundMeter& meter) override;
   [[nodiscard]] const LiftedPoses& block(std::size_t robot) const override {
     return blocks_[robot];
   }

@@ -1,5 +1,6 @@
 #include "modules/pgo_study/proximal_block.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -7,16 +8,14 @@
 namespace km {
 namespace {
 
-// The problem of a block with every inter-robot edge `1 + weight` times as precise, and a fixed
-// pose of its own for each.
-QuadraticProblem weighted(const QuadraticProblem& problem, double weight) {
-  std::vector<PublicEdge> public_edges = problem.public_edges();
-  for (std::size_t k = 0; k < public_edges.size(); ++k) {
-    public_edges[k].fixed = static_cast<Eigen::Index>(k);
-    public_edges[k].kappa *= 1.0 + weight;
-    public_edges[k].tau *= 1.0 + weight;
+// Every inter-robot edge `1 + weight` times as precise, and a fixed pose of its own for each.
+std::vector<PublicEdge> weighted(std::vector<PublicEdge> edges, double weight) {
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    edges[k].fixed = static_cast<Eigen::Index>(k);
+    edges[k].kappa *= 1.0 + weight;
+    edges[k].tau *= 1.0 + weight;
   }
-  return {problem.rank(), problem.poses(), problem.edges(), std::move(public_edges)};
+  return edges;
 }
 
 double checked_weight(double weight) {
@@ -29,27 +28,53 @@ double checked_weight(double weight) {
 }  // namespace
 
 ProximalBlock::ProximalBlock(const SessionGraph& part, LiftedPoses X, double weight)
-    : block_(part, std::move(X)),
+    : X_(std::move(X)),
+      border_(border_of(part)),
       weight_(checked_weight(weight)),
-      problem_(weighted(block_.problem(), weight)) {}
+      problem_(X_.rows(), pose_count(X_), block_edges(part.own), weighted(border_.edges, weight)),
+      heard_(LiftedPoses::Zero(X_.rows(), 4 * static_cast<Eigen::Index>(border_.fixed_of.size()))) {
+}
+
+bool ProximalBlock::set_neighbour(RobotId robot, const ToldBlock& told) {
+  LiftedPoses heard = heard_;
+  const auto begin = border_.fixed_of.lower_bound({robot, 0});
+  for (auto it = begin; it != border_.fixed_of.end() && it->first.robot == robot; ++it) {
+    const auto& keyframes = told.keyframes;
+    const auto at = std::lower_bound(keyframes.begin(), keyframes.end(), it->first.index);
+    if (at == keyframes.end() || *at != it->first.index) return false;
+    heard.middleCols<4>(4 * it->second) = told.X.middleCols<4>(4 * (at - keyframes.begin()));
+  }
+  heard_ = std::move(heard);
+  return true;
+}
 
 TruncatedNewtonResult ProximalBlock::update(const TruncatedNewtonOptions& options,
                                             double relaxation) {
-  const QuadraticProblem& heard = block_.problem();
-  const LiftedPoses& X = block_.X();
-  const auto& edges = heard.public_edges();
-  LiftedPoses targets(X.rows(), 4 * static_cast<Eigen::Index>(edges.size()));
-  for (std::size_t k = 0; k < edges.size(); ++k) {
-    const PublicEdge& e = edges[k];
-    const auto neighbour = heard.fixed().middleCols<4>(4 * e.fixed);
+  LiftedPoses targets(X_.rows(), 4 * static_cast<Eigen::Index>(border_.edges.size()));
+  for (std::size_t k = 0; k < border_.edges.size(); ++k) {
+    const PublicEdge& e = border_.edges[k];
+    const auto neighbour = heard_.middleCols<4>(4 * e.fixed);
     const SE3 T_own_fixed = e.from_own ? e.T : e.T.inverse();
     targets.middleCols<4>(4 * static_cast<Eigen::Index>(k)) =
-        (neighbour + weight_ * lift(X.middleCols<4>(4 * e.own), T_own_fixed)) / (1.0 + weight_);
+        (neighbour + weight_ * lift(X_.middleCols<4>(4 * e.own), T_own_fixed)) / (1.0 + weight_);
   }
   problem_.set_fixed(std::move(targets));
-  TruncatedNewtonResult result = minimise_beyond(problem_, X, options, relaxation);
-  block_.move_to(result.X);
+  TruncatedNewtonResult result = minimise_beyond(problem_, X_, options, relaxation);
+  X_ = result.X;
   return result;
+}
+
+ToldBlock ProximalBlock::round_public_poses() {
+  const auto& keyframes = border_.own;
+  LiftedPoses poses(X_.rows(), 4 * static_cast<Eigen::Index>(keyframes.size()));
+  for (std::size_t k = 0; k < keyframes.size(); ++k)
+    poses.middleCols<4>(4 * static_cast<Eigen::Index>(k)) =
+        X_.middleCols<4>(4 * Eigen::Index{keyframes[k]});
+  poses = restore_stiefel(poses.cast<float>().cast<double>());
+  for (std::size_t k = 0; k < keyframes.size(); ++k)
+    X_.middleCols<4>(4 * Eigen::Index{keyframes[k]}) =
+        poses.middleCols<4>(4 * static_cast<Eigen::Index>(k));
+  return {keyframes, std::move(poses)};
 }
 
 }  // namespace km

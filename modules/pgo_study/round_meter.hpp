@@ -16,7 +16,7 @@ struct TeamMeter {
 /// Work of one round, or sums of it.
 struct TeamWork {
   std::size_t bytes = 0;
-  double critical_path_s = 0.0;  ///< Of the slowest robot of each round.
+  double critical_path_s = 0.0;  ///< Of the slowest robot of each exchange.
   double total_cpu_s = 0.0;      ///< Of all robots.
 
   TeamWork& operator+=(const TeamWork& other) {
@@ -47,24 +47,25 @@ class RoundMeter {
 
   /// Counts a message of so many bytes, see message_sizes.hpp. One to all peers alike is a
   /// broadcast and counts once.
-  void sent(std::size_t bytes) { bytes_ += bytes; }
+  void sent(std::size_t bytes) { round_.bytes += bytes; }
+
+  /// What robots do from here on needs what they were sent before. A round is one exchange unless
+  /// it is divided by this.
+  void finish_exchange() {
+    round_.critical_path_s += *std::max_element(cpu_s_.begin(), cpu_s_.end());
+    for (double& s : cpu_s_) round_.total_cpu_s += std::exchange(s, 0.0);
+  }
 
   /// Work since the last call.
   TeamWork finish_round() {
-    TeamWork work{.bytes = bytes_};
-    for (double& s : cpu_s_) {
-      work.critical_path_s = std::max(work.critical_path_s, s);
-      work.total_cpu_s += s;
-      s = 0.0;
-    }
-    bytes_ = 0;
-    return work;
+    finish_exchange();
+    return std::exchange(round_, {});
   }
 
  private:
   TeamMeter meter_;
-  std::vector<double> cpu_s_;  // per robot, in this round
-  std::size_t bytes_ = 0;
+  std::vector<double> cpu_s_;  // per robot, in this exchange
+  TeamWork round_;
 };
 
 }  // namespace km

@@ -17,16 +17,19 @@ std::vector<TeamRound> run_team(const TeamGraph& graph, TeamSolver& solver,
   RoundMeter round_meter(graph.robots(), meter);
   std::vector<TeamRound> rounds;
   TeamWork work;
+  int round = 0;
   const auto record = [&] {
     const LiftedPoses X = team_poses(graph, solver);
     if (!whole || whole->rank() != X.rows()) whole.emplace(problem_of(graph, X.rows()));
     const double gradient_norm = project_tangent(X, whole->euclidean_gradient(X)).norm();
-    rounds.push_back({whole->cost(X), gradient_norm, work});
+    rounds.push_back({round, whole->cost(X), gradient_norm, work});
     return gradient_norm > options.gradient_tolerance;
   };
   bool going = record();
-  while (going && static_cast<int>(rounds.size()) <= options.max_rounds &&
-         solver.step(round_meter)) {
+  while (going && round < options.max_rounds) {
+    const int made = solver.step(round_meter);
+    if (made == 0) break;
+    round += made;
     work += round_meter.finish_round();
     going = record();
   }

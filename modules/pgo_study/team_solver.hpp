@@ -13,11 +13,12 @@ class TeamSolver {
  public:
   virtual ~TeamSolver() = default;
 
-  /// One round, which is one exchange: every robot may compute, inside meter.run(robot, ...), from
-  /// what was sent in rounds before, and send, told to meter.sent(...) in bytes. Setup that needs
-  /// an exchange (factors, reductions of inner products) takes rounds like any other. False:
-  /// nothing was left to do, and the round does not count.
-  virtual bool step(RoundMeter& meter) = 0;
+  /// Goes on by a round, or by several if poses come after several only, and returns how many they
+  /// were; 0: nothing was left to do. In a round every robot may compute, inside
+  /// meter.run(robot, ...), from what was sent before, and send, told to meter.sent(...) in bytes.
+  /// Setup that needs an exchange (factors, reductions of inner products) takes rounds like any
+  /// other.
+  virtual int step(RoundMeter& meter) = 0;
 
   /// Present poses of a robot, r x 4 n_k, feasible, all robots in one frame.
   [[nodiscard]] virtual const LiftedPoses& block(std::size_t robot) const = 0;
@@ -25,6 +26,7 @@ class TeamSolver {
 
 /// State of the team after a round.
 struct TeamRound {
+  int round = 0;               ///< Rounds of the team until then.
   double cost = 0.0;           ///< Chordal, without 1/2, at the lifted poses, with all verticals.
   double gradient_norm = 0.0;  ///< Riemannian, of the whole graph.
   TeamWork work;               ///< Up to and including this round.

@@ -33,11 +33,6 @@ Eigen::MatrixXd perturbed(const SE3& start, const KeyframeId& keyframe, Eigen::I
   return perturb_rotations(lift(lifted_identity(rank), start), kPerturbation, rng);
 }
 
-// First the fast modes are damped, then the slow ones sped up: grows from 1.5 to `max`.
-double relaxation_in(std::uint32_t round, double max) {
-  return std::min(max, 2.0 - 4.0 / (8.0 + round));
-}
-
 ByteWriter letter(LetterKind kind, std::uint32_t round) {
   ByteWriter writer;
   writer.u8(static_cast<std::uint8_t>(kind));
@@ -161,7 +156,7 @@ void MemberRbcd::update(std::vector<SolverLetter>& letters) {
       minimise_beyond(problem_, X,
                       {.max_iterations = options_.max_newton_steps,
                        .max_cg_iterations = options_.max_cg_iterations},
-                      alone ? 1.0 : relaxation_in(round, options_.max_over_relaxation));
+                      alone ? 1.0 : growing_relaxation(round, options_.max_over_relaxation));
   if (!std::isfinite(result.cost)) throw std::runtime_error("MemberRbcd: the cost is not finite");
   history_.emplace_hint(history_.end(), round + 1, std::move(result.X));
   const auto rounded = round_public_poses();

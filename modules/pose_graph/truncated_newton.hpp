@@ -1,5 +1,8 @@
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
+
 #include "modules/pose_graph/quadratic_problem.hpp"
 
 namespace km {
@@ -42,5 +45,11 @@ struct [[nodiscard]] TruncatedNewtonResult {
                                                     const LiftedPoses& X,
                                                     const TruncatedNewtonOptions& options,
                                                     double relaxation);
+
+/// Relaxation of the block updates after round `round`, for minimise_beyond(): grows from 1.5 to
+/// `max`. The first rounds damp the fast modes, later ones speed up the slow modes.
+[[nodiscard]] inline double growing_relaxation(std::uint32_t round, double max) {
+  return std::min(max, 2.0 - 4.0 / (8.0 + round));
+}
 
 }  // namespace km

@@ -1,11 +1,11 @@
 #include <catch2/catch.hpp>
 
 #include "modules/core/lie.hpp"
-#include "modules/pgo_study/block_descent_team.hpp"
 #include "modules/pgo_study/central_team.hpp"
 #include "modules/pgo_study/local_team.hpp"
 #include "modules/pgo_study/member_team.hpp"
 #include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/member_rbcd.hpp"
 #include "modules/pose_graph/rounding.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
 #include "test/support/team_graphs.hpp"
@@ -18,6 +18,11 @@ namespace {
 std::unique_ptr<MemberSolver> trusting_newton(SessionGraph graph, TreePlace place) {
   return std::make_unique<TreeNewton>(std::move(graph), std::move(place),
                                       TreeNewtonOptions{.robust = false});
+}
+
+std::unique_ptr<MemberSolver> block_descent(SessionGraph graph, const TreePlace& place) {
+  return std::make_unique<MemberRbcd>(std::move(graph), place,
+                                      RbcdOptions{.min_relative_decrease = 1e-9});
 }
 
 std::vector<SE3> start_of(const TeamGraph& graph) {
@@ -78,9 +83,7 @@ TEST_CASE("Newton's method, block descent and the centralised solver come to one
   CHECK(rounds.back().cost == Approx(optimum).epsilon(1e-6));
   CHECK(certify(problem_of(graph, 5), team_poses(graph, newton)).certified);
 
-  const bool accelerated = GENERATE(false, true);
-  CAPTURE(accelerated);
-  BlockDescentTeam descent(graph, lift(start, 5), {.accelerated = accelerated});
+  MemberTeam descent(graph, 3, start, block_descent);
   CHECK(run_team(graph, descent, {.max_rounds = 400}, {}).back().cost ==
         Approx(optimum).epsilon(1e-6));
 

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <vector>
+
+#include "modules/core/ids.hpp"
+#include "modules/pose_graph/stiefel.hpp"
+
+namespace km {
+
+/// Poses of one robot that it tells the others.
+struct ToldBlock {
+  std::vector<KeyframeIndex> keyframes = {};  ///< Ascending.
+  LiftedPoses X = {};                         ///< r x 4 per keyframe.
+};
+
+}  // namespace km
