@@ -134,7 +134,8 @@ void SensorsNode::tell(const ShedLoad& before, const ShedLoad& now) {
                            is_more ? "shed" : "restored");
   line << (is_more ? "processors are short: " : "processors are free again: ");
   if (now.stride > 1)
-    line << "odometry gets one of " << now.stride << " images";
+    line << (now.map && !before.map ? "the map gets no new frames, " : "")
+         << "odometry gets one of " << now.stride << " images";
   else if (before.stride > 1)
     line << "odometry gets every image";
   else
