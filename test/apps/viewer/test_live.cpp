@@ -58,5 +58,16 @@ TEST_CASE("What robots of a domain tell is shown in the page, and recorded", "[v
   CHECK(to_string(reader.report()) == "");
 }
 
+TEST_CASE("A viewer of a team says how robots are started so that it shows them", "[viewer]") {
+  Process viewer({"sh", "-c",
+                  "exec " KM_BIN_DIR "/kimera_multi_viewer --interface lo --port 0 --domain " +
+                      std::to_string(random_domain()) + " 2>&1"});
+  CHECK(viewer.wait_until([](const std::string& line) {
+    return line.find("shows robots that run with --view") != std::string::npos;
+  }));
+  viewer.kill(SIGINT);
+  CHECK(viewer.wait() == 0);
+}
+
 }  // namespace
 }  // namespace km
