@@ -44,7 +44,7 @@ std::vector<ReportCell> row_of(const CosmoSet& set, const Json& root,
           {number_text(number_at(root, "/ate_ratio"), kDecimals)},
           {published == nullptr ? "-" : published_text(published->irls_gnc_m)},
           {published == nullptr ? "-" : published_text(published->gtsam_gnc_m)},
-          {rounds.empty() ? "-" : std::to_string(rounds.size() - 1)},
+          {number_text(of_last("/round"), 0)},
           {number_text(of_last("/critical_path_s"), 3)}};
 }
 

@@ -11,6 +11,8 @@ namespace {
 namespace fs = std::filesystem;
 using Texts = std::vector<std::string>;
 
+constexpr const char* kPaperRun = "-paper";
+
 const WorldConfig* find_world(const std::vector<WorldConfig>& worlds, const std::string& name) {
   const auto found = std::find_if(worlds.begin(), worlds.end(),
                                   [&](const WorldConfig& world) { return world.name == name; });
@@ -49,6 +51,16 @@ void add_with_repetitions(WorldConfig world, const std::string& name,
   }
 }
 
+// The paper's pipeline on the recordings of a world. It is no repetition: it is another method.
+WorldConfig run_by_pipeline(const WorldConfig& world, const Texts& robot_options) {
+  WorldConfig other = world;
+  other.name += kPaperRun;
+  other.title += ", PCM then RBCD";
+  other.robot.insert(other.robot.end(), {"--set", "mapping.mode=off"});
+  other.robot.insert(other.robot.end(), robot_options.begin(), robot_options.end());
+  return other;
+}
+
 void read_names(YamlFields& fields, const std::vector<WorldConfig>& worlds, Texts& names) {
   fields.field("worlds", names);
   fields.required({"worlds"});
@@ -61,6 +73,10 @@ void read_names(YamlFields& fields, const std::vector<WorldConfig>& worlds, Text
 
 const WorldConfig& ExperimentConfig::world(const std::string& name) const {
   return *find_world(worlds, name);
+}
+
+const WorldConfig* ExperimentConfig::paper_run(const std::string& world) const {
+  return find_world(worlds, world + kPaperRun);
 }
 
 std::vector<std::string> ExperimentConfig::repetitions(const std::string& world) const {
@@ -96,6 +112,7 @@ ExperimentConfig read_experiments(const fs::path& folder, bool quick) {
   read("trajectory.yaml", [&](YamlFields& fields) {
     read_names(fields, config.worlds, config.trajectory_worlds);
     fields.sections("methods", config.methods);
+    fields.field("paper_pipeline", config.paper_pipeline);
     fields.required({"methods"});
   });
   read("resources.yaml", [&](YamlFields& fields) {
@@ -113,6 +130,9 @@ ExperimentConfig read_experiments(const fs::path& folder, bool quick) {
   read("semantics.yaml",
        [&](YamlFields& fields) { read_names(fields, config.worlds, config.semantics_worlds); });
   problems.finish();
+  if (!config.paper_pipeline.empty())
+    for (const std::string& name : config.trajectory_worlds)
+      config.worlds.push_back(run_by_pipeline(config.world(name), config.paper_pipeline));
   for (PgoMethodConfig& method : config.methods)
     if (method.title.empty()) method.title = method.name;
   for (CosmoSet& set : config.cosmo.sets)

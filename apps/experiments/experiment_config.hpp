@@ -130,19 +130,23 @@ struct PgoMethodConfig {
 struct ExperimentConfig {
   bool quick = false;  ///< Small versions of the experiments.
   /// Those of worlds.yaml, each followed by its repetitions: WORLD-run2 on the same recordings,
-  /// WORLD-seed2 on those of another seed.
+  /// WORLD-seed2 on those of another seed. Last WORLD-paper, the run of the paper's pipeline.
   std::vector<WorldConfig> worlds;
   PcmExperiment pcm;
   CosmoExperiment cosmo;
   AloneExperiment alone;                       ///< Without a world: there is no such experiment.
   std::vector<std::string> trajectory_worlds;  ///< Names in `worlds`, as those below.
   std::vector<PgoMethodConfig> methods;
+  std::vector<std::string> paper_pipeline;  ///< Options of robots that run the paper's pipeline.
   std::vector<std::string> resources_worlds;
   std::vector<std::string> mesh_worlds;
   std::vector<std::string> semantics_worlds;
 
   /// Precondition: there is one of that name.
   [[nodiscard]] const WorldConfig& world(const std::string& name) const;
+
+  /// The run of a world's team by the paper's pipeline; nullptr if there is none.
+  [[nodiscard]] const WorldConfig* paper_run(const std::string& world) const;
 
   /// Names of the repetitions of a world.
   [[nodiscard]] std::vector<std::string> repetitions(const std::string& world) const;

@@ -427,6 +427,9 @@ std::vector<Step> plan_experiment(const std::string& experiment, const Experimen
       append_steps(steps, world_steps(config.world(repetition), paths));
       append_steps(steps, pgo_steps(config.world(repetition), config.methods, paths));
     }
+    if (const WorldConfig* run = config.paper_run(name);
+        run != nullptr && experiment == "trajectory")
+      append_steps(steps, world_steps(*run, paths));
   }
   if (experiment == "resources" && !config.alone.world.empty())
     append_steps(steps, alone_steps(config, paths));

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <list>
@@ -68,15 +69,15 @@ void add_error(const WorldConfig& world, const PgoFiles& files, const Experiment
 }
 
 // The first of the rounds is the start.
-void add_rounds(const Json& rounds, PgoNumbers& numbers) {
+void add_rounds(const Json& rounds, bool decides, PgoNumbers& numbers) {
   if (rounds.empty()) return;
   const auto at = [&](std::size_t k, const char* key) {
     return number_at(rounds[k], key).value_or(0.0);
   };
   const double finished = (1.0 + PgoNumbers::kFinishedGap) * at(rounds.size() - 1, "/cost");
-  std::size_t k = 0;
+  std::size_t k = decides ? rounds.size() - 1 : 0;
   while (k + 1 < rounds.size() && at(k, "/cost") > finished) ++k;
-  numbers.rounds = k;
+  numbers.rounds = static_cast<std::size_t>(at(k, "/round"));
   numbers.bytes = at(k, "/bytes");
   numbers.seconds = at(k, "/critical_path_s");
 }
@@ -91,9 +92,9 @@ PgoNumbers read_pgo_numbers(const WorldConfig& world, const PgoMethodConfig& met
   PgoNumbers numbers;
   numbers.poses = static_cast<std::size_t>(number("/poses"));
   numbers.edges = static_cast<std::size_t>(number("/edges"));
-  numbers.cost = number("/rounded_cost");
-  numbers.optimum = number("/optimum");
-  add_rounds(root.value("rounds", Json::array()), numbers);
+  numbers.cost = number_at(root, "/rounded_cost").value_or(NAN);
+  numbers.optimum = number_at(root, "/optimum").value_or(NAN);
+  add_rounds(root.value("rounds", Json::array()), root.contains("decided"), numbers);
   add_error(world, files, paths, numbers);
   return numbers;
 }

@@ -110,6 +110,12 @@ std::vector<ReportInput::World> ReportInput::runs_of(const WorldConfig& world) {
   return worlds(names);
 }
 
+const WorldResults* ReportInput::paper_run(const WorldConfig& world) {
+  const WorldConfig* const run = config_.paper_run(world.name);
+  const std::vector<World> found = run == nullptr ? std::vector<World>() : worlds({run->name});
+  return found.empty() ? nullptr : found.front().results;
+}
+
 const PgoNumbers* ReportInput::pgo(const WorldConfig& world, const std::string& method) {
   for (const PgoMethodConfig& candidate : config_.methods)
     if (candidate.name == method) return pgo(world, candidate);

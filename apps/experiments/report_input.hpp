@@ -46,6 +46,9 @@ class ReportInput {
   /// The world and its repetitions, as far as there are results.
   [[nodiscard]] std::vector<World> runs_of(const WorldConfig& world);
 
+  /// The run of a world's team by the paper's pipeline; nullptr if there are no results.
+  [[nodiscard]] const WorldResults* paper_run(const WorldConfig& world);
+
   /// nullptr if the method's result is not there.
   [[nodiscard]] const PgoNumbers* pgo(const WorldConfig& world, const PgoMethodConfig& method);
   /// The same of the method of that name; nullptr also if it is not configured.

@@ -43,7 +43,7 @@ struct RobotNumbers {
 /// A team's run in a world.
 struct WorldResults {
   std::vector<RobotNumbers> robots;
-  std::optional<double> joint_error_m;            ///< Under one alignment.
+  std::optional<double> joint_error_m;            ///< As published, under one alignment.
   MeshPair mesh;                                  ///< Of all robots together.
   std::optional<double> closures, true_closures;  ///< Those kept.
   std::string images;                             ///< "752x480, 90 s, seed 1".
@@ -64,16 +64,17 @@ struct WorldResults {
                                               const ExperimentPaths& paths);
 
 /// What a method of optimisation made of the team's graph. It counts as finished in the first round
-/// whose cost is within kFinishedGap of its last; a limit on rounds says nothing about the method.
+/// whose cost is within kFinishedGap of its last, because a limit on rounds says nothing about the
+/// method. A method that rejects closures is finished when it has decided; it has no cost here.
 struct PgoNumbers {
   static constexpr double kFinishedGap = 1e-6;  ///< Relative.
 
   std::size_t poses = 0, edges = 0;
   std::size_t rounds = 0;  ///< Until finished.
   double bytes = 0.0;      ///< Sent by all robots until then.
-  double seconds = 0.0;    ///< CPU time of the slowest robot of each round until then, summed.
-  double cost = 0.0;       ///< Of rigid poses in the end.
-  double optimum = 0.0;    ///< The certified one.
+  double seconds = 0.0;    ///< CPU time of the slowest robot of each exchange until then, summed.
+  double cost = 0.0;       ///< Of rigid poses in the end; NaN of a method that rejects closures.
+  double optimum = 0.0;    ///< The certified one; or NaN.
   std::optional<double> error_m;  ///< Absolute trajectory error of all keyframes, rmse.
   std::optional<Plot> plot;       ///< From above, likewise.
 };

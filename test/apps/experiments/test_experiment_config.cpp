@@ -29,7 +29,7 @@ TEST_CASE("The shipped experiments are the paper's", "[experiments]") {
   const ExperimentConfig config = read_experiments("config/experiments", false);
   CHECK(config.trajectory_worlds == std::vector<std::string>{"city", "camp", "v1", "v2"});
   CHECK(config.pcm.outliers == 1000);
-  CHECK(config.methods.size() == 7);
+  CHECK(config.methods.size() == 6);
   CHECK(config.world("v1").flights);
   CHECK(config.world("v2").robots == std::vector<std::string>{"V2_01", "V2_02", "V2_03"});
 }
@@ -66,7 +66,7 @@ TEST_CASE("Worlds that are not there are named", "[experiments]") {
              Contains("mesh.yaml:1: worlds = [city, moon, mars] has moon") &&
                  Contains("has mars, which is not in worlds.yaml") && Contains("worlds.yaml:1") &&
                  Contains("none.yaml") && Contains("unknown key city.rate") &&
-                 Contains("trajectory.yaml:4: worlds = [city, camp, v1, v2] has camp"));
+                 Contains("trajectory.yaml:6: worlds = [city, camp, v1, v2] has camp"));
   fs::remove(config.experiments() / "mesh.yaml");
   CHECK_THAT(config.problems(), Contains("mesh.yaml: cannot open"));
 }

@@ -40,7 +40,7 @@ TEST_CASE("A world is simulated, its team is run, its graph is solved by every m
   const Plan plan;
   const auto steps = plan_experiment("trajectory", plan.config, plan.paths());
   constexpr std::size_t kWorlds = 4, kRuns = 3;  // on the same recordings
-  CHECK(steps.size() == kWorlds * (1 + kRuns * (1 + plan.config.methods.size())));
+  CHECK(steps.size() == kWorlds * (1 + kRuns * (1 + plan.config.methods.size()) + 1));
   CHECK(steps[0].name == "simulate-city");
   CHECK(steps[1].name == "team-city");
   CHECK(steps[1].needs == std::vector<std::string>{"simulate-city"});
@@ -59,6 +59,11 @@ TEST_CASE("A world is run again on its recordings, and on those of other seeds",
   CHECK_THAT(command_text(again.command), Contains("data/city/team.yaml") && Contains("--output") &&
                                               Contains("data/city-run3_res") &&
                                               Contains("--set mapping.mode=off"));
+  const Step paper = plan.step("trajectory", "team-city-paper");
+  CHECK(paper.needs == std::vector<std::string>{"simulate-city"});
+  CHECK_THAT(command_text(paper.command),
+             Contains("data/city-paper_res") &&
+                 Contains("--set pcm.selection=pcm --set pose_graph.method=rbcd"));
   const auto mesh = plan_experiment("mesh", plan.config, plan.paths());
   CHECK(std::none_of(mesh.begin(), mesh.end(),
                      [](const Step& step) { return step.name.find("run") != step.name.npos; }));
