@@ -28,7 +28,8 @@ const auto kGraphs = {
 // Enough for several weighings; second derivatives are told in the first of them.
 constexpr int kRounds = 12;
 
-TEST_CASE("No private pose can be chained from the poses and edges that robots tell", "[pgo_study]") {
+TEST_CASE("No private pose can be chained from the poses and edges that robots tell",
+          "[pgo_study]") {
   const auto [name, robots] = GENERATE(values(kGraphs));
   CAPTURE(name);
   const auto graph = recorded(name, robots);
