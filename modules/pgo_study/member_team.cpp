@@ -116,7 +116,7 @@ void MemberTeam::open_session() {
   post_.clear();
   for (std::size_t k = 0; k < parts_.size(); ++k) {
     parts_[k].decided = decided_;
-    if (k < before.size()) parts_[k].lengths = before[k]->lengths();
+    if (k < before.size()) parts_[k].noise = before[k]->noise();
     members_.push_back(make_(parts_[k], places_.at(k)));
   }
   rounds_before_ = rounds_;

@@ -1,5 +1,6 @@
 #include "modules/pose_graph/corroboration.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +9,8 @@
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
+#include "modules/pose_graph/closure_places.hpp"
+#include "modules/pose_graph/cycle_mixture.hpp"
 
 namespace km {
 namespace {
@@ -15,6 +18,10 @@ namespace {
 constexpr std::uint32_t kSteps = 10;  // of odometry in a cycle, at most
 constexpr std::uint32_t kBeside = 5;  // keyframes, at both ends
 constexpr double kLargestTurn = 0.25 * std::numbers::pi;
+// Steps of odometry in a cycle between two places, at most: their noise grows, and beside it the
+// noise of closures no longer shows.
+constexpr std::uint32_t kStepsBetweenPlaces = 60;
+constexpr double kLeastBoxSide_m = 1.0;  // of the volume in which a false closure may end
 
 std::uint32_t steps_between(const KeyframeId& a, const KeyframeId& b) {
   return std::max(a.index, b.index) - std::min(a.index, b.index);
@@ -32,7 +39,7 @@ Matrix6 covariance_in(const Precision& precision, int dimension) {
 
 Corroboration::Corroboration(std::span<const PoseEdge> closures, const PoseOf& pose,
                              const std::map<RobotId, Precision>& step, int dimension)
-    : pose_(pose), step_(step), dimension_(dimension) {
+    : pose_(pose), step_(step), dimension_(dimension), edges_(closures) {
   for (std::size_t k = 0; k < closures.size(); ++k) {
     const PoseEdge& e = closures[k];
     const bool up = e.from < e.to;
@@ -85,6 +92,90 @@ void Corroboration::count_lengths(NoiseHistogram& histogram, std::size_t most) c
   if (cycles.size() > most) cycles.resize(most);
   for (const Cycle& c : cycles)
     count_length(histogram, cycle_length(closures_[c.a], closures_[c.b]));
+}
+
+NoiseCycle Corroboration::noise_cycle(const Upward& one, const Upward& other, double volume) const {
+  const auto chain = [&](const KeyframeId& from, const KeyframeId& to) {
+    const auto step = step_.find(from.robot);
+    const SE3 T = pose_(from).inverse() * pose_(to);
+    const double steps = steps_between(from, to);
+    Matrix6 Sigma =
+        steps * covariance_in(step == step_.end() ? Precision{} : step->second, dimension_);
+    const double lever = Sigma(2, 2) * T.translation().squaredNorm() / 3.0;
+    Sigma.diagonal().segment<2>(3).array() += lever;
+    if (dimension_ == 3) Sigma(5, 5) += lever;
+    return UncertainPose{T, Sigma};
+  };
+  const auto measured = [&](const Upward& c) {
+    return UncertainPose{c.T_lower_upper, covariance_in(c.precision, dimension_)};
+  };
+  const auto exact = [](UncertainPose pose) {
+    pose.Sigma.setZero();
+    return pose;
+  };
+  const UncertainPose above = chain(one.upper, other.upper), below = chain(other.lower, one.lower);
+  const UncertainPose up = measured(one), down = inverse(measured(other));
+  const UncertainPose odometry = compose(compose(compose(exact(up), above), exact(down)), below);
+  const UncertainPose closures = compose(compose(compose(up, exact(above)), down), exact(below));
+  const Vector6 error = se3_log(odometry.T);
+  return NoiseCycle::of(error, odometry.Sigma, closures.Sigma,
+                        log_density_if_false(error, volume, dimension_), dimension_);
+}
+
+// A false closure may end anywhere in twice the box of the poses, and as far beyond as closures
+// reach.
+double Corroboration::volume() const {
+  Eigen::AlignedBox3d below, above;
+  double reach_m = 0.0;
+  for (const Upward& c : closures_) {
+    below.extend(pose_(c.lower).translation());
+    above.extend(pose_(c.upper).translation());
+    reach_m = std::max(reach_m, c.T_lower_upper.translation().norm());
+  }
+  const Eigen::Array3d sides =
+      below.sizes().array() + above.sizes().array() + 2.0 * reach_m + kLeastBoxSide_m;
+  return sides.head(dimension_).prod();
+}
+
+void Corroboration::count_cycles(PairCycles& cycles) const {
+  if (closures_.size() < 2) return;
+  struct Pair {
+    std::uint32_t steps;
+    std::size_t a;
+    std::size_t b;
+  };
+  const ClosurePlaces places = find_places(edges_);
+  std::vector<bool> is_first;  // of its place
+  std::vector<bool> seen(places.sizes.size(), false);
+  for (const Upward& c : closures_) {
+    const std::size_t place = places.place_of[c.place];
+    is_first.push_back(!seen[place]);
+    seen[place] = true;
+  }
+  std::vector<Pair> inside, between;
+  for (std::size_t a = 0; a < closures_.size(); ++a)
+    for (std::size_t b = a + 1; b < closures_.size(); ++b) {
+      const std::uint32_t lower = steps_between(closures_[a].lower, closures_[b].lower);
+      if (lower > kStepsBetweenPlaces || closures_[a].lower.robot != closures_[b].lower.robot)
+        break;
+      const std::uint32_t steps = lower + steps_between(closures_[a].upper, closures_[b].upper);
+      if (steps == 0) continue;  // no odometry between them
+      const bool same = places.place_of[closures_[a].place] == places.place_of[closures_[b].place];
+      if (same && steps <= kSteps) inside.push_back({steps, a, b});
+      if (!same && is_first[a] && is_first[b] && steps <= kStepsBetweenPlaces)
+        between.push_back({steps, a, b});
+    }
+  const double room = volume();
+  const auto count = [&](std::vector<Pair>& pairs, std::vector<NoiseCycle>& counted) {
+    std::ranges::stable_sort(pairs, {}, &Pair::steps);
+    for (const Pair& pair : pairs) {
+      if (counted.size() >= kMostNoiseCycles) break;
+      counted.push_back(noise_cycle(closures_[pair.a], closures_[pair.b], room));
+    }
+  };
+  count(inside, cycles.inside);
+  count(between, cycles.between);
+  cycles.places += static_cast<double>(places.sizes.size());
 }
 
 bool Corroboration::agree(const Upward& one, const Upward& other, double barc) const {

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "modules/pose_graph/closure_noise.hpp"
 #include "modules/pose_graph/noise_histogram.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
 
@@ -36,6 +37,13 @@ class Corroboration {
   /// out. What two closures beside each other have in common does not show.
   void count_lengths(NoiseHistogram& histogram, std::size_t most) const;
 
+  /// Adds the cycles that estimate_closure_noise() needs: at most kMostNoiseCycles through two
+  /// closures of one place, and as many through the first closures of two places (see
+  /// find_places()), those with the fewest steps of odometry first. The covariance of n steps over
+  /// a distance L has the lever arm of their rotation noise: n (sigma_t^2 + sigma_R^2 L^2 / 3).
+  void count_cycles(PairCycles& cycles) const;
+  static constexpr std::size_t kMostNoiseCycles = 150;
+
   /// Which closures stand alone: none beside them agrees up to `barc` [sigma], allowing for the
   /// noise of both and of the steps between.
   [[nodiscard]] std::vector<bool> isolated(double barc) const;
@@ -50,11 +58,14 @@ class Corroboration {
   };
 
   [[nodiscard]] double cycle_length(const Upward& one, const Upward& other) const;
+  [[nodiscard]] NoiseCycle noise_cycle(const Upward& one, const Upward& other, double volume) const;
+  [[nodiscard]] double volume() const;
   [[nodiscard]] bool agree(const Upward& one, const Upward& other, double barc) const;
 
   const PoseOf& pose_;
   const std::map<RobotId, Precision>& step_;
   int dimension_;
+  std::span<const PoseEdge> edges_;
   std::vector<Upward> closures_;  // ascending by the lower end
 };
 

@@ -9,7 +9,7 @@
 #include "modules/core/closure_verdicts.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/pose_graph/noise_histogram.hpp"
+#include "modules/pose_graph/closure_noise.hpp"
 
 namespace km {
 
@@ -62,8 +62,8 @@ class MemberSolver {
   [[nodiscard]] virtual SolverState state() const = 0;
   /// The closures that this robot weighs, as things stand; empty if the solver rejects none.
   [[nodiscard]] virtual ClosureVerdicts verdicts() const = 0;
-  /// SessionGraph::lengths with those that were counted in this session.
-  [[nodiscard]] virtual NoiseHistogram lengths() const { return {}; }
+  /// SessionGraph::noise with the cycles that were counted in this session.
+  [[nodiscard]] virtual ClosureNoiseRecord noise() const { return {}; }
 };
 
 }  // namespace km

@@ -9,6 +9,7 @@
 
 #include "modules/core/lie.hpp"
 #include "modules/pose_graph/closure_places.hpp"
+#include "modules/pose_graph/cycle_mixture.hpp"
 
 namespace km {
 namespace {
@@ -20,7 +21,6 @@ constexpr double kRatioSigma = 0.6931;  // log 2, of log sqrt(v_R / v_t)
 // Log of the odds from which on odometry is taken to be noisier than it claims: one in 1000 wrong.
 constexpr double kEvidence = 6.9;
 constexpr int kSweeps = 4;
-constexpr int kShareSteps = 5;
 
 // Variance factors: of steps' rotations and translations, and of closures.
 enum Component : std::size_t { kRotation, kTranslation, kClosure, kComponents };
@@ -123,48 +123,25 @@ double volume_m3(const Chain& chain, std::span<const PoseEdge> closures) {
   return (2.0 * box.sizes().array() + 2.0 * reach_m + kLeastSide_m).prod();
 }
 
-// A false closure has any rotation and its end anywhere in the volume. In the tangent space at the
-// error the density of both has the factor det J = 2 (1 - cos |w|) / |w|^2.
-double log_density_if_false(const Cycle& cycle, double volume_m3) {
-  const double angle = cycle.error.head<3>().norm();
-  const double det_J = angle < 1e-3 ? 1.0 : 2.0 * (1.0 - std::cos(angle)) / (angle * angle);
-  constexpr double kRotations = 8.0 * std::numbers::pi * std::numbers::pi;
-  return 2.0 * std::log(det_J) - std::log(kRotations) - std::log(volume_m3);
+std::vector<double> log_ratios(const std::vector<Cycle>& cycles,
+                               const std::vector<double>& if_false, const Factors& v) {
+  std::vector<double> ratios;
+  for (std::size_t k = 0; k < cycles.size(); ++k)
+    ratios.push_back(log_density_if_true(cycles[k], v) - if_false[k]);
+  return ratios;
 }
 
-struct Mixture {
-  std::vector<double> ratio;  // per cycle: density if true over density if false
-  double share = 0.8;         // of true closures, the likeliest one
-
-  [[nodiscard]] double true_probability(std::size_t k) const {
-    return share * ratio[k] / (share * ratio[k] + 1.0 - share);
-  }
-};
-
-Mixture fit_mixture(const std::vector<Cycle>& cycles, const std::vector<double>& if_false,
-                    const Factors& v) {
-  Mixture mixture;
-  for (std::size_t k = 0; k < cycles.size(); ++k)
-    mixture.ratio.push_back(
-        std::exp(std::clamp(log_density_if_true(cycles[k], v) - if_false[k], -600.0, 600.0)));
-  double total = 0.0;
-  for (const Cycle& cycle : cycles) total += cycle.weight;
-  for (int i = 0; i < kShareSteps; ++i) {
-    double sum = 0.0;
-    for (std::size_t k = 0; k < cycles.size(); ++k)
-      sum += cycles[k].weight * mixture.true_probability(k);
-    mixture.share = std::clamp(sum / total, 0.02, 0.98);
-  }
-  return mixture;
+std::vector<double> weights_of(const std::vector<Cycle>& cycles) {
+  std::vector<double> weights;
+  for (const Cycle& cycle : cycles) weights.push_back(cycle.weight);
+  return weights;
 }
 
 // Log of the posterior density of the factors, at the likeliest share of true closures.
 double log_posterior(const std::vector<Cycle>& cycles, const std::vector<double>& if_false,
                      const Factors& v) {
-  const Mixture mixture = fit_mixture(cycles, if_false, v);
-  double log_sum = 0.0;
-  for (std::size_t k = 0; k < cycles.size(); ++k)
-    log_sum += cycles[k].weight * std::log(mixture.share * mixture.ratio[k] + 1.0 - mixture.share);
+  double log_sum =
+      fit_cycle_mixture(log_ratios(cycles, if_false, v), weights_of(cycles)).log_likelihood;
   const auto prior = [](double log_root, double sigma) {
     return -0.5 * log_root * log_root / (sigma * sigma);
   };
@@ -182,7 +159,7 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   if (cycles.empty()) return noise;
   std::vector<double> if_false;
   const double volume = volume_m3(chain, closures);
-  for (const Cycle& cycle : cycles) if_false.push_back(log_density_if_false(cycle, volume));
+  for (const Cycle& cycle : cycles) if_false.push_back(log_density_if_false(cycle.error, volume));
 
   // A pattern search, coarse to fine: along each factor, and along both of odometry's.
   constexpr std::array<Factors, 5> kDirections{
@@ -218,9 +195,10 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   if (most - without < kEvidence) return noise;
   noise.rotation = std::sqrt(best[kRotation]);
   noise.translation = std::sqrt(best[kTranslation]);
-  const Mixture mixture = fit_mixture(cycles, if_false, best);
+  const std::vector<double> ratios = log_ratios(cycles, if_false, best);
+  const CycleMixture mixture = fit_cycle_mixture(ratios, weights_of(cycles));
   for (std::size_t k = 0; k < cycles.size(); ++k)
-    if (mixture.true_probability(k) > 0.5) noise.likely.push_back(cycles[k].closure);
+    if (mixture.true_probability(ratios[k]) > 0.5) noise.likely.push_back(cycles[k].closure);
   return noise;
 }
 

@@ -9,7 +9,7 @@
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/core/pose_graph.hpp"
-#include "modules/pose_graph/noise_histogram.hpp"
+#include "modules/pose_graph/closure_noise.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
 #include "modules/pose_graph/vertical_prior.hpp"
 
@@ -40,8 +40,8 @@ struct SessionGraph {
   /// Decided in sessions before: kept or rejected. Closures that are not named are undecided.
   std::map<ClosureId, bool> decided = {};
   std::set<ClosureId> trusted = {};  ///< Between robots, and not to be weighed; the same for both.
-  /// Of cycles through closures that this robot counted in sessions before, see Corroboration.
-  NoiseHistogram lengths = {};
+  /// Cycles through closures that this robot counted in earlier sessions.
+  ClosureNoiseRecord noise = {};
 };
 
 /// A robot's place in the tree of a session, whose edges are links between robots that hear each

@@ -93,8 +93,8 @@ class SessionPart {
   /// On closures to other members what the robot knew when it joined, and once there is a solver,
   /// on all closures that this robot weighs what the solver makes of them.
   [[nodiscard]] ClosureVerdicts verdicts() const;
-  [[nodiscard]] NoiseHistogram lengths() const {
-    return solver_ ? solver_->lengths() : graph_.lengths;
+  [[nodiscard]] ClosureNoiseRecord noise() const {
+    return solver_ ? solver_->noise() : graph_.noise;
   }
   /// The best ones, in the frame of the session once there is a stage.
   [[nodiscard]] const std::vector<SE3>& poses() const;

@@ -139,6 +139,7 @@ class TeamAgent {
 
   // The session that this robot is in.
   void judge_odometry();
+  void notice_closure_noise();
   bool join(const Session& session);
   [[nodiscard]] std::optional<FrozenPart> freeze(const Session& session) const;
   void extend_poses();
@@ -173,9 +174,9 @@ class TeamAgent {
   std::map<ClosureId, int> chances_;  // that rejected closures have had
   bool reconsider_due_ = false;       // once all have told the solution
   std::uint32_t reconsidered_ = 0;    // so many times there was something to weigh again
-  NoiseHistogram lengths_;            // of the closures that are decided
+  ClosureNoiseRecord noise_;          // of the closures that are decided
   std::set<ClosureId> provisional_;   // decided without robots that are known of
-  NoiseHistogram team_lengths_;       // without these
+  ClosureNoiseRecord team_noise_;     // without these
 
   std::uint64_t links_seen_ = 0;
   std::set<RobotId> component_;  // links lead there
@@ -195,11 +196,12 @@ class TeamAgent {
   bool deserted_ = false;  // a member of it has gone on to another one
   bool solved_ = false;    // and all members have its solution
   double started_s_ = 0.0;
-  std::uint64_t sent_bytes_ = 0;        // for it, to every reader, and passed on
-  std::map<ClosureId, bool> verdicts_;  // of that session
-  double odometry_noticed_ = 0.0;       // largest noise scale of odometry in a notice
-  std::optional<World> world_;          // in frame_
-  std::size_t chordal_tried_ = 0;       // with so many closures inside this robot
+  std::uint64_t sent_bytes_ = 0;                // for it, to every reader, and passed on
+  std::map<ClosureId, bool> verdicts_;          // of that session
+  double odometry_noticed_ = 0.0;               // largest noise scale of odometry in a notice
+  std::map<RobotId, double> closures_noticed_;  // noise factor in the last notice, by peer
+  std::optional<World> world_;                  // in frame_
+  std::size_t chordal_tried_ = 0;               // with so many closures inside this robot
 
   std::optional<TeamStatus> sent_status_;
   std::map<std::string, std::size_t> refused_;

@@ -270,6 +270,19 @@ void TeamAgent::judge_odometry() {
                      " places of loop closures inside this robot; it is weighed accordingly");
 }
 
+void TeamAgent::notice_closure_noise() {
+  for (const auto& [peer, cycles] : noise_.pairs) {
+    double& noticed = closures_noticed_.try_emplace(peer, 1.0).first->second;
+    if (cycles.factor < kNoticedAgain * noticed) continue;
+    noticed = cycles.factor;
+    notices_.push_back((peer == self_.robot ? "closures inside this robot"
+                                            : "closures with robot " + std::to_string(peer)) +
+                       " are " + fixed(cycles.factor, 1) +
+                       " times noisier than closures of the team usually are, by " +
+                       fixed(cycles.places, 0) + " places; they are weighed accordingly");
+  }
+}
+
 bool TeamAgent::join(const Session& session) {
   if (graph_.keyframes() == 0) return false;
   if (config_.robust) judge_odometry();
@@ -285,7 +298,7 @@ bool TeamAgent::join(const Session& session) {
   if (part->graph.to_absent.empty()) try_chordal(session);
   part->graph.start = poses_;
   part->graph.decided = decided_;
-  part->graph.lengths = lengths_;
+  part->graph.noise = noise_;
   part_.emplace(session, self_, std::move(*part), factory_,
                 AlignmentTolerance{config_.alignment_rotation_rad, config_.alignment_translation_m},
                 config_.status_period_s, now_s_);
@@ -375,7 +388,7 @@ void TeamAgent::decide(const std::vector<WeighedClosure>& verdicts) {
 
 void TeamAgent::decide_anew() {
   for (const ClosureId& id : std::exchange(provisional_, {})) decided_.erase(id);
-  lengths_ = team_lengths_;
+  noise_ = team_noise_;
 }
 
 // A member's verdicts on a closure hold for both of its ends.
@@ -469,8 +482,9 @@ void TeamAgent::leave(bool with_solution) {
   for (const RobotId member : part_->members())
     if (const MemberPoses* told = part_->told_by(told_, member, 1); told && member != self_.robot)
       decide_with(*told);
-  lengths_ = part_->lengths();
-  if (part_->members().size() > 1) team_lengths_ = lengths_;
+  noise_ = part_->noise();
+  notice_closure_noise();
+  if (part_->members().size() > 1) team_noise_ = noise_;
   reconsider_due_ = part_->state().set_aside;
 }
 

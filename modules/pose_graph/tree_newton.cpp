@@ -33,6 +33,8 @@ constexpr double kTornOfOne = 1.0;
 // Cycles of a pair that count for the noise; fewer where one robot is not to say it for all.
 constexpr std::size_t kEnoughLengths = 300;
 constexpr std::size_t kShareOfLengths = 60;
+// So many closures of a pair that stand alone do no harm: they are weighed from the start.
+constexpr std::ptrdiff_t kFewIsolated = 16;
 
 SolverLetter letter_to(RobotId to, std::vector<std::uint8_t> bytes) {
   return {to, std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes))};
@@ -103,6 +105,28 @@ bool TreeNewton::speaks_for(const Known& k) const {
   return graph_.self <= std::min(k.edge.from.robot, k.edge.to.robot);
 }
 
+// The two robots of a pair know the same closures, poses and claims, so both come to the same
+// noise. A pair that is noisier than the team as a whole is weighed less.
+void TreeNewton::weigh_by_noise() {
+  if (!options_.robust || noise_known_) return;
+  noise_known_ = true;
+  const Corroboration::PoseOf pose = [this](const KeyframeId& id) { return start_of(id); };
+  for (const auto& [peer, places] : by_peer()) {
+    std::vector<PoseEdge> closures;
+    for (const std::size_t k : places)
+      if (known_[k].trust == Trust::kOpen && !graph_.decided.contains(known_[k].edge.id()))
+        closures.push_back(known_[k].edge);
+    PairCycles& cycles = graph_.noise.pairs[peer];
+    Corroboration(closures, pose, graph_.step_precision, options_.dimension).count_cycles(cycles);
+    cycles.factor = estimate_closure_noise(cycles, told_.noise_scale) / told_.noise_scale;
+    const double weaker = 1.0 / (cycles.factor * cycles.factor);
+    for (const std::size_t k : places) {
+      known_[k].edge.precision.kappa *= weaker;
+      known_[k].edge.precision.tau *= weaker;
+    }
+  }
+}
+
 void TreeNewton::find_isolated(double barc) {
   const Corroboration::PoseOf pose = [this](const KeyframeId& id) { return start_of(id); };
   for (const auto& [peer, places] : by_peer()) {
@@ -115,7 +139,8 @@ void TreeNewton::find_isolated(double barc) {
       }
     const auto isolated =
         Corroboration(closures, pose, graph_.step_precision, options_.dimension).isolated(barc);
-    for (std::size_t k = 0; k < open.size(); ++k) {
+    const auto alone = std::ranges::count(isolated, true);
+    for (std::size_t k = 0; k < open.size() && alone > kFewIsolated; ++k) {
       Known& known = known_[open[k]];
       const bool fits =
           residual_of(known.edge, pose(known.edge.from), pose(known.edge.to)) <= told_.barc;
@@ -271,9 +296,9 @@ UpLetter TreeNewton::first_letter() {
         closures.push_back(known_[k].edge);
     // Once only: poses that were optimised agree with closures better than odometry does.
     Corroboration(closures, pose, graph_.step_precision, options_.dimension)
-        .count_lengths(graph_.lengths, most);
+        .count_lengths(graph_.noise.lengths, most);
   }
-  sums.lengths = graph_.lengths;
+  sums.lengths = graph_.noise.lengths;
   return letter;
 }
 
@@ -498,7 +523,10 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
     }
   };
   told_ = v;
-  if (!front_) move_robots(v.moves);
+  if (!front_) {
+    weigh_by_noise();
+    move_robots(v.moves);
+  }
   switch (v.next) {
     case Next::kCount:
       find_isolated(default_threshold(options_.dimension) * v.noise_scale);

@@ -49,7 +49,7 @@ class TreeNewton final : public MemberSolver {
   [[nodiscard]] const std::vector<SE3>& poses() const override { return accepted_; }
   [[nodiscard]] SolverState state() const override { return state_; }
   [[nodiscard]] ClosureVerdicts verdicts() const override;
-  [[nodiscard]] NoiseHistogram lengths() const override { return graph_.lengths; }
+  [[nodiscard]] ClosureNoiseRecord noise() const override { return graph_.noise; }
 
  private:
   enum class Phase { kUp, kDown, kDone };
@@ -75,6 +75,7 @@ class TreeNewton final : public MemberSolver {
   [[nodiscard]] RobotId peer_of(const Known& k) const;
   [[nodiscard]] const SE3& start_of(const KeyframeId& id) const;
   [[nodiscard]] std::map<RobotId, std::vector<std::size_t>> by_peer() const;
+  void weigh_by_noise();
   void find_isolated(double barc);
   [[nodiscard]] std::map<RobotId, double> shares_of_pairs() const;
   void build_front();
@@ -118,6 +119,7 @@ class TreeNewton final : public MemberSolver {
   SolverState state_;
   std::optional<TreeRoot> root_;
   bool factorised_ = true;
+  bool noise_known_ = false;  // weigh_by_noise() has been called
 };
 
 }  // namespace km

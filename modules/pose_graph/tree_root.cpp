@@ -31,7 +31,7 @@ constexpr int kAllInSteps = 8;
 constexpr double kMargin = 8.0;
 // Where so many closures agree with those beside them, one that stands alone has cause to be false.
 constexpr double kMostlyConsistent = 0.75;
-constexpr std::uint32_t kFewIsolated = 32;  // do no harm
+constexpr std::uint32_t kFewOpen = 32;
 // With fewer closures left per pose, the others are needed from the start.
 constexpr double kClosuresPerPose = 0.25;
 
@@ -112,7 +112,7 @@ DownLetter TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   if (first_) {  // what stands alone is aside
     const std::uint32_t left = sums.open;
     const bool enough = static_cast<double>(left) >= kClosuresPerPose * sums.poses;
-    const bool aside = sums.isolated > kFewIsolated && enough && joined(members_, sums.votes);
+    const bool aside = sums.isolated > 0 && enough && joined(members_, sums.votes);
     return start(aside, aside ? sums : *first_);
   }
   first_ = sums;
@@ -121,7 +121,7 @@ DownLetter TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   if (noise) noise_scale_ = noise->scale;
   const double margin = noise_scale_ < 1.0 ? std::min(1.0, kMargin * noise_scale_) : noise_scale_;
   barc_ = options_.barc > 0.0 ? options_.barc : margin * default_threshold(options_.dimension);
-  const bool count = noise && noise->consistent >= kMostlyConsistent && sums.open > kFewIsolated;
+  const bool count = noise && noise->consistent >= kMostlyConsistent && sums.open > kFewOpen;
   DownLetter letter = count ? say(Next::kCount) : start(false, sums);
   if (options_.robust && free_ && sums.open > 0) letter.verdict.moves = moves_of(sums.votes);
   return letter;

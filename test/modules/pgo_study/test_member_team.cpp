@@ -475,9 +475,12 @@ TEST_CASE("The robots of the tunnels find their noise, and one frame", "[pgo_stu
     const BlockEdge& e = graph.edges[k];
     // Which of two between the same poses is kept cannot be asked: verdicts go by poses.
     if (edges_between.at(std::minmax(e.i, e.j)) > 1) continue;
+    const auto [self, peer] = std::minmax({graph.robot_of(e.i), graph.robot_of(e.j)});
+    const double factor = asked.member(self).noise().pairs.at(static_cast<RobotId>(peer)).factor;
     const PoseEdge edge{{0, 0}, {0, 1}, e.T_i_j, {e.kappa, e.tau}};
     largest = std::max(largest, residual_of(edge, poses[static_cast<std::size_t>(e.i)],
-                                            poses[static_cast<std::size_t>(e.j)]));
+                                            poses[static_cast<std::size_t>(e.j)]) /
+                                    factor);
   }
   const SolverState& state = asked.team().state();
   std::size_t bytes = 0;
@@ -489,7 +492,7 @@ TEST_CASE("The robots of the tunnels find their noise, and one frame", "[pgo_stu
   CHECK(ended);
   CHECK(asked.team().rounds() <= 100);
   CHECK(closures >= 2500);
-  CHECK(closures <= 3000);
+  CHECK(closures <= 3150);  // see the test of eight robots in tunnels
   CHECK(state.noise_scale > 3.0);
   CHECK(state.noise_scale < 5.0);
   CHECK(groups_of(graph, kept) == 1);

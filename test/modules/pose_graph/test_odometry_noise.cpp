@@ -24,9 +24,9 @@ struct Walk {
   explicit Walk(unsigned seed) : rng(seed) {
     for (std::uint32_t k = 0; k < kKeyframes; ++k) {
       const double angle = 2.0 * 3.14159265358979 * k / kTurn;
-      truth.push_back(make_pose(
-          Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix(),
-          Eigen::Vector3d(8.0 * std::cos(angle), 8.0 * std::sin(angle), 0.02 * k)));
+      truth.push_back(
+          make_pose(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix(),
+                    Eigen::Vector3d(8.0 * std::cos(angle), 8.0 * std::sin(angle), 0.02 * k)));
     }
   }
 

@@ -368,6 +368,19 @@ TeamProblem with_judged_odometry(TeamProblem problem) {
   return problem;
 }
 
+// The problem with closures weighed by the noise that the robots found for each pair.
+TeamProblem with_closure_noise(TeamProblem problem, TeamNetwork& network) {
+  for (PoseEdge& e : problem.edges) {
+    if (is_step(e)) continue;
+    const auto [self, peer] = std::minmax(e.from.robot, e.to.robot);
+    const auto noise = network.agent(self).part()->noise().pairs;
+    const auto cycles = noise.find(peer);
+    const double factor = cycles == noise.end() ? 1.0 : cycles->second.factor;
+    e.precision = {e.precision.kappa / (factor * factor), e.precision.tau / (factor * factor)};
+  }
+  return problem;
+}
+
 // Closures fit the trajectories up to `barc` [sigma], except for those that are `out`.
 void check_fit(const TeamProblem& problem, const TeamPoses& poses, const std::set<ClosureId>& out,
                double barc) {
@@ -405,10 +418,13 @@ TEST_CASE("eight robots in tunnels decide nearly as one session that knows nothi
   const SolverState state = network.agent(0).part()->state();
   CAPTURE(out.size(), at_once.size(), state.noise_scale, state.round);
   const std::size_t kept = closures_of(problem) - at_once.size();
-  CHECK(kept >= 2600);  // measured: 2775; robust solvers agree on 2669 to 2987
-  CHECK(kept <= 3000);
-  CHECK(differ.size() * 150 < kept);  // Jaccard's index; measured: 11
-  const TeamProblem judged = with_judged_odometry(problem);
+  // Robust solvers that take all closures for equally noisy keep 2669 to 2987. Pairs that are found
+  // noisier keep closures that are further off.
+  CHECK(kept >= 2600);
+  CHECK(kept <= 3150);
+  CAPTURE(differ.size());
+  CHECK(differ.size() * 100 < kept);  // Jaccard's index 0.99
+  const TeamProblem judged = with_closure_noise(with_judged_odometry(problem), network);
   check_fit(judged, network.trajectories(), out, state.barc);
   TeamProblem rest = without(judged, out);
   rest.start = network.trajectories();

@@ -1,0 +1,121 @@
+#include "modules/pose_graph/closure_noise.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "modules/pose_graph/cycle_mixture.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kFactorSigma = 1.0986;    // log 3, of log s
+constexpr double kOddsAgainstUsual = 6.9;  // log of odds of 1000 to 1
+constexpr double kOneSigma = 0.5;          // of the log density: one standard deviation of log s
+// Closures that are noisier than claimed and so many times noisier than the team's say nothing.
+constexpr double kLargestFactor = 10.0;
+constexpr double kGridStep = 1.1;  // a tenth of the standard deviation is precise enough
+// A team that is so much noisier than it claims says nothing about single pairs by its claims.
+constexpr double kClaimsFail = 1.5;
+// Fewer places, some of them false, say nothing about the noise of the others.
+constexpr double kFewPlaces = 5.0;
+// A pair most of whose cycles agree with the noise of the team has that noise, and false closures.
+constexpr double kMostAgree = 0.8;
+constexpr double kAgreeingCycle = 16.8;  // 99 % quantile of chi-squared, 6 degrees of freedom
+// Smaller differences are within the errors of the model: claims are isotropic, and the noise of
+// odometry is that of its mean step.
+constexpr double kNotable = 1.3;
+// A cycle of the estimated noise is this much likelier than a false one (log, mean of all cycles).
+// Closures that are all false are as likely true by a very large noise.
+constexpr double kDistinct = 3.0;
+
+struct Posterior {
+  double log_density = 0.0;  // of the factor s, up to a constant
+  double distinct = 0.0;     // mean log density ratio of a cycle to a false one
+};
+
+Posterior posterior_of(std::span<const NoiseCycle> cycles, std::span<const double> weights,
+                       double s, double usual) {
+  std::vector<double> log_ratio;
+  for (const NoiseCycle& cycle : cycles) {
+    double log_if_true = 0.0;
+    for (std::size_t k = 0; k < cycle.error.size(); ++k) {
+      const double variance = 1.0 + s * s * static_cast<double>(cycle.variance[k]);
+      const double error = cycle.error[k];
+      log_if_true -= 0.5 * (error * error / variance + std::log(variance));
+    }
+    log_ratio.push_back(log_if_true - static_cast<double>(cycle.log_if_false));
+  }
+  const double away = std::log(s / usual) / kFactorSigma;
+  const double log_likelihood = fit_cycle_mixture(log_ratio, weights).log_likelihood;
+  const double total = weights.front() * static_cast<double>(weights.size());
+  return {log_likelihood - 0.5 * away * away, log_likelihood / total};
+}
+
+// Share of the cycles that agree with the factor `s`.
+double agreeing(std::span<const NoiseCycle> cycles, double s) {
+  const auto agrees = [&](const NoiseCycle& cycle) {
+    double squared = 0.0;
+    for (std::size_t k = 0; k < cycle.error.size(); ++k)
+      squared += cycle.error[k] * cycle.error[k] / (1.0 + s * s * cycle.variance[k]);
+    return squared <= kAgreeingCycle;
+  };
+  return static_cast<double>(std::ranges::count_if(cycles, agrees)) /
+         static_cast<double>(cycles.size());
+}
+
+double estimate(std::span<const NoiseCycle> cycles, double observations, double usual) {
+  if (cycles.empty() || observations < kFewPlaces || usual > kClaimsFail) return usual;
+  const double weight = std::min(1.0, observations / static_cast<double>(cycles.size()));
+  const std::vector<double> weights(cycles.size(), weight);
+  std::vector<std::pair<double, double>> densities;  // factor, log posterior density
+  if (agreeing(cycles, usual) > kMostAgree) return usual;
+  double most = posterior_of(cycles, weights, usual, usual).log_density;
+  densities.emplace_back(usual, most);
+  for (double s = usual * kGridStep; s <= std::max(1.0, kLargestFactor * usual); s *= kGridStep) {
+    const Posterior found = posterior_of(cycles, weights, s, usual);
+    if (!(found.distinct > kDistinct)) continue;
+    densities.emplace_back(s, found.log_density);
+    most = std::max(most, found.log_density);
+  }
+  if (most - densities.front().second < kOddsAgainstUsual) return usual;
+  const auto credible = [&](const auto& entry) { return entry.second >= most - kOneSigma; };
+  return std::ranges::find_if(densities, credible)->first;
+}
+
+}  // namespace
+
+NoiseCycle NoiseCycle::of(const Vector6& e, const Matrix6& Sigma_o, const Matrix6& Sigma_c,
+                          double log_if_false, int dimension) {
+  const Eigen::Index first = dimension == 2 ? 2 : 0;
+  const Eigen::Index size = dimension == 2 ? 3 : 6;
+  const Eigen::MatrixXd odometry = Sigma_o.block(first, first, size, size);
+  const Eigen::MatrixXd closures = Sigma_c.block(first, first, size, size);
+  const Eigen::LLT<Eigen::MatrixXd> root(odometry);
+  const auto L = root.matrixL();
+  const Eigen::MatrixXd half = L.solve(closures);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
+      Eigen::MatrixXd(L.solve(half.transpose())));
+  const Eigen::VectorXd error =
+      eigen.eigenvectors().transpose() * L.solve(Eigen::VectorXd(e.segment(first, size)));
+  NoiseCycle cycle;
+  for (Eigen::Index k = 0; k < size; ++k) {
+    cycle.error[static_cast<std::size_t>(k)] = static_cast<float>(error(k));
+    cycle.variance[static_cast<std::size_t>(k)] =
+        static_cast<float>(std::max(0.0, eigen.eigenvalues()(k)));
+  }
+  const double log_root = root.matrixLLT().diagonal().array().log().sum();
+  cycle.log_if_false = static_cast<float>(
+      log_if_false + log_root + 0.5 * static_cast<double>(size) * std::log(2.0 * std::numbers::pi));
+  return cycle;
+}
+
+double estimate_closure_noise(const PairCycles& cycles, double usual) {
+  const double noise = std::max(estimate(cycles.inside, cycles.places, usual),
+                                estimate(cycles.between, cycles.places, usual));
+  return noise < kNotable * usual ? usual : noise;
+}
+
+}  // namespace km

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <span>
+
+#include "modules/core/geometry.hpp"
+
+namespace km {
+
+/// Cycles of a pose graph, some of which contain a false closure.
+struct CycleMixture {
+  double share = 0.8;           ///< Most likely share of cycles without a false closure.
+  double log_likelihood = 0.0;  ///< Relative to all cycles being false.
+
+  /// Probability that a cycle is true, from its log density ratio (true over false).
+  [[nodiscard]] double true_probability(double log_ratio) const;
+};
+
+/// Fits the share of true cycles by expectation maximisation. `log_ratio[k]` is the log density of
+/// the error of cycle k if it is true, minus the log density if it is false. `weight[k]` is the
+/// number of independent observations that cycle k stands for. O(cycles).
+[[nodiscard]] CycleMixture fit_cycle_mixture(std::span<const double> log_ratio,
+                                             std::span<const double> weight);
+
+/// Log density of the error of a cycle with a false closure, in the tangent space at the error. The
+/// rotation is uniform and the translation is uniform in a volume [m^3] (`dimension` 2: an area
+/// [m^2]). det J = 2 (1 - cos |w|) / |w|^2 is the Jacobian of the exponential map of rotations.
+[[nodiscard]] double log_density_if_false(const Vector6& error, double volume, int dimension = 3);
+
+}  // namespace km

@@ -1,0 +1,100 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "modules/pose_graph/closure_noise.hpp"
+#include "modules/pose_graph/cycle_mixture.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kOdometrySigma = 0.02;  // of the odometry in a cycle, on each axis [rad], [m]
+constexpr double kClosureSigma = 0.05;   // of both closures together
+constexpr double kVolume_m3 = 1000.0;
+
+// Cycles whose closures are `scale` times noisier than they claim. A share of them is false.
+std::vector<NoiseCycle> draw_cycles(std::size_t count, double scale, double share_false,
+                                    int dimension, std::mt19937& rng) {
+  Matrix6 axes = Matrix6::Identity();
+  if (dimension == 2) axes(0, 0) = axes(1, 1) = axes(5, 5) = 0.0;
+  const Matrix6 odometry = kOdometrySigma * kOdometrySigma * axes;
+  const Matrix6 closures = kClosureSigma * kClosureSigma * axes;
+  std::bernoulli_distribution is_false(share_false);
+  std::vector<NoiseCycle> cycles;
+  for (std::size_t k = 0; k < count; ++k) {
+    Vector6 e = std::hypot(kOdometrySigma, scale * kClosureSigma) * random_vector<6>(rng);
+    if (is_false(rng)) {
+      e = random_vector<6>(rng);
+      e.tail<3>() *= 4.0;
+    }
+    e = axes * e;
+    cycles.push_back(NoiseCycle::of(e, odometry, closures,
+                                    log_density_if_false(e, kVolume_m3, dimension), dimension));
+  }
+  return cycles;
+}
+
+PairCycles pair_of(std::vector<NoiseCycle> inside, std::vector<NoiseCycle> between) {
+  const auto places = static_cast<double>(std::max(inside.size(), between.size()));
+  return {std::move(inside), std::move(between), places};
+}
+
+}  // namespace
+
+TEST_CASE("The noise of a pair's closures is found beside false closures", "[closure_noise]") {
+  const unsigned seed = GENERATE(range(1U, 6U));
+  const double scale = GENERATE(3.0, 5.0, 10.0);
+  const double share_false = GENERATE(0.0, 0.4);
+  const int dimension = GENERATE(2, 3);
+  CAPTURE(seed, scale, share_false, dimension);
+  std::mt19937 rng(seed);
+  const PairCycles cycles = pair_of(draw_cycles(100, scale, share_false, dimension, rng), {});
+  const double found = estimate_closure_noise(cycles, 1.0);
+  // 60 cycles of 3 axes tell a standard deviation to 5 %; three of these, and the step of the grid.
+  CHECK(found == Approx(scale).epsilon(0.25));
+}
+
+TEST_CASE("Closures that are as noisy as claimed keep the team's factor", "[closure_noise]") {
+  const unsigned seed = GENERATE(range(1U, 21U));
+  const double usual = GENERATE(0.5, 1.0, 4.0);
+  CAPTURE(seed, usual);
+  std::mt19937 rng(seed);
+  const PairCycles cycles =
+      pair_of(draw_cycles(80, usual, 0.3, 3, rng), draw_cycles(20, usual, 0.3, 3, rng));
+  CHECK(estimate_closure_noise(cycles, usual) == usual);
+}
+
+TEST_CASE("An error that the closures of a place share shows between places", "[closure_noise]") {
+  const unsigned seed = GENERATE(range(1U, 6U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const PairCycles cycles =
+      pair_of(draw_cycles(100, 1.0, 0.0, 3, rng), draw_cycles(30, 3.2, 0.0, 3, rng));
+  CHECK(estimate_closure_noise(cycles, 1.0) == Approx(3.2).epsilon(0.25));
+}
+
+TEST_CASE("Few observations do not make closures noisy", "[closure_noise]") {
+  std::mt19937 rng(1);
+  PairCycles cycles = pair_of(draw_cycles(40, 2.2, 0.0, 3, rng), {});
+  CHECK(estimate_closure_noise(cycles, 1.0) > 1.7);
+  cycles.places = 1.0;  // all cycles are of one observation
+  CHECK(estimate_closure_noise(cycles, 1.0) == 1.0);
+  CHECK(estimate_closure_noise({}, 2.5) == 2.5);
+}
+
+TEST_CASE("The share of true cycles is that of the draw", "[closure_noise]") {
+  const double share = GENERATE(0.2, 0.5, 0.9);
+  std::vector<double> log_ratio, weight;
+  for (int k = 0; k < 100; ++k) {
+    log_ratio.push_back(k < 100 * share ? 30.0 : -30.0);
+    weight.push_back(1.0);
+  }
+  const CycleMixture mixture = fit_cycle_mixture(log_ratio, weight);
+  CHECK(mixture.share == Approx(share).margin(1e-9));
+  CHECK(mixture.true_probability(30.0) > 0.999);
+  CHECK(mixture.true_probability(-30.0) < 0.001);
+}
+
+}  // namespace km
