@@ -64,7 +64,7 @@ void define(CLI::App& app, TeamOptions& options) {
              km::links_file_keys());
   options.robot_binary = km::program_folder() / "kimera_multi_robot";
   app.add_option("--config", options.config, "Team file")->required();
-  app.add_option("--dataset", options.dataset, "What ${DATASET} stands for in the team file");
+  app.add_option("--dataset", options.dataset, "Value of ${DATASET} in the team file");
   app.add_option(
          "--rate", options.rate,
          "Times real time, max, or auto, see kimera_multi_robot --help (default: the file's, 1.0)")
@@ -94,15 +94,16 @@ void define(CLI::App& app, TeamOptions& options) {
          "end they become one file (default: team.mcap in the folder of the results)")
       ->expected(0, 1)
       ->type_name("[FILE.mcap]");
-  app.add_flag("--view", options.view,
-               "Robots let anybody in the domain watch them: kimera_multi_viewer --domain N");
+  app.add_flag(
+      "--view", options.view,
+      "Robots allow every program in the domain to watch them: kimera_multi_viewer --domain N");
   app.add_flag("--report", options.report,
                "Start nothing: the tables of a run that has ended, from its folders in --output")
       ->excludes("--links");
   app.add_option("arguments", options.arguments, "After --: more arguments of every robot");
 }
 
-// The command line has the last word over the team file.
+// Options of the command line override the team file.
 km::TeamPlan make_plan(const TeamOptions& options) {
   km::TeamPlan plan = km::read_team_file(options.config, options.dataset);
   if (!options.rate.empty()) plan.rate = options.rate;
@@ -110,7 +111,7 @@ km::TeamPlan make_plan(const TeamOptions& options) {
   if (options.domain) plan.domain = options.domain;
   if (options.time_limit_s) plan.time_limit_s = options.time_limit_s;
   if (!plan.domain) {
-    // Teams of one host must not meet; the lower half is left to who chooses.
+    // Teams on one host must not meet. The lower half remains for domains chosen by people.
     std::random_device device;
     plan.domain = std::uniform_int_distribution<std::uint32_t>(km::kLastQuietDomain / 2 + 1,
                                                                km::kLastQuietDomain)(device);
@@ -118,7 +119,7 @@ km::TeamPlan make_plan(const TeamOptions& options) {
   plan.record = options.record.has_value();
   plan.view = options.view;
   if (!options.security.empty()) plan.security = options.security;
-  if (!options.truth.empty()) plan.notes.clear();  // they are about the truths of the file
+  if (!options.truth.empty()) plan.notes.clear();  // the notes concern the truths of the team file
   for (km::RobotPlan& robot : plan.robots) {
     if (!options.truth.empty()) robot.truth = options.truth;
     robot.arguments.insert(robot.arguments.end(), options.arguments.begin(),
@@ -127,7 +128,8 @@ km::TeamPlan make_plan(const TeamOptions& options) {
   return plan;
 }
 
-// What became of the frames; a run has ended and is told whether or not this can be.
+// Writes the fates of the frames to links.csv. A failure is logged and does not end the program,
+// because the run has ended.
 void write_links(const km::TeamPlan& plan, km::EmulatedLinks& links, km::ResultWriter& results) {
   std::vector<std::string> names;
   for (const km::RobotPlan& robot : plan.robots) names.push_back(robot.name);
@@ -164,7 +166,8 @@ std::vector<km::RobotRun> run_robots(const TeamOptions& options, const km::TeamP
   return runs;
 }
 
-// Names and colours of the labels beside the team's mesh: those of the first robot that has some.
+// Copies names and colours of the labels beside the team's mesh, from the first robot that has
+// them.
 void copy_palette(const km::TeamPlan& plan) {
   for (const km::RobotPlan& robot : plan.robots) {
     const fs::path own = plan.output / robot.name / km::kLabelPalette;
@@ -174,7 +177,7 @@ void copy_palette(const km::TeamPlan& plan) {
   }
 }
 
-// The robots' records as one; in the frame of those that are joined, where there are some.
+// Merges the records of all robots, in the frame of the joined robots if there are some.
 void write_record(const km::TeamPlan& plan, const km::TeamResult& team, const fs::path& file) {
   std::vector<fs::path> records;
   std::string root;
@@ -190,8 +193,8 @@ void write_record(const km::TeamPlan& plan, const km::TeamResult& team, const fs
   km::merge_records(records, root, file);
 }
 
-// The JSON, the report and the mesh of the whole team; `told` hears where all but the
-// first are.
+// Writes the JSON, the report and the mesh of the whole team. Prints the files to `told`, except
+// for the JSON.
 void write_results(const TeamOptions& options, const km::TeamPlan& plan, const km::TeamResult& team,
                    km::ResultWriter& results, std::ostream& told) {
   if (!options.json.empty())
@@ -218,7 +221,7 @@ void write_results(const TeamOptions& options, const km::TeamPlan& plan, const k
 
 int run(const TeamOptions& options) {
   const km::TeamPlan plan = make_plan(options);
-  if (!options.report) km::make_output_folder(plan.output);  // where the files below may be
+  if (!options.report) km::make_output_folder(plan.output);  // the files below may be in it
   km::check_output_folder(options.json);
   if (options.record) km::check_output_folder(*options.record);
   km::ResultWriter results;
@@ -241,7 +244,7 @@ int main(int argc, char** argv) try {
   TeamOptions options;
   define(app, options);
   try {
-    // CLI11 takes "--" behind --record for the end of its values, and no more.
+    // CLI11 takes "--" after --record only as the end of its values.
     char** const robots = std::find(argv, argv + argc, std::string_view("--"));
     app.parse(static_cast<int>(robots - argv), argv);
     if (robots != argv + argc)

@@ -49,10 +49,10 @@ has a random token that is another one every time; what is sent is not encrypted
 
 Examples
   kimera_multi_viewer --domain 7                     # a team that runs
-  kimera_multi_viewer --domain 7 --peers 10.0.0.2,10.0.0.3   # where multicast is off
-  kimera_multi_viewer --domain 7 --record team.mcap  # and keep what is told, for Foxglove and others
+  kimera_multi_viewer --domain 7 --peers 10.0.0.2,10.0.0.3   # without multicast
+  kimera_multi_viewer --domain 7 --record team.mcap  # also write a record, for Foxglove and others
   kimera_multi_viewer results/demo                   # a run that has ended
-  kimera_multi_viewer results/demo --rate 2          # as if it were live, twice as fast
+  kimera_multi_viewer results/demo --rate 2          # replay it, twice as fast
   kimera_multi_viewer results/demo --listen 0.0.0.0  # for other hosts
 
 Exit codes: 0 ended by Ctrl-C; 1 for input that cannot be used, an address that cannot be had, and a
@@ -67,7 +67,7 @@ struct ViewerOptions {
   std::optional<double> rate;
 };
 
-// ADDRESS:PORT is both; an address of IPv6 has more colons.
+// ADDRESS:PORT sets both; an IPv6 address has more than one colon.
 void split_port(PageServerOptions& server) {
   const std::size_t colon = server.address.find(':');
   if (colon == std::string::npos || colon != server.address.rfind(':')) return;
@@ -92,9 +92,9 @@ void define(CLI::App& app, ViewerOptions& options) {
   app.add_option("--peers", options.dds.peers, "Addresses of its hosts, where multicast is off")
       ->delimiter(',')
       ->needs(domain);
-  auto* const record = app.add_option(
-      "--record", options.record,
-      "Write what robots tell into this MCAP file, replacing it: the topics of their own records");
+  auto* const record = app.add_option("--record", options.record,
+                                      "Write the messages of the robots to this MCAP file, "
+                                      "replacing it: the topics of a robot's own record");
   record->needs(domain);
   app.add_flag("--record-images", options.record_images,
                "And all their camera images, small; else those that a page shows")
@@ -103,7 +103,7 @@ void define(CLI::App& app, ViewerOptions& options) {
          "--palette", options.palette,
          "label_palette.csv with names and colours of the labels (default: that of RESULTS)")
       ->check(CLI::ExistingFile);
-  app.add_option("--port", options.server.port, "Of the page; 0: any that is free")
+  app.add_option("--port", options.server.port, "Port of the page; 0: any free port")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
   app.add_option(
@@ -112,8 +112,8 @@ void define(CLI::App& app, ViewerOptions& options) {
          "loopback, the URL has a token")
       ->capture_default_str();
   app.add_option("--memory", options.memory_MB,
-                 "What is kept at most [MB]: beyond, images, then meshes that newer ones have "
-                 "replaced go, the oldest first")
+                 "Memory for messages [MB]: beyond it, images, then superseded meshes are dropped, "
+                 "the oldest first")
       ->check(CLI::Range(10.0, 1e6))
       ->capture_default_str();
   app.add_option("--page", options.server.page_folder,
@@ -126,7 +126,7 @@ void define(CLI::App& app, ViewerOptions& options) {
   });
 }
 
-// Tells the store, at `rate` or at once; false after a signal.
+// Adds the updates to the store, at `rate` or all at once; false after a signal.
 bool play(const std::vector<ViewUpdate>& updates, std::optional<double> rate, ViewStore& store,
           SignalWatch& signals) {
   const double start_s = steady_now_s();
@@ -170,7 +170,7 @@ void show_run(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
   wait_for_end(signals);
 }
 
-// Whose images are asked for: those that pages show, and those that are recorded. Thread-safe.
+// Robots whose images are requested: by pages that show them, and for the record. Thread-safe.
 class ImageRequests {
  public:
   explicit ImageRequests(ViewListener& listener) : listener_(listener) {}
@@ -189,7 +189,7 @@ class ImageRequests {
   }
 
   ViewListener& listener_;
-  std::mutex mutex_;  // guards what follows
+  std::mutex mutex_;  // guards the members below
   std::set<RobotId> shown_, recorded_, asked_;
 };
 
@@ -237,7 +237,7 @@ int main(int argc, char** argv) try {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : km::kBadCommandLine;
   }
-  km::SignalWatch signals;  // before any thread: they inherit the blocked signals
+  km::SignalWatch signals;  // before any thread: threads inherit the blocked signals
   km::ViewStore store(static_cast<std::size_t>(options.memory_MB * 1e6));
   (options.results.empty() ? km::show_team : km::show_run)(options, store, signals);
   return 0;
