@@ -35,10 +35,10 @@ struct SmootherUpdate {
 /// most recent images.
 ///
 /// The window slides in two ways. An image that is neither a keyframe nor recent is removed with
-/// its observations, and the inertial factors on its two sides are replaced by one, which is
-/// integrated from all samples. The oldest keyframe is marginalised: a prior replaces its inertial
-/// factor, the former prior, and the landmarks that it has seen (marginalize_oldest()). Derivatives
-/// by states in the prior are first estimates.
+/// its observations. One inertial factor, integrated from all samples, replaces the two on its
+/// sides. The oldest keyframe is marginalised: a prior replaces its inertial factor, the former
+/// prior, and the landmarks that it has seen (marginalize_oldest()). Derivatives by states in the
+/// prior are first estimates.
 ///
 /// While the body rests, only images are removed. The first image at rest is a keyframe, and
 /// ImuFactor::at_rest() joins it with the most recent ones. The other frames stay. The pose is

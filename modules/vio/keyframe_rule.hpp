@@ -16,7 +16,7 @@ namespace km {
 [[nodiscard]] Matrix6 keyframe_covariance(const VioConfig& config, double dt_s,
                                           const Matrix6& Sigma);
 
-/// A stretch of the way that nothing has measured.
+/// An interval of the motion without measurements.
 struct UnseenWay {
   double lasts_s = 0.0;
   double speed_mps = 0.0;  ///< The larger speed of before and after the interval.
@@ -25,8 +25,9 @@ struct UnseenWay {
 
 /// Time for which a body is assumed to continue at its former speed, and then at its later speed,
 /// in an interval of `lasts_s` without measurements. It is half of the interval, and less if the
-/// interval is long. On five flights and walks of EuRoC and TUM-VI the error is 0.3 to 0.8 times
-/// that of assuming standstill over 1 s, 0.4 to 1.1 over 2 s, and 0.9 to 1.5 over 10 s.
+/// interval is long. The error was compared with that of assuming standstill, on five flights and
+/// walks of EuRoC and TUM-VI. The ratio is 0.3 to 0.8 over 1 s, 0.4 to 1.1 over 2 s, and 0.9 to 1.5
+/// over 10 s.
 [[nodiscard]] double coasting_s(double lasts_s);
 
 /// Covariance of the relative pose across a new start. It grows with the duration without

@@ -21,10 +21,10 @@ struct OutsideOdometryResult {
 
 /// Publishes the poses of an external odometry (see MeasuredPose) in the same way as Vio publishes
 /// its own, with keyframes by the same rules. The covariance of a keyframe's relative pose is the
-/// growth of the odometry's covariance between the two keyframes, as for a chain of independent
-/// steps (between_on_chain()), plus the drift of VioConfig. A constant covariance, as many drivers
-/// report it, adds nothing. No verticals are published, because z of `odom` may not point up. Not
-/// thread-safe.
+/// growth of the odometry's covariance since the previous keyframe (between_on_chain()), plus the
+/// drift of VioConfig. The steps are assumed to be independent. A constant covariance, as many
+/// drivers report it, adds nothing. No verticals are published, because z of `odom` may not point
+/// up. Not thread-safe.
 class OutsideOdometry {
  public:
   /// Throws ConfigError if `config` is out of bounds.

@@ -48,7 +48,7 @@ void ImuPreintegration::add(const ImuSample& begin, const ImuSample& end) {
   B.block<3, 3>(6, 0) = 0.5 * dt * dv_dgyro;
   B.block<3, 3>(3, 3) = dv_daccel;
   B.block<3, 3>(6, 3) = 0.5 * dt * dv_daccel;
-  Vector6 variance;  // of noise held over the step
+  Vector6 variance;  // variance of noise that is constant over the step
   variance.head<3>().setConstant(noise_.gyro_noise_density * noise_.gyro_noise_density / dt);
   variance.tail<3>().setConstant(noise_.accel_noise_density * noise_.accel_noise_density / dt);
   covariance_ =

@@ -8,7 +8,7 @@ namespace km {
 namespace {
 
 // White squares of 20 px every 40 px on black from (first, first) on. Their shading varies a
-// little: in equal levels a corner would tie with its neighbours.
+// little, because with equal levels a corner would tie with its neighbours.
 GrayImage squares(int width, int height, int first) {
   GrayImage image{width, height, {}};
   for (int y = 0; y < height; ++y) {

@@ -55,7 +55,7 @@ TEST_CASE("Features of a moving camera stay on their landmarks to a tenth of a p
   const TexturedPlane plane;
   FeatureTracker tracker(rig, small_image_config());
 
-  std::map<std::uint64_t, Eigen::Vector3d> landmarks;  // Where the feature was first seen.
+  std::map<std::uint64_t, Eigen::Vector3d> landmarks;  // First position of each feature.
   std::vector<double> errors_px;
   constexpr int kFrames = 8;
   for (int i = 0; i < kFrames; ++i) {
@@ -112,7 +112,7 @@ TEST_CASE("Through a fisheye lens features stay on their landmarks, and pairs ha
   REQUIRE(errors_px.size() > 100);
   CHECK(quantile(errors_px, 0.5) < 0.05);
   CHECK(quantile(errors_px, 0.95) < 0.2);
-  REQUIRE(wide_errors_px.size() > 200);  // there the texture is too fine for the pixels
+  REQUIRE(wide_errors_px.size() > 200);  // the texture is too fine for the pixels there
   CHECK(quantile(wide_errors_px, 0.5) < 0.1);
   CHECK(quantile(wide_errors_px, 0.95) < 1.0);
   REQUIRE(depth_errors_px.size() > 4 * 50);
@@ -132,7 +132,7 @@ TEST_CASE("Stereo matches of a plane have its depth", "[vio]") {
 
   const double disparity_px = rig.cameras[0].fx * rig.baseline_m() / depth_m;
   std::vector<double> errors_px;
-  int visible = 0;  // To the right camera.
+  int visible = 0;  // Features that the right camera can see.
   for (const TrackedFeature& feature : frame.features) {
     const Eigen::Vector2d expected = feature.left - Eigen::Vector2d(0.11 / depth_m, 0.0);
     visible += rig.cameras[1].project(expected).value().x() > 16.0 ? 1 : 0;
@@ -325,7 +325,7 @@ TEST_CASE("Features outlive images without depth", "[vio]") {
     const TrackedFrame result = tracker.track(frame, Eigen::Matrix3d::Identity());
     CHECK(result.features.size() > 40);
     CHECK((located(result) > 0) == with_depth);
-    // The motion carries the depth from one depth image to the next.
+    // The motion propagates the depth from one depth image to the next.
     if (i > 0) CHECK(tracker.statistics().motion_known);
   }
 }

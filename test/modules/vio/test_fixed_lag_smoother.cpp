@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-// glog, which comes with Ceres, has a CHECK of its own that ends the program.
+// glog, which comes with Ceres, has its own CHECK, which ends the program.
 #pragma push_macro("CHECK")
 #undef CHECK
 #include <ceres/ceres.h>
@@ -20,8 +20,8 @@ namespace {
 
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// A frame of the window by 15 parameters: the local coordinates of its pose about where it stood at
-// first, then velocity, gyro bias and accelerometer bias.
+// A frame of the window as 15 parameters: local coordinates of its pose about the first one, then
+// velocity, gyro bias and accelerometer bias.
 struct Chart {
   OdometryState origin;
   FirstEstimate held;
@@ -198,8 +198,9 @@ void WindowProblem::add_landmarks(const Window& window) {
   }
 }
 
-// A second opinion on optimize(): the same cost, minimised by trust-region steps of Ceres with the
-// landmarks eliminated (DENSE_SCHUR). Not usable: Ceres failed, and the window is as it was.
+// An independent optimize(): minimises the same cost by trust-region steps of Ceres with the
+// landmarks eliminated (DENSE_SCHUR). If Ceres fails, the solution is not usable and the window is
+// unchanged.
 WindowSolution optimize_by_ceres(Window& window, int max_iterations) {
   WindowProblem problem(window);
   ceres::Solver::Options options;
@@ -300,8 +301,8 @@ TEST_CASE("The window stays bounded and its prior covers keyframes only", "[vio]
     CHECK(window.frames.at(frame_index(window, id)).keyframe);
 }
 
-// How everything turns about the vertical, and shifts, seen from each state: no measurement
-// changes.
+// Directions of a common rotation about the vertical and a common shift, as each state sees them.
+// They change no measurement.
 Eigen::MatrixXd unobservable_directions(const Window& window) {
   const std::vector<FirstEstimate> held = first_estimates(window);
   Eigen::MatrixXd N(15 * static_cast<Eigen::Index>(window.frames.size()), 4);
@@ -320,8 +321,8 @@ Eigen::MatrixXd unobservable_directions(const Window& window) {
 }
 
 TEST_CASE("Marginalisation gives no information on heading and position", "[vio]") {
-  // Nothing holds the first state here, so the information along these directions is zero, and
-  // first-estimate derivatives keep it so although the estimates move after each marginalisation.
+  // Nothing holds the first state here, so the information along these directions is zero.
+  // First-estimate derivatives keep it zero although the estimates move after each marginalisation.
   SyntheticWorld world(SyntheticMotion{}, 4);
   VioConfig config = gaussian_config();
   config.calibrate = false;
@@ -340,7 +341,7 @@ TEST_CASE("Marginalisation gives no information on heading and position", "[vio]
     const Eigen::MatrixXd H = equations.H().selfadjointView<Eigen::Lower>();
     const Eigen::MatrixXd N = unobservable_directions(window);
     const Eigen::VectorXd information = (N.transpose() * H * N).diagonal();
-    // Against what a single state has: rounding of numbers that cancel.
+    // Relative to the information of a single state, to allow for cancellation.
     const double known = H.topLeftCorner<6, 6>().trace();
     for (const double value : information) CHECK(std::abs(value) < 1e-8 * known);
   }
@@ -371,7 +372,7 @@ struct ModelledRun {
   OdometryState last;
 };
 
-// Noise in images and samples, and biases off their guess, all as modelled.
+// Noise in images and samples, and errors of the guessed biases, all as modelled.
 ModelledRun run_as_modelled(unsigned seed, const VioConfig& config) {
   constexpr double kGyroBiasSigma = 0.02;  // around the guess of a start
   std::mt19937 rng(seed + 300);
@@ -413,7 +414,7 @@ TEST_CASE("Relative poses err as their covariance says", "[vio]") {
   CHECK(std::abs(sum - 6.0) < 3 * sigma);
 }
 
-// What a StateCovariance is about, of the difference from `estimate` to `truth`.
+// Components of a StateCovariance, for the difference from `estimate` to `truth`.
 Eigen::Matrix<double, 11, 1> difference(const OdometryState& estimate, const OdometryState& truth) {
   const Eigen::Vector3d turn =
       so3_log(truth.T_odom_body.linear() * estimate.T_odom_body.linear().transpose());
@@ -478,7 +479,7 @@ TEST_CASE("A start from a state with its covariance knows what was known", "[vio
   REQUIRE(kept);
   const Eigen::Matrix<double, 11, 1> scale = known->diagonal().cwiseSqrt().cwiseInverse();
   CHECK((scale.asDiagonal() * (*kept - *known) * scale.asDiagonal()).norm() < 1e-6);
-  // From the next image on there are poses; what the biases were is not learnt anew.
+  // All images from the next one on have poses, and the biases stay known.
   for (std::size_t k = kLast + 1; k < frames.size(); ++k) {
     const SmootherUpdate update = smoother.add(frames[k]);
     REQUIRE(update.solution.usable);
@@ -536,7 +537,7 @@ TEST_CASE("A second without features is bridged by the inertial samples", "[vio]
   for (std::size_t k = 50; k < frames.size(); ++k)  // the tracker sees new features afterwards
     for (TrackedFeature& feature : frames[k].tracked.features) feature.id += 1000;
   VioConfig config = gaussian_config();
-  config.calibrate = false;  // seven unknowns more are not known so well after a second and a half
+  config.calibrate = false;  // seven more unknowns are not well known after 1.5 s
   const Run run = run_smoother(frames, world, 0.005, config);
   for (const SmootherUpdate& update : run.updates) CHECK(update.solution.usable);
   CHECK(position_error(run.states[49], world) < 0.05);
@@ -573,12 +574,12 @@ TEST_CASE("However long a body rests, the window keeps its keyframes and grows b
   for (std::size_t k = before.size(); k < run.smoother.window().frames.size(); ++k)
     samples += run.smoother.window().frames[k].samples.size();
   CHECK(run.smoother.window().frames.size() <= before.size() + 4);
-  CHECK(samples <= std::size_t{4 * 13});  // of 50 ms each, at 200 Hz, and both borders
+  CHECK(samples <= std::size_t{4 * 13});  // samples in 50 ms at 200 Hz, with both borders
   // Ten seconds between two images of one rest.
   const auto T = run.smoother.relative_pose(frames[kRest].tracked.stamp, update.state.stamp);
   REQUIRE(T);
   CHECK(T->T.translation().norm() < 5e-3);
-  // A centimetre is what goes unnoticed at rest.
+  // A centimetre is not noticed at rest.
   CHECK(T->Sigma.diagonal().maxCoeff() < 2e-4);
 }
 

@@ -95,7 +95,7 @@ TEST_CASE("Inertial data that do not fit the images are found inconsistent", "[v
   CHECK(guess(frames).status == StartStatus::kInconsistent);
 }
 
-TEST_CASE("Too few features or images are told apart", "[vio]") {
+TEST_CASE("A start distinguishes too few features from too few images", "[vio]") {
   SyntheticWorld world(SyntheticMotion{}, 5);
   auto frames = world.frames(kImages);
   CHECK(guess({frames.begin(), frames.begin() + 3}).status == StartStatus::kTooFewImages);

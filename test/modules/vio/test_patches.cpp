@@ -87,7 +87,7 @@ TEST_CASE("The local warp is the derivative of the image of a facing surface", "
   CHECK((A.cast<double>() * offset - expected).norm() < 0.02);  // Second order.
   const SE3 behind = make_pose(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0, 0, -2.0));
   CHECK(local_warp(camera, camera, bearing, 1.0 / 1.5, behind).isIdentity());
-  // Next to a bearing that the lens has not.
+  // Next to bearings outside the field of view of the lens.
   const Eigen::Vector2d rim(camera.lens.max_bearing() - 1e-4, 0.0);
   CHECK(local_warp(camera, camera, rim, 0.0, SE3::Identity()).isIdentity());
 }

@@ -116,7 +116,7 @@ TEST_CASE("The inertial error of the true motion is zero, whatever the frame", "
   OdometryState i = motion.state(0), j = motion.state(to);
   const double standard_deviations = factor.error(i, j).norm();
   CHECK(standard_deviations < 0.01);
-  // Heading and position of odom are free.
+  // Heading and position of odom are not observable.
   const SE3 shift = make_pose(so3_exp(Eigen::Vector3d(0, 0, 1.3)), random_vector<3>(rng));
   for (OdometryState* s : {&i, &j}) {
     s->T_odom_body = shift * s->T_odom_body;
@@ -249,7 +249,7 @@ TEST_CASE("Preintegration refuses an interval that its samples do not cover", "[
   CHECK(imu.dt_s() == 0.0);
 }
 
-TEST_CASE("First-order bias correction agrees with integrating anew", "[vio]") {
+TEST_CASE("First-order bias correction agrees with a new integration", "[vio]") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -279,7 +279,7 @@ TEST_CASE("The covariance of preintegration agrees with Monte Carlo", "[vio]") {
   ImuPreintegration reference(noise, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   REQUIRE(reference.add(exact, 0, end));
 
-  // Noise is white over the steps, as the model has it: each step sees its own.
+  // Noise is white over the steps, as modelled: each step has its own.
   std::mt19937 rng(7);
   const double dt = seconds_between(0, step);
   Matrix9 sum = Matrix9::Zero();
@@ -331,7 +331,7 @@ TEST_CASE("Marginalisation leaves the batch solution of a linear problem as it i
   const Eigen::MatrixXd H = prior.J.transpose() * prior.J;
   const Eigen::VectorXd solution = -H.ldlt().solve(prior.J.transpose() * prior.r);
   CHECK((solution - batch.tail(kSize - kTaken)).norm() < 1e-10);
-  // So is the covariance of what is left.
+  // The covariance of the remaining variables is unchanged too.
   const Eigen::MatrixXd covariance =
       q.H.inverse().bottomRightCorner(kSize - kTaken, kSize - kTaken);
   CHECK((H.inverse() - covariance).norm() < 1e-9 * covariance.norm());
@@ -340,7 +340,7 @@ TEST_CASE("Marginalisation leaves the batch solution of a linear problem as it i
 TEST_CASE("Later measurements and a prior give what all measurements give", "[vio]") {
   const Quadratic early = random_quadratic(1, 30);
   Quadratic late = random_quadratic(2, 30);
-  late.H.topRows(kTaken).setZero();  // later ones no longer see what was taken out
+  late.H.topRows(kTaken).setZero();  // later measurements do not involve the eliminated variables
   late.H.leftCols(kTaken).setZero();
   late.g.head(kTaken).setZero();
   const Eigen::VectorXd batch = -(early.H + late.H).ldlt().solve(early.g + late.g);
@@ -359,7 +359,7 @@ TEST_CASE("Directions without information stay without", "[vio]") {
   q.H = scale.asDiagonal() * q.H * scale.asDiagonal();
   q.g = scale.asDiagonal() * q.g;
   const SquareRootPrior prior = marginalize(q.H, q.g, kTaken);
-  CHECK(prior.J.rows() == 1);  // five of six are used up by what is taken out
+  CHECK(prior.J.rows() == 1);  // the eliminated variables use five of the six
   CHECK(prior.J.allFinite());
   CHECK(prior.r.allFinite());
 }
