@@ -31,7 +31,7 @@ struct ClosuresCommand {
 
 constexpr std::string_view kKeyframes = "keyframes.csv", kClosures = "loop_closures.csv";
 
-// What the robots of one folder of results, or of one record, found.
+// Keyframes and closures of the robots of one results folder, or of one record.
 struct Found {
   std::vector<KeyframeRecord> keyframes;
   std::vector<ClosureRecord> closures;
@@ -56,7 +56,7 @@ Found found_in(const fs::path& results) {
   return all;
 }
 
-// When a robot was there, as far as its keyframes tell, and what was given of it.
+// Time span of a robot's keyframes, and its inputs.
 struct RobotSpan {
   RobotId robot = 0;
   Stamp first = 0, last = 0;
@@ -85,7 +85,7 @@ std::vector<RobotSpan> spans_of(const std::vector<KeyframeRecord>& keyframes,
   return all;
 }
 
-// Why numbers may be of no use: true poses that are those of another robot, or of nobody.
+// Reasons why the numbers may be useless: the true poses belong to another robot, or to none.
 std::string notes_on(const std::vector<RobotSpan>& spans) {
   const auto name = [](const RobotSpan& span) {
     return "robot " + std::to_string(span.robot) + " (" + span.results.string() + ')';

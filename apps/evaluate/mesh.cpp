@@ -30,7 +30,7 @@ struct MeshCommand {
   std::filesystem::path json;     // Not written if empty.
 };
 
-// Where the robots' trajectories put the meshes.
+// Transform of the meshes by the robots' trajectories.
 SE3 placed_by(const MeshCommand& command) {
   const std::size_t estimates = command.trajectories.size();
   const std::size_t truths = command.true_trajectories.size();
@@ -97,7 +97,7 @@ constexpr const char* kMeshDetails =
     "metre;\n"
     "\"surface\" is the mean without that floor, to the triangles nearby. Labels are judged where\n"
     "the other side is nearer than --max-distance; unknown counts as not right.\n\n"
-    "A robot's mesh lies in the frame of its trajectory. Where that is not the truth's, "
+    "A robot's mesh lies in the frame of its trajectory. If that frame is not that of the truth, "
     "--trajectory\n"
     "and --trajectory-truth place it before ICP.\n\n"
     "Examples:\n"
@@ -122,10 +122,11 @@ void define(CLI::App& app, MeshCommand& command) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--max-samples", options.max_samples,
-                 "Of either side: with more, the density is lowered, and said so")
+                 "Largest number for the estimate, and for the truth: beyond it the density is "
+                 "reduced, with a note")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--seed", options.seed, "Of the samples")->capture_default_str();
+  app.add_option("--seed", options.seed, "Seed of the samples")->capture_default_str();
   app.add_flag("!--no-icp", options.icp, "Compare the meshes where they are");
   app.add_option("--crop", options.crop_m,
                  "True points further from the estimate are not judged [m]; errors count up to it")

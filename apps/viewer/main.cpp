@@ -27,10 +27,10 @@ namespace {
 constexpr int kBadInput = 1, kBadCommandLine = 2;
 
 constexpr const char* kAbout =
-    "Shows a team in a browser, while it runs or afterwards. It prints the address to open.\n\n"
-    "The page has the map, trajectories and loop closures in 3D, and what the robots say of "
-    "themselves:\nwho hears whom, cost, bytes, loads, memory. Its time slider goes back to any "
-    "moment while the run goes\non.";
+    "Shows a team in a browser, while it runs or afterwards. It prints the address to "
+    "open.\\n\\nThe page has the map, trajectories and loop closures in 3D, and the state of the "
+    "robots:\nwho hears whom, cost, bytes, loads, memory. Its time slider goes back to any moment "
+    "while the run\ncontinues.";
 
 constexpr const char* kFooter = R"(
 With --domain it joins the team's DDS domain and listens; it says nothing there, and robots neither wait

@@ -19,10 +19,10 @@ namespace km {
 /// All messages of the robots in the order of arrival, numbered from 0. Each page receives all of
 /// them, so that it can show any time of the past.
 ///
-/// If they exceed the limit, messages are dropped in this order: images with a newer image, meshes
-/// with a newer version, keyframe poses with a newer version, poses, past states; of each kind the
-/// oldest first. Present states and closures are kept. If they alone exceed the limit, new ones are
-/// refused.
+/// If they exceed the limit, messages are dropped, the oldest of each kind first. First go images
+/// with a newer image, then meshes with a newer version, keyframe poses with a newer version,
+/// poses, and past states. Present states and closures are kept. If they alone exceed the limit,
+/// new ones are refused.
 ///
 /// When another viewer starts, robots send past messages again: those without new content are
 /// ignored. Thread-safe.

@@ -1,7 +1,7 @@
 // The report of a run: shows the JSON in #run, whose keys report_page.hpp documents. Follows
 // charts.js in one module. Text of the data is inserted as text only, never as HTML.
 
-const STAGES = ['proposed', 'asked for', 'compared', 'verified', 'kept'];  // of ClosureStage, in order
+const STAGES = ['proposed', 'asked for', 'compared', 'verified', 'kept'];  // ClosureStage
 const KEPT = 4, VERIFIED = 3;
 const STAGE_COLORS = ['#8b93a1', '#8b93a1', '#d8746c', '#e8a34c', '#6fdc8c'];
 const SEVERITY_BADGES = {
