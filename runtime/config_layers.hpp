@@ -43,10 +43,10 @@ class ConfigLayers {
     return config;
   }
 
-  /// Throws ConfigError that lists every problem, sections nobody loaded included.
+  /// Throws ConfigError that lists every problem, including sections that no module loaded.
   void finish() const;
 
-  /// What was loaded, as a file that gives the same configuration again.
+  /// The loaded configuration as the text of a file that gives it again.
   [[nodiscard]] const std::string& effective() const { return effective_; }
 
  private:

@@ -37,8 +37,8 @@ template <typename T, typename Accepted>
   return '[' + list + ']';
 }
 
-/// Visitor that writes a config struct as YAML, with each field's text and bounds beside it. What
-/// it writes of fields that have values can be read back and gives the same values.
+/// Visitor that writes a config struct as YAML, with the description and bounds of each field
+/// beside it. Fields with values can be read back and then have the same values.
 class ConfigText : public FieldVisitor<ConfigText> {
  public:
   /// `indent`: before every line.

@@ -25,7 +25,7 @@ class Latest {
     return std::exchange(message_, nullptr);
   }
 
-  /// What was put can still be taken.
+  /// Closes the channel; the last value can still be taken.
   void close() {
     const std::lock_guard lock(mutex_);
     closed_ = true;

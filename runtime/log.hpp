@@ -78,8 +78,8 @@ inline Line limited(Level level, std::string_view tag, std::string key) {
 /// Lines less important than `level` are dropped. Default kInfo. Thread-safe.
 void set_level(Level level);
 
-/// Where lines go, unblocked_stderr() by default: no thread waits for whoever reads them. Returns
-/// where they went. For tests.
+/// Sets the output of log lines, by default unblocked_stderr(), so that no thread waits for the
+/// reader of the log. Returns the former output. For tests.
 std::ostream* set_output(std::ostream* output);
 
 }  // namespace log

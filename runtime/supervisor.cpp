@@ -99,7 +99,7 @@ void Supervisor::start_all() {
   lookouts_ = std::make_unique<Periodic>(
       std::chrono::milliseconds(100),
       [this, last_s = steady_now_s()]() mutable {
-        // What is longer than this the process did not run, or not enough to blame a node.
+        // A longer interval means that the process did not run, or too little to blame a node.
         constexpr double kLongest_s = 0.5;
         const double now_s = steady_now_s();
         watchdog_->tick(std::min(now_s - std::exchange(last_s, now_s), kLongest_s));

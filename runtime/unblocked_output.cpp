@@ -32,7 +32,7 @@ struct OutputQueue::State {
   std::mutex mutex;            // guards what follows
   std::condition_variable changed;
   std::deque<Piece> waiting;
-  std::size_t bytes = 0;  // of what waits and of what is being written
+  std::size_t bytes = 0;  // bytes that wait or are being written
   std::uint64_t lost = 0;
   bool writing = false;
   bool closed = false;
@@ -54,13 +54,14 @@ struct OutputQueue::State {
 
 namespace {
 
-// Blocks where nobody reads. False if the rest cannot be written.
+// Blocks while the reader does not read. False if the rest cannot be written.
 bool write_all(int descriptor, std::string_view text) {
   while (!text.empty()) {
     const ssize_t n = ::write(descriptor, text.data(), text.size());
     if (n > 0) {
       text.remove_prefix(static_cast<std::size_t>(n));
-    } else if (n < 0 && errno == EAGAIN) {  // somebody who shares it has made it non-blocking
+    } else if (n < 0 && errno == EAGAIN) {  // another process that shares it has made it
+                                            // non-blocking
       pollfd room{descriptor, POLLOUT, 0};
       poll(&room, 1, -1);
     } else if (n == 0 || errno != EINTR) {

@@ -25,9 +25,10 @@ constexpr double kUniqueness = 1.15;
 constexpr int kNeighbour = 2;               // [px]
 constexpr int kMaxLeftRightDifference = 1;  // [px]
 constexpr double kMaxRefinement_px = 1.5;   // in disparity
-constexpr double kMaxRowOffset_px = 1.5;    // what calibration leaves of the epipolar constraint
+constexpr double kMaxRowOffset_px = 1.5;    // remaining violation of the epipolar constraint after
+                                            // calibration
 
-// Local mean removed: what is left does not depend on exposure.
+// Subtracts the local mean, so that the result does not depend on exposure.
 cv::Mat flattened(const cv::Mat& image) {
   cv::Mat mean, difference;
   cv::blur(image, mean, {21, 21});

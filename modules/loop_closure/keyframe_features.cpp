@@ -30,8 +30,8 @@ void sort_by_response(std::vector<cv::KeyPoint>& corners) {
   });
 }
 
-// Of corners sorted by response, those with no stronger one of the same octave closer than
-// `radius` (grown with the octave); cells of half the radius make the test cheap.
+// The corners, sorted by response, without those that have a stronger one of the same octave closer
+// than `radius` (which grows with the octave). Cells of half the radius make the test cheap.
 std::vector<cv::KeyPoint> suppressed(const std::vector<cv::KeyPoint>& corners, double radius,
                                      cv::Size size) {
   std::vector<cv::KeyPoint> kept;

@@ -141,8 +141,8 @@ class BranchAndBound {
     done_ = best_size_ >= goal_.enough;
   }
 
-  // A clique takes at most one vertex of each colour: only vertices of a colour above `spare` can
-  // lead to a clique larger than the best, and only they enter `order`.
+  // A clique contains at most one vertex of each colour. Only vertices of a colour above `spare`
+  // can lead to a clique larger than the best, so only these enter `order`.
   void colour_candidates(Level& here, std::size_t spare) {
     here.order.clear();
     here.bound.clear();
@@ -187,7 +187,7 @@ class BranchAndBound {
   const BitGraph& graph_;
   const CliqueGoal goal_;
   std::size_t best_size_;
-  std::size_t root_bound_;  // of the cliques with any vertex not yet done at the root
+  std::size_t root_bound_;  // bound of the cliques with any vertex not yet done at the root
   Vertices clique_;
   std::deque<Level> levels_;
   CliqueSearch result_;

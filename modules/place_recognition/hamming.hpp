@@ -31,8 +31,8 @@ struct NearestBits {
   std::uint32_t distance = 0;
 };
 
-/// Precondition: `count` > 0. Without branches on the data: the distances of quantisation are too
-/// alike for an early exit to be predicted.
+/// Precondition: `count` > 0. No branch depends on the data, because the distances in quantisation
+/// are too similar for an early exit to be predicted.
 [[gnu::always_inline]] inline NearestBits nearest(const Bits256& query, const Bits256* candidates,
                                                   std::uint32_t count) {
   std::uint32_t best = ~0U;  // distance in the upper, index in the lower half

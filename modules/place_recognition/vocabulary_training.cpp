@@ -13,7 +13,7 @@
 namespace km {
 namespace {
 
-constexpr int kMaxRounds = 20;  // of Lloyd's iteration; few nodes need more than ten
+constexpr int kMaxRounds = 20;  // rounds of Lloyd's iteration; few nodes need more than ten
 
 // Byte b of entry v is bit b of v: eight counters of one byte in a machine word.
 constexpr std::array<std::uint64_t, 256> kSpread = [] {

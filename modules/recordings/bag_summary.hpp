@@ -11,7 +11,7 @@
 
 namespace km {
 
-/// What the first image of a topic is.
+/// Size and encoding of the first image of a topic.
 struct TopicImage {
   ImageSize size;
   std::string encoding;  ///< "mono8", "jpeg", ...

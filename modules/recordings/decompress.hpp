@@ -10,7 +10,7 @@
 
 namespace km {
 
-/// What a chunk or message of a recording may come to: more is no recording's, but a mistake.
+/// Maximum decompressed size of a chunk or message; a larger size is treated as an error.
 inline constexpr std::uint64_t kMaxDecompressed_bytes = std::uint64_t{512} << 20U;
 
 /// `size` bytes from what was compressed as recordings name it: "none" or "" (not at all), "lz4"

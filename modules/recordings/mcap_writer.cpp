@@ -129,7 +129,7 @@ void McapWriter::finish() {
 void McapWriter::put_summary() {
   std::vector<McapSummaryOffset> groups;
   McapFooter footer{.summary_start = size_};
-  crc_ = 0;  // of the summary from here on
+  crc_ = 0;  // checksum of the summary from here on
   const auto put_group = [&]<typename Record>(const std::vector<Record>& records) {
     const std::uint64_t start = size_;
     for (const Record& record : records) put(record);
@@ -159,7 +159,7 @@ void McapWriter::put_summary() {
   ByteWriter last;
   put_mcap(last, footer);
   auto bytes = last.release();
-  bytes.resize(bytes.size() - sizeof(footer.summary_crc));  // of all before itself
+  bytes.resize(bytes.size() - sizeof(footer.summary_crc));  // covers all bytes before itself
   append(bytes);
   last.u32(crc_);
   last.bytes(magic());

@@ -64,7 +64,7 @@ struct Ros1Connection {
   std::string type;
 };
 
-/// Where a chunk is, and how many messages of which connection it has.
+/// Position of a chunk, and its number of messages per connection.
 struct Ros1ChunkInfo {
   std::uint64_t begin = 0;  ///< [bytes from the beginning of the file].
   Stamp first = 0;

@@ -47,7 +47,7 @@ class RosWire {
   /// builtin_interfaces/Time [ns].
   void stamp(Stamp& value);
 
-  /// Why what was read is no message: it is cut or goes on; null if it is one.
+  /// Why the bytes are no such message: too short or too long; null if they are one.
   [[nodiscard]] const char* problem() const;
   [[nodiscard]] bool failed() const { return reader_.failed(); }
   void fail() { reader_.fail(); }

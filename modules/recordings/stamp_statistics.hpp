@@ -28,7 +28,8 @@ struct StampAgreement {
   std::size_t pairs = 0;             ///< Stamps of the one with the nearest of the other.
   std::size_t equal = 0;             ///< Pairs whose stamps are the same.
   double median_offset_s = 0.0;      ///< Second minus first; NaN without pairs.
-  double largest_deviation_s = 0.0;  ///< Of an offset from the median; NaN without pairs.
+  double largest_deviation_s = 0.0;  ///< Largest deviation of an offset from the median; NaN
+                                     ///< without pairs.
   std::size_t only_first = 0;        ///< Without a stamp of the other within half an interval.
   std::size_t only_second = 0;
 };

@@ -4,8 +4,8 @@
 
 namespace km {
 
-/// What a robot may send. Counted are the bytes of messages as in traffic.csv: once per robot that
-/// they go to, and once more where they are sent again. 0: no limit. See SendBudget.
+/// Limits on the bytes that a robot sends. Counted are the bytes of messages as in traffic.csv:
+/// once per addressee, and once more for each retransmission. 0: no limit. See SendBudget.
 struct BudgetConfig {
   static constexpr const char* kSection = "budget";
 
@@ -32,13 +32,14 @@ struct BudgetConfig {
                   "[B] in the whole run: the mesh is sent up to 60 % of them, words up to 80 %, "
                   "verification up to 90 %, poses up to 95 %, closures up to all");
     visitor.field("verification_bytes_per_s", verification_bytes_per_s, {0.0, 1e12},
-                  "[B/s] of bytes_per_s for requested keyframes");
+                  "[B/s] part of bytes_per_s for requested keyframes");
     visitor.field("poses_bytes_per_s", poses_bytes_per_s, {0.0, 1e12}, "[B/s] for the pose graph");
     visitor.field("words_bytes_per_s", words_bytes_per_s, {0.0, 1e12},
                   "[B/s] for bags of words, new and older ones together");
     visitor.field("mesh_bytes_per_s", mesh_bytes_per_s, {0.0, 1e12}, "[B/s] for the mesh");
-    visitor.field("peer_bytes_per_s", peer_bytes_per_s, {0.0, 1e12},
-                  "[B/s] to any one robot; what is for all goes when it may go to each");
+    visitor.field(
+        "peer_bytes_per_s", peer_bytes_per_s, {0.0, 1e12},
+        "[B/s] to any one robot; a message to all is sent when the limit of each robot permits it");
   }
 };
 

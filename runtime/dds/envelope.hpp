@@ -22,7 +22,7 @@ inline constexpr std::size_t kEnvelopeBytes = 32;
 [[nodiscard]] std::vector<std::uint8_t> serialize(const dds_topic_descriptor_t& type,
                                                   const void* wire);
 
-/// A sample of a generated type, read from bytes that anybody may have sent.
+/// A sample of a generated type, read from untrusted bytes.
 class WireSample {
  public:
   /// `type` outlives this. The sample is zero.

@@ -14,7 +14,8 @@
 
 namespace km {
 
-/// What one peer may have waiting on one topic, and how fast it is served.
+/// Bound on the waiting messages of one peer on one topic, and the rate at which they are
+/// processed.
 struct QueueQuota {
   std::size_t messages = 20000;
   std::size_t bytes = 8U << 20U;

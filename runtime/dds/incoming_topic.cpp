@@ -18,8 +18,8 @@ namespace km {
 namespace {
 
 constexpr std::size_t kMaxStreams = 4096;  // boots of robots remembered per topic
-// For a writer to become known: DDS may tell of its messages before its robot is heard, and a
-// robot that is killed and started again waits for its former self to be missed.
+// Time to wait until a writer becomes known. DDS may deliver messages before it announces their
+// robot. A robot that is killed and started again waits until its former process counts as lost.
 constexpr double kPatience_s = 8.0;
 constexpr double kRetry_s = 0.1;
 constexpr int kMaxInFlight = 16;
@@ -43,7 +43,7 @@ class ReceivedEnvelope {
   bool usable_;
 };
 
-// What a message takes while it is kept.
+// Bytes that a stored message takes.
 std::size_t kept_bytes(const ddsi_serdata& serialized) {
   return ddsi_serdata_size(&serialized) + kFilingBytes;
 }
@@ -126,7 +126,7 @@ void IncomingTopic::arrive(Serdata serialized, dds_instance_handle_t writer, dou
     return refuse("larger than its topic allows");
   const auto guid = writers_.participant_of(writer);
   if (!guid) return refuse("from no known writer");
-  // What waits comes first.
+  // Messages of a writer stay in order behind its waiting messages.
   const Peers::Claim claim = peers_.claim_of(*guid);
   if (!waiting_.contains(*guid) && is_settled(claim.standing))
     return admit(std::move(serialized), *guid, claim, now_s);
@@ -182,8 +182,8 @@ void IncomingTopic::file(Serdata serialized, const TeamPeer& sender, const Guid&
   if (!fits) refuse("for want of room");
 }
 
-// A status of a participant that is not the robot it says it is, or not yet. Of a twin, its number
-// tells how long it has been running; where the team has keys, its seal tells who it is.
+// Handles a status of a participant that is not (yet) the robot it claims to be. The status of a
+// twin states how long that has been running; in a team with keys the seal identifies its sender.
 void IncomingTopic::hear_claim(const ddsi_serdata& serialized, const Guid& writer,
                                const Peers::Claim& claim, double now_s) {
   if (spec_.kind != TopicKind::kStatus) return;
@@ -264,7 +264,8 @@ void IncomingTopic::await_key(Filed filed, double now_s) {
     refuse("one too many under a key that is not known yet");
 }
 
-// Of each robot the oldest that could not be opened for want of a key. False if none opens yet.
+// For each robot, delivers the oldest message that could not be opened because its key is missing.
+// False if none opens yet.
 bool IncomingTopic::deliver_again(double now_s) {
   return sealed_.serve(now_s, [this](RobotId /*from*/, const Filed& filed, double waited_s) {
     if (deliver(filed) == Verdict::kTaken) return true;

@@ -39,14 +39,14 @@ class InFlight : public std::enable_shared_from_this<InFlight> {
   int count_ = 0;
 };
 
-/// The receiving end of a topic, in two steps. The gate, on the receive thread, knows of a message
-/// who wrote it and how long it is, and nothing else: it files what comes from a robot of the team,
-/// apart by robot, lets wait shortly what comes from one that is not known yet, and refuses all
-/// else. It never waits itself. Delivery, on the topic's own thread, reads what was filed, in turn
-/// between the robots, drops duplicates, and hands it to its subscribers.
+/// The receiving end of a topic, in two steps. The gate runs on the receive thread and knows only
+/// the writer and the length of a message. It files messages of robots of the team, separately for
+/// each robot, lets messages of unknown writers wait for a short time, and refuses all others. It
+/// never waits. Delivery runs on the topic's own thread. It reads the filed messages, in rotation
+/// between the robots, drops duplicates, and calls the subscribers.
 ///
-/// Everything that arrives is untrusted: what is refused, and for want of room dropped, is counted
-/// by reason, logged at a limited rate, and goes no further.
+/// All received bytes are untrusted. Messages that are refused, or dropped because there is no
+/// room, are counted by reason and logged at a limited rate.
 class IncomingTopic {
  public:
   /// Gets what a message carries; publishes it, or returns why not (a string literal). `token` is
@@ -71,7 +71,7 @@ class IncomingTopic {
   // Delivery.
 
   void start();
-  /// What is still filed is dropped. Idempotent.
+  /// Drops all filed messages. Idempotent.
   void stop() noexcept;
   [[nodiscard]] std::exception_ptr error() const { return failed_ ? error_ : nullptr; }
 
@@ -90,7 +90,8 @@ class IncomingTopic {
     TeamPeer sender;
     Guid writer{};
   };
-  // What a message carries. `content`, if it opened, is the envelope's or that of `how`.
+  // Parts of a message that are ready to read. `content`, if it opened, is the envelope's or that
+  // of `how`.
   struct Readable {
     Opened how;
     std::span<const std::uint8_t> content;

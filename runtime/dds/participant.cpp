@@ -56,8 +56,8 @@ void write_general(std::ostream& xml, const DdsConfig& config, const NetworkInte
       << "B</FragmentSize></General>";
 }
 
-// Where the discovery of the robots 0, 1, ... of a host listens: the port mapping of RTPS with its
-// default parameters.
+// Discovery ports of the robots 0, 1, ... of a host: the port mapping of RTPS with its default
+// parameters.
 int discovery_port(int domain, int index) {
   return 7400 + 250 * domain + 10 + 2 * index;
 }
@@ -110,7 +110,7 @@ void log_line(void* /*argument*/, const dds_log_data_t* data) {
   while (!text.empty() && text.back() == '\n') text.remove_suffix(1);
   const bool severe = (data->priority & (DDS_LC_FATAL | DDS_LC_ERROR)) != 0;
   const auto level = severe ? log::Level::kError : log::Level::kWarn;
-  // A dead link fails every packet alike: what is limited is the kind of message.
+  // A dead link fails every packet in the same way, so the limit applies to the kind of message.
   log::limited(level, "dds", std::string(text.substr(0, 24))) << text;
 }
 

@@ -65,7 +65,7 @@ class DdsParticipant {
   [[nodiscard]] const NetworkInterface& interface() const { return domain_->interface(); }
   [[nodiscard]] dds_entity_t handle() const { return participant_.handle(); }
   [[nodiscard]] const Guid& guid() const { return guid_; }
-  /// What seals all messages to and from others; null: they go in clear.
+  /// Seal of all messages to and from other robots; null: they are sent unencrypted.
   [[nodiscard]] SharedSeal* seal() const { return seal_.get(); }
 
  private:

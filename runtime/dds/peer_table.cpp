@@ -8,7 +8,7 @@ namespace {
 
 // A robot that has been running for longer is not new: it keeps its id.
 constexpr double kNew_s = 10.0;
-// Uptimes nearer to each other than this do not tell who was first: two statuses.
+// Uptimes closer than the interval of two statuses do not show which process was first.
 constexpr double kSameUptime_s = 1.0;
 
 }  // namespace

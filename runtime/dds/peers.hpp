@@ -41,10 +41,10 @@ class WriterBook {
 /// Knows when all subscribers are done with an event. Thread-safe.
 class EventReceipts : public std::enable_shared_from_this<EventReceipts> {
  public:
-  /// The event, whose process is handed out by take() once nobody holds it any more.
+  /// Returns the event; take() returns its process once all copies of the event are released.
   [[nodiscard]] Topic<PeerEvent>::Message track(PeerEvent event);
 
-  /// Empty thereafter.
+  /// The result is empty afterwards.
   [[nodiscard]] std::vector<TeamPeer> take();
 
  private:
@@ -78,10 +78,10 @@ class Peers {
 
   [[nodiscard]] std::optional<RobotIdentity> identity_of(const Guid& guid) const;
 
-  /// What is to be done with what a participant sends, and whom it says it is.
+  /// Handling of the messages of a participant, and its claimed identity.
   struct Claim {
     Standing standing = Standing::kUnknown;
-    TeamPeer sender;  ///< Of a robot: neither kUnknown nor kStranger.
+    TeamPeer sender;  ///< Set for a robot: neither kUnknown nor kStranger.
   };
   [[nodiscard]] Claim claim_of(const Guid& guid) const;
   [[nodiscard]] bool is_current(const TeamPeer& sender) const;

@@ -33,7 +33,7 @@ class RosNetwork {
   /// "sensor_msgs/msg/Image". Throws std::invalid_argument for others than known_ros_types().
   [[nodiscard]] static const dds_topic_descriptor_t& descriptor_of(std::string_view type);
 
-  /// A DDS topic for ROS' `topic`. Throws likewise.
+  /// A DDS topic for ROS' `topic`. Throws DdsError and std::invalid_argument for an unknown type.
   [[nodiscard]] DdsEntity create_topic(std::string_view topic, std::string_view type) const;
 
  private:

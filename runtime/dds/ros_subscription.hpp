@@ -32,8 +32,8 @@ struct RosMessage {
   std::vector<std::uint8_t> bytes;
 };
 
-/// Messages of ROS 2 as they come. What is silent for kSilence_s is named in the log, from the
-/// first next() on. Not thread-safe but for stop().
+/// Messages of ROS 2 in the order of arrival. From the first next() on, topics that are silent for
+/// kSilence_s are named in the log. Not thread-safe, except for stop().
 class RosSubscription {
  public:
   static constexpr double kSilence_s = 5.0;
@@ -64,9 +64,10 @@ class RosSubscription {
   std::vector<DdsEntity> dds_topics_, readers_;
   DdsEntity waitset_, guard_;
   std::deque<RosMessage> taken_;
-  std::vector<std::uint64_t> lost_before_;  // of each topic, before the first next()
-  std::vector<double> heard_s_;  // of each topic, when last; steady clock; empty before next()
-  double told_s_ = 0.0;          // when silence was looked for
+  std::vector<std::uint64_t> lost_before_;  // by topic: lost messages before the first next()
+  std::vector<double> heard_s_;  // by topic: time of the last message by the steady clock; empty
+                                 // before next()
+  double told_s_ = 0.0;          // time of the last check for silence
   double end_s_ = std::numeric_limits<double>::infinity();
   std::atomic<bool> stopped_ = false;
 };

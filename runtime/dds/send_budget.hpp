@@ -19,7 +19,7 @@ namespace km {
 /// Pure: time comes in [s], any origin, and does not go backwards. Not thread-safe.
 class SendBudget {
  public:
-  /// What may be sent at once after a silence, in seconds of the limit.
+  /// Amount that may be sent at once after a silence, in seconds of the limit.
   static constexpr double kBurst_s = 0.2;
 
   /// Throws ConfigError if `config` is out of bounds.

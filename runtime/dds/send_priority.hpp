@@ -6,10 +6,10 @@
 
 namespace km {
 
-/// What goes first where not all can go, most important first.
+/// Order of sending when the budget is short, most important first.
 enum class SendPriority {
   kPresence,      ///< Statuses: small, and always sent.
-  kClosures,      ///< Told once, and what joins two robots.
+  kClosures,      ///< Sent once; they join robots.
   kVerification,  ///< Requests for keyframes, and replies.
   kPoses,         ///< All messages of the pose graph.
   kWords,         ///< Bags of words.

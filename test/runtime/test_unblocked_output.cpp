@@ -65,7 +65,7 @@ std::string numbered(int i) {
   return "line " + std::to_string(i);
 }
 
-TEST_CASE("What is queued comes out whole and in order", "[output]") {
+TEST_CASE("Queued text is written completely and in order", "[output]") {
   constexpr int kLines = 20000;  // many times what a pipe holds
   Pipe pipe;
   std::vector<std::string> lines;
@@ -79,11 +79,11 @@ TEST_CASE("What is queued comes out whole and in order", "[output]") {
   for (int i = 0; i < kLines; ++i) REQUIRE(lines[static_cast<std::size_t>(i)] == numbered(i));
 }
 
-TEST_CASE("A blocked output holds nobody up, and what is lost is counted in its place",
+TEST_CASE("A blocked output delays no caller, and lost lines are counted in their place",
           "[output]") {
   constexpr int kLines = 20000;
   Pipe pipe;
-  pipe.fill();  // nobody reads: a queue that could still write would have room again in between
+  pipe.fill();  // without a reader; a queue that could still write would have room again in between
   OutputQueue queue(pipe.writer(), 50000);
   for (int i = 0; i < kLines; ++i) queue.write(numbered(i) + '\n');
   auto lines = pipe.read_to("lost: output blocked or failed");
@@ -118,7 +118,8 @@ TEST_CASE("A closed pipe is an error of a write and not the end of the process",
   std::signal(SIGPIPE, before);
 }
 
-TEST_CASE("A full disk costs the lines that it does not take, and tells so later", "[output]") {
+TEST_CASE("A full disk costs the lines that it refuses, and their number is written later",
+          "[output]") {
   Pipe pipe;
   OutputQueue queue(pipe.writer());
   const int working = dup(pipe.writer());

@@ -66,7 +66,7 @@ TEST_CASE("A long step that ends is no fault, and many steps are none", "[watchd
   CHECK_FALSE(bench.watchdog.given_up().has_value());
 }
 
-TEST_CASE("Who waits for another is not blamed, and is again when it goes on", "[watchdog]") {
+TEST_CASE("A node that waits for another is not blamed until it continues", "[watchdog]") {
   Bench bench;
   const Heartbeat::Step step(bench.node.heartbeat);
   {

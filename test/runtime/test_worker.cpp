@@ -30,7 +30,8 @@ TEST_CASE("A worker handles everything posted, in order, before stop returns", "
   CHECK(worker.error() == nullptr);
 }
 
-TEST_CASE("A worker that throws keeps the exception and lets nobody wait for it", "[worker]") {
+TEST_CASE("A worker that throws keeps the exception and releases the threads that wait for it",
+          "[worker]") {
   Worker<int> worker(1, Overflow::kBlock, [](int) { throw std::runtime_error("no"); });
   worker.start();
   while (worker.post(0)) {
@@ -75,7 +76,8 @@ TEST_CASE("A topic hands one shared message to every subscriber, in order", "[to
 static_assert(!std::is_convertible_v<In<int>, Out<int>>);
 static_assert(!std::is_convertible_v<Out<int>, In<int>>);
 
-TEST_CASE("What is published through one handle of a topic is heard through another", "[topic]") {
+TEST_CASE("A message published through one handle of a topic arrives at another handle",
+          "[topic]") {
   Topic<int> topic;
   const In<int> in = topic;
   const Out<int> out = topic;
@@ -86,7 +88,7 @@ TEST_CASE("What is published through one handle of a topic is heard through anot
   CHECK(heard == std::vector<int>{7, 8});
 }
 
-TEST_CASE("A queue hands out what was put in, in order, also after it is closed", "[queue]") {
+TEST_CASE("A queue returns its values in order, also after it is closed", "[queue]") {
   BoundedQueue<int> queue(3, Overflow::kBlock);
   for (int i = 0; i < 3; ++i) CHECK(queue.push(i));
   queue.close();
@@ -123,7 +125,7 @@ TEST_CASE("A full queue that blocks loses nothing between two threads", "[queue]
   CHECK(queue.load().dropped == 0);
 }
 
-TEST_CASE("Closing a queue releases whoever waits on it", "[queue]") {
+TEST_CASE("Closing a queue releases the threads that wait for it", "[queue]") {
   BoundedQueue<int> empty(1, Overflow::kBlock);
   BoundedQueue<int> full(1, Overflow::kBlock);
   full.push(0);
@@ -139,7 +141,7 @@ TEST_CASE("A queue without room is refused", "[queue]") {
   CHECK_THROWS_AS(BoundedQueue<int>(0, Overflow::kBlock), std::invalid_argument);
 }
 
-TEST_CASE("Of what was put the newest is taken, once", "[runtime]") {
+TEST_CASE("The newest value is taken, and only once", "[runtime]") {
   Latest<int> latest;
   CHECK(latest.take() == nullptr);
   const auto old = std::make_shared<const int>(1);

@@ -166,7 +166,7 @@ GrayImage dot_at(const Eigen::Vector2d& bearing, const Camera& camera) {
   return image;
 }
 
-// What the matcher finds of a dot at `left` that has an inverse depth of `truth` [1/m].
+// Inverse depth that the matcher finds for a dot at `left` with an inverse depth of `truth` [1/m].
 float found(const StereoRig& rig, const Eigen::Vector2d& left, double truth) {
   const EpipolarMatcher matcher(rig, {.min_depth_m = 0.5, .max_depth_m = 10.0});
   StereoFrame frame;

@@ -65,7 +65,7 @@ TEST_CASE("a keyframe that does not exist yet makes room and is tried later",
   CHECK(requests.due(2.1) == Ids{{7, 9}});
 }
 
-TEST_CASE("a late answer counts, one nobody asked for does not", "[keyframe_requests]") {
+TEST_CASE("a late reply counts and a reply without a request does not", "[keyframe_requests]") {
   KeyframeRequests requests(2.0, 1);
   CHECK_FALSE(requests.arrived({7, 1}));
   requests.want({7, 1});
@@ -83,7 +83,7 @@ TEST_CASE("windows and time-outs must be positive", "[keyframe_requests]") {
   CHECK_THROWS_AS(KeyframeRequests(1.0, 0), std::invalid_argument);
 }
 
-TEST_CASE("the cache forgets what was used longest ago", "[keyframe_cache]") {
+TEST_CASE("the cache drops the keyframe used longest ago", "[keyframe_cache]") {
   KeyframeCache cache(2);
   const auto keyframe = [](std::uint32_t index) {
     Keyframe k;
@@ -143,7 +143,7 @@ TEST_CASE("Around a closure nothing is asked for, farther with every success",
   CHECK(economy.judge(candidate(100, 50, 1, kPeer + 1)) == Verdict::kAsk);  // another robot
 }
 
-TEST_CASE("What was asked for is not asked for again beside it", "[request_economy]") {
+TEST_CASE("No keyframe near a requested one is requested", "[request_economy]") {
   LoopClosureConfig config;
   config.attempt_separation = 2;
   RequestEconomy economy(config);

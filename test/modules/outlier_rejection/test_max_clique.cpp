@@ -129,7 +129,7 @@ TEST_CASE("A planted clique is found, whatever the order of its vertices", "[cli
   CHECK(std::vector(clique.clique().begin(), clique.clique().end()) == planted);
 }
 
-TEST_CASE("Of equally large cliques the older one is kept", "[clique]") {
+TEST_CASE("The older of equally large cliques is kept", "[clique]") {
   MaxClique clique(kNoLimit);  // 0-1, then 1-2, then 2-3
   CHECK(clique.add({}));
   for (const std::size_t v : {0U, 1U, 2U}) clique.add(std::vector<std::size_t>{v});
@@ -218,7 +218,8 @@ TEST_CASE("The greedy clique follows the degrees", "[clique]") {
   CHECK(greedy_clique(graph) == Vertices{0, 3, 4, 5});
 }
 
-TEST_CASE("What is greedily found is a clique with the vertex, and larger than asked", "[clique]") {
+TEST_CASE("The greedy heuristic finds a clique with the vertex that is larger than required",
+          "[clique]") {
   const unsigned seed = GENERATE(range(0U, 20U));
   const double density = GENERATE(0.2, 0.5, 0.9);
   CAPTURE(seed, density);

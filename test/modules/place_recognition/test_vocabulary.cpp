@@ -151,7 +151,7 @@ TEST_CASE("Training depends on the seed and on nothing else", "[place_recognitio
   CHECK(problem_of(first).empty());
 }
 
-TEST_CASE("Two sightings of one place are more alike than two places", "[place_recognition]") {
+TEST_CASE("Two sightings of one place are more similar than two places", "[place_recognition]") {
   SyntheticOrb world(4, 3);
   const Vocabulary vocabulary(train_vocabulary(world.images(50, 400, 5), {.depth = 4}));
   const auto place = world.image(500, 0);
@@ -164,7 +164,7 @@ TEST_CASE("Two sightings of one place are more alike than two places", "[place_r
   CHECK(same > 2.0 * other);
 }
 
-TEST_CASE("What is no vocabulary is refused with the reason", "[place_recognition]") {
+TEST_CASE("An invalid vocabulary is refused with the reason", "[place_recognition]") {
   CHECK_THROWS_WITH(train_vocabulary(Images{{}, {}}, {}), Contains("no descriptors"));
   CHECK_THROWS_WITH(train_vocabulary(Images{{ladder(3), ladder(3)}}, {}), Contains("are equal"));
   CHECK_THROWS_AS(train_vocabulary(Images{{ladder(3)}}, {.branching = 1}), ConfigError);
@@ -288,7 +288,7 @@ TEST_CASE("A malformed tree is refused although its checksum fits", "[place_reco
                     Contains("offset 40: node 0 has 5 children, branching is 4"));
 }
 
-TEST_CASE("A spoilt vocabulary is refused by name", "[place_recognition]") {
+TEST_CASE("A corrupted vocabulary is refused by name", "[place_recognition]") {
   check_spoilt<std::runtime_error>(
       serialize(small_vocabulary()), "spoilt.kmvoc",
       [](const std::string& bytes) { (void)deserialize(bytes, "spoilt.kmvoc"); });
@@ -296,7 +296,7 @@ TEST_CASE("A spoilt vocabulary is refused by name", "[place_recognition]") {
                                      [](const auto& place) { (void)load_vocabulary(place); });
 }
 
-TEST_CASE("A spoilt tree with a checksum that fits is refused, or finds words",
+TEST_CASE("A corrupted tree with a matching checksum is refused or finds words",
           "[place_recognition]") {
   const VocabularyData good = small_vocabulary();
   unsigned refused = 0;
@@ -351,7 +351,8 @@ TEST_CASE("The shipped vocabulary loads, is the documented one, and is small",
 }
 
 // checks.md L5 on real images, through the tool.
-TEST_CASE("The tool trains on real images and tells the two places apart", "[place_recognition]") {
+TEST_CASE("The tool trains on real images and distinguishes the two places",
+          "[place_recognition]") {
   const auto images = shared_data("kimera_vio_lcd");
   if (!images) return;
   const TemporaryFolder folder;

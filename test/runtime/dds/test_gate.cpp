@@ -55,7 +55,7 @@ TEST_CASE("A message larger than its topic allows is not even read", "[gate]") {
   CHECK(b.received.wait_for(1)[0].index == 2);
 }
 
-TEST_CASE("What a robot said before it left is heard", "[gate]") {
+TEST_CASE("Messages that a robot sent before it left are received", "[gate]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3);
   std::promise<void> leave;
@@ -74,7 +74,8 @@ TEST_CASE("What a robot said before it left is heard", "[gate]") {
   CHECK(a.received.wait_for(50).size() == 50);
 }
 
-TEST_CASE("Nobody speaks for a robot, not even from a writer that is gone", "[gate]") {
+TEST_CASE("No participant can send in a robot's name, not even from a writer that is gone",
+          "[gate]") {
   Two two;
   auto& [domain, a, b] = two;
   const bool shows_the_id = GENERATE(false, true);
@@ -117,7 +118,7 @@ TEST_CASE("A peer that sends much waits for itself and not the others", "[gate]"
   node.stop();
 }
 
-TEST_CASE("Nobody but the status of a robot's twin makes it yield", "[gate]") {
+TEST_CASE("Only the status of a robot's twin makes it yield", "[gate]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3);
   a.start();
