@@ -12,7 +12,7 @@ try {
   const page = await browser.open(pathToFileURL(file).href, 800, 2600);
   await page.until('document.body.dataset.ready');
   if (shot) await page.screenshot(shot);
-  // Of the n-th chart: attributes of its elements, and all its text.
+  // Attributes of the elements of the n-th chart, and all its text.
   const all = (n, where, name) => page.evaluate(`[...document.querySelectorAll('.chart')[${
       n}].querySelectorAll('${where}')].map((e) => e.getAttribute('${name}'))`);
   const texts = (n, where) => page.evaluate(`[...document.querySelectorAll('.chart')[${
@@ -34,7 +34,7 @@ try {
       await texts(0, LABELS), ['0', '1', '2', '3', '4', '0', '2', '4', '6', '8', '10', 'rounds']);
   assert.equal((await all(0, MARKS, 'cx')).length, 1);
 
-  // What has no logarithm parts a line, too; all decades are there.
+  // A value without a logarithm interrupts a line too; all decades are there.
   const decades = await all(1, LINES, 'd');
   assert.match(decades[0], /^M[^ML]*M[^ML]*L[^ML]*$/);
   const labels = await texts(1, LABELS);
