@@ -9,7 +9,7 @@
 
 namespace km {
 
-/// Time that only goes forward, from any origin [s].
+/// Steady time [s] with any origin.
 [[nodiscard]] double steady_now_s();
 
 /// Time since 1970 [s].
@@ -36,7 +36,7 @@ class ReplayClock {
   /// The same now, as steady_now_s() counts.
   [[nodiscard]] std::optional<double> due_s(Stamp stamp);
 
-  /// Everything that is not yet due is due later by `s`; a wait that has begun stays as it is.
+  /// Delays everything that is not yet due by `s`; a wait that has begun is unchanged.
   void pause(double s);
 
   /// Ends every wait, now and later. Idempotent.

@@ -11,7 +11,7 @@
 
 namespace km {
 
-/// A value as it is written in YAML; empty if there is none.
+/// A value as YAML text; empty if it cannot be written.
 template <typename T, typename Accepted>
 [[nodiscard]] std::string yaml_text(const T& value, const Accepted& accepted) {
   if constexpr (std::is_enum_v<T>)

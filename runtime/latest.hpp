@@ -6,8 +6,8 @@
 
 namespace km {
 
-/// The newest message of a kind, until it is taken: for large ones of which only the newest counts.
-/// In the queue of a slow node they would pile up, each held in memory until its turn. Thread-safe.
+/// The newest message of a kind, until it is taken. For large messages of which only the newest
+/// counts: in the queue of a slow node they would accumulate in memory. Thread-safe.
 template <typename T>
 class Latest {
  public:

@@ -70,7 +70,7 @@ inline Line debug(std::string_view tag) {
   return {Level::kDebug, tag};
 }
 
-/// At most one line per `key` in 5 s; the next one says how many were held back.
+/// At most one line per `key` in 5 s; the next one states how many were suppressed.
 inline Line limited(Level level, std::string_view tag, std::string key) {
   return {level, tag, std::move(key)};
 }
@@ -88,7 +88,7 @@ std::ostream* set_output(std::ostream* output);
 /// seconds. Log lines go above it and never into it. One per process. Thread-safe.
 class StatusLine {
  public:
-  /// On unblocked_stdout(); a terminal if isatty() says so.
+  /// Writes to unblocked_stdout(); treats it as a terminal if isatty() is true.
   StatusLine();
   /// For tests: `output` outlives this.
   StatusLine(std::ostream& output, bool terminal, double plain_interval_s = 5.0);

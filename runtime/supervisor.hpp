@@ -78,8 +78,8 @@ class Supervisor {
   Supervisor(const Supervisor&) = delete;
   Supervisor& operator=(const Supervisor&) = delete;
 
-  /// Adds a node in the order of the data flow; the bridge to the other robots comes last.
-  /// Throws std::invalid_argument if a node of that name is there already.
+  /// Adds a node in the order of the data flow, with the bridge to the other robots last. Throws
+  /// std::invalid_argument if a node with that name exists.
   void add(std::unique_ptr<Node> node);
 
   /// Builds a node in place and returns it.

@@ -12,7 +12,7 @@
 
 namespace km {
 
-/// A thread to which no signal to the process is delivered: others are there for those.
+/// Starts a thread that receives no signals of the process, because another thread handles them.
 template <typename Work>
 [[nodiscard]] std::thread start_without_signals(Work&& work) {
   sigset_t all;

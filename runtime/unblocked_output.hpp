@@ -35,11 +35,11 @@ class OutputQueue {
   std::thread writer_;
 };
 
-/// Standard output and standard error through an OutputQueue each, or one for both where they are
-/// the same file, so that the order is kept. A flush passes on what was written since the last.
-/// The program's end waits for what is queued, at most OutputQueue::kGrace_s; what is written to
-/// std::cout or std::cerr beside them comes out of turn, unless drain_standard_output() is called
-/// before. Each stream is for one thread at a time.
+/// Standard output and standard error, each through an OutputQueue, or through a common one if they
+/// are the same file, so that the order is kept. A flush forwards the text since the last one. The
+/// program's end waits for the queued text, at most OutputQueue::kGrace_s. Text written directly to
+/// std::cout or std::cerr may appear out of order, unless drain_standard_output() is called before.
+/// Each stream is for one thread at a time.
 std::ostream& unblocked_stdout();
 std::ostream& unblocked_stderr();
 

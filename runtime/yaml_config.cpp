@@ -40,7 +40,7 @@ std::string one_line(const YAML::Node& node) {
 // Bounds for all problems together, and for one: a file that is no configuration causes a million.
 constexpr std::size_t kMaxMessage = 4000, kMaxProblem = 500;
 
-// A problem: what files say in it may be long, or not printable.
+// Text from files in a problem may be long, or not printable.
 std::string line_of(const std::string& problem) {
   return readable(problem, kMaxProblem) + '\n';
 }

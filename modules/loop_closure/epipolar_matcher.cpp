@@ -134,7 +134,8 @@ std::optional<Refined> refine(const NormalisedPatch& reference, const cv::Mat& t
     H << patch.dx.square().sum(), (patch.dx * patch.dy).sum(), (patch.dx * patch.dy).sum(),
         patch.dy.square().sum();
     const Eigen::Vector2f g((patch.dx * error).sum(), (patch.dy * error).sum());
-    H.diagonal().array() += 1e-6F;  // an edge along the row: stay where the search put it
+    H.diagonal().array() += 1e-6F;  // regularises an edge along the row, so that the match stays
+                                    // there
     const Eigen::Vector2d delta = H.ldlt().solve(g).cast<double>();
     if (delta.norm() < kConverged_px || i == kSteps)
       return Refined{position, (reference.value * patch.value).sum()};

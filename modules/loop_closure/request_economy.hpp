@@ -49,7 +49,7 @@ class RequestEconomy {
   /// The peer's keyframes are others now.
   void forget(RobotId peer) { peers_.erase(peer); }
 
-  /// A keyframe that was asked for has come, and has led to closures or to none.
+  /// Notes that a requested keyframe has arrived and whether it has led to closures.
   void conclude(const KeyframeId& keyframe, bool verified);
 
  private:

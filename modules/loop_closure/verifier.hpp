@@ -39,16 +39,18 @@ struct Verification {
 /// keyframes with its covariance, or the reason of the rejection.
 ///
 ///  1. Matches by descriptor alone (match_descriptors()).
-///  2. A pose that many of them agree with (ransac_pose(); Chang et al., "Kimera-Multi", ICRA 2021,
+///  2. A pose with which many of them agree (ransac_pose(); Chang et al., "Kimera-Multi", ICRA
+///     2021,
 ///     Sec. III-A).
-///  3. Matching again where the pose says, in narrowing circles, and refinement on the inliers:
-///     most correspondences are found only now, since similar corners elsewhere no longer compete.
-///  4. Tests, each against a way of being wrong that was seen on recorded images.
+///  3. Matching again near the predicted places, in narrowing circles, and refinement on the
+///     inliers.
+///     Most correspondences are found in this step, because similar corners elsewhere are excluded.
+///  4. Tests, each against an error that was seen on recorded images.
 ///
 /// The covariance is that of the refinement (both images' noise, scaled up if the residuals are
-/// larger) times a factor for what neighbouring points err in common, plus systematic errors.
+/// larger), times a factor for common errors of neighbouring points, plus systematic errors.
 ///
-/// Pure: the same features give the same result. verify() is safe to call from several threads.
+/// Deterministic: equal features give equal results. verify() is safe to call from several threads.
 class Verifier {
  public:
   /// Throws ConfigError if `config` is out of bounds.

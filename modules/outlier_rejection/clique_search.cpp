@@ -9,8 +9,8 @@ namespace {
 using Vertices = std::vector<std::size_t>;
 
 // Vertices of the k-core of the subgraph that `candidates` induce: each has at least k neighbours
-// among them. Ordered by repeatedly taking the vertex of least degree away (degeneracy order), the
-// last taken first, so that the densest part comes first.
+// among them. In degeneracy order (the vertex of least degree is removed repeatedly), reversed so
+// that the densest part comes first.
 Vertices core_in_degeneracy_order(const BitGraph& graph, std::span<const std::size_t> candidates,
                                   std::size_t k) {
   BitSet members(graph.capacity());

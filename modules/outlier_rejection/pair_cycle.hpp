@@ -9,8 +9,9 @@
 
 namespace km {
 
-/// A symmetric 6x6 matrix, tangent [rotation; translation], by the three blocks that say it all:
-/// [rr rt; rt^T tt]. Moving it into another frame costs a third of the same with Matrix6.
+/// A symmetric 6x6 matrix, tangent [rotation; translation], as its three independent blocks: [rr
+/// rt; rt^T tt]. Transforming it into another frame costs a third of the same operation with
+/// Matrix6.
 struct BlockCovariance {
   Eigen::Matrix3d rr = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d rt = Eigen::Matrix3d::Zero();

@@ -31,9 +31,9 @@ class WitnessedPair {
 
   /// All that were added, ascending.
   [[nodiscard]] std::vector<ClosureId> closures() const { return {added_.begin(), added_.end()}; }
-  /// Independent closures that agree: at least so many, at most PcmConfig::min_witnesses.
+  /// Number of independent closures that agree: a lower bound, at most PcmConfig::min_witnesses.
   [[nodiscard]] std::size_t witnesses() const { return clique_.clique().size(); }
-  /// There are PcmConfig::min_witnesses.
+  /// True if there are PcmConfig::min_witnesses.
   [[nodiscard]] bool is_witnessed() const;
 
  private:

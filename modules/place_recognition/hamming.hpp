@@ -48,8 +48,8 @@ struct NearestBits {
 [[nodiscard]] std::vector<NearestBits> nearest_of_each(std::span<const Bits256> queries,
                                                        std::span<const Bits256> candidates);
 
-/// True if this processor counts bits in one instruction. Kernels that are worth it come twice,
-/// once compiled for such processors; always_inline functions above adapt to their caller.
+/// True if this processor counts bits in one instruction. Important kernels exist twice, once
+/// compiled for such processors; the always_inline functions above adapt to their caller.
 [[nodiscard]] bool has_popcount();
 
 }  // namespace km

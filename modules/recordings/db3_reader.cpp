@@ -20,7 +20,7 @@ bool is_in_use(const fs::path& path, const char* suffix) {
   return !none && size > 0;
 }
 
-// `path` as SQLite takes it with options. Without a log or journal beside it the file is complete:
+// URI of `path` with options for SQLite. Without a log or journal beside it the file is complete:
 // "immutable" then needs no lock, and writes nothing beside it.
 std::string uri_of(const fs::path& path) {
   std::string uri = "file:";

@@ -36,7 +36,7 @@ class McapIn {
     if (!reader_.failed() && crc != 0 && crc != mcap_crc(before)) reader_.fail();
   }
 
-  // A map or list of pairs, of which the length in bytes comes first.
+  // A map or list of pairs, preceded by its length in bytes.
   template <typename Key, typename Value>
   void pairs(std::vector<std::pair<Key, Value>>& values) {
     McapIn in(reader_.bytes(reader_.u32()));

@@ -14,9 +14,9 @@
 
 namespace km {
 
-/// Records of an MCAP file (mcap.dev/spec): an octet that says which, eight that say how many
-/// follow, little endian. Fields that come after those known here are left alone, as the
-/// specification asks for.
+/// Records of an MCAP file (mcap.dev/spec): a byte with the opcode, eight bytes with the size of
+/// the content, little endian, and the content. Unknown fields at its end are ignored, as the
+/// specification demands.
 enum class McapOpcode : std::uint8_t {
   kHeader = 0x01,
   kFooter = 0x02,
@@ -101,7 +101,7 @@ struct McapChunk {
 struct McapMessageIndex {
   static constexpr McapOpcode kOpcode = McapOpcode::kMessageIndex;
   std::uint16_t channel_id = 0;
-  /// Log time, and where the record begins in the chunk's, not compressed [bytes].
+  /// Log time, and position of the record in the uncompressed records of the chunk [bytes].
   std::vector<std::pair<std::uint64_t, std::uint64_t>> messages;
 };
 
@@ -111,7 +111,7 @@ struct McapChunkIndex {
   Stamp message_end_time = 0;
   std::uint64_t chunk_start = 0;   ///< [bytes from the beginning of the file].
   std::uint64_t chunk_length = 0;  ///< With opcode and length.
-  /// By channel, where its index begins [bytes from the beginning of the file].
+  /// By channel: position of its index [bytes from the beginning of the file].
   std::vector<std::pair<std::uint16_t, std::uint64_t>> message_index_offsets = {};
   std::uint64_t message_index_length = 0;  ///< Length of the indexes right behind the chunk.
   std::string compression;

@@ -54,7 +54,8 @@ void McapWriter::add(const McapMessage& message, std::span<const std::uint8_t> d
   if (chunk_.records.size() >= options_.chunk_bytes) end_chunk();
 }
 
-// Before the first message of a channel, in its chunk: who reads from the beginning knows it then.
+// Writes the channel before its first message, in its chunk, for readers that start at the
+// beginning.
 void McapWriter::define(const McapChannel& channel) {
   if (!written_channels_.insert(channel.id).second) return;
   if (written_schemas_.insert(channel.schema_id).second)

@@ -27,7 +27,7 @@ enum class RosImages {
 [[nodiscard]] SE3 T_frame_camera(const RosCameraInfo& info, RosImages images);
 
 /// Distance of a right camera from the left one by Tx = -fx B, the fourth number of its P [m];
-/// nullopt where it says none.
+/// nullopt if P contains none.
 [[nodiscard]] std::optional<double> baseline_m(const RosCameraInfo& right);
 
 }  // namespace km

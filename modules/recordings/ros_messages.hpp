@@ -190,8 +190,8 @@ struct RosLog {
 /// True if the channel's messages are of `type`, a name of ROS 1; ROS 2 writes "/msg/" in it.
 [[nodiscard]] bool is_of_type(const BagChannel& channel, std::string_view type);
 
-/// A message of a type above in the encoding that its channel says, "ros1" or "cdr". Refuses bytes
-/// that are not one, and images with fewer pixels than they say. A RosHeader is read from the
+/// A message of a type above in the encoding of its channel, "ros1" or "cdr". Refuses bytes that
+/// are no such message, and images with fewer pixels than they state. A RosHeader is read from the
 /// beginning of any message that has one.
 template <typename Message>
 Decoded<Message> decode_ros(std::string_view encoding, std::span<const std::uint8_t> bytes);

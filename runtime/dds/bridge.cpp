@@ -32,7 +32,7 @@ TopicSpec key_topic() {
           .carries_keys = true};
 }
 
-// Null where the team has no keys.
+// Null without keys.
 std::unique_ptr<OutgoingTopic> make_key_topic(const DdsParticipant& participant,
                                               const Peers& peers) {
   if (participant.seal() == nullptr) return nullptr;

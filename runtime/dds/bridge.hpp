@@ -37,8 +37,8 @@ struct Addressed {
   std::uint64_t boot = 0;  ///< See Addressee.
 };
 
-/// A channel between robots: what is published here on `to_peers` comes out of `from_peers` there.
-/// One end can only be written and the other only read, so that no node takes one for the other.
+/// A channel between robots: a message published on `to_peers` here arrives on `from_peers` there.
+/// One end can only be written and the other only read, so that no node confuses them.
 template <typename T, typename Sent = T>
 class Crossing {
  public:
@@ -100,7 +100,7 @@ struct ContentGuard {
 /// acknowledged them.
 class DdsBridge final : public Node {
  public:
-  /// How many messages may wait to be encoded; who publishes one more waits.
+  /// Number of messages that may wait to be encoded; then publishers wait.
   static constexpr std::size_t kSendQueue = Sender::kQueue;
 
   /// `participant` outlives the bridge. Throws ConfigError if `budget` is out of bounds.
@@ -114,8 +114,8 @@ class DdsBridge final : public Node {
   void exchange(Crossing<T, Sent>& crossing, TopicKind kind, TrafficCategory category,
                 CrossingEnds ends = {}, Pace pace = {}, ContentGuard<T> guard = {});
 
-  /// Sends this process's key for messages to all to every robot there is, where the team has
-  /// keys. The bridge does so itself when a robot appears, and now and then. Thread-safe.
+  /// In a team with keys, sends this process's key for messages to all to every present robot. The
+  /// bridge also does so when a robot appears, and at intervals. Thread-safe.
   void tell_keys();
 
   /// Needs a crossing of kind kStatus: presence is its liveliness.
@@ -189,7 +189,7 @@ Outgoing outgoing(OutgoingTopic& topic, const GuardPtr<T>& guard,
   return outgoing(topic, guard, message->message, Addressee{message->to, message->boot});
 }
 
-// Publishes what `content` holds, or says why not.
+// Publishes the message in `content`, or returns the reason of a refusal.
 template <typename T>
 const char* publish_decoded(const Out<T>& to, const TeamPeer& sender,
                             std::span<const std::uint8_t> content, std::shared_ptr<void> token,

@@ -24,8 +24,8 @@ struct QueueQuota {
   double burst = 1.0;  ///< Served at once after a silence; with a finite per_second.
 };
 
-/// Queues of messages, one per peer, served in turn: a peer that sends much waits for itself and
-/// not the others. Time comes in [s], any origin, and does not go backwards. Not thread-safe.
+/// Queues of messages, one per peer, served in rotation: a peer that sends much delays only its own
+/// messages. Time comes in [s], with any origin, and does not decrease. Not thread-safe.
 template <typename Message>
 class FairQueue {
  public:
@@ -87,7 +87,7 @@ class FairQueue {
 
     std::deque<Waiting> waiting;
     std::size_t bytes = 0;
-    TokenBucket tokens;  // a message takes one
+    TokenBucket tokens;  // each message takes one
   };
 
   [[nodiscard]] bool has_room(const Line& line, std::size_t bytes) const {

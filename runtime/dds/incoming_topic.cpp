@@ -24,7 +24,7 @@ constexpr double kPatience_s = 8.0;
 constexpr double kRetry_s = 0.1;
 constexpr int kMaxInFlight = 16;
 constexpr std::chrono::milliseconds kMaxStay{100};
-constexpr std::size_t kFilingBytes = 256;  // that a message takes beside its own
+constexpr std::size_t kFilingBytes = 256;  // bytes of bookkeeping per message
 
 // An envelope as DDS reads it: one count and what it counts.
 class ReceivedEnvelope {
@@ -156,7 +156,7 @@ void IncomingTopic::recall(double now_s) {
 bool IncomingTopic::is_settled(Standing standing) const {
   const bool is_open = standing == Standing::kUnknown || standing == Standing::kRival ||
                        standing == Standing::kArriving;
-  // Keys come before anything can show who sends them; each is sealed by itself.
+  // Key messages arrive before any seal can prove their sender; each is sealed individually.
   return !is_open || (spec_.carries_keys && standing != Standing::kUnknown);
 }
 
@@ -211,7 +211,7 @@ IncomingTopic::Readable IncomingTopic::open(const km_wire_Envelope& envelope,
   const auto addressee = addressed_ ? std::optional(TeamPeer{self.robot, self.boot}) : std::nullopt;
   const SealedEnvelope way(spec_.name, writer, envelope, addressee);
   Readable result{seal->with([&](TeamSeal& team) { return team.open(way.context(), *bytes); }), {}};
-  result.content = result.how.content;  // a vector's octets stay where they are when it is moved
+  result.content = result.how.content;  // moving a vector keeps its elements in place
   return result;
 }
 
@@ -296,7 +296,8 @@ IncomingTopic::Verdict IncomingTopic::accept(const km_wire_Envelope& envelope, c
 // Null, or why the message is refused. A duplicate is neither.
 const char* IncomingTopic::hand_on(const km_wire_Envelope& envelope, const Filed& filed,
                                    std::span<const std::uint8_t> content) {
-  std::shared_ptr<void> token = in_flight_->enter();  // before asking who is current: it may wait
+  std::shared_ptr<void> token = in_flight_->enter();  // before the check who is current, because it
+                                                      // may wait
   if (TeamPeer{envelope.robot, envelope.boot} != filed.sender) return "claims another robot's id";
   if (!spec_.carries_keys && !peers_.is_current(filed.sender))
     return "from a former process of its robot";

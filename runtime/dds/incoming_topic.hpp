@@ -54,7 +54,7 @@ class IncomingTopic {
   using Handler = std::function<const char*(
       const TeamPeer& sender, std::span<const std::uint8_t> content, std::shared_ptr<void> token)>;
 
-  /// `addressed`: takes only what is sent to this robot alone, else only what is sent to all.
+  /// `addressed`: accepts only messages to this robot, otherwise only messages to all.
   IncomingTopic(const DdsParticipant& participant, Peers& peers, TopicSpec spec, bool addressed,
                 const QueueQuota& quota, Handler handler);
   ~IncomingTopic();

@@ -68,12 +68,13 @@ class OutgoingTopic {
   /// those that its incarnation was sent before.
   void catch_up(RobotId robot);
 
-  /// Robots that a message written now goes to. An addressee counts before its reader is matched.
+  /// Robots that would receive a message written now. An addressee counts before its reader is
+  /// matched.
   [[nodiscard]] std::vector<RobotId> readers_of(std::optional<Addressee> addressee);
 
   [[nodiscard]] const TopicSpec& spec() const { return spec_; }
 
-  /// Counts what DDS sends by itself to robots that have come since: all that it keeps for them.
+  /// Counts the stored messages that DDS has sent to new readers by itself.
   void notice_readers();
 
   /// Whether such have been noticed since the last call, by whatever was done here.

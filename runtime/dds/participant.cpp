@@ -49,7 +49,7 @@ void write_general(std::ostream& xml, const DdsConfig& config, const NetworkInte
   xml << "<General><Interfaces><NetworkInterface name='" << xml_escaped(interface.name) << '\'';
   // Linux does not flag loopback as capable of multicast, yet it is.
   if (multicast && interface.loopback) xml << " multicast='true'";
-  // Data goes by unicast: on radio, multicast runs at the base rate and without acknowledgement.
+  // Data use unicast: on radio, multicast runs at the base rate and without acknowledgement.
   xml << "/></Interfaces><AllowMulticast>" << (multicast ? "spdp" : "false")
       << "</AllowMulticast><MaxMessageSize>" << config.max_message_bytes
       << "B</MaxMessageSize><FragmentSize>" << config.fragment_bytes
@@ -82,8 +82,8 @@ void write_peers(std::ostream& xml, const DdsConfig& config, const std::string& 
 void write_discovery(std::ostream& xml, const DdsConfig& config,
                      const NetworkInterface& interface) {
   const bool by_address = config.discovery == Discovery::kPeers || !config.peers.empty();
-  // Fixed ports are needed where robots are found by address, and only there: without them any
-  // number of robots fits on one host.
+  // Fixed ports are needed only if robots are found by address. Without them any number of robots
+  // fits on one host.
   xml << "<Discovery><ParticipantIndex>" << (by_address ? "auto" : "none")
       << "</ParticipantIndex><MaxAutoParticipantIndex>" << config.max_participant_index
       << "</MaxAutoParticipantIndex><LeaseDuration>" << milliseconds(config.lease_s)

@@ -193,7 +193,8 @@ void PeerTable::take_over(KnownPeer& known, const Guid& guid, const Participant&
   emit(PeerEventKind::kRestarted, identity, "restarted");
 }
 
-// The participant is heard no more. Its id goes to who has been claiming it for longest.
+// Removes a participant that is no longer received. Its id passes to the participant that has
+// claimed it for longest.
 void PeerTable::give_way(const Guid& guid, PeerState state, PeerEventKind kind, const char* text) {
   const auto found = participants_.find(guid);
   if (found == participants_.end() || !std::exchange(found->second.alive, false)) return;

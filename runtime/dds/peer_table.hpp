@@ -17,7 +17,7 @@ namespace km {
 /// kLost: became silent. kLeft: announced its end. kTold: known only through other robots.
 enum class PeerState { kAlive, kLost, kLeft, kTold };
 
-/// Another robot of the team, as last heard of.
+/// Last known state of another robot of the team.
 struct Peer {
   RobotIdentity identity;
   PeerState state = PeerState::kAlive;
@@ -25,7 +25,7 @@ struct Peer {
 };
 
 enum class PeerEventKind {
-  kJoined,     ///< First heard.
+  kJoined,     ///< First received.
   kTold,       ///< First reported by other robots.
   kLost,       ///< Silent for longer than dds.liveliness_s.
   kReturned,   ///< Received again, same boot id.
@@ -44,7 +44,7 @@ enum class Standing {
   kUnknown,   ///< No data are known yet.
   kStranger,  ///< Not a robot, or refused.
   kTwin,      ///< Claims this robot's id.
-  kRival,     ///< Claims the id of a robot that is there already, or has not been heard itself.
+  kRival,     ///< Claims the id of a present robot, or has not been received itself.
   kArriving,  ///< The robot of its id, but not all nodes know yet that its former incarnation has
               ///< ended.
   kAdmitted,  ///< The robot of its id.
@@ -62,8 +62,8 @@ struct PeerEvent {
 /// origin. Memory is bounded, independent of what other participants announce.
 ///
 /// A robot is present while its participant's user data is accepted and its status writer alive;
-/// that the participant expires (dds.lease_s) changes nothing. An id belongs to the first process
-/// that is heard with it, for as long as that is heard; then to the next. Not thread-safe.
+/// the expiry of the participant (dds.lease_s) changes nothing. An id belongs to the first process
+/// that is received with it, as long as that is received; then to the next. Not thread-safe.
 class PeerTable {
  public:
   static constexpr std::size_t kMaxRobots = 64;
@@ -74,12 +74,12 @@ class PeerTable {
   using Admit =
       std::function<const char*(const RobotIdentity& identity, std::string_view credentials)>;
 
-  /// With `admit`, a robot is there only once prove() is called for it, too: what it shows could be
-  /// a recording.
+  /// With `admit`, a robot is present only after prove() is also called for it, because its
+  /// credentials could be replayed.
   explicit PeerTable(const RobotIdentity& self, Admit admit = {})
       : self_(self), admit_(std::move(admit)) {}
 
-  /// A robot that was met before this process: it is lost, until it is heard.
+  /// A robot that this robot met in a former process: it is lost until it is received.
   void recall(const RobotIdentity& identity);
 
   /// Other robots receive this robot, or have received it. Their report counts if it is not
@@ -91,10 +91,11 @@ class PeerTable {
   void participant(const Guid& guid, std::string_view user_data, const std::string& addresses);
   void participant_gone(const Guid& guid);
 
-  /// A message shows that the participant is who it says it is.
+  /// Notes that a message has proven the identity of the participant.
   void prove(const Guid& guid);
 
-  /// All nodes have handled the event of this process: nothing that it sends comes before that.
+  /// Notes that all nodes have handled the event of this process; only then are its messages
+  /// delivered.
   void told(const TeamPeer& restarted);
 
   /// Its status writer is alive, silent, or closed.

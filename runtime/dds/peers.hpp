@@ -65,8 +65,8 @@ class Peers {
   /// its process sends waits.
   [[nodiscard]] In<PeerEvent> events() { return events_; }
 
-  /// A robot that an earlier process of this one has met: it is lost, until it is heard. Call
-  /// before start().
+  /// A robot that this robot met in a former process: it is lost until it is received. Call before
+  /// start().
   void recall(const RobotIdentity& identity);
 
   /// See PeerTable. Thread-safe.

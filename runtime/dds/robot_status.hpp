@@ -77,7 +77,7 @@ class RobotStatusNode final : public Node {
   /// `provider` is called on this node's thread.
   RobotStatusNode(std::function<RobotStatus()> provider, const RobotStatusTopics& topics);
 
-  /// Latest of each robot heard of, ascending by id. Thread-safe.
+  /// Latest status of each known robot, ascending by id. Thread-safe.
   [[nodiscard]] std::vector<RobotStatus> peers() const;
 
   std::string_view name() const override { return "robot_status"; }

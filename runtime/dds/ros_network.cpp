@@ -98,7 +98,7 @@ DdsQos ros_qos(RosQos kind, int depth) {
                        DDS_MSECS(100));
   dds_qset_durability(qos.get(), kind == RosQos::kLatched ? DDS_DURABILITY_TRANSIENT_LOCAL
                                                           : DDS_DURABILITY_VOLATILE);
-  if (kind == RosQos::kLatched)  // else DDS keeps one message for those who come later
+  if (kind == RosQos::kLatched)  // otherwise DDS keeps one message for late readers
     dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, depth, DDS_LENGTH_UNLIMITED,
                                 DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   return qos;

@@ -13,7 +13,7 @@ namespace km {
 enum class RosQos {
   kSensorData,  ///< Best effort: what is lost is not sent again.
   kReliable,
-  kLatched,  ///< Reliable, and the last is kept for those who come later.
+  kLatched,  ///< Reliable, and the last message is kept for late readers.
 };
 
 /// A participant among those of ROS 2: as rmw_cyclonedds_cpp and rmw_fastrtps_cpp it names topics

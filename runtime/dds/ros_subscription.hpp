@@ -25,7 +25,7 @@ struct RosTopic {
   int depth = 10;  ///< Messages kept until next() takes them; the oldest go.
 };
 
-/// A message as it is on the wire: CDR with its encapsulation header.
+/// A serialised message: CDR with its encapsulation header.
 struct RosMessage {
   std::size_t topic = 0;  ///< Index into RosSubscription::topics().
   Stamp arrival = 0;      ///< System clock [ns].
@@ -46,7 +46,7 @@ class RosSubscription {
   /// Messages of a topic that came too fast for DDS or for next(), since that was called first.
   [[nodiscard]] std::uint64_t lost(std::size_t topic) const;
 
-  /// next() gives nothing once so much time has passed from now [s].
+  /// Ends next() when this time [s] has passed from now.
   void give_up_after(double patience_s);
 
   /// Ends next(), now and later. Thread-safe.

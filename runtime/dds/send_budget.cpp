@@ -5,7 +5,7 @@
 namespace km {
 namespace {
 
-// A little in debt is at the end of it: sums of doubles do not come to zero.
+// A slightly negative balance counts as no debt, because sums of doubles do not reach zero exactly.
 constexpr double kNoDebt_bytes = -1e-3;
 
 // It begins empty: a run's first second is no exception.

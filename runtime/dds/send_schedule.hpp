@@ -65,8 +65,8 @@ class SendSchedule {
     drop_surplus(lane);
   }
 
-  /// The next message that may go. `readers_of(entry)` is the robots that it goes to, or nullopt
-  /// while it should wait for some to be there; it is not asked without a budget.
+  /// The next message that may be sent. `readers_of(entry)` returns its receivers, or nullopt while
+  /// the message should wait for a receiver. It is not called without a budget.
   template <typename ReadersOf>
   [[nodiscard]] std::optional<Entry> pop(double now_s, const ReadersOf& readers_of) {
     wait_s_.reset();

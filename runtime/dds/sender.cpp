@@ -73,7 +73,7 @@ void Sender::run() try {
   posted_.close();
 }
 
-// Goes past the budget, which settle() has it count against.
+// Bypasses the budget; settle() charges the bytes afterwards.
 void Sender::catch_up_due() {
   std::set<RobotId> due;
   {

@@ -30,8 +30,8 @@ struct Outgoing {
 };
 
 /// Encodes messages and writes them on a thread of its own, in the order of SendSchedule. With a
-/// budget, what is for all robots waits while there is none, within bounds: what DDS is given, it
-/// sends at once to who comes.
+/// budget, messages to all robots wait, within bounds, while there is no receiver: DDS would send
+/// all of them to a new reader at once.
 class Sender {
  public:
   /// How many messages may wait to be encoded; who posts one more waits.

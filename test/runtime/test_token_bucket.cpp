@@ -21,7 +21,7 @@ TEST_CASE("Tokens flow in at their rate up to the capacity", "[token_bucket]") {
   CHECK(bucket.wait_s(1.0, 200.0) == Approx(0.1));
 }
 
-TEST_CASE("A debt is paid by what flows in", "[token_bucket]") {
+TEST_CASE("Later tokens pay a debt first", "[token_bucket]") {
   TokenBucket bucket(10.0, 5.0, 0.0);
   bucket.spend(30.0, 0.0);
   CHECK(bucket.wait_s(0.0, 0.0) == Approx(3.0));

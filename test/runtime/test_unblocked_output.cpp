@@ -96,7 +96,7 @@ TEST_CASE("A blocked output delays no caller, and lost lines are counted in thei
   CHECK(pipe.read_to("news") == std::vector<std::string>{"news"});
 }
 
-TEST_CASE("An output that stays blocked does not hold up the end", "[output]") {
+TEST_CASE("An output that stays blocked does not delay the end", "[output]") {
   Pipe pipe;
   {
     OutputQueue queue(pipe.writer());
@@ -137,7 +137,7 @@ TEST_CASE("A full disk costs the lines that it refuses, and their number is writ
   close(full);
 }
 
-TEST_CASE("A program's end writes all it said on both streams, in order where they are one",
+TEST_CASE("The end of a program writes all text of both streams, in order if they are one file",
           "[output]") {
   Pipe pipe;
   const pid_t child = fork();

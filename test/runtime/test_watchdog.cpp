@@ -93,7 +93,7 @@ TEST_CASE("A node that is to end and makes no steps is given up", "[watchdog]") 
   CHECK(bench.watchdog.given_up()->why == "has not ended for 20 s");
 }
 
-TEST_CASE("A node that has ended is blamed for nothing more", "[watchdog]") {
+TEST_CASE("A node that has ended is not blamed any more", "[watchdog]") {
   Bench bench;
   bench.watchdog.expect_end(bench.node);
   bench.watchdog.has_ended(bench.node);

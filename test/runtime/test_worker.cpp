@@ -154,7 +154,7 @@ TEST_CASE("The newest value is taken, and only once", "[runtime]") {
   CHECK(latest.take() == nullptr);
 }
 
-TEST_CASE("After the end nothing is put, and what was there can be taken", "[runtime]") {
+TEST_CASE("After close() values are refused and the last one can still be taken", "[runtime]") {
   Latest<int> latest;
   latest.put(std::make_shared<const int>(1));
   latest.close();
@@ -163,7 +163,8 @@ TEST_CASE("After the end nothing is put, and what was there can be taken", "[run
   CHECK(latest.take() == nullptr);
 }
 
-TEST_CASE("A taker sees ever newer values while others are put, and the last", "[runtime]") {
+TEST_CASE("A taker sees increasingly newer values while others are put, and the last one",
+          "[runtime]") {
   constexpr int kLast = 10000;
   Latest<int> latest;
   std::thread putter([&] {

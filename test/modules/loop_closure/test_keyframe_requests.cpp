@@ -43,7 +43,7 @@ TEST_CASE("a peer that returns is asked at once", "[keyframe_requests]") {
   CHECK(requests.due(10.6) == Ids{{7, 1}});
 }
 
-TEST_CASE("only so many requests are under way to one peer", "[keyframe_requests]") {
+TEST_CASE("the number of unanswered requests to one peer is bounded", "[keyframe_requests]") {
   KeyframeRequests requests(2.0, 2);
   for (std::uint32_t i = 0; i < 5; ++i) requests.want({7, i});
   requests.want({8, 0});
@@ -118,7 +118,7 @@ void succeed(RequestEconomy& economy, KeyframeIndex query, KeyframeIndex own) {
   economy.conclude({kPeer, query}, true);
 }
 
-TEST_CASE("Around a closure nothing is asked for, farther with every success",
+TEST_CASE("No keyframe near a closure is requested and the distance grows with successes",
           "[request_economy]") {
   LoopClosureConfig config;
   config.max_link_separation = 3;
@@ -160,7 +160,8 @@ TEST_CASE("No keyframe near a requested one is requested", "[request_economy]") 
   CHECK(economy.judge(candidate(0, 0)) == Verdict::kAsk);
 }
 
-TEST_CASE("A kind that fails is asked for ever less, and no other with it", "[request_economy]") {
+TEST_CASE("Candidates of a kind that fails are requested less and less often, others are not",
+          "[request_economy]") {
   LoopClosureConfig config;
   config.attempt_separation = 0;
   config.failure_patience = 1.0;

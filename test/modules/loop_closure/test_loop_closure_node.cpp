@@ -221,8 +221,7 @@ TEST_CASE("a reply contains the points whose words the requester's own keyframe 
   CHECK(sent.keypoints.size() == expected.size());
 }
 
-TEST_CASE("how many points are sent goes by the words that both images have",
-          "[loop_closure_node]") {
+TEST_CASE("the number of points in a reply depends on the common words", "[loop_closure_node]") {
   constexpr std::uint32_t kSent = 50;
   constexpr std::size_t kFirst = 12;
   struct Case {
@@ -257,7 +256,7 @@ TEST_CASE("how many points are sent goes by the words that both images have",
   CHECK(peer.replies[kFirst].message->keyframe.features.keypoints.size() == later);
 }
 
-TEST_CASE("a peer that returns is asked at once for what it owes", "[loop_closure_node]") {
+TEST_CASE("a returned peer is at once asked for its outstanding keyframes", "[loop_closure_node]") {
   Meeting meeting(5);
   auto& [scene, robot, peer] = meeting;
   robot.give(scene.candidate());

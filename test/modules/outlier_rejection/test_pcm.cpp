@@ -93,7 +93,7 @@ TEST_CASE("PCM keeps the true closures among as many random ones", "[pcm]") {
   CHECK(pcm.clique().proven());
 }
 
-TEST_CASE("As many closures agree in whatever order they come", "[pcm]") {
+TEST_CASE("The number of agreeing closures is independent of their order", "[pcm]") {
   const unsigned seed = GENERATE(range(0U, 10U));
   CAPTURE(seed);
   std::mt19937 rng(seed);

@@ -64,8 +64,7 @@ TEST_CASE("In any order each keyframe is searched for once, with its predecessor
   for (const auto& [index, vector] : stored) CHECK(vector.expired() == (index != 59));
 }
 
-TEST_CASE("The nearest earlier keyframe stands in for one that does not come",
-          "[place_recognition]") {
+TEST_CASE("The nearest earlier keyframe replaces a missing predecessor", "[place_recognition]") {
   PeerHistory history(2);
   history.add(0, vector_of(0));
   CHECK(history.add(5, vector_of(5)).empty());

@@ -141,7 +141,7 @@ TEST_CASE("Weights are term counts times ln(N / n), scaled to norm 1", "[place_r
   CHECK(vector.weights[1 - at] == Approx(std::log(3.0) / total).epsilon(kFloatTolerance));
 }
 
-TEST_CASE("Training depends on the seed and on nothing else", "[place_recognition]") {
+TEST_CASE("Training depends only on input and seed", "[place_recognition]") {
   SyntheticOrb world(3, 5);
   const Images images = world.images(10, 200, 5);
   const VocabularyTrainingConfig config{.branching = 6, .depth = 3, .seed = 11};
@@ -321,7 +321,7 @@ TEST_CASE("A corrupted tree with a matching checksum is refused or finds words",
   CHECK(refused > 0);
 }
 
-TEST_CASE("A file that is not there is named", "[place_recognition]") {
+TEST_CASE("A missing file is named", "[place_recognition]") {
   CHECK_THROWS_WITH(load_vocabulary("/nowhere/at.all"), Contains("/nowhere/at.all"));
   CHECK_THROWS_WITH(load_vocabulary("config"), Contains("config: a folder, not a file"));
   CHECK_THROWS_WITH(save_vocabulary(small_vocabulary(), "/nowhere/at.all"),
@@ -381,7 +381,7 @@ TEST_CASE("The tool trains on real images and distinguishes the two places",
   CHECK(score_of(2, 3) > score_of(1, 3));
 }
 
-TEST_CASE("The tool names what it cannot use and fails", "[place_recognition]") {
+TEST_CASE("The tool names unusable input and fails", "[place_recognition]") {
   const TemporaryFolder folder;
   const auto check_fails = [&](const std::string& arguments, const char* reason) {
     const CommandResult run = run_tool(arguments);

@@ -65,7 +65,7 @@ std::vector<std::string> names_in(const fs::path& folder) {
 
 }  // namespace
 
-TEST_CASE("Bags of ROS 2 give what SQLite's own program gives", "[recordings]") {
+TEST_CASE("Bags of ROS 2 give the same messages as SQLite's own program", "[recordings]") {
   struct Known {
     const char* folder;
     ListedSum sum;  // result of Python's sqlite3

@@ -205,7 +205,8 @@ TEST_CASE("Messages outside of chunks are checked by the checksum of the data", 
   CHECK(reader.report().count(BagFault::kChecksum) == 1);
 }
 
-TEST_CASE("An index that says too late a time costs the messages that are late", "[recordings]") {
+TEST_CASE("Messages are dropped if the index states too late a time for their chunk",
+          "[recordings]") {
   McapFile file({});
   file.add_chunk(numbered_messages(10, 100), 100);
   file.add_chunk(numbered_messages(10, 95), 105);

@@ -159,7 +159,7 @@ void check_bag_order(const std::vector<BagMessage>& messages) {
 
 }  // namespace
 
-TEST_CASE("Bags of ROS 1 give what ROS' own reader gives", "[recordings]") {
+TEST_CASE("Bags of ROS 1 give the same messages as ROS' own reader", "[recordings]") {
   struct Known {
     const char* file;
     ListedSum sum;  // result of Debian's python3-rosbag 1.15

@@ -133,7 +133,7 @@ TEST_CASE("An addressed message reaches its addressee and no other robot gets a 
   CHECK(a.traffic(Direction::kOut).count.messages == 0);
 }
 
-TEST_CASE("Sender and receiver count the same bytes, whatever the size", "[dds]") {
+TEST_CASE("Sender and receiver count the same bytes for all sizes", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4), c(domain, 5);
   for (TestRobot* robot : {&a, &b, &c}) robot->start();
@@ -238,7 +238,7 @@ TEST_CASE("A guard appends a tail to messages and sees them before any node", "[
   CHECK(eventually([&] { return b.refused(Codec<MarkedPing>::kTopic) == 1; }));
 }
 
-TEST_CASE("Programs without an identity, or with a broken one, are not heard", "[dds]") {
+TEST_CASE("Programs without an identity, or with a broken one, are ignored", "[dds]") {
   const std::string user_data =
       GENERATE(std::string(), std::string("robot=7;name=\033[2J;proto=1;boot=1"),
                std::string("robot=") + std::string(5000, '9'));
@@ -263,7 +263,7 @@ TEST_CASE("Programs without an identity, or with a broken one, are not heard", "
   CHECK(b.bridge.peers().list().size() == 1);
 }
 
-TEST_CASE("Robots of another protocol version are refused and not heard", "[dds]") {
+TEST_CASE("Robots of another protocol version are refused and ignored", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3),
       newer(domain, 4, TopicKind::kEvent, TopicKind::kRequest, kProtocolVersion + 1);

@@ -63,7 +63,7 @@ TEST_CASE(
   CHECK(held.dropped.messages == 0);
 }
 
-TEST_CASE("A closure arrives before what waits for the budget", "[dds][budget]") {
+TEST_CASE("A closure overtakes messages that wait for the budget", "[dds][budget]") {
   Thrifty team({.bytes_per_s = 20'000.0});
   team.offer(4000, 1000);  // for 200 s
   REQUIRE(eventually([&] { return team.a.bridge.holds_back(); }));

@@ -21,7 +21,7 @@ std::uint64_t refusals(TestRobot& robot, const std::string& reason) {
   return robot.traffic(Direction::kIn).refused[reason];
 }
 
-TEST_CASE("Bytes that are no message are refused, and messages after them are heard", "[gate]") {
+TEST_CASE("Bytes that are no message are refused and later messages are received", "[gate]") {
   Two two;
   auto& [domain, a, b] = two;
   RawWriter writer(a.participant.handle(), domain->config(), TopicKind::kEvent);
@@ -94,7 +94,7 @@ TEST_CASE("No participant can send in a robot's name, not even from a writer tha
   CHECK(b.received.messages().size() == 1);
 }
 
-TEST_CASE("A peer that sends much waits for itself and not the others", "[gate]") {
+TEST_CASE("A peer that sends much delays only its own messages", "[gate]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4), c(domain, 5);
   constexpr std::uint32_t kFlood = 2000;

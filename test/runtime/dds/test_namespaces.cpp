@@ -73,7 +73,7 @@ TEST_CASE("On a host with only loopback robots meet without configuration", "[dd
   CHECK(b->wait_for("joined 3"));
 }
 
-TEST_CASE("Two robots that do not hear each other both hear a third", "[dds][namespaces]") {
+TEST_CASE("Two robots without a link both receive a third", "[dds][namespaces]") {
   if (!VirtualNetwork::available()) return;
   VirtualNetwork network(3);
   network.set_link_between(1, 3, false);

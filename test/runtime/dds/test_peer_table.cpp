@@ -86,7 +86,7 @@ TEST_CASE("Reports of other robots count for a robot that is not received, until
     table.told({7, kOtherLife});
     CHECK_FALSE(table.is_arriving(7));
   }
-  SECTION("it is heard itself") {
+  SECTION("it is received itself") {
     const bool restarted = GENERATE(false, true);
     CAPTURE(restarted);
     const std::uint64_t boot = restarted ? kOtherLife : kLife;
@@ -128,7 +128,8 @@ TEST_CASE("A robot joins once its identity and its liveliness are known, in eith
   CHECK_FALSE(table.is_current({7, 71}));
 }
 
-TEST_CASE("Silence is a loss, sound a return, whatever happens to the lease", "[peers]") {
+TEST_CASE("A silent robot is lost and returns when it is received again, whatever the lease does",
+          "[peers]") {
   PeerTable table(kSelf);
   table.participant(guid(2), data_of(7, 70), "");
   table.alive(guid(2));
@@ -240,7 +241,7 @@ TEST_CASE("No participant takes over the id of a present robot", "[peers]") {
   CHECK(kinds(table) == Kinds{PeerEventKind::kReturned});
 }
 
-TEST_CASE("An id goes to who has claimed it for longest", "[peers]") {
+TEST_CASE("An id passes to the participant that has claimed it for longest", "[peers]") {
   PeerTable table = with_robot();
   for (const std::uint8_t n : std::vector<std::uint8_t>{5, 4, 3}) {
     table.participant(guid(n), data_of(7, kBoot + n), "");
@@ -434,7 +435,7 @@ TEST_CASE("Duplicates and gaps agree with a set of all numbers, in any order", "
   }
 }
 
-TEST_CASE("A stream that skips every other number does not use up the memory", "[sequence]") {
+TEST_CASE("A stream that skips every other number does not exhaust the memory", "[sequence]") {
   constexpr std::uint32_t kCount = 10 * SequenceTracker::kMaxIntervals;
   SequenceTracker tracker(true);
   for (std::uint32_t i = 0; i < kCount; ++i) CHECK(tracker.is_new(2 * i + 1));
@@ -445,7 +446,7 @@ TEST_CASE("A stream that skips every other number does not use up the memory", "
   CHECK_FALSE(tracker.is_new(2));  // given up: better lost than twice
 }
 
-TEST_CASE("The last number there is counts like any other", "[sequence]") {
+TEST_CASE("The largest number counts like any other", "[sequence]") {
   SequenceTracker tracker(false);
   CHECK(tracker.is_new(0xFFFFFFFFU));
   CHECK_FALSE(tracker.is_new(0xFFFFFFFFU));
@@ -480,7 +481,7 @@ TEST_CASE("Traffic is written when it changes, cumulatively", "[traffic]") {
         "3.5,out,bow,place_recognition,*,0,0,30\n");
 }
 
-TEST_CASE("Traffic of a run that is taken up is added to what there was", "[traffic]") {
+TEST_CASE("Traffic of a resumed run is added to the former traffic", "[traffic]") {
   const std::string former =
       "time_s,direction,topic,category,peer,messages,bytes,retransmitted_bytes\n"
       "1,out,bow,place_recognition,7,1,100,0\n"

@@ -205,7 +205,7 @@ TEST_CASE("Messages under a new key wait for it, however many they are", "[seale
   CHECK(b.refused() == 0);
 }
 
-TEST_CASE("Robots appear and are heard while nothing can be sent", "[sealed]") {
+TEST_CASE("Robots appear and are received while sending is blocked", "[sealed]") {
   const ToyTeam team;
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, member_of(team));

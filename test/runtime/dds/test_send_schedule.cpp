@@ -76,7 +76,7 @@ TEST_CASE("After a silence little more than the budget is sent at once", "[budge
   CHECK(*schedule.wait_s() == Approx(0.01).margin(1e-6));
 }
 
-TEST_CASE("A closure goes before all that waits for the budget", "[budget]") {
+TEST_CASE("A closure overtakes all messages that wait for the budget", "[budget]") {
   Schedule schedule({.bytes_per_s = 1000.0});
   for (int k = 0; k < 100; ++k) schedule.push(entry(kMesh, k), 0.0);
   CHECK(sent(schedule, 0.0) == std::vector<int>{0});
@@ -95,7 +95,7 @@ TEST_CASE("Statuses never wait, and are counted", "[budget]") {
   CHECK(sent(schedule, 1.01) == std::vector<int>{10});
 }
 
-TEST_CASE("Bags of words that have waited go after new ones", "[budget]") {
+TEST_CASE("Bags of words that have waited follow new ones", "[budget]") {
   Schedule schedule({.bytes_per_s = 1000.0});
   for (int k = 0; k < 60; ++k) schedule.push(entry(kWords, k), 0.0);
   CHECK(sent(schedule, 0.0) == std::vector<int>{0});
