@@ -46,7 +46,8 @@ Examples
   For programs:
     kimera_multi_doctor MH_01_easy --json doctor.json
 
-A quantity that motion and images do not determine is listed and is no finding: turn the camera about two axes.
+A quantity that motion and images do not determine is listed, and is no finding. Turn the camera about two
+axes to determine it.
 Exit codes: 0 sound; 1 warnings; 2 it will not work, or this command line or PATH cannot be used.)";
 
 struct Options {

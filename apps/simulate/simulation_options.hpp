@@ -102,7 +102,7 @@ struct SimulationOptions {
 };
 
 /// Adds the options to a command line, and --config for a file of them: a YAML map. The command
-/// line overrides the file. All errors of both are reported together, by name and line.
+/// line has priority over the file. All errors of both are reported together, by name and line.
 void define(CLI::App& app, SimulationOptions& options);
 
 /// Options with derived values filled in: names, the number of robots, the rate of depth images,

@@ -65,9 +65,9 @@ struct TeamResult {
 /// nullopt if it left no summary.
 [[nodiscard]] std::optional<RobotId> frame_of(const RobotResult& robot);
 
-/// Finds the robots whose optimised poses are not in the frame that most robots ended in. Of
-/// equally common frames, that of the lowest anchor counts. Sets `in_team_frame` of the other
-/// robots to false and notes why. A robot without a summary is assumed to be in it.
+/// Finds the robots whose optimised poses are not in the frame that most robots ended in. If
+/// several frames are equally common, that of the lowest anchor counts. Sets `in_team_frame` of the
+/// other robots to false and notes why. A robot without a summary is assumed to be in it.
 void find_team_frame(std::vector<RobotResult>& robots);
 
 /// Reads the meshes of the robots and merges them in the frame of the true poses, to which

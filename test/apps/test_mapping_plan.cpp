@@ -50,7 +50,7 @@ TEST_CASE("Recorded depth and labels are preferred, others computed", "[robot][m
   CHECK(computed->sensor.labels == LabelsFrom::kNetwork);
   network.palette = full.folder.write("own.csv", "name,red,green,blue,alpha,id\nsky,1,2,3,255,9\n");
   CHECK(stereo.plan(config, network)->palette.find(9)->name == "sky");
-  CHECK(full.plan(config, network)->palette.find(1)->name == "road");  // of the recorded labels
+  CHECK(full.plan(config, network)->palette.find(1)->name == "road");  // name of a recorded label
   config.depth = DenseSource::kComputed;
   config.labels = DenseSource::kComputed;
   CHECK(full.plan(config, network)->sensor.depth == DepthFrom::kStereo);

@@ -35,10 +35,11 @@ class RoutePath {
 /// Unevenness of the road under one wheel track by the way along it, frozen in space.
 class RoadProfile {
  public:
-  /// Covers distances from `begin_m` to `end_m`. `roughness` scales heights; 1 is a street of ISO
-  /// 8608 class A. Its displacement has the one-sided density 16e-6 m^3 at 0.1 cycles per metre,
-  /// falling with the square of the frequency. Below one cycle in about 100 m it is flat, because
-  /// the world's own ground has these frequencies. Above one in about 0.3 m a tyre averages it.
+  /// Covers distances from `begin_m` to `end_m`. `roughness` scales heights: 1 is a street of ISO
+  /// 8608 class A. That class has the one-sided displacement density 16e-6 m^3 at 0.1 cycles per
+  /// metre. The density falls with the square of the frequency. Below one cycle in about 100 m it
+  /// is zero, because the world's own ground has these frequencies. Above one in about 0.3 m a tyre
+  /// averages it.
   RoadProfile(double begin_m, double end_m, double roughness, std::uint64_t seed);
 
   [[nodiscard]] double height_m(double way_m) const { return curve_.at(way_m).value[0]; }

@@ -41,9 +41,9 @@ struct VehicleOptions {
 
 /// A vehicle that drives along `route`, once around and further, from time 0 to `duration_s` or a
 /// few milliseconds more. Body: x forward, y left, z up. Heading is the path's tangent. Pitch and
-/// roll are those of the ground under four wheels, filtered by a suspension. The ground, the road's
-/// roughness and the vehicle's accelerations excite the suspension. If `ground_height` is null, the
-/// ground is level at 0.
+/// roll are those of the ground under four wheels, filtered by a suspension. The suspension is
+/// excited by the ground, the road's roughness and the vehicle's accelerations. If `ground_height`
+/// is null, the ground is level at 0.
 ///
 /// The limits hold for the path of the point on the ground below the body; the body itself sways
 /// above it by a few centimetres. Throws ConfigError for options out of range,

@@ -409,8 +409,8 @@ class ViewPass {
            scene_.surfaces.record(pixel.triangle).normal.dot(surface.normal) > kLeastCosine;
   }
 
-  // A pixel whose shade can be used for a sample that hit `triangle`: the sample's own pixel or its
-  // neighbours on that side, if one shows the same triangle or a similar surface.
+  // A pixel whose shade can be used for a sample that hit `triangle`. Candidates are the sample's
+  // own pixel and its neighbours on that side, if they show the same triangle or a similar surface.
   [[nodiscard]] std::optional<std::size_t> shaded_nearby(const Sample& sample,
                                                          std::uint32_t triangle,
                                                          float depth_m) const {

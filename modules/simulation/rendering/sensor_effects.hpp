@@ -93,9 +93,9 @@ template <typename Value>
 
 /// Motion of each pixel's content in the image while the shutter is open [px].
 ///
-/// The camera rotates and moves with the body. A static point at depth z and bearing b = (x, y, 1)
-/// has the image motion -(omega x b + v / z) less its part along b, on the plane z = 1. The
-/// camera's own bearings convert it to pixels, distortion included. `depth_m`: 0 is infinitely far.
+/// The camera rotates and moves with the body. A static point at depth z has bearing b = (x, y, 1).
+/// On the plane z = 1 its image motion is -(omega x b + v / z) less its part along b. The camera's
+/// own bearings convert it to pixels, distortion included. `depth_m`: 0 is infinitely far.
 /// `body_velocity` = [rad/s; m/s] in the body frame.
 [[nodiscard]] std::vector<Eigen::Vector2f> image_motion(const PixelRays& rays,
                                                         const std::vector<float>& depth_m,

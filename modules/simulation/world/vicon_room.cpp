@@ -117,7 +117,7 @@ void add_room_floor(Scene& scene, float width_m, float depth_m, SeededRandom& ra
   add_scraps(scene, width_m, depth_m, random);
 }
 
-// Walls of a room and what hangs on them. A wall lies in the plane y = 0 of the builder's current
+// Walls of a room and the objects on them. A wall lies in the plane y = 0 of the builder's current
 // frame, x along it from -length / 2 to length / 2, and is seen from -y.
 
 struct WallWindow {
@@ -431,7 +431,7 @@ void furnish_desk_wall(Scene& scene, SeededRandom& random) {
   scene.at({3.6F, -0.3F, 0.0F}).add(add_bucket, random);
 }
 
-/// What stands free, lower than any flight.
+/// Free-standing objects, lower than any flight.
 void furnish_middle(Scene& scene, SeededRandom& random) {
   const float x = kHalf_m + random.uniform(0.6F, 1.2F);
   const float y = kHalf_m + random.uniform(0.9F, 1.4F);

@@ -78,7 +78,7 @@ TEST_CASE("The doctor says why candidates came to nothing, commas and all", "[do
              Catch::Contains("most of them: \"no pose, too few inliers\" (1 of 1)"));
 }
 
-TEST_CASE("Of a robot alone the findings are those of its end", "[doctor]") {
+TEST_CASE("The findings on a single robot are those of its end", "[doctor]") {
   const Results results;
   RunSummary summary = read_summary(results.folder.path() / "alice/summary.json");
   summary.findings = {failed_run("vio: no memory"), {.id = "team.not_joined", .what = "x"}};
@@ -89,7 +89,7 @@ TEST_CASE("Of a robot alone the findings are those of its end", "[doctor]") {
   CHECK(exit_code_of(result.findings) == 2);
 }
 
-TEST_CASE("The folder of a robot that was killed is no recording: how it goes on is named",
+TEST_CASE("The folder of a robot that was killed is no recording, and the message names --resume",
           "[doctor]") {
   const Results results;
   const auto bob = results.folder.path() / "bob";

@@ -143,7 +143,8 @@ TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]")
       top("--mesh " + meshes.truth.string() + " --trajectory " + upright.string());
   const cv::Mat3b found = top("--mesh " + meshes.a.string() + " --trajectory " + turned.string() +
                               " --reference " + upright.string());
-  CHECK(cv::norm(expected, found, cv::NORM_L1) / (3.0 * 320 * 240) < 0.5);  // of 255
+  CHECK(cv::norm(expected, found, cv::NORM_L1) / (3.0 * 320 * 240) <
+        0.5);  // average grey level, out of 255
   const auto many = run_command(kMeshTool + "render --mesh " + meshes.a.string() + " --output " +
                                 meshes.png.string() + " --reference " + upright.string());
   CHECK_THAT(many.output, Catch::Contains("more --reference than --trajectory"));

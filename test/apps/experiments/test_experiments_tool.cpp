@@ -71,7 +71,7 @@ TEST_CASE("The quick pcm experiment runs, reports, and is not run twice", "[expe
   CHECK_THAT(laboratory.run("run pcm").output, Contains("2 steps made"));
 }
 
-TEST_CASE("What a run was given is kept with its results", "[experiments]") {
+TEST_CASE("The inputs of a run are kept with its results", "[experiments]") {
   const Laboratory laboratory;
   const CommandResult empty = laboratory.bare("report");
   CHECK(empty.exit_code == 1);
@@ -85,7 +85,7 @@ TEST_CASE("What a run was given is kept with its results", "[experiments]") {
   CHECK(laboratory.folder.read("results/numbers.json") == before);
   CHECK_THAT(laboratory.bare("list").output,
              Contains((laboratory.folder.path() / "graphs").string()));
-  // The command line has the last word.
+  // The command line has priority.
   fs::create_directory(laboratory.folder.path() / "none");
   const CommandResult other =
       laboratory.bare("report --graphs " + (laboratory.folder.path() / "none").string());
@@ -108,7 +108,7 @@ TEST_CASE("A run with another folder that makes nothing leaves all as it was", "
   const CommandResult list = laboratory.bare("list");
   CHECK_THAT(list.output, Contains("pcm-1   done") && Contains("pcm-2   done"));
   CHECK(laboratory.folder.read("results/report.md") == report);
-  // What makes something stays.
+  // Inputs of a run that makes results are kept.
   laboratory.folder.write("other/polygon.g2o", polygon_graph() + "\n");
   REQUIRE(laboratory.bare("run pcm --graphs " + (laboratory.folder.path() / "other").string())
               .exit_code == 0);

@@ -125,7 +125,7 @@ TEST_CASE("The page stands alone and is well formed", "[experiments]") {
   CHECK(is_balanced(page));
   CHECK(occurrences(page, "http") == 0);
   const Json plots = data_of_page(page, "plots");
-  CHECK(plots.size() == 4);  // of outlier rejection, two trajectories, mesh errors
+  CHECK(plots.size() == 4);  // outlier rejection, two trajectories, mesh errors
   for (const auto& [id, drawn] : plots.items()) CHECK(occurrences(page, " id=\"" + id + '"') == 1);
   CHECK(occurrences(page, "data:image/png;base64,") == 2);
   for (const char* id :

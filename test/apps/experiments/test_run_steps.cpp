@@ -88,7 +88,7 @@ TEST_CASE("A failed step says why, and holds up only those that need it", "[expe
                                       Contains("results/logs/bad.log"));
   CHECK(outcome.problems[1] == "not run, as bad is not done: needs, needs_more");
   CHECK(workshop.runs("free") == 1);
-  CHECK(workshop.run(steps).problems.size() == 2);  // it was not taken for done
+  CHECK(workshop.run(steps).problems.size() == 2);  // the failed step did not count as done
   CHECK(workshop.runs("bad") == 2);
 }
 
@@ -160,7 +160,8 @@ TEST_CASE("A signal ends the running step and begins no other", "[experiments]")
   CHECK(state_of(steps[1], results) == StepState::kOutdated);  // its output is there, but not whole
 }
 
-TEST_CASE("What a stopped or failed step did not touch keeps its record", "[experiments]") {
+TEST_CASE("Results that a stopped or failed step did not change keep their record",
+          "[experiments]") {
   Workshop workshop;
   const auto results = workshop.folder.path() / "results";
   const char* const fate = GENERATE("kill -INT $PPID; exec sleep 600", "exit 7");

@@ -7,7 +7,8 @@
 #include "test/support/command.hpp"
 #include "test/support/temporary_folder.hpp"
 
-// apps/demo from end to end: a world is rendered, and three robots find themselves in it over DDS.
+// apps/demo from end to end: a world is rendered, and three robots localise themselves in it over
+// DDS.
 
 namespace km {
 

@@ -36,7 +36,7 @@ std::string problems_of(const fs::path& file, const fs::path& dataset) {
 
 }  // namespace
 
-TEST_CASE("A spoilt team file is refused by name, or plans robots", "[team]") {
+TEST_CASE("A corrupted team file is refused by name, or plans robots", "[team]") {
   const Inputs inputs;
   check_spoilt<ConfigError>(
       "config: common.yaml\ntruth: truth.csv\nrate: max\ndomain: 7\ntime_limit_s: 12.5\nrobots:\n"
@@ -145,7 +145,7 @@ TEST_CASE("The command line of a robot says what its plan says", "[team]") {
             "1.0",        "--domain", "9",         "--output", "out/x",   "--set",   "a.b=1"});
 }
 
-TEST_CASE("Every problem of a team file is told with its line", "[team]") {
+TEST_CASE("Every problem of a team file is reported with its line", "[team]") {
   const Inputs inputs;
   const std::string problems = problems_of(inputs.team("config: none.yaml\n"
                                                        "speed: 3\n"

@@ -24,7 +24,7 @@ DdsConfig loopback(int domain) {
   return config;
 }
 
-TEST_CASE("What robots of a domain tell is shown in the page, and recorded", "[viewer]") {
+TEST_CASE("Messages of the robots of a domain are shown in the page, and recorded", "[viewer]") {
   const TemporaryFolder folder;
   const std::filesystem::path record = folder.path() / "team.mcap";
   const int domain = random_domain();

@@ -40,7 +40,7 @@ TEST_CASE("The page follows a team that runs, shows its past, and knows how it e
   CHECK(result.exit_code == 0);
 }
 
-TEST_CASE("The page's model keeps all that was told, by its time", "[page]") {
+TEST_CASE("The page's model keeps all messages by their time", "[page]") {
   if (run_command("node --version").exit_code != 0) {
     std::cout << "SKIPPED: no node (apt-get install nodejs)\n";
     return;

@@ -27,7 +27,7 @@ int port_of(const PageServer& server) {
   return std::stoi(found[1]);
 }
 
-// What is below the address of a server.
+// Path and query of the address of a server.
 std::string path_of(const PageServer& server) {
   return server.url().substr(server.url().find('/', std::string("http://").size()));
 }

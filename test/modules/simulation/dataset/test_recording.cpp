@@ -120,7 +120,7 @@ Camera some_camera(double shift_m) {
 }
 
 void check_equal(const Camera& a, const Camera& b) {
-  constexpr double kRounding = 1e-14;  // of the reader's nearest rotation
+  constexpr double kRounding = 1e-14;  // tolerance of the reader's nearest rotation
   CHECK(a.width == b.width);
   CHECK(a.height == b.height);
   // Those of calibrations with a xi are 1 + xi times as long.

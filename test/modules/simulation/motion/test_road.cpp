@@ -37,8 +37,8 @@ TEST_CASE("A path follows its route and rounds its corners", "[motion]") {
     farthest = std::max(farthest, distance_to(kBlock, path.at(s).position));
     sharpest = std::max(sharpest, std::abs(path.at(s).curvature));
   }
-  // Where a right angle is rounded, the arc passes (sqrt(2) - 1) r from the corner, that is
-  // r (1 - 1/sqrt(2)) from the lines.
+  // The arc of a right angle passes the corner at (sqrt(2) - 1) r, that is r (1 - 1/sqrt(2)) from
+  // the lines.
   CHECK(farthest == Approx(radius * (1.0 - std::sqrt(0.5))).margin(0.15));
   CHECK(sharpest <= 1.05 / radius);  // smoothing tightens short arcs a little
   CHECK(sharpest > 0.9 / radius);

@@ -99,7 +99,8 @@ TEST_CASE("A box hides what is behind it, and only that", "[simulation][renderin
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       const Eigen::Vector2d bearing = camera.unproject({x, y}).value();
-      // Where the ray meets the planes x = 4 and x = 8 of the world; left is +y, up is +z.
+      // Intersections of the ray with the planes x = 4 and x = 8 of the world; left is +y, up is
+      // +z.
       const Eigen::Vector2d near = -4.0 * bearing;
       const Eigen::Vector2d far = -8.0 * bearing;
       const bool box = std::abs(near.x()) < 0.5 && near.y() > -0.25 && near.y() < 0.75;

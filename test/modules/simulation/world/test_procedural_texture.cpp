@@ -119,7 +119,8 @@ TEST_CASE("Materials of nature have structure at every scale", "[simulation][tex
   for (int level = 1; texture.size() >> level >= 4; ++level) {
     CAPTURE(level);
     const Moments coarse = moments(texels(texture, level));
-    // What averaging over twice the edge takes away is the power of one octave.
+    // The difference between averages over an edge and over twice the edge is the power of one
+    // octave.
     const double power = fine.variance - coarse.variance;
     CHECK(std::sqrt(std::max(power, 0.0)) > 0.004 * fine.mean);
     fine = coarse;
