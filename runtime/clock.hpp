@@ -30,7 +30,7 @@ class ReplayClock {
   /// Waits until `stamp` is due. False if stopped: the source should end.
   bool wait_until(Stamp stamp);
 
-  /// When `stamp` is due; the first call, at `now`, fixes the origin. Nullopt: at once.
+  /// Time at which `stamp` is due; the first call, at `now`, fixes the origin. Nullopt: at once.
   [[nodiscard]] std::optional<TimePoint> due(Stamp stamp, TimePoint now);
 
   /// The same now, as steady_now_s() counts.
@@ -46,7 +46,7 @@ class ReplayClock {
   std::optional<TimePoint> due_locked(Stamp stamp, TimePoint now);
 
   const double rate_;
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards the members below
   std::condition_variable wake_;
   bool started_ = false;
   bool stopped_ = false;

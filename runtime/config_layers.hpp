@@ -11,9 +11,9 @@
 
 namespace km {
 
-/// A configuration put together from files and command-line overrides: what is added later wins,
-/// key by key. Problems are collected over all layers and sections and thrown together by
-/// finish(), each with the file and line it comes from:
+/// A configuration composed of files and command-line overrides: a later layer replaces keys of
+/// earlier ones. Problems are collected over all layers and sections and thrown together by
+/// finish(), each with its file and line:
 ///
 ///     ConfigLayers layers;
 ///     layers.add_file("config/robot.yaml");

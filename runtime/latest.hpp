@@ -13,7 +13,7 @@ class Latest {
  public:
   using Message = std::shared_ptr<const T>;
 
-  /// Replaces what was not taken. Nothing after close().
+  /// Replaces a value that has not been taken. Does nothing after close().
   void put(Message message) {
     const std::lock_guard lock(mutex_);
     if (!closed_) message_.swap(message);

@@ -36,7 +36,7 @@ constexpr double kLimitedInterval_s = 5.0;
 
 // The terminal is one per process, and so is this: log lines and the status line share it.
 struct Console {
-  std::mutex mutex;  // guards what follows
+  std::mutex mutex;  // guards the members below
   std::ostream* log_output = &unblocked_stderr();
   log::Listener listener;
   RateLimit rate_limit{kLimitedInterval_s};

@@ -8,7 +8,7 @@
 
 namespace km {
 
-/// Lets a message of a kind through at most once per interval, and counts what it held back.
+/// Passes a message of a kind at most once per interval, and counts the suppressed ones.
 /// Memory is bounded. Not thread-safe.
 class RateLimit {
  public:

@@ -38,7 +38,7 @@ class Periodic {
   const Duration period_;
   const std::function<void()> tick_;
   const std::string name_;
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards the members below
   std::condition_variable wake_;
   bool stop_ = false;
   std::exception_ptr error_;

@@ -85,7 +85,7 @@ RunResult Supervisor::run(const Finished& finished, double poll_interval_s) {
   const bool failed_before = result.failure.has_value();
   for (Entry& entry : nodes_)
     if (!wait_for_end(entry)) result.left_behind.emplace_back(entry.node->name());
-  // A node may also fail on what was left to do.
+  // A node may also fail on its remaining inputs.
   if (!failed_before) result.failure = first_failure();
   if (result.failure && !failed_before)
     log::error("supervisor") << result.failure->node << " failed: " << result.failure->message;

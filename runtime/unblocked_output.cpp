@@ -29,7 +29,7 @@ struct OutputQueue::State {
 
   const int descriptor;
   const std::size_t capacity;  // [bytes]
-  std::mutex mutex;            // guards what follows
+  std::mutex mutex;            // guards the members below
   std::condition_variable changed;
   std::deque<Piece> waiting;
   std::size_t bytes = 0;  // bytes that wait or are being written
@@ -134,7 +134,7 @@ bool OutputQueue::drain(double grace_s) {
 
 namespace {
 
-// Passes on what was written at every flush.
+// Forwards the written text at every flush.
 class QueueBuffer final : public std::stringbuf {
  public:
   explicit QueueBuffer(OutputQueue& queue) : std::stringbuf(std::ios::out), queue_(queue) {}
@@ -168,7 +168,7 @@ struct StandardStreams {
 };
 
 StandardStreams& standard_streams() {
-  // Never destroyed: what logs while the program ends finds it.
+  // Never destroyed, because destructors may log while the program ends.
   static auto* const streams = new StandardStreams;
   static const struct AtExit {
     ~AtExit() {

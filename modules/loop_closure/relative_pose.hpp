@@ -16,7 +16,7 @@
 
 namespace km {
 
-/// Standard deviations of what a keyframe measures, at the finest level of the pyramid.
+/// Standard deviations of the measurements of a keyframe, at the finest level of the pyramid.
 struct ImageNoise {
   double keypoint_px = 1.0;   ///< Position in the image; grows by 1.2 with each octave.
   double disparity_px = 0.5;  ///< Stereo disparity at the keyframe's focal length.

@@ -166,8 +166,8 @@ class BranchAndBound {
     }
   }
 
-  // Tries to give v one of the first `spare` colours by moving the only vertex there that is in its
-  // way to another of them.
+  // Tries to give v one of the first `spare` colours by recolouring the only conflicting vertex of
+  // that colour with another of them.
   bool recolour(Level& here, std::size_t v, std::size_t spare) {
     for (std::size_t c = 0; c + 1 < spare; ++c) {
       BitSet& colour = here.colours[c];

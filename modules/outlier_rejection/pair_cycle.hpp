@@ -58,8 +58,8 @@ struct BlockCovariance {
   return moved;
 }
 
-/// A closure turned so that a.id < b.id: the direction it was measured in does not matter to a
-/// cycle. Covariances are scaled to what the test assumes.
+/// A closure oriented so that a.id < b.id, because the direction of its measurement does not matter
+/// to a cycle. Covariances are multiplied by the noise scales of the test.
 struct OrientedClosure {
   ClosureId id;
   OdometryPose a;

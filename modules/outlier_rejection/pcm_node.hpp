@@ -46,7 +46,7 @@ class PcmNode final : public Node {
 
   std::string_view name() const override { return PcmConfig::kSection; }
   void start() override;
-  /// Publishes what is left to publish.
+  /// Publishes the remaining changes.
   void stop() noexcept override;
   std::exception_ptr error() const override;
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }

@@ -23,7 +23,7 @@ struct McapRecord {
   std::uint64_t begin = 0;  // position of the content in the bytes that were read
 };
 
-// Calls `use` with each record; false if the bytes end within one, or have what is none.
+// Calls `use` with each record; false if the bytes end within a record, or contain an invalid one.
 template <typename Use>
 bool for_each_record(std::span<const std::uint8_t> bytes, const Use& use) {
   for (std::uint64_t at = 0; at < bytes.size();) {

@@ -94,7 +94,7 @@ struct McapChunk {
   std::uint64_t uncompressed_size = 0;
   std::uint32_t uncompressed_crc = 0;  ///< 0: none.
   std::string compression;
-  std::span<const std::uint8_t> records;  ///< Into what was parsed, or is to be written.
+  std::span<const std::uint8_t> records;  ///< Into the parsed bytes, or into those to be written.
 };
 
 /// Index of the messages of one channel in the chunk before it.
@@ -126,7 +126,7 @@ struct McapAttachment {
   Stamp create_time = 0;
   std::string name;
   std::string media_type;              ///< "text/csv", ...
-  std::span<const std::uint8_t> data;  ///< Into what was parsed, or is to be written.
+  std::span<const std::uint8_t> data;  ///< Into the parsed bytes, or into those to be written.
 };
 
 struct McapAttachmentIndex {
@@ -178,7 +178,7 @@ struct McapDataEnd {
 template <typename Record>
 [[nodiscard]] std::optional<Record> parse_mcap(std::span<const std::uint8_t> bytes);
 
-/// `bytes` may end behind kMcapMessageFields_bytes; `size` is what they are of.
+/// `bytes` may end behind kMcapMessageFields_bytes; `size` is the full size of the content.
 [[nodiscard]] std::optional<McapMessage> parse_mcap_message(std::span<const std::uint8_t> bytes,
                                                             std::uint64_t size);
 

@@ -7,7 +7,7 @@
 
 namespace km {
 
-/// True if `path` is what open_bag() looks into: a file, or a folder with .db3 or .mcap files.
+/// True if open_bag() accepts `path`: a file, or a folder with .db3 or .mcap files.
 [[nodiscard]] bool may_be_bag(const std::filesystem::path& path);
 
 /// Opens a recording, whose kind is recognised by its first bytes: a bag of ROS 1 (.bag), an MCAP

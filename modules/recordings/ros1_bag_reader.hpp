@@ -38,7 +38,7 @@ class Ros1BagReader final : public BagReader {
     std::uint64_t data_begin = 0;
     std::uint32_t data_size = 0;
   };
-  // nullopt if it is none, or does not end before `end`.
+  // nullopt if it is no record, or does not end before `end`.
   [[nodiscard]] std::optional<Place> record_at(std::uint64_t begin, std::uint64_t end) const;
 
   // Why the index cannot be used, or null.

@@ -55,7 +55,7 @@ class Crossing {
 template <typename T>
 using AddressedCrossing = Crossing<T, Addressed<T>>;
 
-/// Which ends of a crossing a robot uses: it is not sent what it does not receive.
+/// Ends of a crossing that a robot uses: messages that it does not receive are not sent to it.
 struct CrossingEnds {
   bool send = true;
   bool receive = true;
@@ -65,7 +65,7 @@ struct CrossingEnds {
 /// to send and costly to answer.
 struct Pace {
   double per_second = std::numeric_limits<double>::infinity();
-  double burst = 1.0;  ///< At once, after a silence.
+  double burst = 1.0;  ///< Number of messages delivered at once after a silence.
 };
 
 /// Additional processing of the messages of a crossing. `content` is the sealed part of a message:
@@ -77,7 +77,8 @@ struct ContentGuard {
   /// Octets that `tail` puts behind every message; they are taken off before it is read.
   std::size_t tail_bytes = 0;
   std::function<std::vector<std::uint8_t>(const T& message, Content serialized)> tail = {};
-  /// Sees what arrives before others do: null, or why it is refused (a string literal).
+  /// Checks each received message before it is published: null, or the reason of a refusal (a
+  /// string literal).
   std::function<const char*(const TeamPeer& sender, const T& message, Content content)> check = {};
 };
 

@@ -24,13 +24,14 @@ struct BudgetConfig {
   }
 
   void visit_fields(auto& visitor) {
-    visitor.field("bytes_per_s", bytes_per_s, {0.0, 1e12},
-                  "[B/s] that this robot sends, each receiver and what is sent again counted; more "
-                  "waits: closures go first, then verification, poses, new words, older words, "
-                  "the mesh; statuses are counted but never wait; 0, here and below: no limit");
+    visitor.field(
+        "bytes_per_s", bytes_per_s, {0.0, 1e12},
+        "[B/s] that this robot sends, including each receiver and retransmissions; further "
+        "messages wait, in this order of priority: closures, verification, poses, new words, older "
+        "words, mesh; statuses are counted but never wait; 0, here and below: no limit");
     visitor.field("bytes_per_run", bytes_per_run, {0.0, 1e15},
-                  "[B] in the whole run: the mesh is sent up to 60 % of them, words up to 80 %, "
-                  "verification up to 90 %, poses up to 95 %, closures up to all");
+                  "[B] in the whole run: the mesh may use the first 60 %, words 80 %, verification "
+                  "90 %, poses 95 %, closures all of them");
     visitor.field("verification_bytes_per_s", verification_bytes_per_s, {0.0, 1e12},
                   "[B/s] part of bytes_per_s for requested keyframes");
     visitor.field("poses_bytes_per_s", poses_bytes_per_s, {0.0, 1e12}, "[B/s] for the pose graph");

@@ -31,8 +31,8 @@ class WireSample {
   WireSample(const WireSample&) = delete;
   WireSample& operator=(const WireSample&) = delete;
 
-  /// False if `bytes` are not one sample of the type, with what later versions append to it; then
-  /// the sample is as it was. Call once.
+  /// False if `bytes` are not one sample of the type, possibly with fields that later versions
+  /// append; then the sample is unchanged. Call once.
   [[nodiscard]] bool read(std::span<const std::uint8_t> bytes);
 
   [[nodiscard]] const void* get() const { return sample_.data(); }

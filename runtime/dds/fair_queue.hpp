@@ -19,9 +19,11 @@ namespace km {
 struct QueueQuota {
   std::size_t messages = 20000;
   std::size_t bytes = 8U << 20U;
-  bool newest_wins = false;  ///< Full: the oldest makes room; else the newest is not taken.
+  bool newest_wins = false;  ///< When the queue is full, drop the oldest message; otherwise refuse
+                             ///< the newest.
   double per_second = std::numeric_limits<double>::infinity();
-  double burst = 1.0;  ///< Served at once after a silence; with a finite per_second.
+  double burst = 1.0;  ///< Number of messages served at once after a silence; with a finite
+                       ///< per_second.
 };
 
 /// Queues of messages, one per peer, served in rotation: a peer that sends much delays only its own
@@ -61,7 +63,7 @@ class FairQueue {
     return std::nullopt;
   }
 
-  /// How long after `now_s` pop() will give something if nothing is pushed; nullopt: never.
+  /// Time after `now_s` until pop() returns a message if nothing is pushed; nullopt: never.
   [[nodiscard]] std::optional<double> wait_s(double now_s) {
     std::optional<double> least;
     for (auto& [peer, line] : peers_) {

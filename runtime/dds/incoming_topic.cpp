@@ -26,7 +26,7 @@ constexpr int kMaxInFlight = 16;
 constexpr std::chrono::milliseconds kMaxStay{100};
 constexpr std::size_t kFilingBytes = 256;  // bytes of bookkeeping per message
 
-// An envelope as DDS reads it: one count and what it counts.
+// An envelope in the form in which DDS reads it, with a count and its elements.
 class ReceivedEnvelope {
  public:
   explicit ReceivedEnvelope(const ddsi_serdata& serialized)
@@ -152,7 +152,7 @@ void IncomingTopic::recall(double now_s) {
   }
 }
 
-// Whether it is known what is to be done with the messages of a participant.
+// True if the handling of a participant's messages is decided.
 bool IncomingTopic::is_settled(Standing standing) const {
   const bool is_open = standing == Standing::kUnknown || standing == Standing::kRival ||
                        standing == Standing::kArriving;
@@ -293,7 +293,7 @@ IncomingTopic::Verdict IncomingTopic::accept(const km_wire_Envelope& envelope, c
   return Verdict::kTaken;
 }
 
-// Null, or why the message is refused. A duplicate is neither.
+// Returns the reason of a refusal, otherwise null. A duplicate is dropped without a reason.
 const char* IncomingTopic::hand_on(const km_wire_Envelope& envelope, const Filed& filed,
                                    std::span<const std::uint8_t> content) {
   std::shared_ptr<void> token = in_flight_->enter();  // before the check who is current, because it

@@ -23,18 +23,18 @@
 
 namespace km {
 
-/// How many messages are with their subscribers, so that the next waits with those of its peer
-/// instead of before those of others in a node's queue. Thread-safe.
+/// Number of messages that subscribers hold. It is bounded, so that the next message waits with
+/// those of its peer and not before other peers' messages in a node's queue. Thread-safe.
 class InFlight : public std::enable_shared_from_this<InFlight> {
  public:
-  /// Waits until there is room, at most for a while: what a subscriber keeps must not stop the
-  /// rest. The one it counts is in flight until the token is gone.
+  /// Waits until there is room, for a bounded time, because one subscriber must not stop the
+  /// others. The message counts until the token is released.
   [[nodiscard]] std::shared_ptr<void> enter();
 
  private:
   void leave();
 
-  std::mutex mutex_;  // guards what follows
+  std::mutex mutex_;  // guards the members below
   std::condition_variable left_;
   int count_ = 0;
 };
@@ -49,8 +49,8 @@ class InFlight : public std::enable_shared_from_this<InFlight> {
 /// room, are counted by reason and logged at a limited rate.
 class IncomingTopic {
  public:
-  /// Gets what a message carries; publishes it, or returns why not (a string literal). `token` is
-  /// to be held as long as subscribers are busy with it.
+  /// Receives the content of a message and publishes it, or returns the reason of a refusal (a
+  /// string literal). Subscribers hold `token` as long as they process the message.
   using Handler = std::function<const char*(
       const TeamPeer& sender, std::span<const std::uint8_t> content, std::shared_ptr<void> token)>;
 
@@ -65,7 +65,7 @@ class IncomingTopic {
   [[nodiscard]] dds_entity_t condition() const { return condition_.handle(); }
   /// Files everything there is.
   void take(double now_s);
-  /// Files what has been waiting for its writer to be known. For now and then.
+  /// Files the messages whose writer has become known. Call at intervals.
   void recall(double now_s);
 
   // Delivery.
@@ -126,7 +126,7 @@ class IncomingTopic {
   WaitingRooms<RobotId, Filed> sealed_;  // delivery only: for which a key is missing
   double started_s_ = 0.0;
 
-  mutable std::mutex mutex_;  // guards what is filed, and the counts
+  mutable std::mutex mutex_;  // guards the filed messages and the counts
   std::condition_variable filed_changed_;
   FairQueue<Filed> filed_;
   bool stopping_ = false;

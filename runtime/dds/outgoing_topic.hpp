@@ -22,7 +22,7 @@
 
 namespace km {
 
-/// A topic between robots: what travels on it are envelopes (idl/envelope.idl).
+/// A topic between robots, which carries envelopes (idl/envelope.idl).
 struct TopicSpec {
   std::string name;
   std::uint16_t version = 1;  ///< Version of the content's type.
@@ -80,7 +80,7 @@ class OutgoingTopic {
   /// Whether such have been noticed since the last call, by whatever was done here.
   [[nodiscard]] bool take_newcomers() { return std::exchange(newcomers_, false); }
 
-  /// So far: once per reader, and what was sent again.
+  /// Bytes sent so far, counted once per reader and retransmission.
   [[nodiscard]] std::uint64_t sent_bytes() const;
 
   /// Waits until every matched reader has everything. False on timeout.
@@ -98,9 +98,9 @@ class OutgoingTopic {
     std::unique_ptr<dds_statistics, StatisticsDeleter> statistics;
     std::optional<TeamPeer> receiver;  // none: all
     std::string partition;
-    std::map<std::string, std::uint32_t> next_number;  // by partition: a process may return
-    std::vector<Guid> readers;                         // participants of those matched
-    std::map<MessageKey, Octets> kept;                 // to be sealed for the next process
+    std::map<std::string, std::uint32_t> next_number;  // by partition, because a process may return
+    std::vector<Guid> readers;                         // participants of the matched readers
+    std::map<MessageKey, Octets> kept;                 // messages to be sealed for the next process
     std::set<MessageKey> due;                          // messages of these that this process still
                                                        // needs
     TrafficCount written;

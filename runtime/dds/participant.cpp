@@ -62,8 +62,8 @@ int discovery_port(int domain, int index) {
   return 7400 + 250 * domain + 10 + 2 * index;
 }
 
-// Robots on this host cost nothing on the network: the whole range is asked. Elsewhere each port
-// that is asked is a packet on the air.
+// Asks all ports of this host, because that costs nothing on the network. On other hosts each port
+// costs a packet on the air.
 void write_peers(std::ostream& xml, const DdsConfig& config, const std::string& own_address) {
   xml << "<Peers><Peer address='" << own_address << "'/>";
   for (const std::string& peer : config.peers) {

@@ -69,7 +69,7 @@ class PeerTable {
   static constexpr std::size_t kMaxRobots = 64;
   static constexpr std::size_t kMaxParticipants = 1024;
 
-  /// Whether a robot may be talked to, by what it shows beside its identity: null, or why not (a
+  /// Decides by the credentials whether a robot is accepted: null, or the reason of a refusal (a
   /// string literal).
   using Admit =
       std::function<const char*(const RobotIdentity& identity, std::string_view credentials)>;
@@ -134,7 +134,7 @@ class PeerTable {
     bool proven = false;
     bool alive = false;
     bool warned = false;        // a twin or rival was logged once
-    std::uint64_t arrival = 0;  // counts those that came alive
+    std::uint64_t arrival = 0;  // order in which participants became alive
   };
   struct KnownPeer {
     Peer peer;

@@ -120,7 +120,7 @@ Peers::Peers(const DdsParticipant& participant)
           kMaxEvents, Overflow::kDropOldest, [this](const auto& event) { events_.publish(event); },
           "peer_events") {}
 
-// Called with the mutex held, as all of the table is.
+// The mutex is held, as for all calls of the table.
 const char* Peers::admit(const RobotIdentity& identity, std::string_view credentials) {
   if (credentials.empty()) return "shows no keys";
   const auto now_s = static_cast<std::int64_t>(wall_now_s());

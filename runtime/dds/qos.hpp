@@ -8,7 +8,8 @@ namespace km {
 /// Purpose of a topic between robots; it decides the quality of service (see make_writer_qos()).
 ///
 /// Writers of all kinds keep the last sample of each key, so that none blocks on an unreachable
-/// robot. Readers keep all until it is taken: another's sample with the same key replaces nothing.
+/// robot. Readers keep all samples until they are taken; samples of different writers with one key
+/// do not replace each other.
 enum class TopicKind {
   kEvent,    ///< Every sample arrives, also at robots that join later. One key value per sample.
   kState,    ///< Reliable, newest sample of each key wins, also for robots that join later.

@@ -34,8 +34,8 @@ constexpr std::array<KnownType, 11> kTypes = {{
     {"visualization_msgs", "Marker", &visualization_msgs_msg_dds__Marker__desc},
 }};
 
-// DDS has one configuration per domain number and process. That of ROS gets a number of its own
-// here, beyond those on the network, and its true one there.
+// DDS has one configuration per domain number and process. So ROS' domain gets another number
+// inside this process, beyond those on the network, and its true number on the network.
 constexpr dds_domainid_t kOwnNumbers = 1000;
 
 std::string cyclone_xml(const RosConfig& config, const NetworkInterface& interface) {

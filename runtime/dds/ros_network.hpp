@@ -11,14 +11,14 @@ namespace km {
 
 /// Kinds of quality of service that ROS has for its topics.
 enum class RosQos {
-  kSensorData,  ///< Best effort: what is lost is not sent again.
+  kSensorData,  ///< Best effort: lost samples are not retransmitted.
   kReliable,
   kLatched,  ///< Reliable, and the last message is kept for late readers.
 };
 
-/// A participant among those of ROS 2: as rmw_cyclonedds_cpp and rmw_fastrtps_cpp it names topics
-/// "rt/..." and types "sensor_msgs::msg::dds_::Imu_". It shares nothing with the domain of the
-/// team, which may have the same number.
+/// A participant in the network of ROS 2. Like rmw_cyclonedds_cpp and rmw_fastrtps_cpp it names
+/// topics "rt/..." and types "sensor_msgs::msg::dds_::Imu_". It shares nothing with the domain of
+/// the team, which may have the same number.
 class RosNetwork {
  public:
   /// Throws ConfigError for an unusable `config`, DdsError if DDS refuses it.

@@ -76,7 +76,7 @@ void RosSubscription::add(std::size_t topic, const ddsi_serdata& sample) {
   heard_s_[topic] = steady_now_s();
 }
 
-// A driver that died, or a topic by another name, is what people look for first.
+// Reports silent topics, because a dead driver or a wrong topic name is the most frequent error.
 void RosSubscription::tell_silence() {
   const double now_s = steady_now_s();
   if (now_s - told_s_ < kSilence_s) return;

@@ -59,7 +59,7 @@ class RosSubscription {
   void tell_silence();
   [[nodiscard]] std::uint64_t lost_ever(std::size_t topic) const;
 
-  std::shared_ptr<const RosNetwork> network_;  // outlives what follows
+  std::shared_ptr<const RosNetwork> network_;  // outlives the members below
   std::vector<RosTopic> topics_;
   std::vector<DdsEntity> dds_topics_, readers_;
   DdsEntity waitset_, guard_;

@@ -35,8 +35,8 @@ class SendBudget {
   void spend(SendPriority priority, std::uint64_t bytes, std::span<const RobotId> readers,
              double now_s);
 
-  /// The sum of all that has gone, as counted elsewhere: what was sent without asking, or again, is
-  /// spent now.
+  /// Updates the sum of all sent bytes, which is counted elsewhere: bytes that DDS has sent by
+  /// itself, or again, are charged now.
   void settle(std::uint64_t sent_bytes, double now_s);
 
  private:

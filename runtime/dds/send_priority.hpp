@@ -14,7 +14,7 @@ enum class SendPriority {
   kPoses,         ///< All messages of the pose graph.
   kWords,         ///< Bags of words.
   kBacklog,       ///< Bags of words that are not new any more.
-  kMesh           ///< And whatever else there is.
+  kMesh           ///< Chunks of the mesh, and all other messages.
 };
 inline constexpr std::size_t kSendPriorities = 7;
 

@@ -76,14 +76,14 @@ class SendSchedule {
     return std::nullopt;
   }
 
-  /// After a pop() that gave nothing: how long after it the budget lets something go; nullopt if
-  /// nothing waits for that.
+  /// After a pop() without a result: time until the budget permits a message; nullopt if no message
+  /// waits for the budget.
   [[nodiscard]] std::optional<double> wait_s() const { return wait_s_; }
 
   /// See SendBudget.
   void settle(std::uint64_t sent_bytes, double now_s) { budget_.settle(sent_bytes, now_s); }
 
-  /// Nothing more will be sent: what waits is dropped.
+  /// Drops all waiting messages at the end.
   void drop_all() {
     for (Lane& lane : lanes_)
       while (!lane.messages.empty()) drop_front(lane);

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kPatience_s = std::chrono::duration<double>(kPatience).count();
 
-// A pipe; what is read of it comes line by line.
+// A pipe that is read line by line.
 class Pipe {
  public:
   Pipe() { REQUIRE(pipe2(ends_.data(), O_CLOEXEC) == 0); }
@@ -32,7 +32,7 @@ class Pipe {
     if (ends_[0] >= 0) close(ends_[0]);
     ends_[0] = -1;
   }
-  // Writes lines until not one more fits, so that the next writer waits.
+  // Writes lines until the pipe is full, so that the next writer waits.
   void fill() {
     const int flags = fcntl(ends_[1], F_GETFL);
     REQUIRE(fcntl(ends_[1], F_SETFL, flags | O_NONBLOCK) == 0);
@@ -66,7 +66,7 @@ std::string numbered(int i) {
 }
 
 TEST_CASE("Queued text is written completely and in order", "[output]") {
-  constexpr int kLines = 20000;  // many times what a pipe holds
+  constexpr int kLines = 20000;  // more than a pipe can hold
   Pipe pipe;
   std::vector<std::string> lines;
   std::thread reader([&] { lines = pipe.read_to(numbered(kLines - 1)); });

@@ -85,7 +85,7 @@ TEST_CASE("A node that is to end and makes no steps is given up", "[watchdog]") 
   bench.watchdog.expect_end(bench.node);
   for (int i = 0; i < 5; ++i) {
     bench.pass(15.0);
-    const Heartbeat::Step step(bench.node.heartbeat);  // it works off what is left
+    const Heartbeat::Step step(bench.node.heartbeat);  // it processes its remaining inputs
   }
   CHECK_FALSE(bench.watchdog.given_up().has_value());
   bench.pass(22.0);

@@ -72,7 +72,7 @@ TEST_CASE("A topic hands one shared message to every subscriber, in order", "[to
   CHECK(heard[0].second == heard[1].second);
 }
 
-// A node cannot write what it is to read, nor take what comes from peers for what goes to them.
+// A node can neither write its inputs nor confuse the channels from peers and to peers.
 static_assert(!std::is_convertible_v<In<int>, Out<int>>);
 static_assert(!std::is_convertible_v<Out<int>, In<int>>);
 
@@ -147,7 +147,7 @@ TEST_CASE("The newest value is taken, and only once", "[runtime]") {
   const auto old = std::make_shared<const int>(1);
   latest.put(old);
   latest.put(std::make_shared<const int>(2));
-  CHECK(old.use_count() == 1);  // nothing is held that is not wanted any more
+  CHECK(old.use_count() == 1);  // no former value is kept
   const auto taken = latest.take();
   REQUIRE(taken != nullptr);
   CHECK(*taken == 2);

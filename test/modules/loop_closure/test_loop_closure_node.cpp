@@ -12,7 +12,7 @@ namespace {
 constexpr RobotId kSelf = 3;
 constexpr RobotId kPeer = 9;
 
-// A robot's node with its channels; what it sends is kept.
+// A robot's node with its channels; its messages are kept.
 struct Robot {
   explicit Robot(RobotId self, const LoopClosureConfig& config = {},
                  LoopClosureNode::Recall recall = {})
@@ -63,7 +63,7 @@ struct Robot {
   LoopClosureNode node;
 };
 
-// Delivers what both have sent; a reply may produce further requests.
+// Delivers the messages of both robots; a reply may produce further requests.
 void deliver(Robot& a, Robot& b) {
   while (!a.requests.empty() || !b.requests.empty() || !a.replies.empty() || !b.replies.empty())
     for (auto [from, to] : {std::pair(&a, &b), std::pair(&b, &a)}) {

@@ -9,7 +9,7 @@
 namespace km {
 namespace {
 
-// Two robots that drive along x; closures say where b is in the frame of a.
+// Two robots that drive along x; closures state the position of b in the frame of a.
 struct Aisles {
   Chain a{0}, b{1};
 

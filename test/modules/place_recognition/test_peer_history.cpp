@@ -12,7 +12,7 @@
 namespace km {
 namespace {
 
-// The vector of keyframe i says so.
+// A vector that contains the number of its keyframe.
 BowVector vector_of(std::uint32_t index) {
   return toy_vector({index});
 }
@@ -68,7 +68,7 @@ TEST_CASE("The nearest earlier keyframe replaces a missing predecessor", "[place
   PeerHistory history(2);
   history.add(0, vector_of(0));
   CHECK(history.add(5, vector_of(5)).empty());
-  CHECK(history.add(6, vector_of(6)).size() == 1);  // its predecessor is there
+  CHECK(history.add(6, vector_of(6)).size() == 1);  // its predecessor has arrived
   const auto overdue = history.add(7, vector_of(7));
   REQUIRE(overdue.size() == 2);
   CHECK(overdue[0].index == 5);

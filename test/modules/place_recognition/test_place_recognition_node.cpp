@@ -108,7 +108,7 @@ TEST_CASE("The keyframes of a restarted peer are searched again and those of a r
   event.identity.robot = kPeer;
   robot.node.step(std::make_shared<const PeerEvent>(event));
   const bool restarted = kind == PeerEventKind::kRestarted;
-  CHECK(robot.restarts.received.size() == (restarted ? 1 : 0));  // before what follows
+  CHECK(robot.restarts.received.size() == (restarted ? 1 : 0));  // before the outputs below
   robot.node.step(bow({kPeer, 0}, {11, 12, 13, 14}));
   robot.node.step(bow({kPeer, 1}, {11, 12, 13, 15}));
   REQUIRE(robot.candidates.received.size() == (restarted ? 2 : 1));
@@ -184,7 +184,7 @@ TEST_CASE("Keyframes that cannot be compared are reported and change nothing",
   CHECK(status_after(bow({kPeer, 0}, {1, 2, 3, 4})) == PlaceQueryStatus::kRepeated);
   CHECK(status_after(bow({kPeer, 1}, {})) == PlaceQueryStatus::kSearched);
   CHECK(robot.candidates.received.empty());
-  robot.node.step(bow({kSelf, 0}, {1, 2, 3, 4}));  // its own, come back
+  robot.node.step(bow({kSelf, 0}, {1, 2, 3, 4}));  // own bag that returns
   CHECK(robot.queries.received.empty());
 }
 

@@ -134,7 +134,7 @@ TEST_CASE("Weights are term counts times ln(N / n), scaled to norm 1", "[place_r
 
   const std::vector<OrbDescriptor> image = {in_two, everywhere, in_two, in_one};
   const BowVector vector = vocabulary.transform(image);
-  REQUIRE(vector.words.size() == 2);  // the word that is everywhere says nothing
+  REQUIRE(vector.words.size() == 2);  // the word of every image has no weight
   const double total = 2.0 * std::log(1.5) + std::log(3.0);
   const std::size_t at = vector.words[0] == word(in_two) ? 0 : 1;
   CHECK(vector.weights[at] == Approx(2.0 * std::log(1.5) / total).epsilon(kFloatTolerance));

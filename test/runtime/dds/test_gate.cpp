@@ -160,7 +160,7 @@ class LocalEnvelope {
     ddsi_serdata_to_ser(serialized_, 0, result.size(), result.data());
     return result;
   }
-  // The way that what arrives on the network goes. False if DDS refuses it.
+  // The path of messages that arrive on the network. False if DDS refuses the message.
   [[nodiscard]] bool reads(std::vector<std::uint8_t> bytes) const {
     const ddsrt_iovec_t part{bytes.data(), bytes.size()};
     ddsi_serdata* received =

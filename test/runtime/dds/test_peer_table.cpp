@@ -164,7 +164,7 @@ TEST_CASE("An orderly end is not a loss", "[peers]") {
 constexpr std::uint64_t kBoot = 70U << kResumeBits;
 constexpr std::uint64_t kOtherLife = 71U << kResumeBits;
 
-// Robot 7, heard from guid 2, with kBoot.
+// Robot 7, received from guid 2, with kBoot.
 PeerTable with_robot() {
   PeerTable table(kSelf);
   table.participant(guid(2), data_of(7, kBoot), "udp/10.0.0.7");
@@ -188,7 +188,7 @@ TEST_CASE("A robot that is started again has its id back once its former self is
   SECTION("restarted after it was lost") {
     table.silent(guid(2));
     table.participant(guid(3), data_of(7, boot), "");
-    CHECK(table.standing(guid(3)) == Standing::kRival);  // not heard itself yet
+    CHECK(table.standing(guid(3)) == Standing::kRival);  // not received itself yet
     table.alive(guid(3));
   }
   SECTION("restarted after it left") {
