@@ -33,8 +33,8 @@ namespace km {
 template <typename TopicId, typename Message>
 class SendSchedule {
  public:
-  static constexpr std::size_t kMaxMessages = 8192;       ///< That wait, of one priority.
-  static constexpr std::uint64_t kMaxBytes = 32U << 20U;  ///< Bound for one priority.
+  static constexpr std::size_t kMaxMessages = 8192;       ///< Waiting messages of one priority.
+  static constexpr std::uint64_t kMaxBytes = 32U << 20U;  ///< Waiting bytes of one priority.
   static constexpr double kNew_s = 5.0;                   ///< Age up to which a bag of words is
                                                           ///< new.
 
