@@ -59,7 +59,7 @@ TEST_CASE("The lists of a EuRoC folder are its topics", "[robot]") {
         Words{"cam0", "cam1", "2", "2", "0.000", "0.000", "0", "0"});
 }
 
-TEST_CASE("A EuRoC folder needs no rig file: what to do instead is said", "[robot]") {
+TEST_CASE("A EuRoC folder needs no rig file, and the message names the alternative", "[robot]") {
   const TemporaryFolder folder;
   folder.write("mav0/cam0/data.csv", "1000000000,a\n");
   const auto rig = folder.path() / "rig.yaml";

@@ -85,7 +85,7 @@ TEST_CASE("The journal knows a published keyframe as long as its file exists", "
   CHECK(journal.node.recall(0) == nullptr);
 }
 
-TEST_CASE("A journal holds what all corrections of the cameras come to", "[robot]") {
+TEST_CASE("A journal holds the product of all corrections of the cameras", "[robot]") {
   Journal journal({0.02, make_pose(Eigen::Matrix3d::Identity(), {0.1, 0.0, 0.0})});
   KeyframeOdometry keyframe;
   keyframe.id = {1, 0};
@@ -100,7 +100,7 @@ TEST_CASE("A journal holds what all corrections of the cameras come to", "[robot
 }
 
 // Nodes stop in this order.
-TEST_CASE("The journal stops behind all that find closures and before those that use them",
+TEST_CASE("The journal stops after all nodes that find closures and before those that use them",
           "[robot]") {
   const TemporaryFolder folder;
   RobotOptions options;

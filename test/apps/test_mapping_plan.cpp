@@ -57,7 +57,7 @@ TEST_CASE("Recorded depth and labels are preferred, others computed", "[robot][m
   CHECK(full.plan(config, network)->sensor.labels == LabelsFrom::kNetwork);
 }
 
-TEST_CASE("Depth is used as far as it is good enough", "[robot][mapping]") {
+TEST_CASE("Depth is used up to the range at which it is accurate enough", "[robot][mapping]") {
   Camera camera;
   camera.fx = 500.0;
   const StereoRig rig = rgbd_rig(camera, 0.1);
@@ -82,7 +82,7 @@ TEST_CASE("A bag has the images that its rig file names", "[robot][mapping]") {
                     Catch::Contains("no label images in rig.yaml"));
 }
 
-TEST_CASE("A map that cannot be had is refused with what is missing", "[robot][mapping]") {
+TEST_CASE("A map that is not possible is refused with the missing inputs", "[robot][mapping]") {
   const Recording stereo({"cam0", "cam1"});
   const Recording depth({"cam0", "depth0", "label0"});
   const auto refused = [](const Recording& recording, const MappingConfig& config,

@@ -24,7 +24,7 @@ TEST_CASE("Memory that is taken shows, and processor time does", "[robot]") {
   CHECK(taken.back() == 1);
 }
 
-TEST_CASE("The growth of memory is that of the second half of the time", "[robot]") {
+TEST_CASE("The growth of memory is measured in the second half of the time", "[robot]") {
   std::ostringstream text;
   ProcessCsv csv(text);
   CHECK_FALSE(csv.summary().memory_growth_bytes_per_minute);

@@ -47,7 +47,7 @@ RunSummary full_summary() {
 
 }  // namespace
 
-TEST_CASE("A summary with all there can be is read as it was written", "[robot][summary]") {
+TEST_CASE("A summary with all possible values is read as it was written", "[robot][summary]") {
   const TemporaryFolder folder;
   const RunSummary full = full_summary();
   CHECK(read_summary(folder.write("full.json", json_text(full))) == full);

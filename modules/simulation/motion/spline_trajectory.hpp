@@ -138,7 +138,7 @@ class SplineTrajectory final : public BodyTrajectory {
 [[nodiscard]] SplineTrajectory::Control spline_control(const SE3& T);
 
 /// The trajectory whose controls are `poses`, one every `interval_s`: at its start near poses[2],
-/// at its end near the last but two. It smooths what is faster than two or three intervals.
+/// at its end near the last but two. Motion faster than two or three intervals is smoothed.
 [[nodiscard]] SplineTrajectory spline_along(double start_s, double interval_s,
                                             std::span<const SE3> poses);
 

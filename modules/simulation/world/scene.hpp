@@ -88,7 +88,7 @@ class Scene {
     return {*this, standing_at(position, yaw_rad)};
   }
 
-  /// Shift of the texture of what follows [m]: likes do not look the same to the grain.
+  /// Shift of the texture of the following shapes [m], so that equal objects differ in their grain.
   void set_uv_offset(const Eigen::Vector2f& offset_m) { uv_offset_ = offset_m; }
 
   /// Corners counter-clockwise seen from outside.

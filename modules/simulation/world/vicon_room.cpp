@@ -362,7 +362,7 @@ constexpr float kHeight_m = 4.0F;
 const Vector3f kCorner(-4.6F, -3.5F, 0.0F);
 constexpr float kHalf_m = 0.5F * kEdge_m;
 
-/// The stretch of a wall whose middle is at x, to put things before it.
+/// The part of a wall whose middle is at x, as a frame for objects in front of it.
 Isometry3f at_wall(float x) {
   return standing_at({x, 0.0F, 0.0F}, 0.0F);
 }

@@ -100,8 +100,7 @@ TEST_CASE("The doctor says of a file why no robot can play it", "[doctor]") {
   CHECK_THAT(told("record.mcap"), Catch::Contains("no topic of it has images"));
 }
 
-TEST_CASE("The doctor's exit code is 2 for what it cannot use, with a line that says why",
-          "[doctor]") {
+TEST_CASE("The doctor's exit code is 2 for unusable input, with a line that says why", "[doctor]") {
   const TemporaryFolder folder;
   const CommandResult empty = run_command(kDoctor + ' ' + folder.path().string());
   CHECK(empty.exit_code == 2);
@@ -117,7 +116,7 @@ TEST_CASE("The doctor's exit code is 2 for what it cannot use, with a line that 
   CHECK_THAT(domain.output, Catch::Contains("--set ros.domain=N"));
 }
 
-TEST_CASE("The doctor listens to the topics of a rig file, and looks at what they show",
+TEST_CASE("The doctor listens to the topics of a rig file, and examines their messages",
           "[doctor]") {
   const auto data = shared_data("euroc/MH_01_easy");
   if (!data) return;

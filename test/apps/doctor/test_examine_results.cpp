@@ -106,7 +106,7 @@ TEST_CASE("The folder of a robot that was killed is no recording, and the messag
   }
 }
 
-TEST_CASE("Results with files that are missing or broken are looked at as far as they go",
+TEST_CASE("Results with files that are missing or broken are examined as far as possible",
           "[doctor]") {
   const Results results;
   std::filesystem::remove(results.folder.path() / "alice/config.yaml");

@@ -81,7 +81,7 @@ TEST_CASE("mesh starts registration where the trajectories say", "[evaluate]") {
              Catch::Contains("give one --trajectory-truth for all --trajectory"));
 }
 
-TEST_CASE("mesh refuses what it cannot compare, by name", "[evaluate]") {
+TEST_CASE("mesh refuses incomparable input by name", "[evaluate]") {
   const Meshes meshes;
   const std::string truth = kMeshTool + "mesh --truth " + meshes.truth.string() + " --estimate ";
   CHECK(run_command(truth + "/none.ply").output ==
@@ -150,7 +150,7 @@ TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]")
   CHECK_THAT(many.output, Catch::Contains("more --reference than --trajectory"));
 }
 
-TEST_CASE("render refuses what it cannot draw", "[evaluate]") {
+TEST_CASE("render refuses input that it cannot draw", "[evaluate]") {
   const Meshes meshes;
   const std::string command = kMeshTool + "render --mesh " + meshes.truth.string() + " --output ";
   CHECK_THAT(run_command(command + "out.jpg").output, Catch::Contains("out.jpg: pictures are PNG"));

@@ -93,7 +93,7 @@ TEST_CASE("The inputs of a run are kept with its results", "[experiments]") {
   CHECK(laboratory.folder.read("results/numbers.json") == before);
 }
 
-TEST_CASE("A run with another folder that makes nothing leaves all as it was", "[experiments]") {
+TEST_CASE("A run with another folder and without new results changes nothing", "[experiments]") {
   const Laboratory laboratory;
   REQUIRE(laboratory.run("run pcm").exit_code == 0);
   const std::string report = laboratory.folder.read("results/report.md");
@@ -115,7 +115,7 @@ TEST_CASE("A run with another folder that makes nothing leaves all as it was", "
   CHECK_THAT(laboratory.bare("list").output, Contains("pcm-1   done") && Contains("other"));
 }
 
-TEST_CASE("The tool says what is wrong or missing", "[experiments]") {
+TEST_CASE("The tool names faults and missing inputs", "[experiments]") {
   const Laboratory laboratory;
   const auto fails_with = [&](const std::string& arguments, int code, const std::string& message) {
     const CommandResult result = laboratory.run(arguments);

@@ -106,7 +106,7 @@ TEST_CASE("A robot that never met the others is named", "[experiments]") {
   CHECK_THAT(city.read("report.md"), Contains("City: robot2 never met the others;"));
 }
 
-TEST_CASE("Small versions are judged only by what they can answer", "[experiments]") {
+TEST_CASE("Small versions are judged only by targets that they can decide", "[experiments]") {
   const CannedCity city(true);
   const ReportSummary summary = city.report();
   CHECK(summary.targets == 6);  // a cost, COSMO-Bench, two searches with time and clique
@@ -156,7 +156,7 @@ TEST_CASE("Without results the report says so", "[experiments]") {
                        Contains("Nothing was measured yet."));
 }
 
-TEST_CASE("A spread is median, lowest and highest of what is finite", "[experiments]") {
+TEST_CASE("A spread is median, lowest and highest of the finite values", "[experiments]") {
   const Spread spread = spread_of({3.0, 1.0, std::numeric_limits<double>::quiet_NaN(), 2.0, 10.0});
   CHECK(spread.count == 4);
   CHECK(spread.median == 2.5);

@@ -157,7 +157,7 @@ TEST_CASE("The demo needs the evaluation program for a map", "[demo]") {
   CHECK_THAT(with.output, Catch::StartsWith("demo: --programs: no kimera_multi_evaluate in "));
 }
 
-TEST_CASE("The demo refuses what it cannot use", "[demo]") {
+TEST_CASE("The demo refuses unusable input", "[demo]") {
   const auto refusal = [](const std::string& arguments) {
     const auto result = run_command("apps/demo " + arguments);
     CHECK(result.exit_code != 0);

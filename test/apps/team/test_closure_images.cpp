@@ -101,7 +101,7 @@ TEST_CASE("A recording that is gone is a note, a pose graph none", "[closure_ima
              Catch::StartsWith("r1: no images of its closures: ") && Contains("/no/such/place"));
 }
 
-TEST_CASE("A clock that is corrected is that of the keyframes", "[closure_images]") {
+TEST_CASE("A corrected camera clock is the clock of the keyframes", "[closure_images]") {
   const EurocFolder recording;
   const TemporaryFolder folder;
   const auto rig = folder.write("rig.yaml", "camera_time_offset_s: 0.05\n").string();

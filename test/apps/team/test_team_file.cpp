@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A folder with what team files refer to.
+// A folder with the files that team files name.
 struct Inputs {
   TemporaryFolder folder;
   fs::path dataset = folder.path() / "recording";
@@ -167,7 +167,7 @@ TEST_CASE("Every problem of a team file is reported with its line", "[team]") {
   }
 }
 
-TEST_CASE("Misspelt keys come before what they are the cause of", "[team]") {
+TEST_CASE("Misspelt keys are reported before the errors that they cause", "[team]") {
   const Inputs inputs;
   const std::string robot = problems_of(
       inputs.team("robots:\n  - {id: 1, datset: recording}\n  - {id: 1, graph: recording/g.csv}\n"),

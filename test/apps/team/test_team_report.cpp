@@ -52,7 +52,7 @@ LabelledMesh moved(LabelledMesh mesh, const Eigen::Vector3d& by) {
   return mesh;
 }
 
-// Robots a, b, ... with ids from 1 on, what they left, and the truth: a straight line each.
+// Robots a, b, ... with ids from 1 on, their results, and the truth: a straight line each.
 struct Team {
   TemporaryFolder folder;
   TeamPlan plan;

@@ -55,7 +55,7 @@ export class Browser {
     return new Promise((done, failed) => this.waiting.set(id, [done, failed, method]));
   }
 
-  /** A new page of that size, with what it complains of in `errors`. */
+  /** A new page of that size; `errors` has its error messages. */
   async open(url, width = 1440, height = 900) {
     const {targetId} = await this.send('Target.createTarget', {url: 'about:blank'});
     const {sessionId} = await this.send('Target.attachToTarget', {targetId, flatten: true});

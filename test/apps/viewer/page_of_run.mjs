@@ -1,4 +1,4 @@
-// Opens the page on a finished run and compares what it knows with what the robots left.
+// Opens the page on a finished run and compares its state with the results of the robots.
 //   node page_of_run.mjs VIEWER RESULTS [FOLDER for screenshots]
 import assert from 'node:assert/strict';
 import {mkdirSync} from 'node:fs';

@@ -107,7 +107,7 @@ ViewUpdate state_of(const std::string& name) {
   return {3, 1, 0, state};
 }
 
-TEST_CASE("A page hears the greeting, the past, and what comes", "[page_server]") {
+TEST_CASE("A page receives the greeting, all past messages, and new ones", "[page_server]") {
   ViewStore store(1'000'000);
   store.add(state_of("early"));
   const PageServer server(store, any_port());
@@ -119,7 +119,7 @@ TEST_CASE("A page hears the greeting, the past, and what comes", "[page_server]"
   CHECK(page.hears(R"("name":"later")"));
 }
 
-TEST_CASE("A robot is asked for images as long as any page wants them", "[page_server]") {
+TEST_CASE("A robot is asked for images as long as any page requests them", "[page_server]") {
   ViewStore store(1'000'000);
   std::mutex mutex;
   std::condition_variable changed;

@@ -131,7 +131,7 @@ TEST_CASE("A message that is repeated without a change reaches pages once", "[vi
   CHECK(all.messages[7]->bytes.find("rejected") != std::string::npos);
 }
 
-TEST_CASE("A page waits for what comes", "[view_store]") {
+TEST_CASE("A page waits for new messages", "[view_store]") {
   ViewStore store(5000);
   std::jthread teller([&] { store.add(pose(3)); });
   ViewStore::Cursor page;

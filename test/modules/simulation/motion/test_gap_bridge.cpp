@@ -53,7 +53,7 @@ struct Flight {
   }
 };
 
-TEST_CASE("A gap in a recording is bridged by what the inertial sensor felt", "[motion]") {
+TEST_CASE("A gap in a recording is bridged by the inertial samples", "[motion]") {
   const Flight flight;
   const BridgedPoses bridged = bridge_gaps(flight.poses, flight.imu);
   CHECK(bridged.gaps == 1);

@@ -80,7 +80,7 @@ TEST_CASE("The way begins where the route begins", "[motion]") {
   CHECK(path.at(0.0).tangent.x() == Approx(1.0));
 }
 
-TEST_CASE("Corners closer together than their arcs are rounded as far as there is room",
+TEST_CASE("Corners closer together than their arcs are rounded as far as the room allows",
           "[motion]") {
   // A chicane of 4 m pieces with a radius of 10 m.
   const Route route{{{0, 0}, {20, 0}, {20, 4}, {24, 4}, {24, 0}, {60, 0}, {60, 40}, {0, 40}}, 6.0};

@@ -187,7 +187,7 @@ TEST_CASE("Equal controls are a body at rest", "[motion]") {
   check_at_rest(trajectory, 1.0, 2.0);
 }
 
-TEST_CASE("A spline refuses what is no motion", "[motion]") {
+TEST_CASE("A spline refuses controls that are no motion", "[motion]") {
   const std::vector<Control> good = lively_controls(1, 10);
   CHECK_THROWS_AS(SplineTrajectory(0.0, 0.1, lively_controls(1, 5)), std::invalid_argument);
   CHECK_THROWS_AS(SplineTrajectory(0.0, 0.0, good), std::invalid_argument);
@@ -408,7 +408,7 @@ TEST_CASE("A vehicle follows the ground", "[motion]") {
     const Eigen::Vector3d ground = T * Eigen::Vector3d(0, 0, -options.rig_height_m);
     CAPTURE(t);
     CHECK(ground.z() == Approx(hills(ground.x(), ground.y())).margin(0.1));
-    // Tilted as the slope under it, give or take what the springs do.
+    // Tilted like the slope below, up to the motion of the springs.
     const Eigen::Vector2d slope(0.8 / 12.0 * std::cos(ground.x() / 12.0),
                                 -0.5 / 9.0 * std::sin(ground.y() / 9.0));
     const Eigen::Vector3d normal = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
