@@ -133,9 +133,9 @@ void run(const ClosuresCommand& command) {
 }
 
 constexpr const char* kClosuresDetails =
-    "Loop closures of a finished run against the truth, per stage: how many there are, which "
+    "Loop closures of a finished run against the truth, per stage: their number, the "
     "share\n"
-    "is true (precision), and which share of what there was to be found it found (recall)\n\n"
+    "of true ones (precision), and the share of the possible ones that was found (recall)\n\n"
     "A candidate is true if both keyframes see the same place: --min-overlap of either's image, "
     "at\n"
     "the median depth that the keyframe sees, lies in the other's. A verified closure and an "

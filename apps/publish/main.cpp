@@ -22,7 +22,7 @@ namespace {
 constexpr int kBadInput = 1, kBadCommandLine = 2;
 
 constexpr const char* kAbout =
-    "Plays a recording as live topics of ROS 2, without ROS: a stand-in for the drivers of a "
+    "Plays a recording as live topics of ROS 2, without ROS, in place of the drivers of a "
     "robot.";
 
 constexpr const char* kFooter = R"(

@@ -33,19 +33,20 @@ constexpr const char* kAbout =
     "while the run\ncontinues.";
 
 constexpr const char* kFooter = R"(
-With --domain it joins the team's DDS domain and listens; it says nothing there, and robots neither wait
-for it nor count it. Robots that run with --view send what a page needs: about 2 kB/s, the map's pieces as
-they change, and small camera images of a robot while a page shows them.
+With --domain it joins the team's DDS domain as a listener: robots neither wait for it nor count
+it. Robots that run with --view send the data of a page: about 2 kB/s, chunks of the map as they change,
+and small camera images of a robot while a page shows them.
 
-RESULTS is the folder of kimera_multi_team, or of one robot. Results do not say when all was known:
-a piece of the mesh is shown from when the robot came nearest to it, and robots join with the first
-closure of theirs that was kept: before it, the page has what odometry made, then what came of it.
+RESULTS is the folder of kimera_multi_team, or of one robot. Results do not contain all times:
+a chunk of the mesh is shown from the time at which the robot came nearest to it, and robots join with
+their first kept closure. Before it, the page has the estimates of odometry, afterwards the optimised
+ones.
 
-In the page: drag to turn, right button to move, wheel to come near; double click on a robot's name to
+In the page: drag to turn, right button to move, wheel to zoom; double click on a robot's name to
 follow it; measure: two clicks on the map. Keys: space plays and stops, T from above, F all in view.
 
-Without --listen only this host can open the page. With it, who knows the address can, so the address
-has a random token that is another one every time; what is sent is not encrypted.
+Without --listen only this host can open the page. With it, every program that knows the address can.
+The address therefore has a random token, a new one for every run; the content is not encrypted.
 
 Examples
   kimera_multi_viewer --domain 7                     # a team that runs
