@@ -7,8 +7,8 @@
 namespace km {
 namespace {
 
-constexpr int kRimPx =
-    8;  // Pixels at the rim without corners, because their windows would exceed the image.
+// Pixels at the rim without corners, because their windows would exceed the image.
+constexpr int kRimPx = 8;
 constexpr int kScoreRadius = 3;       // Window of the gradient matrix: 7 x 7.
 constexpr float kMinScore = 6.0F;     // Smaller eigenvalue, mean of (grey levels per px)^2.
 constexpr int kStrongThreshold = 35;  // FAST threshold tried first.

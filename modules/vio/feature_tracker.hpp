@@ -68,10 +68,10 @@ class FeatureTracker {
     Eigen::Vector2f px = Eigen::Vector2f::Zero();    // In the left image.
     Eigen::Vector2d left = Eigen::Vector2d::Zero();  // Bearings.
     std::optional<Eigen::Vector2d> right;
-    std::optional<double>
-        inverse_depth;  // Measured in this image, or propagated by the motion [1/m].
-    std::unique_ptr<const AlignmentPatch>
-        patch;  // Patch in which the track began; null at the rim.
+    // Measured in this image, or propagated by the motion [1/m].
+    std::optional<double> inverse_depth;
+    // Patch in which the track began; null at the rim.
+    std::unique_ptr<const AlignmentPatch> patch;
     Eigen::Matrix2f A = Eigen::Matrix2f::Identity();  // Warp from the patch to this image.
   };
   // A track in the new image, with its state in the image before.
@@ -113,8 +113,8 @@ class FeatureTracker {
   std::vector<Track> tracks_;  // Tracks of the last image, ascending ids.
   ImagePyramid previous_left_;
   Stamp stamp_ = 0;  // Stamp of the last image.
-  Eigen::Vector3d velocity_ =
-      Eigen::Vector3d::Zero();  // Velocity of the left camera, in its frame [m/s].
+  // Velocity of the left camera, in its frame [m/s].
+  Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();
   TrackerStatistics statistics_;
 };
 

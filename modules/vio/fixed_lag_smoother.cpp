@@ -56,8 +56,8 @@ constexpr double kMostCalibration = 10.0;
 constexpr double kMostOffset_s = 0.1;
 constexpr double kMostOffsetStep = 0.25;  // fraction of the time between two images
 
-constexpr double kHeldPosition_m =
-    1e-3;  // standard deviation of the first position, which fixes the gauge
+// Standard deviation of the first position, which fixes the gauge.
+constexpr double kHeldPosition_m = 1e-3;
 constexpr double kHeldHeading_rad = 1e-3;
 // Noise of samples interpolated over a gap. It is so large (0.35 rad and 1.4 m/s after 0.5 s) that
 // the images determine the motion.
@@ -381,8 +381,8 @@ std::optional<StateCovariance> FixedLagSmoother::state_covariance(Stamp stamp) c
       without_gauge(frame->state).transpose();
   const auto Sigma = covariance_of(std::move(D_T));
   if (!Sigma) return std::nullopt;
-  return StateCovariance(
-      Sigma->selfadjointView<Eigen::Upper>());  // rounding leaves neither triangle exact
+  // Rounding leaves neither triangle exact.
+  return StateCovariance(Sigma->selfadjointView<Eigen::Upper>());
 }
 
 // If no samples cover the instant, the next inertial factor cannot start there: the offset is 0.

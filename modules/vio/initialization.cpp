@@ -93,8 +93,8 @@ std::optional<std::vector<SE3>> stereo_odometry(std::span<const InertialFrame> f
   return poses;
 }
 
-constexpr double kMaxGravityError =
-    0.25;  // relative difference of stereo and samples in the length of gravity
+// Relative difference of stereo and samples in the length of gravity.
+constexpr double kMaxGravityError = 0.25;
 constexpr double kStereoPosition_m = 0.003;  // noise of a relative position from stereo
 constexpr double kVelocityStep_mps = 0.005;  // noise of a preintegrated change of velocity
 constexpr int kGyroBiasSteps = 4;

@@ -28,8 +28,8 @@ struct StartGuess {
   StartStatus status = StartStatus::kTooFewImages;
   std::vector<OdometryState> states;  ///< One for each image if started().
   double image_motion_px = 0.0;       ///< Median between the first and the last image.
-  double gravity_mps2 =
-      0.0;  ///< Measured length before it is set to the known one; 0 if not measured.
+  /// Measured length before it is set to the known one; 0 if not measured.
+  double gravity_mps2 = 0.0;
 };
 
 inline constexpr std::size_t kMinStartImages = 5;

@@ -19,9 +19,9 @@ constexpr double kRestartTranslation = 1.0;
 // TUM-VI, heading errs by 0.3-1.4, 0.5-1.7 and 0.8-1.8 rad. Translation errs by 0.3-0.9, 0.9-2.0
 // and 1.2-4.1 m.
 constexpr double kUnseenHeading = 0.5;  // [rad/sqrt(s)]
-constexpr double kMostHeading =
-    std::numbers::pi / std::numbers::sqrt3;  // uniformly distributed heading
-constexpr double kUnseenShare = 0.5;         // share of the distance travelled at the speed
+// Uniformly distributed heading.
+constexpr double kMostHeading = std::numbers::pi / std::numbers::sqrt3;
+constexpr double kUnseenShare = 0.5;  // share of the distance travelled at the speed
 constexpr double kLeastSpeed_mps = 0.5;
 constexpr double kMostTranslation_m = 1000.0;
 

@@ -15,8 +15,8 @@ struct OutsideOdometryResult {
   std::optional<OdometryState> state;        ///< nullopt: the packet has no usable pose.
   std::optional<KeyframeOdometry> keyframe;  ///< Only if the packet makes a new one.
   std::optional<LocatedFrame> frame;
-  bool has_jumped =
-      false;  ///< The pose jumped faster than VioConfig::max_speed_mps; the body keeps its place.
+  /// The pose jumped faster than VioConfig::max_speed_mps; the body keeps its place.
+  bool has_jumped = false;
 };
 
 /// Publishes the poses of an external odometry (see MeasuredPose) in the same way as Vio publishes

@@ -10,8 +10,8 @@ namespace km {
 namespace {
 
 constexpr float kMinStereoCorrelation = 0.8F;  // Least correlation of a match, full resolution.
-constexpr float kMinSearchCorrelation =
-    0.7F;  // Least correlation of a search, half resolution, whole pixels.
+// Least correlation of a search, half resolution, whole pixels.
+constexpr float kMinSearchCorrelation = 0.7F;
 // The second best place must be less similar by this amount. A fence or a net has many similar
 // places.
 constexpr float kMinDistinction = 0.05F;

@@ -52,9 +52,9 @@ struct BearingPair {
 
 /// Which pairs agree with one direction of translation.
 struct TwoPointResult {
-  Eigen::Vector3d direction =
-      Eigen::Vector3d::Zero();  ///< Direction of t_previous_current, unit length, any sign.
-  std::vector<bool> inlier;     ///< One for each pair.
+  /// Direction of t_previous_current, unit length, any sign.
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  std::vector<bool> inlier;  ///< One for each pair.
   int inliers = 0;
 };
 

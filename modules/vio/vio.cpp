@@ -329,8 +329,8 @@ bool Vio::locates_points(const StereoFrame& frame) const {
 }
 
 bool Vio::due(const OdometryState& state, const StereoFrame& frame) const {
-  if (!locates_points(frame))
-    return false;  // a keyframe without points cannot close a loop; wait for a better image
+  // A keyframe without points cannot close a loop; wait for a better image.
+  if (!locates_points(frame)) return false;
   const double dt = moved_s(state.stamp);
   const WindowFrame* previous = smoother_.frame_at(last_keyframe_->stamp);
   if (previous == nullptr) return dt >= config_.output_interval_s - 1e-3;

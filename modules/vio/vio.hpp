@@ -122,8 +122,8 @@ class Vio {
   FixedLagSmoother smoother_;
   RestDetector rest_detector_;
   VisionWatch vision_;
-  std::optional<Stamp>
-      back_since_;  // Return of vision; until the prior from the dark is discarded.
+  // Return of vision; until the prior from the dark is discarded.
+  std::optional<Stamp> back_since_;
   VioStatistics statistics_;
   std::vector<ImuSample> samples_;  // From the last sample not after the last image.
   std::optional<Stamp> last_image_;

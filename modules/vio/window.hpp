@@ -29,8 +29,8 @@ struct WindowFrame {
   std::optional<ImuFactor> imu;  ///< Factor from the frame before; none for the first.
   /// The state belongs to the instant state.stamp + offset_s of the inertial sensor.
   double offset_s = 0.0;
-  Eigen::Vector3d gyro =
-      Eigen::Vector3d::Zero();  ///< Angular rate measured at that instant [rad/s].
+  /// Angular rate measured at that instant [rad/s].
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
 
   [[nodiscard]] Stamp instant() const { return state.stamp + nanoseconds(offset_s); }
 };
@@ -55,8 +55,8 @@ struct Window {
   CameraCalibration calibration;
   bool calibrates = false;  ///< The calibration is one of the unknowns.
   double gravity_mps2 = 9.81;
-  double loss_scale =
-      1.5;  ///< Scale of the Cauchy loss on reprojection errors [standard deviations].
+  /// Scale of the Cauchy loss on reprojection errors [standard deviations].
+  double loss_scale = 1.5;
   std::vector<WindowFrame> frames;        ///< In order of time.
   std::vector<WindowLandmark> landmarks;  ///< Ascending ids.
   StatePrior prior;
