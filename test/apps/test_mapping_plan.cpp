@@ -10,7 +10,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kPalette = "name,red,green,blue,alpha,id\nroad,1,2,3,255,1\n";
 
-// A recording's folders, without content but the palette.
+// A recording's folders, empty except for the palette.
 struct Recording {
   TemporaryFolder folder;
 

@@ -54,7 +54,7 @@ TEST_CASE("New work after all had settled starts the wait again", "[departure]")
   CHECK(robot.leaves_at(8.5));
 }
 
-TEST_CASE("A settled robot goes as soon as a peer says that it leaves", "[departure]") {
+TEST_CASE("A settled robot leaves as soon as a peer reports that it leaves", "[departure]") {
   Done robot{.peers = {kSettled, kSettled}};
   CHECK_FALSE(robot.leaves_at(9.0));
   robot.peers[1].phase = RobotPhase::kLeaving;
@@ -160,7 +160,7 @@ TEST_CASE("Live sensors that gave no image make a failure of a run, however it e
   CHECK(verdict_of(end).exit_code == 0);
   end = usual_end();
   end.is_live = true;
-  end.id_taken = true;  // a graver reason comes first
+  end.id_taken = true;  // the more severe reason comes first
   end.images = ImageCounts{};
   CHECK(verdict_of(end).exit_code == 3);
 }

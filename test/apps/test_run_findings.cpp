@@ -42,7 +42,7 @@ Finding the_finding_of(const RunFacts& run) {
 
 }  // namespace
 
-TEST_CASE("Nothing stands out of runs of robots that joined", "[robot][findings]") {
+TEST_CASE("Runs of robots that joined have no findings", "[robot][findings]") {
   const std::vector<RunFacts> team = {run_of(0, true, tally_of(400, 30, 10, 10)),
                                       run_of(2, true, tally_of(300, 20, 5, 5))};
   CHECK(findings_of(team).empty());

@@ -19,7 +19,7 @@ TEST_CASE("Every message between robots is decoded as it was sent", "[messages]"
   }
 }
 
-TEST_CASE("No message ends where it does not end", "[messages]") {
+TEST_CASE("A truncated message is refused", "[messages]") {
   for (const MessageReader& reader : all_messages()) {
     CAPTURE(reader.name);
     for (Bytes sample : reader.samples)

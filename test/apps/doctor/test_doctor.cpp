@@ -85,7 +85,7 @@ TEST_CASE("The doctor finds a recording sound, or names its fault", "[doctor]") 
   }
 }
 
-TEST_CASE("The doctor says of a file why no robot can play it", "[doctor]") {
+TEST_CASE("The doctor gives the reason why no robot can play a file", "[doctor]") {
   const TemporaryFolder folder;
   const auto told = [&](const std::string& file) {
     const CommandResult run = run_command(kDoctor + ' ' + (folder.path() / file).string());

@@ -46,7 +46,7 @@ std::string ids_of(const NetworkFacts& facts) {
 
 }  // namespace
 
-TEST_CASE("Nothing is found wrong with a sound network", "[doctor]") {
+TEST_CASE("A sound network has no findings", "[doctor]") {
   NetworkFacts facts = sound();
   CHECK(ids_of(facts).empty());
   facts.announced = {robot(7, "alice")};
@@ -174,7 +174,7 @@ TEST_CASE("A robot is heard on its domain and in its team, whichever is looked f
   CHECK_THAT(ids, Catch::Contains("warning network.other_domain"));
 }
 
-TEST_CASE("Packets that announce nothing are passed over", "[doctor]") {
+TEST_CASE("Packets without an announcement are skipped", "[doctor]") {
   CHECK_FALSE(parse_announcement({}, 0, ""));
   CHECK_FALSE(parse_announcement({'R', 'T', 'P', 'X'}, 0, ""));
   std::mt19937 rng(1);

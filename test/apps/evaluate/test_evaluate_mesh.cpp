@@ -57,7 +57,7 @@ TEST_CASE("mesh judges each robot and all together", "[evaluate]") {
   CHECK(run_command(command).output == result.output);
 }
 
-TEST_CASE("mesh starts registration where the trajectories say", "[evaluate]") {
+TEST_CASE("mesh starts registration at the transform of the trajectories", "[evaluate]") {
   const Meshes meshes;
   LabelledMesh far = room();
   far.transform(make_pose(Eigen::Matrix3d::Identity(), {50, 0, 0}));

@@ -50,8 +50,8 @@ TEST_CASE("The report has every table with our values and the paper's", "[experi
                        Contains("Numbers to reach"));
   // Costs 1060 over 1000 in their cells beside the paper's, and the gap between them.
   CHECK_THAT(text, Contains("1060.0 (1113.1)") && Contains("| 6.0 (6.3) |"));
-  // No motion as a whole comes nearer to such a bend: it is the whole error; half of it is less
-  // than the paper's share.
+  // The bend is such that no rigid motion reduces the error. Half of the error is less than the
+  // paper's share.
   CHECK_THAT(text, Contains("1.00 (6.09)") && Contains("0.500 (2.38)"));
   // Published by default and by the paper's pipeline, which is no repetition.
   CHECK_THAT(text,
@@ -165,7 +165,7 @@ TEST_CASE("A spread is median, lowest and highest of the finite values", "[exper
   CHECK(spread_of({}).count == 0);
 }
 
-TEST_CASE("A range is shown where there are several values", "[experiments]") {
+TEST_CASE("A range is shown if there are several values", "[experiments]") {
   const ReportCell several = spread_cell(spread_of({1.0, 2.0, 4.0}), 1);
   CHECK(several.text == "2.0");
   CHECK(several.paper == "1.0 to 4.0");

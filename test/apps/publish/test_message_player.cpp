@@ -64,7 +64,7 @@ TEST_CASE("A recording is played in its order and pace", "[publish]") {
   CHECK(std::ranges::is_sorted(stamps));
 }
 
-TEST_CASE("A part of a recording is played, and at once", "[publish]") {
+TEST_CASE("A part of a recording is played without waiting for its start", "[publish]") {
   PlayedTopic topic;
   const auto begin = std::chrono::steady_clock::now();
   const auto stamps =

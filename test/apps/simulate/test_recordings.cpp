@@ -139,7 +139,8 @@ TEST_CASE("A run that is stopped continues to the same bytes", "[simulate]") {
   check_equal(contents(folder, "stopped"), contents(folder, "whole"));
 }
 
-TEST_CASE("A signal ends the preparation, and a second one at once", "[simulate]") {
+TEST_CASE("One signal ends the preparation in order, and a second one ends it at once",
+          "[simulate]") {
   const TemporaryFolder folder;
   Process program({kProgram, "--world", "city", "--robots", "1", "--duration", "60", "--output",
                    (folder.path() / "city").string()});

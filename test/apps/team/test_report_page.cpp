@@ -98,8 +98,7 @@ TEST_CASE("If there is a truth, the report has it and the error over time", "[re
   }
 }
 
-TEST_CASE("Lines are broken where no pose is known, not where keyframes are rare",
-          "[report_page]") {
+TEST_CASE("Lines are interrupted at missing poses, not between rare keyframes", "[report_page]") {
   ReportedRun reported;
   reported.know_truth();
   const auto write = [&](const char* file, const std::vector<double>& times_s) {

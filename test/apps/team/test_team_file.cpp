@@ -93,7 +93,7 @@ TEST_CASE("A team file gives the robots their inputs", "[team]") {
   CHECK(b.arguments == std::vector<std::string>{"--link", "wifi", "--verbose"});
 }
 
-TEST_CASE("A team file may say when a closure counts as true", "[team]") {
+TEST_CASE("A team file may define when a closure counts as true", "[team]") {
   const Inputs inputs;
   const std::string robots = "robots:\n  - {id: 1, graph: recording/g.csv}\n";
   const auto plan = read_team_file(
@@ -127,7 +127,7 @@ TEST_CASE("A truth may be a folder, and one that is missing is a note", "[team]"
   CHECK(read_team_file(file, {}).robots[1].truth == inputs.folder.path() / "truth/data.csv");
 }
 
-TEST_CASE("The command line of a robot says what its plan says", "[team]") {
+TEST_CASE("The command line of a robot has the options of its plan", "[team]") {
   TeamPlan plan;
   plan.configs = {"/c.yaml", "/d.yaml"};
   plan.domain = 9;

@@ -116,7 +116,7 @@ class Page {
     while (Date.now() < end) {
       const value =
           this.evaluate(`(() => { try { return !!(${expression}); } catch { return false; } })()`);
-      if (await value.catch(() => false)) return;  // between two pages nothing can be asked
+      if (await value.catch(() => false)) return;  // between two pages there is no page to query
       await pause(0.1);
     }
     throw new Error(`after ${seconds} s it is not so: ${expression}; the page says: ${

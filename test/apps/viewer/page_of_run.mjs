@@ -21,7 +21,7 @@ try {
   const shoot = (name) => shots && page.screenshot(join(shots, `${name}.png`));
   await page.until('kimera.ready');
 
-  // The end: as the files say.
+  // The end: as in the files.
   const robots = await page.evaluate('kimera.robots');
   assert.deepEqual(
       robots.map((r) => [r.id, r.name, r.keyframes]),
@@ -43,7 +43,7 @@ try {
   assert.equal(await page.evaluate('kimera.frames.length'), anchors.size);
   await shoot('finished');
 
-  // The past: apart first, and nothing of the future; then the end again.
+  // The past: separate frames first, and no later messages; then the end again.
   const end = await page.evaluate('kimera.end');
   const joined = await page.evaluate(`Math.min(...[...kimera.model.robots.values()].flatMap((r) =>
     r.log.filter((m) => m.optimized && m.anchor !== r.id).map((m) => m.t)), Infinity)`);

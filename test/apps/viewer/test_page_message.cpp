@@ -64,7 +64,7 @@ TEST_CASE("A closure is sent with its verdict and the reason", "[page_message]")
         json::parse(R"([[0, 4, 1, 2, "rejected", 30, 8, "too far"]])"));
 }
 
-TEST_CASE("A mesh goes as its arrays, one behind the other", "[page_message]") {
+TEST_CASE("A mesh is sent as its arrays, one after the other", "[page_message]") {
   MeshChunk chunk{.key = {3, {-1, 0, 7}, 2}, .anchor = 1};
   chunk.offsets = {{1, 2, 3}, {4, 5, 6}, {7, 8, 65535}};
   chunk.labels = {9, 8, 7};
@@ -81,7 +81,7 @@ TEST_CASE("A mesh goes as its arrays, one behind the other", "[page_message]") {
   CHECK(data.substr(sizeof(numbers)) == "\x09\x08\x07");
 }
 
-TEST_CASE("An image goes behind its features", "[page_message]") {
+TEST_CASE("An image follows its features", "[page_message]") {
   const ViewImage image{0, {0xff, 0xd8}, {{1.5F, 2.5F}}};
   const auto [object, data] = parts_of(page_message({0, 1, 0, image}, 1));
   CHECK(object["features"] == 1);

@@ -70,7 +70,7 @@ TEST_CASE("The page and all its parts are served from the program", "[page_serve
   CHECK(get(port, "/../apps/viewer/main.cpp").status >= 400);
 }
 
-TEST_CASE("Pages of other sites get nothing", "[page_server]") {
+TEST_CASE("Pages of other sites are refused", "[page_server]") {
   ViewStore store(1'000'000);
   const PageServer server(store, any_port());
   const int port = port_of(server);
@@ -85,7 +85,7 @@ TEST_CASE("Pages of other sites get nothing", "[page_server]") {
   CHECK(get(port, "/updates", upgrade + "Origin: http://evil.example\r\n").status == 0);
 }
 
-TEST_CASE("Beyond this host nothing is served without the token", "[page_server]") {
+TEST_CASE("Other hosts need the token", "[page_server]") {
   ViewStore store(1'000'000);
   PageServerOptions options = any_port();
   options.address = "0.0.0.0";

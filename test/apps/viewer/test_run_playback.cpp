@@ -63,7 +63,7 @@ TEST_CASE("Robots join with the first closure of theirs that was kept", "[run_pl
   CHECK(optimized_s == std::vector<double>{4.5, 8.0});
 }
 
-TEST_CASE("The mesh comes when the robot is near, and is another one once it joins",
+TEST_CASE("The mesh appears when the robot is near, and is replaced once the robot joins",
           "[run_playback]") {
   const SmallRun files;
   const auto chunks = told<MeshChunk>(read_run(files.folder.path(), kBegin), 1);

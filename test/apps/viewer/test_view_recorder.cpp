@@ -195,7 +195,7 @@ TEST_CASE("After a robot has left or is silent, a record has no more of its mess
   CHECK(record.count("/bob/closures") <= 2);  // with the path, and as they were received
 }
 
-TEST_CASE("A record that cannot be written says so", "[viewer]") {
+TEST_CASE("A record that cannot be written throws an error", "[viewer]") {
   ViewRecorder recorder("/dev/full", {});
   for (const ViewUpdate& update : team()) recorder.add(update);
   CHECK_THROWS_WITH(recorder.finish(), Catch::Contains("/dev/full"));

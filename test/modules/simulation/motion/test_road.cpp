@@ -59,7 +59,7 @@ TEST_CASE("A path's parameter is the way, its tangent and curvature its derivati
   }
 }
 
-TEST_CASE("A path closes and goes round again", "[motion]") {
+TEST_CASE("A path is closed and periodic", "[motion]") {
   const RoutePath path(kBlock, 5.0);
   for (const double s : {0.0, 10.0, 77.7}) {
     CHECK((path.at(s).position - path.at(s + path.length_m()).position).norm() < 1e-9);
@@ -72,7 +72,7 @@ TEST_CASE("A path closes and goes round again", "[motion]") {
   CHECK(std::abs(end.curvature - start.curvature) < 1e-4);
 }
 
-TEST_CASE("The way begins where the route begins", "[motion]") {
+TEST_CASE("The path begins at the begin of the route", "[motion]") {
   const Route route{{{40, 0}, {80, 0}, {80, 50}, {0, 50}, {0, 0}}, 6.0};  // starts on a straight
   const RoutePath path(route, 5.0);
   CHECK((path.at(0.0).position - Eigen::Vector2d(40, 0)).norm() < 0.02);

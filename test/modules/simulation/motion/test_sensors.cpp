@@ -306,7 +306,7 @@ TEST_CASE("Samples lie on the grid of the rate, rounded to nanoseconds", "[motio
   CHECK(samples[600].sample.stamp == kFlightEpoch + 2000000000);
 }
 
-TEST_CASE("White noise has the density that was asked for", "[motion]") {
+TEST_CASE("White noise has the configured density", "[motion]") {
   ImuSimulation options;
   options.seed = GENERATE(1U, 2U);
   CAPTURE(options.seed);

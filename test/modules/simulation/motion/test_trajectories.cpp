@@ -84,7 +84,7 @@ std::vector<Control> lively_controls(std::uint64_t seed, int count) {
   return controls;
 }
 
-TEST_CASE("The weights of the basis sum to one and their derivatives to nothing", "[motion]") {
+TEST_CASE("The weights of the basis sum to one and their derivatives to zero", "[motion]") {
   for (double u = 0.0; u <= 1.0; u += 0.125) {
     const QuinticBasis basis = QuinticBasis::at(u);
     CAPTURE(u);
@@ -479,7 +479,7 @@ TEST_CASE("Equal options give equal flights and drives, another seed others", "[
         [](const VehicleOptions& o) { return make_vehicle_trajectory(kBlock, hills, o); });
 }
 
-TEST_CASE("The start's way along the route is where the vehicle starts", "[motion]") {
+TEST_CASE("A vehicle starts at the configured distance along the route", "[motion]") {
   VehicleOptions options;
   options.duration_s = 3.0;
   const RoutePath path(kBlock, options.corner_radius_m);

@@ -51,7 +51,8 @@ TEST_CASE("The grey of an edge is the share of the pixel that is covered",
   int partial = 0;
   for (int y = 4; y < 44; ++y) {
     for (int x = 4; x < 44; ++x) {
-      // The light of the screen's rim is baked: grey levels are shares of that beside the edge.
+      // The light of the screen's rim is interpolated: grey levels are shares of that beside the
+      // edge.
       const double expected = share_right_of(x0, slope, x, y);
       const double white_level = static_cast<double>(at(view, 47, y));
       const double share = static_cast<double>(at(view, x, y)) / white_level;

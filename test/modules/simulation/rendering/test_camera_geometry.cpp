@@ -116,7 +116,8 @@ TEST_CASE("A box hides only the surfaces behind it", "[simulation][rendering]") 
   }
 }
 
-TEST_CASE("A known point is seen where the camera model projects it", "[simulation][rendering]") {
+TEST_CASE("A known point appears at its projection by the camera model",
+          "[simulation][rendering]") {
   const int seed = GENERATE(1, 2, 3, 4);
   CAPTURE(seed);
   std::mt19937 random(static_cast<std::mt19937::result_type>(seed));

@@ -115,7 +115,7 @@ TEST_CASE("Grey levels are the response to the exposed light", "[simulation][sen
   for (const std::uint8_t level : image.pixels) CHECK(std::abs(level - expected) <= 0.51);
 }
 
-TEST_CASE("The corners lose the light that vignetting says", "[simulation][sensor]") {
+TEST_CASE("The corners lose the configured share of light", "[simulation][sensor]") {
   SensorEffectsConfig config = clean();
   config.vignetting = 0.3;
   const Camera camera = forward_camera(101, 75, 60.0);
@@ -177,7 +177,7 @@ TEST_CASE("Noise is a function of the seed", "[simulation][sensor]") {
   CHECK(effects.gray(view, shot(1.0, 1)).pixels != effects.gray(view, shot(1.0, 2)).pixels);
 }
 
-TEST_CASE("Amplification raises the noise where the shutter cannot open longer",
+TEST_CASE("Amplification raises the noise if the shutter cannot open longer",
           "[simulation][sensor]") {
   SensorEffectsConfig config = clean();
   config.read_noise = 2.0;
@@ -201,7 +201,7 @@ TEST_CASE("Colour is developed channel by channel", "[simulation][sensor]") {
   }
 }
 
-// Light of an image, and where it lies about the pixel `center`.
+// Light of an image, and its centre of mass relative to the pixel `center`.
 struct LightMoments {
   double mass = 0.0;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();

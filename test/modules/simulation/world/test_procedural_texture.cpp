@@ -127,7 +127,7 @@ TEST_CASE("Materials of nature have structure at every scale", "[simulation][tex
   }
 }
 
-TEST_CASE("Fractal noise has mean 0, deviation 1 and the octaves it is asked for",
+TEST_CASE("Fractal noise has mean 0, deviation 1 and the configured octaves",
           "[simulation][texture]") {
   constexpr int kSize = 128;
   const auto seed = GENERATE(range(1U, 5U));

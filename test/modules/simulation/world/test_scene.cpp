@@ -111,7 +111,7 @@ TEST_CASE("Equal requests share a material, and recipes share textures", "[simul
         0);  // the next scene begins from scratch
 }
 
-TEST_CASE("Frames nest, and end where their scope does", "[simulation]") {
+TEST_CASE("Frames nest, and end with their scope", "[simulation]") {
   Scene scene;
   {
     const auto outer = scene.at({10, 0, 0}, 0.5F * kPi);
