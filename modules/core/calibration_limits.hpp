@@ -25,8 +25,9 @@ inline constexpr Bounds<double> kDepthBaseline_m{1e-3, 100.0};
 /// Time offset of cameras and inertial sensor.
 inline constexpr Bounds<double> kTimeOffset_s{-10.0, 10.0};
 
-/// Each returns the reason why the values are impossible, or nullopt if they are possible: width
-/// and height of an image [px], focal lengths and principal point [px], coefficients of a lens.
+/// Each returns the reason why its values are impossible, or nullopt if they are possible. The
+/// values are width and height of an image [px], focal lengths and principal point [px], and
+/// coefficients of a lens.
 [[nodiscard]] std::optional<std::string> resolution_problem(double width, double height);
 [[nodiscard]] std::optional<std::string> intrinsics_problem(const Camera& camera);
 [[nodiscard]] std::optional<std::string> coefficients_problem(std::span<const double> values);

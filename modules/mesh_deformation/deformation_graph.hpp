@@ -131,8 +131,8 @@ struct [[nodiscard]] DeformationSolution {
 ///
 /// A weak term is added to those of the paper. It rotates each node with its keyframes (see
 /// kRotationNoise_rad in the source). The minimum is then unique even if a node has few neighbours
-/// or all of them are on one line. Keyframes without a tie stay at their anchors; without any tie the
-/// result is `initial`.
+/// or all of them are on one line. Keyframes without a tie stay at their anchors; without any tie
+/// the result is `initial`.
 [[nodiscard]] DeformationSolution solve(const DeformationGraph& graph,
                                         std::span<const SE3> T_world_kf,
                                         const DeformationNoise& noise, const DeformationStop& stop,

@@ -161,7 +161,7 @@ TEST_CASE("Only changed blocks are meshed again, and vertices keep their identit
     CHECK(after.ids == before.ids);
     CHECK(after.mesh.faces == before.mesh.faces);
   }
-  SECTION("the same values again give the same vertices") {
+  SECTION("repeated values give the same vertices") {
     for (const auto& block : map.blocks()) fill(*block, sphere);
     const MeshUpdateReport report = mesh.update(map);
     CHECK(report.vertices_added == 0);

@@ -195,7 +195,7 @@ TEST_CASE("A depth image of no frame is counted", "[sensors]") {
                    "depth0/data.csv line 4: 10100000000.png");
 }
 
-TEST_CASE("Depths outside the sensor's range are none", "[sensors]") {
+TEST_CASE("Depths outside the sensor's range are dropped", "[sensors]") {
   const EurocFolder folder;
   folder.make_rgbd();
   cv::Mat pixels(24, 32, CV_16UC1, cv::Scalar(0));
@@ -296,7 +296,7 @@ TEST_CASE("The palette comes with the reader, a broken one is refused", "[sensor
                     Catch::Contains("label_palette.csv"));
 }
 
-TEST_CASE("7-Scenes red kitchen: depth and poses agree on the room", "[sensors]") {
+TEST_CASE("7-Scenes red kitchen: depth and poses agree", "[sensors]") {
   const auto folder = shared_data("7scenes_redkitchen");
   if (!folder) return;
   RecordedKitchen kitchen(*folder);

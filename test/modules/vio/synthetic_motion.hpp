@@ -84,7 +84,7 @@ inline SensorRig synthetic_rig() {
   return rig;
 }
 
-/// Landmarks before the cameras and what a tracker without faults would see of them.
+/// Landmarks in front of the cameras, and the output of a tracker without faults.
 class SyntheticWorld {
  public:
   SyntheticWorld(SyntheticMotion motion, unsigned seed, std::size_t landmarks = 80)

@@ -146,7 +146,7 @@ TEST_CASE("Stereo matches of a plane have its depth", "[vio]") {
   CHECK(quantile(errors_px, 0.95) < 0.2);
 }
 
-TEST_CASE("Features that move by themselves are dropped", "[vio]") {
+TEST_CASE("Features with a motion of their own are dropped", "[vio]") {
   const StereoRig rig = test_rig();
   const TexturedPlane plane;
   FeatureTracker tracker(rig, small_image_config());
@@ -224,7 +224,7 @@ TEST_CASE("After a second of darkness features return under new ids", "[vio]") {
   }
 }
 
-TEST_CASE("One dark eye leaves features without a right point", "[vio]") {
+TEST_CASE("A dark right image leaves features without a right point", "[vio]") {
   const StereoRig rig = test_rig();
   const TexturedPlane plane;
   FeatureTracker tracker(rig, small_image_config());
@@ -270,7 +270,7 @@ TEST_CASE("An image of the wrong size or no rotation is refused and changes noth
   }
 }
 
-TEST_CASE("A rig or a configuration without sense is refused", "[vio]") {
+TEST_CASE("An invalid rig or configuration is refused", "[vio]") {
   StereoRig rig = test_rig();
   TrackerConfig config;
   config.window_px = 0;
@@ -294,7 +294,7 @@ std::ptrdiff_t located(const TrackedFrame& frame) {
                        [](const TrackedFeature& f) { return f.right.has_value(); });
 }
 
-TEST_CASE("Depth puts features where a right camera would see them", "[vio]") {
+TEST_CASE("Depth gives features the right points of a virtual camera", "[vio]") {
   const StereoRig rig = test_rgbd_rig();
   const TexturedPlane plane{2.0, 0.06, 3};
   FeatureTracker tracker(rig, small_image_config());
@@ -313,7 +313,7 @@ TEST_CASE("Depth puts features where a right camera would see them", "[vio]") {
   }
 }
 
-TEST_CASE("Features outlive images without depth", "[vio]") {
+TEST_CASE("Features survive images without depth", "[vio]") {
   const StereoRig rig = test_rgbd_rig();
   const TexturedPlane plane;
   FeatureTracker tracker(rig, small_image_config());
@@ -366,7 +366,7 @@ TEST_CASE("Holes and edges of the depth image give no right observation", "[vio]
   CHECK(beyond > 10);
 }
 
-TEST_CASE("Nearer than the nearest depth is no depth", "[vio]") {
+TEST_CASE("A depth below the smallest one is no depth", "[vio]") {
   const StereoRig rig = test_rgbd_rig();
   TrackerConfig config = small_image_config();
   config.min_depth_m = 2.5;

@@ -259,7 +259,7 @@ double position_error(const OdometryState& state, const SyntheticWorld& world) {
       .norm();
 }
 
-TEST_CASE("Exact data of a constant velocity are recovered exactly", "[vio]") {
+TEST_CASE("The motion at constant velocity is estimated exactly from exact data", "[vio]") {
   SyntheticMotion motion;
   motion.amplitude_m.setZero();
   motion.turn_amplitude.setZero();
@@ -275,7 +275,7 @@ TEST_CASE("Exact data of a constant velocity are recovered exactly", "[vio]") {
   }
 }
 
-TEST_CASE("Biases and a lively motion are recovered from exact data", "[vio]") {
+TEST_CASE("Biases and a varied motion are estimated from exact data", "[vio]") {
   SyntheticMotion motion;
   motion.gyro_bias = {0.01, -0.015, 0.005};
   motion.accel_bias = {0.02, 0.03, -0.02};
@@ -391,7 +391,7 @@ ModelledRun run_as_modelled(unsigned seed, const VioConfig& config) {
   return run;
 }
 
-TEST_CASE("Relative poses err as their covariance says", "[vio]") {
+TEST_CASE("The errors of relative poses agree with their covariance", "[vio]") {
   // Mean of chi-squared with 6 degrees of freedom over the runs: 6 with this standard deviation.
   constexpr int kRuns = 60;
   const double sigma = std::sqrt(12.0 / kRuns);
@@ -425,7 +425,7 @@ Eigen::Matrix<double, 11, 1> difference(const OdometryState& estimate, const Odo
   return e;
 }
 
-TEST_CASE("A gyroscope that is noisier than assumed is trusted less", "[vio]") {
+TEST_CASE("A gyroscope that is noisier than assumed has less weight", "[vio]") {
   const auto scale_with = [](double factor) {
     const VioConfig config = gaussian_config();
     VioConfig noisy = config;
@@ -445,7 +445,7 @@ TEST_CASE("A gyroscope that is noisier than assumed is trusted less", "[vio]") {
   CHECK(tenfold <= GyroNoiseScale::kMost);
 }
 
-TEST_CASE("States err as their covariance says", "[vio]") {
+TEST_CASE("The errors of states agree with their covariance", "[vio]") {
   // Mean of chi-squared with 11 degrees of freedom over 20 runs: 11 with a standard deviation of
   // 1.05.
   double sum = 0.0;
@@ -462,7 +462,7 @@ TEST_CASE("States err as their covariance says", "[vio]") {
   CHECK(std::abs(sum - 11.0) < 3 * 1.05);
 }
 
-TEST_CASE("A start from a state with its covariance knows what was known", "[vio]") {
+TEST_CASE("A start from a state with its covariance keeps that covariance", "[vio]") {
   SyntheticMotion motion;
   motion.gyro_bias = {0.005, -0.01, 0.01};
   SyntheticWorld world(motion, 10, 40);
@@ -513,7 +513,7 @@ TEST_CASE("Ceres reaches the same minimum of a window with a prior", "[vio]") {
               .norm() < 1e-4);
 }
 
-TEST_CASE("Wrong observations are dropped and do no harm", "[vio]") {
+TEST_CASE("Wrong observations are dropped and do not increase the error", "[vio]") {
   SyntheticWorld world(SyntheticMotion{}, 6);
   auto frames = world.frames(60, 0.5);
   std::mt19937 rng(6);
@@ -544,8 +544,7 @@ TEST_CASE("A second without features is bridged by the inertial samples", "[vio]
   CHECK(position_error(run.states.back(), world) < 0.05);
 }
 
-TEST_CASE("However long a body rests, the window keeps its keyframes and grows by nothing",
-          "[vio][rest]") {
+TEST_CASE("During a long rest the window keeps its keyframes and does not grow", "[vio][rest]") {
   SyntheticMotion motion;
   motion.amplitude_m.setZero();
   motion.turn_amplitude.setZero();

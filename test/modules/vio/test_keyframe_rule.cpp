@@ -6,7 +6,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("A speed lasts for about a second", "[vio]") {
+TEST_CASE("A speed persists for about a second", "[vio]") {
   CHECK(coasting_s(0.0) == 0.0);
   CHECK(coasting_s(0.1) == Approx(0.05).epsilon(0.05));  // both ends together cover all of the time
   CHECK(coasting_s(2.0) < 1.0);

@@ -51,7 +51,7 @@ TEST_CASE("MH_01_easy: depth in place of the right image is about as good", "[vi
   CHECK(errors.scale == Approx(1.0).epsilon(0.03));
 }
 
-TEST_CASE("MH_01_easy: depth at a quarter of the rate will do", "[vio]") {
+TEST_CASE("MH_01_easy: depth at a quarter of the rate suffices", "[vio]") {
   const Recording* const stereo = recording();
   if (stereo == nullptr) return;
   const std::size_t first = 2;
@@ -82,7 +82,7 @@ Recording darkened(Recording recording, std::size_t first, std::size_t last) {
   return recording;
 }
 
-TEST_CASE("MH_01_easy: a second of black images does not lose it", "[vio]") {
+TEST_CASE("MH_01_easy: odometry continues over a second of black images", "[vio]") {
   const Recording* const data = recording();
   if (data == nullptr) return;
   const Recording black = darkened(*data, 36, 56);
@@ -95,7 +95,7 @@ TEST_CASE("MH_01_easy: a second of black images does not lose it", "[vio]") {
   CHECK(errors.max_m < 0.10);
 }
 
-TEST_CASE("MH_01_easy: half a second without inertial samples does not lose it", "[vio]") {
+TEST_CASE("MH_01_easy: odometry continues over half a second without inertial samples", "[vio]") {
   const Recording* const data = recording();
   if (data == nullptr) return;
   Recording gap = *data;
@@ -139,7 +139,7 @@ TEST_CASE("MH_01_easy: over a second without images and samples the body continu
 }
 
 // The velocity after the dark contradicts the images if the time offset is not estimated.
-TEST_CASE("MH_01_easy: after five seconds of black images with late stamps odometry sees again",
+TEST_CASE("MH_01_easy: after five seconds of black images with late stamps odometry continues",
           "[vio]") {
   const auto folder = shared_data("euroc/MH_01_easy");
   if (!folder) return;
@@ -163,7 +163,8 @@ TEST_CASE("MH_01_easy: after five seconds of black images with late stamps odome
 }
 
 // The prior from the dark would move the pose for seconds more.
-TEST_CASE("MH_01_easy: a second after five of black images odometry is as good as ever", "[vio]") {
+TEST_CASE("MH_01_easy: one second after five seconds of black images odometry is accurate again",
+          "[vio]") {
   const auto folder = shared_data("euroc/MH_01_easy");
   if (!folder) return;
   const Recording light = read_recording(*folder, 0.0, 15.0);
@@ -307,7 +308,7 @@ TEST_CASE("MH_01_easy: a body set down stays there whatever the images show", "[
     CHECK((there.inverse() * run.states[k].T_odom_body).translation().norm() < 1e-3);
 }
 
-TEST_CASE("The odometry node publishes what odometry gives, in order of time", "[vio][node]") {
+TEST_CASE("The odometry node publishes the results of odometry in order of time", "[vio][node]") {
   const Recording* const data = recording();
   if (data == nullptr) return;
   Topic<SensorPacket> packets;

@@ -66,7 +66,7 @@ TEST_CASE("A reprojection error is in standard deviations of the image point", "
                                  camera.T_body_cam * Eigen::Vector3d(0, 0, -1), r));
 }
 
-TEST_CASE("With a first estimate only the derivatives are taken there", "[vio]") {
+TEST_CASE("Only the derivatives are taken at a first estimate", "[vio]") {
   std::mt19937 rng(3);
   const ViewModel view = view_model(synthetic_rig().stereo.cameras[0], 1.0);
   const SE3 T = random_pose(rng);
@@ -102,7 +102,7 @@ TEST_CASE("Inertial Jacobians agree with differences", "[vio]") {
                                  [&](const Vector15& d) { return factor.error(i, moved(j, d)); }));
 }
 
-TEST_CASE("The inertial error of the true motion is zero, whatever the frame", "[vio]") {
+TEST_CASE("The inertial error of the true motion is zero in any frame", "[vio]") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -147,7 +147,7 @@ TEST_CASE("Noise too small for a double makes no factor", "[vio]") {
   CHECK_FALSE(ImuFactor::of(imu, kGravity_mps2));
 }
 
-TEST_CASE("At rest a factor holds the state as it is, whatever gravity and biases", "[vio][rest]") {
+TEST_CASE("A factor at rest holds the state with any gravity and biases", "[vio][rest]") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -167,7 +167,7 @@ TEST_CASE("At rest a factor holds the state as it is, whatever gravity and biase
   CHECK(factor.error(i, moved(i, walked)).squaredNorm() == Approx(6.0));
 }
 
-TEST_CASE("At its first estimates a prior's offset moves as its states do", "[vio]") {
+TEST_CASE("At its first estimates a prior's offset has the identity as derivative", "[vio]") {
   std::mt19937 rng(11);
   StatePrior prior;
   std::vector<const OdometryState*> states;
@@ -322,7 +322,7 @@ Quadratic random_quadratic(unsigned seed, int rows) {
   return {J.transpose() * J, J.transpose() * residual};
 }
 
-TEST_CASE("Marginalisation leaves the batch solution of a linear problem as it is", "[vio]") {
+TEST_CASE("Marginalisation does not change the batch solution of a linear problem", "[vio]") {
   const unsigned seed = GENERATE(range(0U, 10U));
   CAPTURE(seed);
   const Quadratic q = random_quadratic(seed, 30);
@@ -337,7 +337,7 @@ TEST_CASE("Marginalisation leaves the batch solution of a linear problem as it i
   CHECK((H.inverse() - covariance).norm() < 1e-9 * covariance.norm());
 }
 
-TEST_CASE("Later measurements and a prior give what all measurements give", "[vio]") {
+TEST_CASE("Later measurements and a prior give the solution of all measurements", "[vio]") {
   const Quadratic early = random_quadratic(1, 30);
   Quadratic late = random_quadratic(2, 30);
   late.H.topRows(kTaken).setZero();  // later measurements do not involve the eliminated variables
@@ -351,7 +351,7 @@ TEST_CASE("Later measurements and a prior give what all measurements give", "[vi
   CHECK((-H.ldlt().solve(g) - batch.tail(kLeft)).norm() < 1e-10);
 }
 
-TEST_CASE("Directions without information stay without", "[vio]") {
+TEST_CASE("Directions without information get none by marginalisation", "[vio]") {
   // Six measurements of twelve variables; scales differ by 1e8, as radians and accelerations do.
   Quadratic q = random_quadratic(5, 6);
   Eigen::VectorXd scale = Eigen::VectorXd::Ones(kSize);
@@ -364,7 +364,7 @@ TEST_CASE("Directions without information stay without", "[vio]") {
   CHECK(prior.r.allFinite());
 }
 
-TEST_CASE("Nothing taken out leaves the quadratic itself", "[vio]") {
+TEST_CASE("Elimination of no variable leaves the quadratic itself", "[vio]") {
   const Quadratic q = random_quadratic(3, 30);
   const SquareRootPrior prior = marginalize(q.H, q.g, 0);
   CHECK((prior.J.transpose() * prior.J - q.H).norm() < 1e-9 * q.H.norm());

@@ -52,7 +52,7 @@ TEST_CASE("A body that stands still for a second is at rest", "[vio][rest]") {
   CHECK(images_before_rest(world.frames(40, kNoisePx), motion) == 20);
 }
 
-TEST_CASE("Rotors that idle do not disturb a rest", "[vio][rest]") {
+TEST_CASE("Idling rotors do not prevent rest", "[vio][rest]") {
   const SyntheticMotion motion = standing();
   SyntheticWorld world(motion, 1);
   auto frames = world.frames(40, kNoisePx);
@@ -65,7 +65,7 @@ TEST_CASE("Rotors that idle do not disturb a rest", "[vio][rest]") {
   CHECK(images_before_rest(frames, motion) == 20);
 }
 
-TEST_CASE("A slow ride is no rest although the samples look like it", "[vio][rest]") {
+TEST_CASE("Slow motion is not detected as rest although the samples resemble it", "[vio][rest]") {
   const double speed = GENERATE(0.05, 0.1);
   const int axis = GENERATE(0, 1, 2);
   CAPTURE(speed, axis);
@@ -76,7 +76,7 @@ TEST_CASE("A slow ride is no rest although the samples look like it", "[vio][res
         kTenSeconds);
 }
 
-TEST_CASE("A slow turn is no rest", "[vio][rest]") {
+TEST_CASE("A slow rotation is not detected as rest", "[vio][rest]") {
   SyntheticMotion motion = standing();
   motion.turn_amplitude(2) = 0.1;  // 0.01 rad/s at most, 0.005 at both ends
   motion.turn_frequency(2) = 0.1;
@@ -85,7 +85,8 @@ TEST_CASE("A slow turn is no rest", "[vio][rest]") {
         kTenSeconds);
 }
 
-TEST_CASE("Frozen images are no rest while the body turns or gains speed", "[vio][rest]") {
+TEST_CASE("Frozen images are not detected as rest while the body rotates or accelerates",
+          "[vio][rest]") {
   const SyntheticMotion motion = standing();
   SyntheticWorld world(motion, 4);
   auto frames = world.frames(kTenSeconds, kNoisePx);

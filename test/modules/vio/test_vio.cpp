@@ -65,7 +65,7 @@ VioResult feed(Vio& vio, const Bench& bench, int first, int last) {
   return all;
 }
 
-TEST_CASE("Every image has a pose, at rest the same", "[vio]") {
+TEST_CASE("Every image has a pose and at rest all are equal", "[vio]") {
   const Bench bench;
   Vio vio = bench.vio();
   const VioResult result = feed(vio, bench, 0, 80);
@@ -151,7 +151,7 @@ TEST_CASE("Packets without a usable image are refused and counted", "[vio]") {
   CHECK(vio.statistics().starts == 1);
 }
 
-TEST_CASE("Broken inertial samples are refused, the image still has a pose", "[vio]") {
+TEST_CASE("Invalid inertial samples are refused and the image still has a pose", "[vio]") {
   const Bench bench;
   Vio vio = bench.vio();
   REQUIRE(feed(vio, bench, 0, 20).states.size() == 20);
@@ -305,7 +305,7 @@ TEST_CASE("An impossible motion is detected and odometry starts again", "[vio]")
   CHECK(after.states.back().T_odom_body.translation().norm() < 1.0);
 }
 
-TEST_CASE("Whatever the samples, poses are finite and odometry can be weighed", "[vio]") {
+TEST_CASE("Poses are finite and covariances valid with any samples", "[vio]") {
   const unsigned seed = GENERATE(range(0U, 8U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
