@@ -87,7 +87,7 @@ struct ClosureOutcome {
 /// A robot's optimised keyframe poses, index i being keyframe i of `robot`.
 struct Trajectory {
   RobotId robot = 0;
-  RobotId anchor = 0;  ///< Robot whose odometry frame is `world`; `robot` itself when alone.
+  RobotId anchor = 0;  ///< Robot whose odometry frame is `world`; `robot` itself if it is alone.
   std::vector<SE3> T_world_kf;
 };
 

@@ -18,7 +18,7 @@ int stride_of(const DepthView& view, double voxel_size_m) {
   return static_cast<int>(std::clamp(pixels, 1.0F, static_cast<float>(kLongest)));
 }
 
-// Whole part towards minus infinity, for values above -kOffset.
+// Largest integer not above the value, for values above -kOffset.
 Eigen::Vector3i floor_of(const Eigen::Vector3f& value) {
   constexpr float kOffset = 4096.0F;
   return (value.array() + kOffset).cast<int>() - static_cast<int>(kOffset);

@@ -20,7 +20,7 @@ namespace km {
 enum class ReaderFault {
   kMalformedRow,       ///< Too few fields, or a stamp or value that is not a number.
   kNotFinite,          ///< NaN or infinity in an inertial sample.
-  kImplausible,        ///< An inertial sample beyond what sensors measure.
+  kImplausible,        ///< An inertial sample beyond the range of sensors.
   kUnorderedStamp,     ///< Earlier than previous rows, or later than following rows.
   kRepeatedStamp,      ///< Equal to a row before.
   kJumpingStamp,       ///< More than an hour away from most rows.

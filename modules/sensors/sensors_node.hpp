@@ -27,7 +27,7 @@ namespace km {
 /// first.
 struct SensorsEnd {
   std::size_t published = 0;  ///< Packets.
-  std::size_t skipped = 0;    ///< Frames left out because processors were short.
+  std::size_t skipped = 0;    ///< Frames not used because processors were too slow.
   double paused_s = 0.0;      ///< Time that the recording's clock paused for the same reason.
   ReaderReport faults;        ///< Faults of the recording.
 };
@@ -62,7 +62,7 @@ class SensorsNode final : public Node {
   /// Reading and decoding a packet.
   DurationHistogram timing() const override { return reading_.histogram(); }
 
-  /// Packets published and frames left out so far. Thread-safe.
+  /// Packets published and frames not used so far. Thread-safe.
   std::size_t published() const { return published_; }
   std::size_t skipped() const { return skipped_; }
   /// Time for which the recording's clock has paused because processors were too slow [s].

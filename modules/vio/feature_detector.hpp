@@ -57,7 +57,8 @@ class DistanceGrid {
   std::vector<std::vector<Eigen::Vector2f>> buckets_;
 };
 
-/// Finds new corners where an image has no features yet. Not thread-safe: it keeps its buffers.
+/// Finds new corners where an image has no features yet. Not thread-safe, because it reuses
+/// buffers.
 ///
 /// Candidates are FAST corners (Rosten and Drummond, ECCV 2006). The threshold is high at first,
 /// and config.fast_threshold if that finds none. Candidates are ranked by the smaller eigenvalue of
@@ -77,7 +78,7 @@ class FeatureDetector {
   struct Candidate {
     cv::Point2i px;
     float score = 0.0F;
-    int rank = 0;  // Features and better corners in its cell.
+    int rank = 0;  // Number of features and better corners in its cell.
 
     // Total orders, so that the result does not depend on how equal scores are sorted.
     static bool better(const Candidate& a, const Candidate& b) {

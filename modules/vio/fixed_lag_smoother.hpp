@@ -75,7 +75,7 @@ class FixedLagSmoother {
   /// solution is not usable, and only start() may follow.
   [[nodiscard]] SmootherUpdate add(const InertialFrame& frame, bool rests = false);
 
-  /// States now in the window, in order of time.
+  /// Current states of the window, in order of time.
   [[nodiscard]] const Window& window() const { return window_; }
 
   /// The current estimate at an image in the window; null if it is not there.

@@ -76,7 +76,7 @@ class ImuPreintegration {
 };
 
 /// The state dt_s() after `state` by its biases and `imu`; gravity is [0, 0, -gravity_mps2].
-/// The stamp is left as it is. Forster et al., TRO 2017, Eq. (38) without noise, for state j.
+/// The stamp does not change. Forster et al., TRO 2017, Eq. (38) without noise, for state j.
 [[nodiscard]] OdometryState predict(const OdometryState& state, const ImuPreintegration& imu,
                                     double gravity_mps2);
 

@@ -15,7 +15,7 @@ constexpr float kMinSearchCorrelation = 0.7F;
 // The second best place must be less similar by this amount. A fence or a net has many similar
 // places.
 constexpr float kMinDistinction = 0.05F;
-constexpr int kPeakWidth = 2;             // Steps at which a correlation peak still counts as one.
+constexpr int kPeakWidth = 2;             // Width in steps of one correlation peak.
 constexpr double kMinDisparityPx = -1.0;  // Noise of a point at infinity.
 
 }  // namespace

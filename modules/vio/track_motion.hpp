@@ -50,7 +50,7 @@ struct BearingPair {
   Eigen::Vector2d current = Eigen::Vector2d::Zero();
 };
 
-/// Which pairs agree with one direction of translation.
+/// The direction of translation that most pairs agree with, and these pairs.
 struct TwoPointResult {
   /// Direction of t_previous_current, unit length, any sign.
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();

@@ -43,7 +43,7 @@ double longest_step_s(const std::vector<ImuSample>& samples) {
   return longest_s;
 }
 
-constexpr double kLeastTiltSigma = 1e-4;  // [rad]; no inertial sensor knows better
+constexpr double kLeastTiltSigma = 1e-4;  // [rad]; no inertial sensor is more accurate
 constexpr double kMostTiltSigma = 1.5;    // a larger uncertainty means that the vertical is unknown
 
 }  // namespace

@@ -29,7 +29,7 @@ std::vector<const OdometryState*> prior_states(const Window& window) {
 
 constexpr double kInitialDamping = 1e-6;
 constexpr double kMaxDamping = 1e3;
-constexpr double kSmallStep = 1e-6;  // largest of rad, m, m/s: far below what images resolve
+constexpr double kSmallStep = 1e-6;  // largest of rad, m, m/s: far below the resolution of images
 
 // Variables that an iteration changes, saved so that it can be undone.
 struct Snapshot {

@@ -24,7 +24,7 @@ try {
   assert.deepEqual(await texts(0, '.chart-title'), ['a < b & <i>m']);
   assert.deepEqual(await texts(0, '.chart-key:not(.chart-save)'), ['</svg>', 'marks']);
 
-  // A point that is not finite interrupts a line. The x axis is tight; y begins at 0, with a margin.
+  // A point that is not finite interrupts a line. The x axis is tight; y begins at 0 with a margin.
   const [line] = await all(0, LINES, 'd');
   assert.match(line, /^M[^ML]*L[^ML]*M[^ML]*L[^ML]*$/);
   const [a, b, , d] = points(line);

@@ -20,7 +20,7 @@ struct DepthError {
   double share = 0.0;
 };
 
-// Against the true distance of `plane` along the axis of the depth camera.
+// Accuracy against the true distance of `plane` along the axis of the depth camera.
 DepthError compare(const DepthImage& depth, const StereoDepth& stereo, const TexturedPlane& plane,
                    const SE3& T_world_body) {
   const Camera& camera = stereo.camera();

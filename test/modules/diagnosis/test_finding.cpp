@@ -44,7 +44,7 @@ TEST_CASE("A finding is three lines for people", "[diagnosis]") {
   CHECK(to_text(std::vector<Finding>()).empty());
 }
 
-TEST_CASE("A finding is read from JSON as it was written", "[diagnosis]") {
+TEST_CASE("A finding is equal after writing and reading JSON", "[diagnosis]") {
   const Finding finding = finding_of("a.b", Severity::kError);
   CHECK(Json(finding).get<Finding>() == finding);
   CHECK(Json(finding).dump() ==

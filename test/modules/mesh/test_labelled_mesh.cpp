@@ -67,7 +67,7 @@ const std::string kAsciiHeader =
     "property double y\nproperty float z\nproperty int label\nelement face 1\n"
     "property list uchar int vertex_indices\nend_header\n";
 
-TEST_CASE("A mesh is read back as it was written") {
+TEST_CASE("A mesh is equal after writing and reading") {
   LabelledMesh mesh;
   mesh.vertices = {{0, 0.1F, -3e-7F}, {1e6F, 0, 0}, {0, 1, 0}, {1, 1, 1}};
   mesh.labels = {0, 255, 7, 1};

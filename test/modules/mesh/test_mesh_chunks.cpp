@@ -54,7 +54,7 @@ std::string refusal(const LabelledMesh& mesh, const ChunkGrid& grid = kGrid) {
   return {};
 }
 
-TEST_CASE("The chunks of a mesh are the mesh", "[mesh]") {
+TEST_CASE("The chunks of a mesh contain the whole mesh", "[mesh]") {
   const bool labelled = GENERATE(true, false);
   LabelledMesh mesh = wavy_sheet(150, 0.1);
   if (!labelled) mesh.labels.clear();
@@ -248,7 +248,7 @@ TEST_CASE("Moves below the threshold are sent when their sum exceeds it", "[mesh
   CHECK(sent_cells(schedule) == Cells{0});
 }
 
-TEST_CASE("The newest state of a chunk is sent, once", "[mesh]") {
+TEST_CASE("Only the newest state of a chunk is sent and only once", "[mesh]") {
   ChunkSchedule schedule(0.0);
   schedule.update({chunk(0, 1)});
   schedule.update({chunk(0, 2)});
@@ -300,7 +300,7 @@ TEST_CASE("After a restart everything is sent again and vanished cells are sent 
   CHECK_FALSE(schedule.next());
 }
 
-TEST_CASE("Every chunk has its turn although all change faster than they can be sent", "[mesh]") {
+TEST_CASE("Every chunk is sent although all change faster than they can be sent", "[mesh]") {
   ChunkSchedule schedule(0.0);
   Cells sent;
   for (std::uint16_t version = 1; version <= 10; ++version) {

@@ -38,7 +38,7 @@ MeshChunksConfig slow() {
   return config;
 }
 
-TEST_CASE("Chunks leave no faster than configured", "[node]") {
+TEST_CASE("Chunks are sent no faster than configured", "[node]") {
   Topic<MeshChunk> topic;
   Inbox<MeshChunk> sent(topic);
   MeshChunksNode node(slow(), 7, topic);

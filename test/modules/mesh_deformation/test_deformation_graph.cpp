@@ -201,7 +201,7 @@ TEST_CASE("The solution does not depend on the first guess", "[mesh_deformation]
   CHECK(warm.final_cost < cold.initial_cost);
 }
 
-TEST_CASE("Starting from the solution itself ends at once", "[mesh_deformation]") {
+TEST_CASE("A start from the solution itself ends at once", "[mesh_deformation]") {
   const DeformationGraph graph = patch(6);
   const std::vector<SE3> anchors = disturbed(graph.T_odom_kf, 7, 0.1, 0.3);
   const auto cold = solve(graph, anchors, {}, kStop, initial_poses(graph, anchors));

@@ -90,7 +90,7 @@ TEST_CASE("A straight corridor follows bent keyframes and stays locally rigid",
   CHECK(largest_stretch < 0.1);
 }
 
-TEST_CASE("A warm start ends where a cold one does", "[mesh_deformation]") {
+TEST_CASE("A warm start and a cold start have the same solution", "[mesh_deformation]") {
   // Within a millimetre at the default tolerance, and within the precision of floats at a small
   // one.
   const auto [tolerance, same_m] = GENERATE(table<double, double>(

@@ -102,8 +102,8 @@ TEST_CASE("The mesh of a box is closed across blocks and near the box", "[semant
   CHECK(rim_of(result).empty());
   CHECK(2 * result.vertices.size() == result.faces.size() + 4);
   const Errors errors = errors_of(result, box);
-  CHECK(errors.mean < 0.05);     // exact on the faces; beside edges and corners, which are cut
-  CHECK(errors.largest < 0.25);  // off, interpolation errs by up to a quarter
+  CHECK(errors.mean < 0.05);     // exact on the faces
+  CHECK(errors.largest < 0.25);  // interpolation at edges and corners
   CHECK(volume_of(result) == Approx(8.0 * half.prod()).epsilon(0.01));
 }
 

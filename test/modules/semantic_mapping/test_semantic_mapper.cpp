@@ -202,7 +202,8 @@ TEST_CASE("Labels of another size or outside the palette are dropped and counted
   }
 }
 
-TEST_CASE("The label seen more often wins, and a doubtful one is unknown", "[semantic_mapping]") {
+TEST_CASE("The label seen more often is chosen and an uncertain one is unknown",
+          "[semantic_mapping]") {
   SemanticMappingConfig config = settings();
   config.label_confidence = 0.8;
   config.min_label_probability = GENERATE(0.0, 0.7, 0.85);
@@ -229,7 +230,7 @@ TEST_CASE("The label seen more often wins, and a doubtful one is unknown", "[sem
   CHECK(inside > 100);
 }
 
-TEST_CASE("Surface is meshed once its weights are enough", "[semantic_mapping]") {
+TEST_CASE("Surface is meshed once its weights suffice", "[semantic_mapping]") {
   SemanticMappingConfig config = settings();
   config.depth_sigma_per_m = 0.0;  // all weights are 1
   config.min_weight = 2.5;

@@ -37,7 +37,7 @@ DenseFrame frame(int i) {
   return {i * kPeriod, depth, labels, at(0), static_cast<KeyframeIndex>(i / 2)};
 }
 
-TEST_CASE("A mesh comes every few seconds and at the end, coloured by its labels",
+TEST_CASE("A mesh is published every few seconds and at the end and is coloured by its labels",
           "[semantic_mapping_node]") {
   Bench bench;
   for (int i = 0; i < 35; ++i) bench.node->step(frame(i));

@@ -42,7 +42,8 @@ void check_one_pair_less(const EurocFolder& folder, ReaderFault fault, const std
 
 }  // namespace
 
-TEST_CASE("A faultless recording gives every pair and every sample between", "[sensors]") {
+TEST_CASE("A recording without faults gives every pair and every sample between them",
+          "[sensors]") {
   const EurocFolder folder(GENERATE(".png", ".jpg"));
   EurocReader reader = open_euroc(folder.root());
   const auto packets = packets_of(reader);

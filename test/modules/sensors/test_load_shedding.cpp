@@ -94,7 +94,8 @@ TEST_CASE("The map loses its frames first and then odometry every second image a
   REQUIRE(half > map);
   for (int k = 0; k < map; ++k) CHECK(run.uses[static_cast<std::size_t>(k)] == FrameUse::kAll);
   for (const ShedLoad& load : run.loads) CHECK((load.stride == 1 || load.map));
-  for (const int gap : run.gaps) CHECK(gap <= 2);  // a stride of 2 is enough, and used evenly
+  for (const int gap : run.gaps)
+    CHECK(gap <= 2);  // a stride of 2 suffices, and images are used evenly
   CHECK(run.worst_lag_s < 2.0 * kMaxLag_s);
 
   run.cost_s = 0.01;

@@ -38,7 +38,7 @@ TEST_CASE("Between poses the body moves at constant velocity", "[sensors][poses]
   CHECK(poses.at(nanoseconds(12.5)));
 }
 
-TEST_CASE("A covariance of ROS is that of the body's perturbation", "[sensors][poses]") {
+TEST_CASE("A covariance of ROS becomes that of the body's perturbation", "[sensors][poses]") {
   const SE3 T_odom_child = pose_at(1.0);
   const SE3 T_child_body = se3_exp((Vector6() << -0.3, 0.5, 0.2, 0.7, -0.4, 0.9).finished());
   const int axis = GENERATE(0, 1, 2, 3, 4, 5);  // axis of ROS: x, y, z, and rotations about them

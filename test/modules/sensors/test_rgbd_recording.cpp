@@ -108,7 +108,7 @@ TEST_CASE("Depth at a lower rate leaves frames without depth", "[sensors]") {
     CHECK((outcome.packets[i].frame->depth != nullptr) == (i % 3 == 0));
 }
 
-TEST_CASE("Depth and labels beside stereo are read if asked for", "[sensors]") {
+TEST_CASE("Depth and labels beside stereo are read on request", "[sensors]") {
   const EurocFolder folder;
   folder.add_depth();
   folder.add_labels(2);
@@ -237,7 +237,7 @@ TEST_CASE("Depth that is not aligned with the left camera is refused", "[sensors
                     Catch::Contains("depth0/sensor.yaml") && Catch::Contains(c.message));
 }
 
-TEST_CASE("Labels as colours become ids by the palette", "[sensors]") {
+TEST_CASE("The palette maps labels from colours to ids", "[sensors]") {
   const EurocFolder folder;
   folder.add_labels();
   folder.write("label_palette.csv", kPalette);
@@ -282,7 +282,7 @@ TEST_CASE("A label image that cannot be read loses only itself", "[sensors]") {
   check_image_lost(folder, {.labels = true}, ReaderFault::kWrongImageFormat, text);
 }
 
-TEST_CASE("The palette comes with the reader, a broken one is refused", "[sensors]") {
+TEST_CASE("The reader returns the palette and refuses an invalid one", "[sensors]") {
   const EurocFolder folder;
   folder.add_labels();
   folder.write("label_palette.csv", kPalette);

@@ -32,7 +32,7 @@ TEST_CASE("The first of several equal stamps counts", "[sensors]") {
         Verdicts{kGood, kGood, kRepeated, kRepeated, kGood});
 }
 
-TEST_CASE("A clock that was set leaves the part with the most stamps", "[sensors]") {
+TEST_CASE("After a clock was set the part with the most stamps is kept", "[sensors]") {
   CHECK(judge_stamps(std::vector<Stamp>{1, 2, kDay, kDay + 1, kDay + 2}) ==
         Verdicts{kJump, kJump, kGood, kGood, kGood});
   CHECK(judge_stamps(std::vector<Stamp>{kDay, kDay + 1, 1, 2, 3}) ==

@@ -142,7 +142,7 @@ TEST_CASE("True points beyond the rim of the estimate or behind it count separat
 
 TEST_CASE("Surface that the truth lacks counts with the crop distance", "[mesh_error]") {
   LabelledMesh estimate = square(2.0F, 0.0F);
-  estimate.append(square(1.0F, 3.0F));  // a fifth of the estimate, in the air
+  estimate.append(square(1.0F, 3.0F));  // a fifth of the estimate, above the truth
   const MeshReport report = compare(square(2.0F, 0.0F), estimate, in_place());
   CHECK(report.merged.beyond == Approx(0.2).margin(1e-3));
   CHECK(report.merged.estimate.surface.mean_m == Approx(0.1).margin(1e-3));
